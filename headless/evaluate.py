@@ -21,6 +21,12 @@ from headless.detection import case_study, study_results
 from headless.detection.average_precision import too_few_runs
 from headless.detection.claims import detection_claims
 from headless.detection.detector import check_device
+from headless.detection.placements_study.criteria import criteria_of, weights_of_targets
+from headless.detection.placements_study.drawing import PlacementsStudySettings, draw_placements
+from headless.detection.placements_study.occupancy import require_vehicles
+from headless.detection.placements_study.precision import detectors_of, learnt_clouds, precisions
+from headless.detection.placements_study.results import PlacementsStudy, save_study
+from headless.detection.read_placements import read_placements, records_in
 from headless.detection.recordings import SensorConfiguration, Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.options import add_rolling_shutter, new_parser
@@ -40,6 +46,9 @@ def main(argv: list[str]) -> None:
     options = _parser().parse_args(argv)
     if options.seeds < 1:
         raise SeipError(f"ask for one training or more, not {options.seeds}")
+    if options.placements is not None:
+        _evaluate_placements(options)
+        return
     study = prepare_study(options)
     watch, simulator, folder = study.stopwatch, study.simulator, options.output
     network = NetworkSettings()
@@ -78,30 +87,89 @@ def main(argv: list[str]) -> None:
     runtime.print_line(f"written to {folder}/")
 
 
+def _evaluate_placements(options: argparse.Namespace) -> None:
+    """Evaluate placements of one type and number, and write how well coverage and others foretell detection."""
+    if options.placement:
+        raise SeipError("name either --placements, to draw placements, or --placement, to evaluate some of your own")
+    settings = PlacementsStudySettings(
+        placements=options.placements,
+        count=options.count,
+        learnt=options.learnt_placements,
+        trainings=options.seeds,
+        steps=options.steps,
+        seed=options.placement_seed,
+    )
+    settings.check(options.sensor)
+    site = prepare_site(options, settings.count)
+    watch, folder = site.stopwatch, options.output
+    require_vehicles(site.traffic, site.surveyed.site)
+    drawn = watch.run(
+        "placements", draw_placements(site.surveyed, settings, weights_of_targets(site.surveyed, site.traffic))
+    )
+    simulator = site.simulator
+    models = detectors_of(drawn, settings)
+    training_set = watch.run("simulation", learnt_clouds(simulator, drawn, site.traffic))
+    trained = watch.run("training", case_study.train_all(models, training_set, folder, device=options.device))
+    detectors = [one.detector for one in trained]
+    precise = watch.run("evaluation", precisions(simulator, drawn.evaluated, detectors, site.traffic, folder))
+    judged = watch.run("criteria", criteria_of(site.surveyed, simulator, drawn.evaluated, site.traffic, precise))
+    study = PlacementsStudy(site.surveyed.site.name, settings, options.sensor[0], drawn, precise, judged)
+    with runtime.incomplete_if_interrupted(folder):
+        asked = site.surveyed.settings.as_record() | {"frames_every_s": options.every}
+        save_study(folder, study, asked, site.traffic, versions(blender=bpy.app.version_string))
+    for line in study.sentences():
+        runtime.print_line(line)
+    runtime.print_line(", ".join(f"{what} {seconds:.0f} s" for what, seconds in watch.seconds.items()))
+    runtime.print_line(f"written to {folder}/")
+
+
 @dataclass(frozen=True, eq=False)
-class DetectionStudy:
+class DetectionSite:
+    """A scene with its traffic, ready for placements and detectors."""
+
+    surveyed: Survey
+    stopwatch: survey.Stopwatch
+    traffic: case_study.Traffic
+    simulator: Simulator
+
+
+@dataclass(frozen=True, eq=False)
+class DetectionStudy(DetectionSite):
     """A scene with its placements and its traffic, ready for detectors.
 
     Parameters
     ----------
     configurations : tuple of SensorConfiguration
-        1, 2 and 4 sensors of each type.
+        1, 2 and 4 sensors of each type, and the placements that were named.
     """
 
-    surveyed: Survey
-    stopwatch: survey.Stopwatch
-    traffic: case_study.Traffic
     configurations: tuple[SensorConfiguration, ...]
-    simulator: Simulator
 
 
 def prepare_study(options: argparse.Namespace) -> DetectionStudy:
     """Survey the scene, read its traffic and place the sensors; the options are those of `add_options`."""
+    records = records_in(options.placement)
+    if options.only_placement and not records:
+        raise SeipError("--only-placement leaves nothing to evaluate: name folders with --placement")
+    site = prepare_site(options, 1 if options.only_placement else COUNTS[-1])
+    alike = sorted(set(records) & set(site.surveyed.models))
+    if alike:
+        raise SeipError(f"the folder {alike[0]!r} is called as a sensor type is: rename it")
+    configurations: tuple[SensorConfiguration, ...] = ()
+    if not options.only_placement:
+        configurations = site.stopwatch.run("placements", case_study.place_all(site.surveyed))
+    if records:
+        configurations += site.stopwatch.run("named placements", read_placements(site.surveyed, records))
+    return DetectionStudy(**vars(site), configurations=configurations)
+
+
+def prepare_site(options: argparse.Namespace, count: int) -> DetectionSite:
+    """Survey a scene that can carry so many sensors, and read its traffic."""
     check_device(options.device)
     if options.every <= 0:
         raise SeipError(f"the time between frames must be above 0 s, not {options.every:g} s")
     surveyed, watch = survey.survey(
-        options, lambda layout: check_objective(layout.site, layout.models, Objective(count=COUNTS[-1]))
+        options, lambda layout: check_objective(layout.site, layout.models, Objective(count=count))
     )
     paths = options.traffic or survey.runs_beside(options.scene)
     traffic = case_study.read_traffic(paths, surveyed.geometry.origin, options.every)
@@ -109,10 +177,8 @@ def prepare_study(options: argparse.Namespace) -> DetectionStudy:
     runtime.LOG.info(traffic.overlap())
     runtime.LOG.info(traffic.shared_bays())
     runtime.warn(filter(None, [too_few_runs(len(traffic.test))]))
-    configurations = watch.run("placements", case_study.place_all(surveyed))
     scans = ScanSettings(seed=options.scan_seed, rolling_shutter=options.rolling_shutter, engine=options.engine)
-    simulator = Simulator(surveyed.geometry, scans)
-    return DetectionStudy(surveyed, watch, traffic, configurations, simulator)
+    return DetectionSite(surveyed, watch, traffic, Simulator(surveyed.geometry, scans))
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -132,15 +198,31 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     detection.add_argument("--scan-seed", type=int, default=0, help="of noise and lost returns")
     add_rolling_shutter(detection)
     detection.add_argument("--device", default="cpu", help="of torch: cpu or cuda")
+    detection.add_argument(
+        "--placement",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="FOLDER",
+        help="evaluate the placements that `seip place` wrote into these folders beside numbers and types",
+    )
+    detection.add_argument("--only-placement", action="store_true", help="evaluate those of --placement alone")
 
 
 def _parser() -> argparse.ArgumentParser:
     what = "Find out what 1, 2 and 4 sensors of each type detect; name types from the simplest to the best."
     parser = new_parser("evaluate", what)
     add_options(parser)
-    parser.add_argument("--seeds", type=int, default=3, metavar="N", help="trainings, each with a seed of its own")
+    parser.add_argument(
+        "--seeds", "--trainings", type=int, default=3, metavar="N", help="trainings, each with a seed of its own"
+    )
     parser.add_argument("--separate", action="store_true", help="a detector for each placement, not one for all")
     parser.add_argument("--ablation", action="store_true", help="claim 9: also train with zero-padded pillars")
+    drawn = parser.add_argument_group("does coverage foretell detection? Placements of one type and number")
+    drawn.add_argument("--placements", type=int, metavar="N", help="evaluate the optimal one and others that are drawn")
+    drawn.add_argument("--count", type=int, default=2, metavar="N", help="sensors of each")
+    drawn.add_argument("--learnt-placements", type=int, default=12, metavar="N", help="others, to learn from")
+    drawn.add_argument("--placement-seed", type=int, default=0, metavar="SEED", help="of what is drawn")
     return parser
 
 

@@ -158,13 +158,22 @@ def average_precisions_without_each_run(evaluation: Evaluation) -> Float | None:
     Too few are below `MIN_TEST_RUNS` with road users that count. Two evaluations of the same frames leave out the same
     runs: the differences of what is returned are those of pairs.
     """
-    count = int(evaluation.run.max()) + 1
-    of_detection = evaluation.run[evaluation.detections.frame]
-    wanted = np.bincount(evaluation.run[evaluation.wanted.frame], minlength=count)
-    if np.count_nonzero(wanted) < MIN_TEST_RUNS:
+    if len(np.unique(evaluation.run[evaluation.wanted.frame])) < MIN_TEST_RUNS:
         return None
-    kept = 1.0 - np.eye(count)
-    return _areas(evaluation, kept[:, of_detection], kept @ wanted)
+    return average_precisions_of_runs(evaluation, 1.0 - np.eye(int(evaluation.run.max()) + 1))
+
+
+def average_precisions_of_runs(evaluation: Evaluation, times: Float | Integer) -> Float:
+    """Return the average precision where runs come several times or not at all, (b,).
+
+    Parameters
+    ----------
+    times : (b, r) array
+        How often each of the r runs is there; all at once, so few rows at a time take less memory.
+    """
+    of_detection = evaluation.run[evaluation.detections.frame]
+    wanted = np.bincount(evaluation.run[evaluation.wanted.frame], minlength=times.shape[1])
+    return _areas(evaluation, times[:, of_detection], times @ wanted)
 
 
 def too_few_runs(count: int) -> str:

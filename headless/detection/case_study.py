@@ -18,7 +18,7 @@ import numpy as np
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress, side_by_side, within
+from seip_addon.core.progress import Progress, in_detail, side_by_side, within
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.parked import shared_bays
 from seip_addon.core.traffic.run_overlap import MATCH_RADIUS, require_independent, vehicle_positions
@@ -163,14 +163,14 @@ class DetectorOutcome:
     @property
     def seed_result(self) -> SeedResult:
         """Its figures, as the claims need them."""
-        case, false = self.configuration.case, false_positives(self.evaluation, self.score)
+        configuration, false = self.configuration, false_positives(self.evaluation, self.score)
         return SeedResult(
-            sensor=case.sensor,
-            count=case.count,
+            sensor=configuration.sensor,
+            count=configuration.count,
             seed=self.model.training.seed,
             average_precision=self.evaluation.average_precision,
-            price=case.deployment.price,
-            coverage=case.deployment.coverage,
+            price=configuration.deployment.price,
+            coverage=configuration.deployment.coverage,
             false_positives=false.per_frame,
             sparse=false.sparse,
             padded=self.model.network.padded,
@@ -228,7 +228,7 @@ def place_all(survey: Survey) -> Generator[Progress, None, tuple[SensorConfigura
         steps = solve_cell(site, models, visible, cell, survey.settings.limits)
         placed.append((yield from within(progress, steps)))
     yield Progress(len(cells), len(cells), "placed")
-    return tuple(SensorConfiguration(case) for case in placed)
+    return tuple(map(SensorConfiguration.of_case, placed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,32 +296,51 @@ def evaluate_all(
 ) -> Generator[Progress, None, list[DetectorOutcome]]:
     """Evaluate every detector with each of its configurations; a frame is simulated once for all of them."""
     configurations = {one.name: one for model in models for one in model.configurations}.values()
-    total = len(configurations) * sum(len(run.times) for run in (*traffic.validation, *traffic.test))
-    done = 0
     validated: dict[tuple[str, str], list[FrameResult]] = {}
     tested: dict[tuple[str, str], list[FrameResult]] = {}
-    for configuration in configurations:
+    for done, configuration in enumerate(configurations):
         asked = [
             (model, detector)
             for model, detector in zip(models, detectors, strict=True)
             if configuration in model.configurations
         ]
-        known: dict[str, Any] = {"region": simulator.static.region, "sensors": configuration.places}
-        known["classes"] = tuple(CLASS_CATEGORIES.values())
-        for results, runs in ((validated, traffic.validation), (tested, traffic.test)):
-            for run in runs:
-                for number in range(len(run.times)):
-                    yield Progress(done, total, f"detect with {configuration.name}")
-                    done += 1
-                    frame = simulator.frame(configuration, run, number)
-                    cloud = CloudInPlan(frame.points)
-                    for model, detector in asked:
-                        with deterministic(model.training.threads):
-                            found = detect(detector, simulator.area(detector.settings.pillar), frame)
-                        result = frame_result(frame, cloud, found, run=run.name, parked=run.parked, **known)
-                        results.setdefault((model.name, configuration.name), []).append(result)
-    yield Progress(total, total, "evaluated")
+        runs = (*traffic.validation, *traffic.test)
+        steps = detect_in_runs(
+            simulator, configuration, runs, [detector for _, detector in asked], models[0].training.threads
+        )
+        found = yield from in_detail(Progress(done, len(configurations), "detect"), steps)
+        aside = sum(len(run.times) for run in traffic.validation)
+        for (model, _), frames in zip(asked, found, strict=True):
+            validated[model.name, configuration.name] = frames[:aside]
+            tested[model.name, configuration.name] = frames[aside:]
     return [outcome for model in models for outcome in _outcomes(model, validated, tested)]
+
+
+def detect_in_runs(
+    simulator: Simulator,
+    configuration: SensorConfiguration,
+    runs: Sequence[SampledRun],
+    detectors: Sequence[Detector],
+    threads: int,
+) -> Generator[Progress, None, list[list[FrameResult]]]:
+    """Detect road users in every frame of some runs; return the frames' results by detector."""
+    known: dict[str, Any] = {"region": simulator.static.region, "sensors": configuration.places}
+    known["classes"] = tuple(CLASS_CATEGORIES.values())
+    results: list[list[FrameResult]] = [[] for _ in detectors]
+    total = sum(len(run.times) for run in runs)
+    done = 0
+    for run in runs:
+        for number in range(len(run.times)):
+            yield Progress(done, total, f"detect with {configuration.name}")
+            done += 1
+            frame = simulator.frame(configuration, run, number)
+            cloud = CloudInPlan(frame.points)
+            for detector, own in zip(detectors, results, strict=True):
+                with deterministic(threads):
+                    found = detect(detector, simulator.area(detector.settings.pillar), frame)
+                own.append(frame_result(frame, cloud, found, run=run.name, parked=run.parked, **known))
+    yield Progress(total, total, f"detect with {configuration.name}")
+    return results
 
 
 def suitability_by_configuration(
@@ -332,9 +351,8 @@ def suitability_by_configuration(
     frames = {one.name: simulator.frame(one, traffic.test[0], 0) for model in models for one in model.configurations}
     for model, detector in zip(models, detectors, strict=True):
         for one in model.configurations:
-            sentences = suitability_warnings(
-                detector, [one.case.sensor], simulator.area(detector.settings.pillar), frames[one.name]
-            )
+            area = simulator.area(detector.settings.pillar)
+            sentences = suitability_warnings(detector, one.types, area, frames[one.name])
             found.setdefault(one.name, {}).update(dict.fromkeys(sentences))
     return {name: tuple(sentences) for name, sentences in found.items()}
 

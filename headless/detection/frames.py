@@ -38,6 +38,8 @@ class Recording:
         Catalogue keys of the sensors' types, where they are known.
     site : str
         The scene's name, where it is known.
+    placement : str
+        Identifier of where the sensors hang, where a name does not tell.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Recording:
     frames: Sequence[Frame]
     sensors: tuple[str, ...] = ()
     site: str = ""
+    placement: str = ""
 
 
 def recording_of(folder: Path, site: str = "") -> Recording:

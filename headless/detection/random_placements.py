@@ -7,32 +7,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.scans import MountedSensor
 from seip_addon.core.site.candidates import Candidates
 
+from .recordings import PlacedSensors
+
 MAX_SENSORS = 5  # of a random placement
 
 
 @dataclass(frozen=True, eq=False)
-class RandomPlacement:
+class RandomPlacement(PlacedSensors):
     """Sensors of any types, heights and tilts at random positions of a site."""
 
     name: str
     sensors: tuple[MountedSensor, ...]
-
-    @property
-    def types(self) -> tuple[str, ...]:
-        """Catalogue keys of the sensors' types, in alphabetical order."""
-        return tuple(sorted({sensor.model.key for sensor in self.sensors}))
-
-    @property
-    def places(self) -> Float:
-        """Positions of the sensors, (s, 3) in metres."""
-        return np.array([sensor.xyz for sensor in self.sensors])
 
 
 def random_placement(

@@ -1,16 +1,22 @@
 """Simulated recordings of traffic for each sensor configuration, made on demand."""
 
+from __future__ import annotations
+
 import functools
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from headless.coverage_study.cells import Case
 
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.placement.deployment import Deployment
 from seip_addon.core.progress import finish
+from seip_addon.core.results.placement_record import versions
 from seip_addon.core.scans import Frame, MountedSensor, ScanSettings, Simulation, prepare, static_scene
+from seip_addon.core.scans.run_folder import Run
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import digest
 from seip_addon.core.traffic import Trajectories
@@ -47,53 +53,71 @@ class SampledRun:
         return digest(self.trajectories.first, self.trajectories.time, self.trajectories.position)
 
 
-class Placement(Protocol):
-    """Sensors that recordings are made with."""
+class PlacedSensors(ABC):
+    """Sensors where they hang, to make recordings with."""
+
+    name: str
 
     @property
-    def name(self) -> str:
-        """For people."""
-
-    @property
+    @abstractmethod
     def sensors(self) -> tuple[MountedSensor, ...]:
         """The sensors where they hang."""
 
     @property
     def types(self) -> tuple[str, ...]:
-        """Catalogue keys of the sensors' types."""
+        """Catalogue keys of the sensors' types, in alphabetical order."""
+        return tuple(sorted({sensor.model.key for sensor in self.sensors}))
 
-    def __hash__(self) -> int:
-        """Tell it from others."""
+    @property
+    def key(self) -> str:
+        """Digest of where which sensors hang."""
+        return digest(*(part for one in self.sensors for part in (one.model.key, one.xyz, one.orientation)))
+
+    @property
+    def places(self) -> Float:
+        """Positions of the sensors, (s, 3) in metres."""
+        return np.array([sensor.xyz for sensor in self.sensors])
 
 
 @dataclass(frozen=True, eq=False)
-class SensorConfiguration:
-    """A number of sensors of one type, placed where they cover most."""
+class SensorConfiguration(PlacedSensors):
+    """Sensors of a placement, however it came about.
 
-    case: Case
+    Parameters
+    ----------
+    sensor : str
+        What charts and tables group it under: the type, or the name of a placement that was read.
+    count : int
+        N, the number of sensors asked for.
+    status : str
+        As in `Placement`.
+    gap : float
+        Infinite where nothing bounds it.
+    read : bool
+        Whether it was read from a folder; it is no number of sensors of a type then.
+    """
 
-    @property
-    def name(self) -> str:
-        """For people: ``2 × type1``."""
-        return f"{self.case.count} × {self.case.sensor}"
+    name: str
+    deployment: Deployment
+    sensor: str
+    count: int
+    status: str
+    gap: float
+    read: bool = False
+
+    @classmethod
+    def of_case(cls, case: Case) -> SensorConfiguration:
+        """Return a number of sensors of one type, placed where they cover most."""
+        name = f"{case.count} × {case.sensor}"
+        return cls(name, case.deployment, case.sensor, case.count, case.placement.status, case.placement.gap)
 
     @property
     def sensors(self) -> tuple[MountedSensor, ...]:
         """The sensors where they hang."""
         return tuple(
             MountedSensor(sensor.label, sensor.model, sensor.xyz, sensor.orientation)
-            for sensor in self.case.deployment.sensors
+            for sensor in self.deployment.sensors
         )
-
-    @property
-    def types(self) -> tuple[str, ...]:
-        """Catalogue keys of the sensors' types."""
-        return (self.case.sensor,)
-
-    @property
-    def places(self) -> Float:
-        """Positions of the sensors, (s, 3) in metres."""
-        return np.array([sensor.xyz for sensor in self.sensors])
 
 
 class Simulator:
@@ -113,16 +137,33 @@ class Simulator:
         self.area = functools.cache(functools.partial(area_of, geometry))
         self._simulation = functools.lru_cache(maxsize=1)(self._prepared)
 
-    def record(self, configuration: Placement, run: SampledRun) -> Recording:
+    def record(self, configuration: PlacedSensors, run: SampledRun) -> Recording:
         """Return the frames of a run, to be simulated when they are asked for."""
         frames = LazyFrames(len(run.times), lambda number: self.frame(configuration, run, number))
         name = f"{configuration.name} in {run.name}"
-        return Recording(name, run.key, frames, configuration.types, self.site)
+        return Recording(name, run.key, frames, configuration.types, self.site, configuration.key)
 
-    def frame(self, configuration: Placement, run: SampledRun, number: int) -> Frame:
+    def frame(self, configuration: PlacedSensors, run: SampledRun, number: int) -> Frame:
         """Simulate a frame of a run."""
         return self._simulation(configuration, run).frame(number, float(run.times[number]))
 
-    def _prepared(self, configuration: Placement, run: SampledRun) -> Simulation:
+    def key(self, configuration: PlacedSensors, runs: Sequence[SampledRun]) -> str:
+        """Return a digest of all that the frames of some runs follow from."""
+        scans = (
+            Run(
+                static=self.static,
+                origin=run.trajectories.origin,
+                sensors=configuration.sensors,
+                trajectories=run.trajectories,
+                bodies=[fitted_body(user) for user in run.trajectories.users],
+                times=run.times,
+                settings=self.settings,
+                versions=versions(),
+            )
+            for run in runs
+        )
+        return digest(*(scan.key for scan in scans))
+
+    def _prepared(self, configuration: PlacedSensors, run: SampledRun) -> Simulation:
         bodies = [fitted_body(user) for user in run.trajectories.users]
         return finish(prepare(self.static, configuration.sensors, run.trajectories, bodies, self.settings))

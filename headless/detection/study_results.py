@@ -59,9 +59,13 @@ class StudyResults:
 
     @property
     def seed_results(self) -> list[SeedResult]:
-        """The figures of all outcomes, with how their trainings went."""
+        """The figures of all numbers of sensors of a type, with how their trainings went."""
         rising = {model.name: curve.still_rises for model, curve in zip(self.models, self.curves, strict=True)}
-        return [replace(one.seed_result, still_rising=rising[one.model.name]) for one in self.outcomes]
+        return [
+            replace(one.seed_result, still_rising=rising[one.model.name])
+            for one in self.outcomes
+            if not one.configuration.read
+        ]
 
     @property
     def masked(self) -> list[DetectorOutcome]:
@@ -90,12 +94,10 @@ def save_charts(folder: Path, results: StudyResults, trained: Sequence[TrainedDe
     save_count_chart(folder / "ap_by_count.png", points, results.name)
     save_price_chart(folder / "ap_by_price.png", points, results.name)
     save_coverage_chart(folder / "ap_by_coverage.png", points, *results.correlation, results.name)
-    curves = [
-        curve(one.configuration.case.sensor, one.configuration.case.count, one.evaluation) for one in results.first
-    ]
+    curves = [curve(one.configuration.sensor, one.configuration.count, one.evaluation) for one in results.first]
     save_precision_recall_chart(folder / "precision_recall.png", curves, results.name)
-    for sensor in dict.fromkeys(one.configuration.case.sensor for one in results.first):
-        own = [one for one in results.first if one.configuration.case.sensor == sensor]
+    for sensor in dict.fromkeys(one.configuration.sensor for one in results.first):
+        own = [one for one in results.first if one.configuration.sensor == sensor]
         save_parts_chart(folder / f"where_{sensor}.png", _parts(own), f"{results.name}, {sensor}")
         _save_errors(folder / f"errors_{sensor}.png", results, own)
     for model, one in zip(results.models, trained, strict=True):
@@ -215,13 +217,13 @@ def save_record(
             "configurations": [
                 {
                     "name": name,
-                    "coverage": one.case.deployment.coverage,
-                    "status": one.case.placement.status,
-                    "gap": one.case.placement.gap,
-                    "price_usd": one.case.deployment.price,
+                    "coverage": one.deployment.coverage,
+                    "status": one.status,
+                    "gap": one.gap if math.isfinite(one.gap) else None,
+                    "price_usd": one.deployment.price,
                     "sensors": [
                         {"model": sensor.model.key, "xyz": sensor.xyz.tolist(), "position": sensor.position_name}
-                        for sensor in one.case.deployment.sensors
+                        for sensor in one.deployment.sensors
                     ],
                 }
                 for name, one in configurations.items()

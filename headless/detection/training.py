@@ -251,7 +251,8 @@ class _Run:
 
     def _sources(self) -> list[list[str | int]]:
         both = (*self.training_set, *self.aside)
-        return [[sampled.recording.name, sampled.recording.traffic, len(sampled)] for sampled in both]
+        recordings = [(sampled.recording, len(sampled)) for sampled in both]
+        return [[one.name, one.traffic, one.placement, count] for one, count in recordings]
 
 
 def _with_frames(recordings: Sequence[SampledRecording]) -> list[SampledRecording]:

@@ -208,6 +208,28 @@ def rank_correlation(x: Float | Sequence[float], y: Float | Sequence[float]) -> 
     return float(centred[0] @ centred[1]) / scale if scale else math.nan
 
 
+def rank_agreements(x: Float, y: Float) -> tuple[Float, Float]:
+    """Return Spearman's and Kendall's (tau-b, 1945) rank correlation along the last axis; NaN where all are equal.
+
+    Both from the signs of all differences of pairs; equal values share their mean rank.
+
+    Parameters
+    ----------
+    x, y : (…, n) float64
+
+    Returns
+    -------
+    spearman, kendall : (…) float64
+    """
+    of_x, of_y = (np.sign(values[..., :, None] - values[..., None, :]) for values in (x, y))
+    return _cosine(of_x.sum(axis=-1), of_y.sum(axis=-1), (-1,)), _cosine(of_x, of_y, (-2, -1))
+
+
+def _cosine(one: Float, other: Float, axes: tuple[int, ...]) -> Float:
+    scale = np.sqrt((one**2).sum(axis=axes) * (other**2).sum(axis=axes))
+    return np.divide((one * other).sum(axis=axes), scale, out=np.full(scale.shape, np.nan), where=scale > 0)
+
+
 def rank_correlation_interval(x: Sequence[float], y: Sequence[float], seed: int) -> Interval | None:
     """Return the 95 % interval of the rank correlation, or None where there are too few pairs.
 

@@ -56,6 +56,17 @@ def within(whole: Progress, steps: Generator[Progress, None, Result]) -> Generat
         yield whole
 
 
+def in_detail(whole: Progress, steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
+    """Run work as one unit of a larger whole of units that are equally long, and show how far it is within its unit."""
+    while True:
+        try:
+            step = next(steps)
+        except StopIteration as stop:
+            result: Result = stop.value
+            return result
+        yield Progress(whole.done * step.total + step.done, whole.total * step.total, step.what)
+
+
 def in_thread(work: Callable[[threading.Event], Result], what: str) -> Generator[Progress, None, Result]:
     """Run work that cannot yield, such as a call of a library, in a thread of its own.
 

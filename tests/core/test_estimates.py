@@ -16,6 +16,7 @@ from seip_addon.core.estimates import (
     SHARE,
     jackknife_reach,
     mean_interval,
+    rank_agreements,
     rank_correlation,
     rank_correlation_interval,
     share_interval,
@@ -118,3 +119,16 @@ def test_verdicts():
     assert worst_verdict(["holds", "undecided", "holds"]) == "undecided"
     assert worst_verdict(["undecided", "does not hold"]) == "does not hold"
     assert worst_verdict(["holds"]) == "holds"
+
+
+@given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=3, max_size=20))
+def test_rank_agreements(pairs):
+    """Each row by itself, ties and all, is as scipy has it."""
+    x, y = np.array(pairs, dtype=float).T
+    spearman, kendall = rank_agreements(np.array([x, -x]), np.array([y, y]))
+    if len(set(x)) == 1 or len(set(y)) == 1:
+        assert np.isnan([spearman, kendall]).all()
+    else:
+        assert spearman[0] == pytest.approx(scipy.stats.spearmanr(x, y).statistic, abs=1e-12)
+        assert kendall[0] == pytest.approx(scipy.stats.kendalltau(x, y).statistic, abs=1e-12)
+        assert [spearman[1], kendall[1]] == pytest.approx([-spearman[0], -kendall[0]])

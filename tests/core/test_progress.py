@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from seip_addon.core.progress import Progress, finish, side_by_side
+from seip_addon.core.progress import Progress, finish, in_detail, side_by_side
 
 
 def counting(steps, name, seen=None):
@@ -70,3 +70,9 @@ def test_stopping_stops_all():
     next(steps)
     steps.close()
     assert all(one.wait(10) for one in stopped)
+
+
+def test_work_in_detail_counts_what_is_done_within_its_unit():
+    seen = []
+    assert finish(in_detail(Progress(2, 5, "whole"), counting(4, "part")), seen.append) == "part"
+    assert [(step.done, step.total, step.what) for step in seen] == [(8 + done, 20, "part") for done in range(4)]

@@ -37,7 +37,7 @@ class Hung:
     """What a configuration is to a trial."""
 
     def __init__(self):
-        self.name, self.case, self.sensors = "2 × type1", SimpleNamespace(sensor="type1"), sensors()
+        self.name, self.sensor, self.sensors = "2 × type1", "type1", sensors()
         self.places = np.array([sensor.xyz for sensor in self.sensors])
 
 
@@ -151,7 +151,7 @@ def test_charts_are_drawn(study, tmp_path):
 
 def test_a_course_trains_all_that_the_study_tries():
     configurations = [
-        SimpleNamespace(name=f"{count} × {sensor}", case=SimpleNamespace(sensor=sensor, count=count))
+        SimpleNamespace(name=f"{count} × {sensor}", sensor=sensor, count=count)
         for sensor in ("type1", "type2", "type3")
         for count in (1, 2)
     ]

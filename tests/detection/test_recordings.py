@@ -14,5 +14,6 @@ from seip_addon.core.lidar import load_catalogue
 def test_a_tilted_sensor_records_tilted():
     turn = orientation(0.3, math.radians(20))
     sensor = SimpleNamespace(label="S1", model=load_catalogue()["type1"], xyz=np.zeros(3), orientation=turn)
-    (mounted,) = SensorConfiguration(SimpleNamespace(deployment=SimpleNamespace(sensors=(sensor,)))).sensors
+    deployment = SimpleNamespace(sensors=(sensor,))
+    (mounted,) = SensorConfiguration("1 × type1", deployment, "type1", 1, "optimal", 0.0).sensors
     assert (mounted.orientation == turn).all()

@@ -111,7 +111,7 @@ def precision_front(
     progress = Progress(0, 1, "place")
     cell = Cell(lidar.key, None, count, 1.0)
     placed = solve_cell(survey.site, survey.models, survey.grid.visible, cell, survey.settings.limits)
-    configuration = SensorConfiguration((yield from within(progress, placed)))
+    configuration = SensorConfiguration.of_case((yield from within(progress, placed)))
     static, area = static_scene(survey.geometry), area_of(survey.geometry, NetworkSettings().pillar)
     trained = yield from _trained(configuration, traffic, survey, training, folder)
 
@@ -159,7 +159,7 @@ def _trained(
 ) -> Generator[Progress, None, TrainedDetector]:
     network = NetworkSettings()
     simulator = Simulator(survey.geometry, ScanSettings(seed=training.seed))
-    name = f"detector-{configuration.case.sensor}-{training.steps}-{training.seed}"
+    name = f"detector-{configuration.sensor}-{training.steps}-{training.seed}"
     asked = case_study.ModelConfiguration(name, (configuration,), network, training)
     learnt = yield from case_study.simulate_training_set(simulator, [configuration], traffic, network)
     (trained,) = yield from case_study.train_all([asked], learnt, folder, device="cpu")

@@ -105,7 +105,7 @@ def _on_other_scene(
     settings = surveyed.settings
     runtime.open_scene(scene)
     reading = read_scene(bpy.context.scene)
-    candidates = replace(settings.candidates, sensors=(main.case.sensor,))
+    candidates = replace(settings.candidates, sensors=(main.sensor,))
     layout = lay_out(reading.geometry, replace(settings, candidates=candidates), reading.warnings)
     there = yield from case_study.place_all((yield from see(layout, folder / f"visibility_{scene.stem}.npz")))
     runs = case_study.read_runs(survey.runs_beside(scene), layout.geometry.origin, TRAINING_INTERVAL)
@@ -118,9 +118,9 @@ def _studio(layout: Layout) -> Simulator:
 
 def _most(configurations: Sequence[SensorConfiguration]) -> SensorConfiguration:
     """Return the most sensors of the type in the middle: those that have something to lose, and to be lost."""
-    types = list(dict.fromkeys(one.case.sensor for one in configurations))
-    own = [one for one in configurations if one.case.sensor == types[len(types) // 2]]
-    return max(own, key=lambda one: one.case.count)
+    types = list(dict.fromkeys(one.sensor for one in configurations))
+    own = [one for one in configurations if one.sensor == types[len(types) // 2]]
+    return max(own, key=lambda one: one.count)
 
 
 def _thinned(runs: Sequence[SampledRun]) -> tuple[SampledRun, ...]:

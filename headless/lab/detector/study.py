@@ -290,8 +290,8 @@ def training_plan(
     """
     alike = model_configurations(configurations, network, training, seeds=seeds, separate=False)
     by_type = {}
-    for sensor in dict.fromkeys(one.case.sensor for one in configurations):
-        own = tuple(one for one in configurations if one.case.sensor == sensor)
+    for sensor in dict.fromkeys(one.sensor for one in configurations):
+        own = tuple(one for one in configurations if one.sensor == sensor)
         steps = max(1, training.steps * len(own) // len(configurations))
         by_type[sensor] = ModelConfiguration(f"detector-{sensor}", own, network, replace(training, steps=steps))
     return TrainingPlan(tuple(alike), by_type, tuple(padded(alike)) if padding else ())
@@ -434,9 +434,9 @@ class _TrialRunner:
             for sensor, one_tested in candidates.by_type.items():
                 made = yield from self.run(configuration, Disturbance(), [one_tested])
                 tried[sensor] = [ResampledPrecision(made[0].evaluation)]
-            native = tried.pop(configuration.case.sensor, None)
+            native = tried.pop(configuration.sensor, None)
             for sensor, those in tried.items() if native else ():
-                against = f"learnt from {configuration.case.sensor}"
+                against = f"learnt from {configuration.sensor}"
                 found.append(
                     TransferResult(sensor, configuration.name, level(those), change(those, native or those), against)
                 )

@@ -23,9 +23,7 @@ from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.results.placement_record import versions
 from seip_addon.core.scans import Frame, prepare
-from seip_addon.core.scans.run_folder import Run
 from seip_addon.core.storage.array_file import ArrayFile, ArrayRule, ContentError
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
@@ -79,21 +77,7 @@ class TrialSite:
 
     def key(self, configuration: SensorConfiguration) -> str:
         """Return a digest of all that undisturbed frames follow from."""
-        simulator = self.simulator
-        runs = (
-            Run(
-                static=simulator.static,
-                origin=run.trajectories.origin,
-                sensors=configuration.sensors,
-                trajectories=run.trajectories,
-                bodies=[fitted_body(user) for user in run.trajectories.users],
-                times=run.times,
-                settings=simulator.settings,
-                versions=versions(),
-            )
-            for run in self.runs
-        )
-        return digest(*(run.key for run in runs))
+        return self.simulator.key(configuration, self.runs)
 
 
 @dataclass(frozen=True, eq=False)

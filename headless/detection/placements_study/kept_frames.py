@@ -1,0 +1,74 @@
+"""Results of frames on disk, so that a study that was stopped goes on."""
+
+from collections.abc import Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from headless.detection.frame_results import EvaluatedBoxes, FrameResult, GroundTruth
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seip_addon.core.storage.array_file import ArrayFile, ArrayRule, ContentError
+
+TABLES = {"truth": GroundTruth, "detected": EvaluatedBoxes}
+TYPES = {"category": "U", "points": "i8", "inside": "b1"}  # of columns; of others float64
+
+
+def _rules() -> dict[str, ArrayRule]:
+    rules = {"run": ArrayRule("U", ("f",)), "time": ArrayRule("f8", ("f",))}
+    for table, kind in TABLES.items():
+        rules[f"{table}.count"] = ArrayRule("i8", ("f",), 0)
+        for column in fields(kind):
+            shape: tuple[int | str, ...] = (table, 7) if column.name == "boxes" else (table,)
+            rules[f"{table}.{column.name}"] = ArrayRule(TYPES.get(column.name, "f8"), shape)
+    return rules
+
+
+FILE = ArrayFile("seip.detections", 1, "file of detections", "delete it, and it is made again", _rules())
+
+
+def save_frames(path: Path, frames: Sequence[FrameResult]) -> None:
+    """Write the results of frames, one after the other."""
+    arrays: dict[str, NDArray[Any]] = {
+        "run": np.array([frame.run for frame in frames], dtype=np.str_),
+        "time": np.array([frame.time for frame in frames]),
+    }
+    for table, kind in TABLES.items():
+        parts = [getattr(frame, table) for frame in frames]
+        arrays[f"{table}.count"] = np.array([len(part) for part in parts])
+        arrays |= {
+            f"{table}.{column.name}": np.concatenate([getattr(part, column.name) for part in parts])
+            for column in fields(kind)
+        }
+    FILE.save(path, {}, arrays)
+
+
+def load_frames(path: Path) -> list[FrameResult]:
+    """Read what `save_frames` wrote.
+
+    Raises
+    ------
+    SeipError
+        The file is damaged, or something else.
+    """
+    with FILE.reading(path) as (_, arrays):
+        tables = {table: _split(table, arrays) for table in TABLES}
+        return [
+            FrameResult(str(run), float(time), truth, detected)
+            for run, time, truth, detected in zip(
+                arrays["run"], arrays["time"], tables["truth"], tables["detected"], strict=True
+            )
+        ]
+
+
+def _split(table: str, arrays: dict[str, NDArray[Any]]) -> list[Any]:
+    """Return the rows of each frame of a table."""
+    kind = TABLES[table]
+    ends = np.cumsum(arrays[f"{table}.count"])
+    columns = {column.name: arrays[f"{table}.{column.name}"] for column in fields(kind)}
+    if len(columns["boxes"]) != (ends[-1] if len(ends) else 0):
+        raise ContentError("its rows are not those of its frames")
+    split = {name: np.split(values, ends[:-1]) for name, values in columns.items()}
+    return [kind(**{name: parts[frame] for name, parts in split.items()}) for frame in range(len(ends))]
