@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from seip_addon.core.storage.array_file import ArrayFile, ArrayRule, ContentError
 
 TABLES = {"truth": GroundTruth, "detected": EvaluatedBoxes}
-TYPES = {"category": "U", "points": "i8", "inside": "b1"}  # of columns; of others float64
+TYPES = {"category": "U", "points": "i8", "inside": "b1", "parked": "b1"}  # of columns; of others float64
 
 
 def _rules() -> dict[str, ArrayRule]:
