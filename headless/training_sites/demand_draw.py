@@ -12,7 +12,12 @@ Random = np.random.Generator
 FLOW = {1: (300.0, 700.0), 2: (300.0, 950.0), 3: (400.0, 1100.0)}
 """Vehicles per hour that come in on each arm, at least and at most, by the lanes of the widest."""
 MIX_SPREAD = 0.45  # standard deviation of the logarithm by which each share of the mix differs from the usual
-LEAST_SHARES = {"truck": 0.08, "bus": 0.06, "motorcycle": 0.05, "bicycle": 0.08}  # of vehicles at least
+LEAST_SHARES = {
+    "truck": 0.10,
+    "bus": 0.10,
+    "motorcycle": 0.05,
+    "bicycle": 0.08,
+}  # of vehicles, before their sum is made 1
 PEDESTRIANS = (60.0, 260.0)  # persons per hour and arm
 BAYS = (3, 9)  # in a row at the kerb, the last one excluded
 FIRST_BAY = (18.0, 40.0)  # metres from the junction
