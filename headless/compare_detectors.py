@@ -58,7 +58,7 @@ def main(argv: list[str]) -> None:
     ]
     trainings = [_train(study, model, options.device) for model in models]
     with deterministic(1):
-        trained = study.stopwatch.run("training", side_by_side(trainings, case_study.PARALLEL_TRAININGS))
+        trained = study.stopwatch.run("training", side_by_side(trainings, case_study.AT_ONCE))
     detectors = [detector for detector, _ in trained]
     evaluation = case_study.evaluate_all(study.simulator, models, detectors, study.traffic)
     outcomes = study.stopwatch.run("evaluation", evaluation)

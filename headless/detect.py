@@ -1,9 +1,10 @@
 """Judge a placement by what a trained detector finds with its sensors on runs of traffic.
 
-python -m headless.detect out/placed.blend --traffic run-5.npz run-6.npz --detector detector.pt -o out/detection
-blender -b --python-exit-code 1 out/placed.blend -P headless/detect.py -- --traffic run-5.npz --detector detector.pt …
+python -m headless.detect out/placed.blend --traffic run-*.npz -o out/detection
+blender -b --python-exit-code 1 out/placed.blend -P headless/detect.py -- --traffic run-*.npz -o out/detection
 
-Needs torch (make detection). The sensors are those of the scene, wherever they hang and of whatever types.
+Needs torch (make detection). The sensors are those of the scene, wherever they hang and of whatever types. The
+detector that ships with the project has learnt from random placements at random sites (`headless/train_on_sites.py`).
 """
 
 import argparse
@@ -23,7 +24,7 @@ from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_pr
 from headless.detection.case_study import read_runs
 from headless.detection.chart_data import error_view, parts
 from headless.detection.detection_area import area_of
-from headless.detection.detector import Detector, check_device
+from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
 from headless.detection.judgement import Judgement, figures, judge
 from headless.detection.rules import MAIN_RULE
 from headless.detection.suitability import suitability_warnings
@@ -136,7 +137,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("scene", nargs="?", type=Path, help="the .blend with its sensors; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the figures")
     parser.add_argument("--traffic", nargs="+", type=Path, required=True, metavar="NPZ", help="runs to detect in")
-    parser.add_argument("--detector", type=Path, required=True, metavar="PT", help="the file that `seip train` wrote")
+    parser.add_argument(
+        "--detector",
+        type=Path,
+        default=SHIPPED_DETECTOR,
+        metavar="PT",
+        help="another than the shipped one, of `seip train`",
+    )
     parser.add_argument("--every", type=float, default=2.5, metavar="S", help="time from frame to frame")
     parser.add_argument("--device", default="cpu", help="of torch: cpu or cuda")
     parser.add_argument("--threads", type=int, default=1, help="of torch")

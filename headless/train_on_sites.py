@@ -19,7 +19,7 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime, survey
 from headless.charts.detection import save_training_chart
-from headless.detection.case_study import read_runs
+from headless.detection.case_study import AT_ONCE, read_runs, simulated
 from headless.detection.detector import check_device
 from headless.detection.frames import SampledRecording
 from headless.detection.random_placements import random_placement
@@ -32,7 +32,7 @@ import bpy
 import numpy as np
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress
+from seip_addon.core.progress import Progress, side_by_side
 from seip_addon.core.scans import ScanSettings
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.workflows.survey import SurveySettings, lay_out
@@ -73,10 +73,10 @@ def main(argv: list[str]) -> None:
         recordings.append(runtime.finish_with_bar(_recordings(scene, number, network, learning)))
     aside = max(1, len(recordings) // ASIDE)
     learnt, validation = ([one for site in some for one in site] for some in (recordings[:-aside], recordings[-aside:]))
-    path = options.output / "detector.pt"
-    trained = runtime.finish_with_bar(train(learnt, validation, network, training, device=options.device, store=path))
+    store = options.output / "training.pt"
+    trained = runtime.finish_with_bar(train(learnt, validation, network, training, device=options.device, store=store))
     best = trained.curve.best
-    trained.detector.save(path)
+    trained.detector.save(options.output / "detector.pt", half=True)
     save_training_chart(options.output / "training.png", trained.curve.loss, trained.curve.validation, "training")
     runtime.print_line(
         f"best after {best:,} steps: average precision {trained.curve.validation[best]:.1%} at sites set aside"
@@ -119,17 +119,13 @@ def _recordings(
     area = simulator.area(network.pillar)
     random = np.random.default_rng([learning.seed, site])
     recordings = []
-    total = len(runs) * learning.placements * len(runs[0].times)
-    done = 0
     for run in runs:
-        for number in range(learning.placements):
-            placement = random_placement(f"placement {number + 1}", layout.site.candidates, layout.models, random)
-            sampled = SampledRecording(simulator.record(placement, run), area, network.most_points)
-            for frame in range(len(sampled)):
-                yield Progress(done, total, f"simulate {scene.parent.name}/{scene.stem}")
-                done += 1
-                sampled.get(frame)
-            recordings.append(sampled)
+        for number in range(1, learning.placements + 1):
+            name = f"{scene.parent.name}/{scene.stem}, placement {number}"
+            placement = random_placement(name, layout.site.candidates, layout.models, random)
+            recordings.append(SampledRecording(simulator.record(placement, run), area, network.most_points))
+    yield from side_by_side([simulated([one]) for one in recordings], AT_ONCE)
+    simulator.forget()
     return recordings
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress, in_detail, side_by_side, within
+from seip_addon.core.progress import Progress, side_by_side, within
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.parked import shared_bays
 from seip_addon.core.traffic.run_overlap import MATCH_RADIUS, require_independent, vehicle_positions
@@ -33,7 +33,7 @@ from .frame_results import FrameResult, frame_result
 from .frames import SampledRecording
 from .inference import detect
 from .kitti_precision import Kitti, kitti
-from .recordings import SampledRun, SensorConfiguration, Simulator
+from .recordings import PlacedSensors, SampledRun, SensorConfiguration, Simulator
 from .rules import MAIN_RULE, Precision, precisions
 from .settings import CLASS_CATEGORIES, NetworkSettings, TrainingSettings
 from .suitability import suitability_warnings
@@ -46,7 +46,7 @@ SPLIT = "the last half for tests, an eighth before it (one at least) for validat
 """How runs are split, in words."""
 
 WARM_UP = 2.0  # seconds from the first sample of a run to its first frame
-PARALLEL_TRAININGS = (os.cpu_count() or 1) + 1  # at once on the CPU: one more than cores, as each also waits
+AT_ONCE = (os.cpu_count() or 1) + 1  # works in threads on the CPU: one more than cores, as each also waits
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,24 +246,28 @@ def simulate_training_set(
     network: NetworkSettings,
 ) -> Generator[Progress, None, TrainingSet]:
     """Simulate what the configurations measure, and keep what a network learns from it."""
-    training_set = TrainingSet({}, {})
-    total = sum(len(run.times) for run in (*traffic.training, *traffic.validation)) * len(configurations)
-    done = 0
-    for configuration in configurations:
-        for kept, runs in ((training_set.training, traffic.training), (training_set.validation, traffic.validation)):
-            kept[configuration.name] = [
-                SampledRecording(
-                    simulator.record(configuration, run), simulator.area(network.pillar), network.most_points
-                )
-                for run in runs
-            ]
-            for sampled in kept[configuration.name]:
-                for number in range(len(sampled)):
-                    yield Progress(done, total, f"simulate {configuration.name}")
-                    sampled.get(number)
-                    done += 1
-    yield Progress(total, total, "simulated")
+    area = simulator.area(network.pillar)
+
+    def recordings(placed: PlacedSensors, runs: Sequence[SampledRun]) -> list[SampledRecording]:
+        return [SampledRecording(simulator.record(placed, run), area, network.most_points) for run in runs]
+
+    training_set = TrainingSet(
+        {one.name: recordings(one, traffic.training) for one in configurations},
+        {one.name: recordings(one, traffic.validation) for one in configurations},
+    )
+    each = [(*training_set.training[one.name], *training_set.validation[one.name]) for one in configurations]
+    yield from side_by_side([simulated(some) for some in each], AT_ONCE)
     return training_set
+
+
+def simulated(recordings: Sequence[SampledRecording]) -> Generator[Progress, None, None]:
+    """Simulate all frames of some recordings."""
+    total, done = sum(map(len, recordings)), 0
+    for sampled in recordings:
+        for number in range(len(sampled)):
+            yield Progress(done, total, f"simulate {sampled.recording.name}")
+            sampled.get(number)
+            done += 1
 
 
 def training(
@@ -286,7 +290,7 @@ def train_all(
 ) -> Generator[Progress, None, list[TrainedDetector]]:
     """Train detectors, on the CPU one on each core; what was trained before an interruption is not trained again."""
     trainings = [training(model, training_set, device=device, store=folder / f"{model.name}.pt") for model in models]
-    at_once = PARALLEL_TRAININGS if device == "cpu" else 1
+    at_once = AT_ONCE if device == "cpu" else 1
     with deterministic(models[0].training.threads):  # all the time, as torch keeps one such setting for all threads
         return (yield from side_by_side(trainings, at_once))
 
@@ -296,23 +300,25 @@ def evaluate_all(
 ) -> Generator[Progress, None, list[DetectorOutcome]]:
     """Evaluate every detector with each of its configurations; a frame is simulated once for all of them."""
     configurations = {one.name: one for model in models for one in model.configurations}.values()
+    runs = (*traffic.validation, *traffic.test)
+    threads = models[0].training.threads
+    asked = [
+        [number for number, model in enumerate(models) if configuration in model.configurations]
+        for configuration in configurations
+    ]
+    works = [
+        detect_in_runs(simulator, configuration, runs, [detectors[number] for number in numbers], threads)
+        for configuration, numbers in zip(configurations, asked, strict=True)
+    ]
+    with deterministic(threads):  # all the time, as torch keeps one such setting for all threads
+        found = yield from side_by_side(works, AT_ONCE)
+    aside = sum(len(run.times) for run in traffic.validation)
     validated: dict[tuple[str, str], list[FrameResult]] = {}
     tested: dict[tuple[str, str], list[FrameResult]] = {}
-    for done, configuration in enumerate(configurations):
-        asked = [
-            (model, detector)
-            for model, detector in zip(models, detectors, strict=True)
-            if configuration in model.configurations
-        ]
-        runs = (*traffic.validation, *traffic.test)
-        steps = detect_in_runs(
-            simulator, configuration, runs, [detector for _, detector in asked], models[0].training.threads
-        )
-        found = yield from in_detail(Progress(done, len(configurations), "detect"), steps)
-        aside = sum(len(run.times) for run in traffic.validation)
-        for (model, _), frames in zip(asked, found, strict=True):
-            validated[model.name, configuration.name] = frames[:aside]
-            tested[model.name, configuration.name] = frames[aside:]
+    for configuration, numbers, results in zip(configurations, asked, found, strict=True):
+        for number, frames in zip(numbers, results, strict=True):
+            validated[models[number].name, configuration.name] = frames[:aside]
+            tested[models[number].name, configuration.name] = frames[aside:]
     return [outcome for model in models for outcome in _outcomes(model, validated, tested)]
 
 

@@ -30,6 +30,9 @@ from .pillars import Pillars
 from .settings import NetworkSettings
 
 SCHEMA, VERSION = "seip.detector", 3
+SHIPPED_DETECTOR = Path(__file__).with_name("shipped_detector.pt")
+"""Trained by `make detector` on random placements at random sites."""
+
 _MAX_BYTES = 1 << 32  # bytes of a file: 4 GiB
 _SEED_LOCK = threading.Lock()  # torch draws first weights from one source of random numbers for all threads
 
@@ -92,9 +95,18 @@ class Detector(nn.Module):
             output: Tensor = self.head(self.feature_map(features, pillar, shape))
         return output.float()
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write settings and weights; the same detector gives the same bytes."""
-        save_state(path, {**self.description(), "weights": self.state_dict()})
+    def save(self, path: str | os.PathLike[str], *, half: bool = False) -> None:
+        """Write settings and weights; the same detector gives the same bytes.
+
+        Parameters
+        ----------
+        half : bool
+            Whether matrices are rounded to 16 bits, for a file of half the size.
+        """
+        weights = {
+            name: value.half() if half and value.ndim > 1 else value for name, value in self.state_dict().items()
+        }
+        save_state(path, {**self.description(), "weights": weights})
 
     def description(self) -> dict[str, Any]:
         """Return settings and what it has learnt from as plain values."""

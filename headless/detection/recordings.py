@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -124,7 +125,8 @@ class Simulator:
     """A scene in which runs of traffic are recorded.
 
     What stands still is cast against once for a configuration and a run, and
-    kept until another is asked for: ask for the frames of one after the other.
+    kept until some others were asked for: ask for the frames of one after the
+    other, in no more threads than there are cores and one.
 
     Attributes
     ----------
@@ -135,7 +137,11 @@ class Simulator:
     def __init__(self, geometry: SceneGeometry, settings: ScanSettings) -> None:
         self.static, self.settings, self.site = static_scene(geometry), settings, geometry.name
         self.area = functools.cache(functools.partial(area_of, geometry))
-        self._simulation = functools.lru_cache(maxsize=1)(self._prepared)
+        self._simulation = functools.lru_cache(maxsize=(os.cpu_count() or 1) + 1)(self._prepared)
+
+    def forget(self) -> None:
+        """Free the memory of what was cast."""
+        self._simulation.cache_clear()
 
     def record(self, configuration: PlacedSensors, run: SampledRun) -> Recording:
         """Return the frames of a run, to be simulated when they are asked for."""
