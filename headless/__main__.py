@@ -18,6 +18,7 @@ VERBS = {
     "generate-sites": "generate random sites with traffic, to train detectors on",
     "evaluate": "average precision of types × numbers",
     "train": "train and test one detector",
+    "train-on-sites": "train a detector for any placement on several sites",
     "detect": "judge a placement by what a detector finds with its sensors",
     "compare-detectors": "average precision against time of other detector settings",
     "calibrate": "compare LiDAR models with measured sweeps",

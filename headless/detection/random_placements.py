@@ -23,7 +23,12 @@ class RandomPlacement(PlacedSensors):
     """Sensors of any types, heights and tilts at random positions of a site."""
 
     name: str
-    sensors: tuple[MountedSensor, ...]
+    mounted: tuple[MountedSensor, ...]
+
+    @property
+    def sensors(self) -> tuple[MountedSensor, ...]:
+        """The sensors where they hang."""
+        return self.mounted
 
 
 def random_placement(

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from car_and_bus import car_and_bus
 
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
@@ -16,32 +17,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from scene_by_hand import make_scene
-from small_junction import ORIGIN, make_example
+from small_junction import make_example
 
 from seip_addon.core.datasets.detection_files import kitti_results, openpcdet_results
 from seip_addon.core.errors import SeipError
-from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.scene.blend_file import save_blend
 from seip_addon.scene.write import write_result
-
-
-def make_traffic(y, seconds=8.0) -> Trajectories:
-    """Return a car that drives along +x, and one that stands."""
-    times = np.arange(int(seconds * 5)) / 5
-    count = len(times)
-    moving = np.column_stack([-30 + 6 * times, np.full(count, y), np.zeros(count)])
-    standing = np.tile([10.0 + y, -y, 0.0], (count, 1))
-    return Trajectories(
-        users=(RoadUser("moving", "car", 4.5, 1.8, 1.5), RoadUser("standing", "bus", 12.0, 2.5, 3.2)),
-        origin=np.zeros(3),
-        first=np.array([0, count, 2 * count]),
-        time=np.concatenate([times, times]),
-        position=np.concatenate([moving, standing]) + ORIGIN,
-        yaw=np.zeros(2 * count),
-        pitch=np.zeros(2 * count),
-        speed=np.concatenate([np.full(count, 6.0), np.zeros(count)]),
-        source=f"by hand, {y}",
-    )
 
 
 @pytest.fixture(scope="module")
@@ -51,8 +32,8 @@ def folder(tmp_path_factory):
     example = make_example()
     write_result(make_scene(example.geometry), example.site, example.deployment)
     save_blend(folder / "placed.blend")
-    make_traffic(-3.5).save(folder / "first.npz")
-    make_traffic(3.5).save(folder / "second.npz")
+    car_and_bus(-3.5).save(folder / "first.npz")
+    car_and_bus(3.5).save(folder / "second.npz")
     settings = NetworkSettings(width=8, blocks=(1, 1, 1))
     record = TrainingRecord(sensors=("vlp16",), sites=("Elsewhere",))
     Detector(settings, training_record=record).save(folder / "detector.pt")
@@ -108,7 +89,7 @@ def test_mistakes_are_named(folder, tmp_path):
     save_blend(tmp_path / "bare.blend")
     with pytest.raises(SeipError, match="no sensors"):
         detect.main(arguments(folder, "x", scene=tmp_path / "bare.blend"))
-    far = make_traffic(-3.5)
+    far = car_and_bus(-3.5)
     far.position[:] += [5000.0, 0.0, 0.0]
     far.save(tmp_path / "far.npz")
     with pytest.raises(SeipError, match=r"nobody of the run of traffic \(by hand, -3\.5\) is ever in the region"):
