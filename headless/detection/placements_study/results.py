@@ -22,7 +22,6 @@ from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.storage.files import save_json, whole_file
 
 from .agreement import (
-    NEAR,
     Correlation,
     JudgedCriterion,
     NoiseCeiling,
@@ -33,7 +32,7 @@ from .agreement import (
     upper_half,
 )
 from .criteria import Criterion
-from .drawing import OPTIMAL, RANDOM, DrawnPlacements, PlacementsStudySettings
+from .drawing import NEAR, OPTIMAL, RANDOM, DrawnPlacements, PlacementsStudySettings
 from .precision import Precisions
 
 SCHEMA = "seip-placements-study/1"
