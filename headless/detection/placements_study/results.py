@@ -149,9 +149,12 @@ class PlacementsStudy:
         if standing:
             named = " and ".join(f"{one.criterion.name} ({_points(one.gain)})" for one in standing)
             return f"a point or more of AP that the interval leaves standing is gained by {named}"
-        if all(one.best == self.judged[0].best for one in self._beforehand):
-            return "no criterion gains a point: all that can be had beforehand like the same placement best"
         most = max(self._beforehand, key=lambda one: one.gain.value)
+        if most.gain.value <= 0:
+            return (
+                "no criterion that can be had beforehand gains anything: none likes a placement best that detects more "
+                "than the one that coverage likes best"
+            )
         return (
             "no criterion that can be had beforehand gains a point of AP that its interval leaves standing; the most "
             f"has {most.criterion.name}: {_points(most.gain)}"
