@@ -20,6 +20,7 @@ from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import Interval
 from seip_addon.core.progress import Progress, in_detail, side_by_side, within
+from seip_addon.core.storage.files import digest
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.run_overlap import require_independent, vehicle_positions
 from seip_addon.core.workflows.survey import Survey
@@ -334,6 +335,12 @@ def detect_in_runs(
                 own.append(frame_result(frame, cloud, found, run=run.name, **known))
     yield Progress(total, total, f"detect with {configuration.name}")
     return results
+
+
+def detector_key(detector: Detector) -> str:
+    """Return a digest of a detector's weights, settings and grid."""
+    weights = [one for name, value in detector.state_dict().items() for one in (name, value.cpu().numpy())]
+    return digest(repr(detector.settings), repr(detector.grid), *weights)
 
 
 def suitability_by_configuration(
