@@ -19,6 +19,7 @@ import numpy as np
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, side_by_side, within
+from seip_addon.core.storage.files import digest
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.parked import shared_bays
 from seip_addon.core.traffic.run_overlap import MATCH_RADIUS, require_independent, vehicle_positions
@@ -347,6 +348,12 @@ def detect_in_runs(
                 own.append(frame_result(frame, cloud, found, run=run.name, parked=run.parked, **known))
     yield Progress(total, total, f"detect with {configuration.name}")
     return results
+
+
+def detector_key(detector: Detector) -> str:
+    """Return a digest of a detector's weights and settings."""
+    weights = [one for name, value in detector.state_dict().items() for one in (name, value.cpu().numpy())]
+    return digest(repr(detector.settings), *weights)
 
 
 def suitability_by_configuration(

@@ -127,9 +127,16 @@ def test_sentences_follow_from_the_figures():
     said = list(study(told, wrong).sentences())
     assert any("the upper half" in line and "foretells detection there, too" in line for line in said)
     assert said[-2].startswith("no criterion that can be had beforehand correlates better than coverage")
-    assert said[-1].startswith("no criterion that can be had beforehand gains a point")
-    same = Criterion("same", "the same", told.quality)
-    assert "like the same placement best" in list(study(told, same).sentences())[-1]
+    assert said[-1].startswith("no criterion that can be had beforehand gains anything")
+
+
+def test_a_gain_that_does_not_stand_is_told_with_its_interval():
+    told = Told(np.linspace(0.7, 0.71, PLACEMENTS), 0.3, 0.0)
+    best = Criterion("lucky", "the lucky", told.values)
+    assert list(study(told, best).sentences())[-1].startswith(
+        "no criterion that can be had beforehand gains a point of AP that its interval leaves standing; the most has "
+        "the lucky: +"
+    )
 
 
 def test_a_criterion_that_gains_is_named():

@@ -15,6 +15,7 @@ from headless.detection.placements_study.car_returns import CAR_HEIGHT, CAR_REFL
 from headless.detection.placements_study.criteria import criteria_of
 from headless.detection.placements_study.drawing import (
     BETWEEN,
+    NEAR,
     OPTIMAL,
     OTHERWISE,
     RANDOM,
@@ -82,9 +83,9 @@ def test_placements_are_feasible_different_and_spread(survey):
         (visible[a] | visible[b]).mean() for a in range(len(visible)) for b in range(a) if position[a] != position[b]
     )
     assert coverage[0] == pytest.approx(best)
-    between = np.sort(coverage[6:])
-    assert np.ptp(between) > 0.6 * np.ptp(coverage)
-    assert np.diff(between).max() < 0.5 * np.ptp(coverage)
+    assert np.ptp(coverage[6:]) > 0.4 * np.ptp(coverage)
+    assert (coverage[6:] >= coverage[0] - NEAR).sum() >= 2
+    assert (coverage[6:] < coverage[0] - NEAR).sum() >= 2
 
 
 def test_the_optimal_placements_of_other_weights_are_evaluated_as_well(survey):

@@ -15,10 +15,9 @@ from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.estimates import IntervalEstimate, percentiles, rank_agreements
 
 from .criteria import Criterion
-from .drawing import MIN_PLACEMENTS
+from .drawing import MIN_PLACEMENTS, NEAR
 from .precision import PLACEMENT_SEED, Precisions
 
-NEAR = 0.05  # of the targets: how much less than the optimal placement one near it covers at most
 MAX_CORRELATION = 1 - 1e-6  # beyond it Fisher's scale is endless
 
 

@@ -21,6 +21,8 @@ MIN_PLACEMENTS = 4
 MAX_TRIES = 20_000  # draws for one placement, before it is said that there are no more
 SWAPS_PER_PLACEMENT = 20  # draws from which those in between are taken
 
+NEAR = 0.05  # of the targets: how much less than the optimal placement one near it covers at most
+
 OPTIMAL, RANDOM, BETWEEN, OTHERWISE = "optimal", "random", "in between", "optimal by other weights"
 
 
@@ -97,9 +99,9 @@ def draw_placements(
 
     With the optimal placement go those of other weights: random placements alone do not show what weights are for.
     Half of the others are drawn uniformly from all feasible sets of poses. Most of these cover about the same; the rest
-    are therefore the nearest to steps evenly spread from the coverage of the worst placement (greedily, each sensor
-    adds least) to that of the optimal one, of many that differ in one sensor from either. Those to learn from are drawn
-    in the same way, afterwards.
+    are therefore the nearest to given steps of coverage, of many that differ in one sensor from the optimal or from the
+    worst placement (greedily, each sensor adds least): half of the steps are even between the two, and half within
+    `NEAR` of the optimal, where choices are made. Those to learn from are drawn in the same way, afterwards.
 
     Parameters
     ----------
@@ -177,7 +179,7 @@ class _Drawing:
         return [self._new(lambda: self._random.choice(self._poses, self._count, replace=False)) for _ in range(number)]
 
     def between(self, number: int) -> list[Integer]:
-        """Draw sets whose coverage is evenly spread from that of the worst to that of the optimal."""
+        """Draw sets whose coverage is spread from that of the worst to that of the optimal, half of them near that."""
         ends = (self._worst(), self._optimal)
         pool: dict[frozenset[int], float] = {}
         for draw in range(SWAPS_PER_PLACEMENT * number):
@@ -185,7 +187,11 @@ class _Drawing:
             pool[frozenset(swapped.tolist())] = self._coverage(swapped)
         chosen: list[Integer] = []
         low, high = (self._coverage(end) for end in ends)
-        for level in np.linspace(low, high, number + 2)[1:-1].tolist():
+        few = number // 2
+        levels = np.concatenate(
+            [np.linspace(low, high, number - few + 2)[1:-1], high - NEAR * np.arange(few) / (few or 1)]
+        )
+        for level in levels.tolist():
             if not pool:
                 return chosen + self.random(number - len(chosen))
             nearest = min(pool, key=lambda poses: (abs(pool[poses] - level), sorted(poses)))

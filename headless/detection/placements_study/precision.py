@@ -1,7 +1,7 @@
 """Average precision of one detector with each of several placements, on the same test runs."""
 
 from collections.abc import Generator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
@@ -18,6 +18,7 @@ from headless.detection.case_study import (
     Traffic,
     TrainingSet,
     detect_in_runs,
+    detector_key,
     simulate_training_set,
 )
 from headless.detection.detector import Detector
@@ -186,9 +187,3 @@ def precisions(
                 save_frames(paths[number], frames)
         evaluations.append(tuple(evaluate(load_frames(path), MAIN_RULE) for path in paths))
     return Precisions(runs, tuple(evaluations))
-
-
-def detector_key(detector: Detector) -> str:
-    """Return a digest of a detector's weights and settings."""
-    weights = [one for name, value in detector.state_dict().items() for one in (name, value.cpu().numpy())]
-    return digest(repr(asdict(detector.settings)), *weights)

@@ -22,7 +22,6 @@ from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.storage.files import save_json, whole_file
 
 from .agreement import (
-    NEAR,
     Correlation,
     JudgedCriterion,
     NoiseCeiling,
@@ -33,7 +32,7 @@ from .agreement import (
     upper_half,
 )
 from .criteria import Criterion
-from .drawing import OPTIMAL, RANDOM, DrawnPlacements, PlacementsStudySettings
+from .drawing import NEAR, OPTIMAL, RANDOM, DrawnPlacements, PlacementsStudySettings
 from .precision import Precisions
 
 SCHEMA = "seip-placements-study/1"
@@ -150,9 +149,12 @@ class PlacementsStudy:
         if standing:
             named = " and ".join(f"{one.criterion.name} ({_points(one.gain)})" for one in standing)
             return f"a point or more of AP that the interval leaves standing is gained by {named}"
-        if all(one.best == self.judged[0].best for one in self._beforehand):
-            return "no criterion gains a point: all that can be had beforehand like the same placement best"
         most = max(self._beforehand, key=lambda one: one.gain.value)
+        if most.gain.value <= 0:
+            return (
+                "no criterion that can be had beforehand gains anything: none likes a placement best that detects more "
+                "than the one that coverage likes best"
+            )
         return (
             "no criterion that can be had beforehand gains a point of AP that its interval leaves standing; the most "
             f"has {most.criterion.name}: {_points(most.gain)}"

@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from headless.detection.average_precision import CountedTruth, EvaluatedDetections, Evaluation, evaluate
+from headless.detection.case_study import detector_key
 from headless.detection.cloud_in_plan import CloudInPlan
 from headless.detection.detector import Detector
 from headless.detection.frame_results import FrameResult, frame_result
@@ -90,8 +91,7 @@ class EvaluatedDetector:
     @cached_property
     def key(self) -> str:
         """Digest of its weights and its settings."""
-        weights = [part for name, value in self.detector.state_dict().items() for part in (name, value.cpu().numpy())]
-        return digest(repr(self.detector.settings), *weights)
+        return detector_key(self.detector)
 
 
 @dataclass(frozen=True, eq=False)
