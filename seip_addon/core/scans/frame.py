@@ -37,9 +37,7 @@ _LABELS = {
     "labels.visibility": ArrayRule("f8", ("k",), 0.0, _ROUNDED_ONE),
     "labels.inside": ArrayRule("b1", ("k",)),
 }
-FILE = ArrayFile(
-    "seip.frame", 3, "frame of scans", "simulate it again", _POINTS | _LABELS, compressed=False, undigested=True
-)
+FILE = ArrayFile("seip.frame", 3, "frame of scans", "simulate it again", _POINTS | _LABELS, compressed=False)
 
 STATIC_INSTANCE = -1
 """The instance of a point that is on no road user."""

@@ -289,6 +289,33 @@ def test_noise_of_what_stands_still_does_not_depend_on_the_traffic() -> None:
     assert set(still) <= points
 
 
+def test_without_noise_foreground_is_what_traffic_returns() -> None:
+    cars = parked((10.0, 0.0, 0.0, 0.0, 0.0), (-7.0, 12.0, 0.0, 1.0, 0.0))
+    frame = simulation(make_static(ground()), [make_sensor(), make_sensor((8.0, 9.0, 5.0))], cars).frame(0, 0.0)
+    on_cars = frame.instance != STATIC_INSTANCE
+    assert on_cars.sum() > 50
+    assert not frame.foreground[~on_cars].any()
+    lowest = frame.points[on_cars & ~frame.foreground, 2]  # where a tyre stands, the road is no farther
+    assert len(lowest) < 0.05 * on_cars.sum()
+    assert (lowest < 0.2).all()
+
+
+def test_noise_hardly_makes_foreground_of_the_background() -> None:
+    sensor = make_sensor(range_noise_std=0.1, law=CarlaDropoff(general=0.1))
+    frame = simulation(make_static(ground()), [sensor], parked(), NOISY).frame(0, 0.0)
+    assert len(frame) > 1000
+    assert frame.foreground.mean() < 0.003  # Φ(−3) is 0.0013
+
+
+def test_before_the_sky_all_is_foreground() -> None:
+    sensor = make_sensor((0.0, 0.0, 1.0), **ONE_RAY)
+    stands = [(time, 10.0, 0.0, 0.0, 0.0, 0.0) for time in (0.0, 10.0)]
+    wall = make_trajectories(stands, users=[RoadUser("truck", "truck", 8.0, 40.0, 4.0)])
+    frame = simulation(make_static(ground()), [sensor], wall).frame(0, 0.0)
+    assert len(frame) > 0
+    assert frame.foreground.all()
+
+
 def share_in(points: np.ndarray, others: np.ndarray) -> float:
     """Which share of points is, bit for bit, among others."""
     known = {tuple(point) for point in others.tolist()}
