@@ -193,7 +193,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="NPZ",
         help=f"runs of traffic: {case_study.SPLIT} (those in the folder SCENE_traffic beside the scene)",
     )
-    detection.add_argument("--every", type=float, default=2.5, metavar="S", help="time from frame to frame")
+    detection.add_argument(
+        "--every", type=float, default=2.5, metavar="S", help="time from frame to frame; twice that in tests"
+    )
     detection.add_argument("--steps", type=int, default=TrainingSettings().steps, help="of each training")
     detection.add_argument("--scan-seed", type=int, default=0, help="of noise and lost returns")
     add_rolling_shutter(detection)

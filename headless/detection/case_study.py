@@ -46,6 +46,7 @@ RUNS_PER_TEST, RUNS_PER_VALIDATION = 2, 8  # of all runs one half is for tests, 
 SPLIT = "the last half for tests, an eighth before it (one at least) for validation, the others to learn from"
 """How runs are split, in words."""
 
+TEST_STRIDE = 2  # frames to learn from for each to test on: what is seen now is seen again soon, and only costs time
 WARM_UP = 2.0  # seconds from the first sample of a run to its first frame
 AT_ONCE = (os.cpu_count() or 1) + 1  # works in threads on the CPU: one more than cores, as each also waits
 
@@ -96,7 +97,7 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     ----------
     origin : (3,) float64, metres
     every : float, seconds
-        From frame to frame.
+        From frame to frame of those to learn from; in the others `TEST_STRIDE` times that.
 
     Raises
     ------
@@ -111,7 +112,8 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     runs = read_runs(paths, origin, every)
     tested = len(runs) // RUNS_PER_TEST
     learnt = len(runs) - tested - max(1, len(runs) // RUNS_PER_VALIDATION)
-    return Traffic(runs[:learnt], runs[learnt:-tested], runs[-tested:])
+    sparse = tuple(replace(run, times=run.times[::TEST_STRIDE]) for run in runs[learnt:])
+    return Traffic(runs[:learnt], sparse[:-tested], sparse[-tested:])
 
 
 def read_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[SampledRun, ...]:

@@ -24,7 +24,7 @@ def test_the_chapter_holds_rows_and_charts_of_home_and_away(tmp_path):
     little = chapters.StabilityScope(detector={"seeds": 2, "steps": 2})
     argv = [str(home), "-o", str(tmp_path), "--work", str(tmp_path / "work"), *COARSE]
     only = patch.object(stability, "chapters", lambda _stage: [("detector", chapters.detector)])
-    few = patch.multiple(detector_limits, TRAINING_INTERVAL=29.0, TEST_STRIDE=1)
+    few = patch.multiple(detector_limits, TRAINING_INTERVAL=29.0, TEST_INTERVAL=29.0)
     with only, few, patch.object(limits_study, "full_series", lambda _sensor: TRIED):
         stability.main([*argv, "--other", str(away)], little)
     page = (tmp_path / "stability.md").read_text(encoding="utf-8")

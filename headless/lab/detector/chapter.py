@@ -9,7 +9,7 @@ from pathlib import Path
 from headless import runtime, survey
 from headless.detection import case_study
 from headless.detection.average_precision import balanced_score
-from headless.detection.recordings import SampledRun, SensorConfiguration, Simulator
+from headless.detection.recordings import SensorConfiguration, Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import TrainedDetector
 from headless.lab.detector.disturbances import Disturbance
@@ -24,9 +24,7 @@ from seip_addon.core.workflows.survey import Layout, Survey, lay_out, see
 from seip_addon.scene.read import read_scene
 
 TRAINING_INTERVAL = 2.5  # seconds between frames to learn from
-
-TEST_STRIDE = 2
-"""Every second test frame is used: neighbouring ones show nearly the same."""
+TEST_INTERVAL = TRAINING_INTERVAL * case_study.TEST_STRIDE
 
 
 def detector_limits(
@@ -71,13 +69,13 @@ def detector_limits(
     candidates = asked.candidates([one.detector for one in trained])
 
     main = _most(configurations)
-    home = TrialSite(simulator.site, simulator, _thinned(traffic.test))
-    practice = TrialSite(simulator.site, simulator, _thinned(traffic.validation))
+    home = TrialSite(simulator.site, simulator, traffic.test)
+    practice = TrialSite(simulator.site, simulator, traffic.validation)
     (tried,) = yield from trials(practice, main, Disturbance(), candidates.tested[:1], folder)
     elsewhere = []
-    dense = case_study.read_runs(survey.runs_beside(scene, "_dense"), origin, TRAINING_INTERVAL)
+    dense = case_study.read_runs(survey.runs_beside(scene, "_dense"), origin, TEST_INTERVAL)
     if dense:
-        elsewhere.append(OtherSite(TrialSite("denser traffic", simulator, _thinned(dense)), (main,), candidates.tested))
+        elsewhere.append(OtherSite(TrialSite("denser traffic", simulator, dense), (main,), candidates.tested))
     for other in others:
         there = yield from _on_other_scene(other, surveyed, main, candidates.tested, folder)
         elsewhere.append(there)
@@ -108,8 +106,8 @@ def _on_other_scene(
     candidates = replace(settings.candidates, sensors=(main.sensor,))
     layout = lay_out(reading.geometry, replace(settings, candidates=candidates), reading.warnings)
     there = yield from case_study.place_all((yield from see(layout, folder / f"visibility_{scene.stem}.npz")))
-    runs = case_study.read_runs(survey.runs_beside(scene), layout.geometry.origin, TRAINING_INTERVAL)
-    return OtherSite(TrialSite(layout.site.name, _studio(layout), _thinned(runs)), (_most(there),), tuple(tested))
+    runs = case_study.read_runs(survey.runs_beside(scene), layout.geometry.origin, TEST_INTERVAL)
+    return OtherSite(TrialSite(layout.site.name, _studio(layout), runs), (_most(there),), tuple(tested))
 
 
 def _studio(layout: Layout) -> Simulator:
@@ -121,7 +119,3 @@ def _most(configurations: Sequence[SensorConfiguration]) -> SensorConfiguration:
     types = list(dict.fromkeys(one.sensor for one in configurations))
     own = [one for one in configurations if one.sensor == types[len(types) // 2]]
     return max(own, key=lambda one: one.count)
-
-
-def _thinned(runs: Sequence[SampledRun]) -> tuple[SampledRun, ...]:
-    return tuple(replace(run, times=run.times[::TEST_STRIDE]) for run in runs)
