@@ -36,10 +36,13 @@ class DetectionArea:
         Over the region of interest; its bottom and top are heights above the road.
     road : HeightRaster
         Heights of the highest carriageway, and of what would continue it elsewhere.
+    site : str
+        The scene's name; empty where it is not known.
     """
 
     grid: PillarGrid
     road: HeightRaster
+    site: str = ""
 
     def cloud(self, frame: Frame) -> NDArray[np.float32]:
         """Return the foreground returns over the grid, (n, 4): x, y, height above the road (metres), intensity."""
@@ -80,4 +83,5 @@ def area_of(geometry: SceneGeometry, pillar: float) -> DetectionArea:
         raise SeipError("there is no road in the region of interest: put the carriageway into SEIP Roads")
     known = HeightRaster(empty.low, ROAD_STEP, heights)
     continued = known.smoothed(ROAD_BLUR).heights
-    return DetectionArea(grid, HeightRaster(empty.low, ROAD_STEP, np.where(np.isfinite(heights), heights, continued)))
+    road = HeightRaster(empty.low, ROAD_STEP, np.where(np.isfinite(heights), heights, continued))
+    return DetectionArea(grid, road, geometry.name)

@@ -1,4 +1,4 @@
-"""Warnings where a detector is used beyond the sensor types and densities that it was trained on."""
+"""Warnings where a detector is used beyond the sensor types, sites and densities that it was trained on."""
 
 from collections.abc import Sequence
 
@@ -19,7 +19,7 @@ kept fewer points than they were learnt with: `disturbances.Capped`.
 def suitability_warnings(
     detector: Detector, sensors: Sequence[str], area: DetectionArea, frame: Frame
 ) -> tuple[str, ...]:
-    """Return warnings about using a detector beyond the types and the densities that it was trained on.
+    """Return warnings about using a detector beyond the types, the sites and the densities that it was trained on.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def suitability_warnings(
     frame : Frame
         That it is used on.
     """
-    found = (_of_types(detector, sensors), _of_pillars(detector, area, frame))
+    found = (_of_types(detector, sensors), _of_site(detector, area.site), _of_pillars(detector, area, frame))
     return tuple(sentence for sentence in found if sentence)
 
 
@@ -41,6 +41,16 @@ def _of_types(detector: Detector, sensors: Sequence[str]) -> str:
     return (
         f"the detector has learnt from clouds of {' and '.join(learnt)}, not of {' and '.join(foreign)}: "
         "test it on clouds of these types before you trust it with them, or train it on them too"
+    )
+
+
+def _of_site(detector: Detector, site: str) -> str:
+    sites = detector.training_record.sites
+    if not site or len(sites) != 1 or site in sites:
+        return ""
+    return (
+        f"the detector has learnt at {sites[0]} alone, not at {site}: at other sites it may find less than the "
+        "detector that ships, which has learnt at many"
     )
 
 
