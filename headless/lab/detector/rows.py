@@ -137,8 +137,8 @@ def _transfer_row(one: TransferResult) -> Row:
         f"learnt from {one.trained_on}, used on {one.tested_on}",
         f"{points_in_words(one.change)} against {one.against}: {one.precision.describe(1)}",
         "the same frames, paired" if one.against != "at home" else "other frames: compared as a whole",
-        "a detector's file says of which sensor types and sites it has learnt; used on other types, or away from its only "
-        "site, it is warned of",
+        "a detector's file says of which sensor types and sites it has learnt; on other types, or away from its only "
+        "site, a warning says so",
     )
 
 
