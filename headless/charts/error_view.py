@@ -71,7 +71,8 @@ def save_error_view(path: str | os.PathLike[str], views: Sequence[ErrorView], ti
     for panel, view in zip(panels, views, strict=True):
         panel.set(**limits)
         _draw(panel, view)
-    legend = figure.legend(handles=_legend(), frameon=False, fontsize=9, loc="outside lower center", ncols=7)
+    columns = 6 if len(views) > 1 else 3  # one frame is too narrow for all in a row
+    legend = figure.legend(handles=_legend(), frameon=False, fontsize=9, loc="outside lower center", ncols=columns)
     for text in legend.get_texts():
         text.set_color(INK)
     save_chart(path, figure, title)

@@ -216,6 +216,15 @@ def test_error_view(tmp_path, figures):
     assert len(middles(panel, error_view.DETECTED_COLOUR, error_view.ERROR)) == 2
 
 
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_the_legend_of_errors_is_whole(tmp_path, figures, count):
+    save_error_view(tmp_path / "errors.png", [errors()] * count, "Junction")
+    (legend,) = figures[0].legends
+    extent = legend.get_window_extent()
+    assert extent.x0 >= 0
+    assert extent.x1 <= figures[0].bbox.width
+
+
 def test_corners_of_a_turned_box():
     """4 × 2 m about (10, 0), a right angle to the left: the front left corner is at (9, 2)."""
     (turned,) = error_view.corners(np.array([[10, 0, 4, 2, np.pi / 2]]))
