@@ -10,7 +10,7 @@ from car_and_bus import car_and_bus
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless import detect
-from headless.detection.detector import Detector, TrainingRecord
+from headless.detection.detector import SHIPPED_DETECTOR, Detector, TrainingRecord
 from headless.detection.settings import NetworkSettings
 
 import numpy as np
@@ -68,6 +68,15 @@ def test_figures_charts_and_detections_are_written(folder, capsys):
     said = capsys.readouterr()
     assert "bev_0.7: AP" in said.out
     assert any("has learnt from clouds of vlp16" in sentence for sentence in record["warnings"])
+
+
+def test_the_shipped_detector_finds_the_car_and_the_bus(folder):
+    options = ["--traffic", str(folder / "first.npz"), "--every", "2", "-o", str(folder / "shipped")]
+    detect.main([str(folder / "placed.blend"), *options])
+    record = json.loads((folder / "shipped" / "detection.json").read_text(encoding="utf-8"))
+    assert record["average_precision"]["bev_0.5"]["average_precision"] > 0.5
+    assert {"type1", "type2", "type3"} <= set(record["detector"]["experience"]["sensors"])
+    assert SHIPPED_DETECTOR.stat().st_size < 2_000_000
 
 
 def test_the_same_inputs_give_the_same_figures(folder):
