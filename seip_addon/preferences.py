@@ -44,8 +44,8 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
     python: bpy.props.StringProperty(
         name="Python with PyTorch",
         subtype="FILE_PATH",
-        description="In which Detect runs: .venv/bin/python of a checkout of this project after `make detection`, or one of "
-        "your own after `pip install '.[detection]'` there",
+        description="In which Detect runs: .venv/bin/python of a checkout of this project after `make detection`, "
+        "or one of your own after `pip install '.[detection]'` there",
     )
     catalogues: bpy.props.CollectionProperty(type=SEIP_PG_catalogue_file)
 
