@@ -12,7 +12,7 @@ import bpy
 from .. import preferences, scene_status
 from ..core.errors import SeipError
 from ..core.progress import Progress
-from ..core.results.detection_record import parsed_detection
+from ..core.results.detection_record import MAIN_RULE, parsed_detection
 from ..core.storage.files import check_folder, digest
 from ..core.workflows.detection import INSTALL, DetectionJob, detect_elsewhere
 from ..core.workflows.traffic import found_runs
@@ -22,7 +22,6 @@ from ..scene.blend_file import save_blend
 from ..scene.sensors import labelled_sensors, pose_of
 from .base import LongWork, started
 
-MAIN_RULE = "bev_0.7"
 NO_SENSORS = "There is no sensor to detect road users with: place sensors first."
 NO_PYTHON = f"Detection needs a Python with PyTorch: {INSTALL}, and name its Python in the extension's preferences."
 

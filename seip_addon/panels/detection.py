@@ -8,18 +8,18 @@ import bpy
 
 from .. import preferences
 from ..core.errors import SeipError
-from ..core.results.detection_record import DetectionRecord, parsed_detection
+from ..core.results.detection_record import MAIN_RULE, DetectionRecord, parsed_detection
 from ..core.workflows.detection import ERRORS
 from ..core.workflows.traffic import traffic_folder
-from ..operators.detection import MAIN_RULE, NO_PYTHON, SEIP_OT_detect, sensors_key, why_no_detection
+from ..operators.detection import NO_PYTHON, SEIP_OT_detect, sensors_key, why_no_detection
 from ..properties.conversion import absolute
 from .run_button import draw_run
-from .sidebar import Sidebar, is_narrow, settings_column
+from .sidebar import Sidebar, settings_column
 from .traffic import SEIP_PT_traffic
 from .wrapped_text import draw_sentence
 
 NAMES = {
-    MAIN_RULE: "All",
+    MAIN_RULE: "AP of all",
     "car_van_0.7": "Cars, vans",
     "truck_bus_0.7": "Trucks, buses",
     "motorcycle_bicycle_0.5": "Two-wheelers",
@@ -74,14 +74,11 @@ def _draw_found(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         draw_sentence(column, CHANGED, icon="ERROR")
         column = box.column()
         column.active = False
-    lines = figures(found)
     table = column.column(align=True)
-    for name, precision, users in (("", "AP", "Road users"), *lines):
-        row = table.split(factor=0.3)
+    for name, figure in figures(found):
+        row = table.split(factor=0.42)
         row.label(text=name)
-        row.label(text=precision)
-        if not is_narrow(bpy.context):
-            row.label(text=users)
+        row.label(text=figure)
     draw_sentence(column, MEANING)
     for sentence in found.warnings:
         draw_sentence(column, sentence, icon="INFO")
@@ -92,17 +89,15 @@ def _draw_found(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         row.operator("wm.path_open", text="", icon="FILE_FOLDER").filepath = str(folder)
 
 
-def figures(found: DetectionRecord) -> list[tuple[str, str, str]]:
-    """Return the name, average precision with its interval, and number of each kind of road users, as texts."""
-    lines = []
-    for rule, name in NAMES.items():
-        one = found.average_precision.get(rule)
-        if one is not None:
-            between = (
-                "" if one.interval is None else " ({:.1f} to {:.1f})".format(*(100.0 * end for end in one.interval))
-            )
-            lines.append((name, f"{one.average_precision:.1%}{between}", f"{one.road_users:,}"))
-    return lines
+def figures(found: DetectionRecord) -> list[tuple[str, str]]:
+    """Return how many road users there were, and the average precision of each kind with its interval, as text."""
+    precisions = {NAMES[rule]: one for rule, one in found.average_precision.items() if rule in NAMES}
+    lines = [(name, f"{one.average_precision:.1%}{_between(one.interval)}") for name, one in precisions.items()]
+    return [("Road users", f"{precisions[NAMES[MAIN_RULE]].road_users:,}"), *lines]
+
+
+def _between(interval: tuple[float, float] | None) -> str:
+    return "" if interval is None else " ({:.1f}–{:.1f})".format(*(100.0 * end for end in interval))
 
 
 CLASSES = (SEIP_PT_detection,)

@@ -106,8 +106,12 @@ def test_the_figures_stand_in_the_panel_and_the_files_in_the_folder(placed, stan
     assert files(tmp_path / "out") == {"detection.json", "errors.png", str(Path("kitti", "000000.txt"))}
     assert json.loads(placed.seip.detection.record) == RECORD
     said, labels = drawn(monkeypatch)
-    assert labels[3:6] == ["All", "71.2% (66.0 to 77.5)", "1,234"]
-    assert labels[6:] == ["Cars, vans", "80.0%", "1,000", "Pedestrians", "25.0%", "234"]
+    assert dict(zip(labels[::2], labels[1::2], strict=True)) == {
+        "Road users": "1,234",
+        "AP of all": "71.2% (66.0–77.5)",
+        "Cars, vans": "80.0%",
+        "Pedestrians": "25.0%",
+    }
     assert said == [detection_panel.MEANING, "other types were learnt"]
 
 
@@ -193,6 +197,7 @@ def test_each_mistake_has_its_sentence(placed, stand_in, tmp_path, wrong, words)
         ("raise MemoryError('of 3 GiB')", RECORD, "detection failed in .*: MemoryError: of 3 GiB"),
         ("os.kill(os.getpid(), 9)", RECORD, "detection failed in .*: it ended with status -9"),
         ("", RECORD | {"schema": "seip-detection/9"}, "schema 'seip-detection/9', not 'seip-detection/1'"),
+        ("", {**RECORD, "average_precision": {}}, r"damaged: average_precision\.bev_0\.7 is missing; detect again"),
         ("", {**RECORD, "warnings": 3}, "figures of detection are damaged: warnings must be a list"),
     ],
 )

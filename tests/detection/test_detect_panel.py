@@ -18,7 +18,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from small_junction import make_example
 
 import seip_addon
-from seip_addon.panels.detection import MAIN_RULE, NAMES
+from seip_addon.core.results.detection_record import MAIN_RULE
+from seip_addon.panels.detection import NAMES
 from seip_addon.scene.write import write_result
 
 

@@ -276,7 +276,7 @@ def _detection_runs_in_another_python(window: Window) -> Steps:
     yield from _press(window, "seip.detect(")
     assert {path.name for path in (OUT / "detection").iterdir()} == {"detection.json", "errors.png"}
     assert (yield from _says(window, "has learnt from clouds"))
-    yield from window.find("seip.detect(")
+    yield from window.find("wm.path_open(")
     yield from window.picture("detected")
     preferences.own().python = ""
 

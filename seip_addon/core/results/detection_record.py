@@ -8,6 +8,8 @@ from ..errors import SeipError
 from ..storage.json_dataclass import from_json
 
 SCHEMA = "seip-detection/1"
+MAIN_RULE = "bev_0.7"
+"""Counts all road users; in every record."""
 FORMATS = ("kitti", "openpcdet")
 """Folders of the detections of each frame, beside ``detection.json``."""
 
@@ -36,6 +38,10 @@ class DetectionRecord:
 
     average_precision: Mapping[str, RecordedPrecision]
     warnings: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        if MAIN_RULE not in self.average_precision:
+            raise ValueError(f"average_precision.{MAIN_RULE} is missing")
 
 
 def parsed_detection(text: str) -> DetectionRecord:
