@@ -36,6 +36,7 @@ import numpy as np
 from seip_addon.core.datasets.detection_files import kitti_results, openpcdet_results
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.results.detection_record import FORMATS, SCHEMA
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.robustness.traffic_instants import check_runs
 from seip_addon.core.scans import MountedSensor, ScanSettings, static_scene
@@ -47,8 +48,6 @@ from seip_addon.core.workflows.survey import SurveySettings
 from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import changed_beams, read_sensors
-
-SCHEMA = "seip-detection/1"
 
 
 def main(argv: list[str]) -> None:
@@ -67,7 +66,8 @@ def main(argv: list[str]) -> None:
         replace(one, model=weather.through(one.model))
         for one in read_sensors(bpy.context.scene, load_catalogue(options.catalogue))
     ]
-    runtime.warn(changed_beams(bpy.context.scene, sensors))
+    changed = changed_beams(bpy.context.scene, sensors)
+    runtime.warn(changed)
     runs = read_runs(options.traffic, geometry.origin, options.every)
     if len(runs) > 1:
         moved = [vehicle_positions(run.name, run.trajectories) for run in runs]
@@ -95,7 +95,7 @@ def main(argv: list[str]) -> None:
             "scans": {"seed": scans.seed, "rolling_shutter": scans.rolling_shutter},
             "average_precision": figures(judgement),
             "score": judgement.score,
-            "warnings": list(doubts),
+            "warnings": [*changed, *doubts],
             "versions": versions(blender=bpy.app.version_string),
         }
         save_json(options.output / "detection.json", record)
@@ -127,7 +127,7 @@ def _save(folder: Path, judgement: Judgement, static: StaticScene, sensors: list
     save_error_view(folder / "errors.png", [view], f"{name}, {frame.run} at {frame.time:.1f} s")
     for number, one in enumerate(judgement.frames):
         boxes, categories, scores = one.detected.boxes, one.detected.category.tolist(), one.detected.score
-        for form, lines in (("kitti", kitti_results), ("openpcdet", openpcdet_results)):
+        for form, lines in zip(FORMATS, (kitti_results, openpcdet_results), strict=True):
             with whole_file(folder / form / f"{number:06d}.txt") as temporary:
                 temporary.write_text(lines(boxes, categories, scores), encoding="utf-8")
 

@@ -48,7 +48,7 @@ except ImportError:
 Result = TypeVar("Result")
 
 EXIT_STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl-C
-SECONDS_BETWEEN_LINES = 10.0
+SECONDS_BETWEEN_LINES = float(os.environ.get("SEIP_SECONDS_BETWEEN_LINES", "10"))  # of progress, in a log
 ELAPSED_FORMAT = "{desc} [{elapsed}]"  # how progress of unknown length is shown
 LOG = logging.getLogger("headless")  # progress and warnings of commands and modules; results go through `print_line`
 _LOCKS: dict[Path, int] = {}  # folders that this process has locked, and what holds each lock
@@ -162,7 +162,8 @@ def progress_bar() -> Iterator[Callable[[Progress], None]]:
     """Yield a callable for `finish` that shows work done and time left on standard error.
 
     A terminal sees one bar, which stays on its line and begins anew where the work does (a smaller count, another
-    total); work of unknown length shows what it does and for how long. A log gets a line every ten seconds at most.
+    total); work of unknown length shows what it does and for how long. A log gets a line every ten seconds at most,
+    or as often as ``SEIP_SECONDS_BETWEEN_LINES`` in the environment says.
     """
     if not sys.stderr.isatty():
         yield _line_reporter()
@@ -181,7 +182,7 @@ def progress_bar() -> Iterator[Callable[[Progress], None]]:
 
 
 def _line_reporter() -> Callable[[Progress], None]:
-    """Return what writes a line on progress where ten seconds have passed since the last one."""
+    """Return what writes a line on progress where `SECONDS_BETWEEN_LINES` have passed since the last one."""
     start = shown = time.monotonic()
 
     def report(progress: Progress) -> None:

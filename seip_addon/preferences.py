@@ -1,5 +1,7 @@
 """Add-on preferences, for all files."""
 
+import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import bpy
@@ -8,6 +10,7 @@ from .core.errors import SeipError
 from .core.lidar import LidarModel, load_catalogue
 from .core.visibility.ray_casting import MAX_THREADS
 from .core.visibility.store import GridFolder
+from .core.workflows.detection import DetectingPython
 
 ADDON_ID = (__package__ or "").removesuffix(".seip_addon")
 """The extension's key among Blender's add-ons: not that of the package in it."""
@@ -38,6 +41,12 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
         subtype="DIR_PATH",
         description="Where visibility is kept from run to run; empty for the extension's own folder",
     )
+    python: bpy.props.StringProperty(
+        name="Python with PyTorch",
+        subtype="FILE_PATH",
+        description="In which Detect runs: .venv/bin/python of a checkout of this project after `make detection`, "
+        "or one of your own after `pip install '.[detection]'` there",
+    )
     catalogues: bpy.props.CollectionProperty(type=SEIP_PG_catalogue_file)
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -49,6 +58,7 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
         row = layout.row()
         row.label(text=f"Kept visibility: {_kept().megabytes():,.1f} MB")
         row.operator("seip.empty_cache", icon="TRASH")
+        layout.prop(self, "python")
         layout.label(text="Catalogues of sensor types")
         for number, file in enumerate(self.catalogues):
             row = layout.row(align=True)
@@ -67,6 +77,18 @@ def cache_folder() -> Path:
     if ADDON_ID.startswith("bl_ext."):
         return Path(bpy.utils.extension_path_user(ADDON_ID, path="visibility", create=True))
     return Path(bpy.utils.resource_path("USER")) / "seip" / "visibility"  # run from a checkout
+
+
+def detecting_python() -> DetectingPython | None:
+    """Return the Python that detection runs in, or None where nobody has named one and this one cannot be it."""
+    preferences = own()
+    if preferences is not None and preferences.python:
+        program = Path(bpy.path.abspath(preferences.python)).absolute()  # not resolved: .venv/bin/python is a link
+        return DetectingPython(program, program.parent.parent.parent)
+    project = find_spec("headless")
+    if bpy.app.module and project is not None and project.origin is not None and find_spec("torch") is not None:
+        return DetectingPython(Path(sys.executable), Path(project.origin).parents[1])
+    return None
 
 
 def cores() -> int | None:

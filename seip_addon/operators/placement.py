@@ -19,8 +19,9 @@ from ..core.progress import Progress
 from ..core.results.placement_record import Provenance, versions
 from ..core.robustness.robust_study import RobustnessSettings
 from ..core.workflows.robust import check_robust_objective, place_robustly
-from ..core.workflows.survey import Layout, Survey, place, record_of
-from ..core.workflows.traffic import TrafficRuns, TrafficSettings, place_in_traffic, read_runs, runs_in
+from ..core.workflows.survey import Survey, place, record_of
+from ..core.workflows.traffic import TrafficSettings, found_runs, place_in_traffic, read_runs
+from ..properties.conversion import runs_folder
 from ..scene.write import write_result
 from ..session import SceneState
 from ..viewport import coverage
@@ -46,7 +47,7 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneState], bpy.types.Ope
         self._asked: dict[str, object] = {}
         if traffic is not None:
             self._asked = {"traffic": asdict(traffic)}
-            return _placed_in_traffic(surveying, objective, traffic, asked.runs_folder())
+            return _placed_in_traffic(surveying, objective, traffic, runs_folder(asked.runs))
         if robustness is not None:
             self._asked = {"robustness": robustness.as_record()}
             return _placed(surveying, objective, partial(_robust, objective=objective, settings=robustness))
@@ -87,22 +88,12 @@ def _placed_in_traffic(
     surveying: Generator[Progress, None, SceneState], objective: Objective, settings: TrafficSettings, folder: Path
 ) -> Generator[Progress, None, SceneState]:
     state = yield from surveying
-    runs = yield from _read_runs(folder, state.layout)  # refuses before any ray is cast
+    runs = yield from read_runs(found_runs(folder), state.layout)  # refuses before any ray is cast
 
     def placing(survey: Survey) -> Generator[Progress, None, Solution]:
         return (yield from place_in_traffic(survey, objective, runs, settings)).solution
 
     return (yield from _placed_on(state, objective, placing))
-
-
-def _read_runs(folder: Path, layout: Layout) -> Generator[Progress, None, TrafficRuns]:
-    paths = runs_in(folder)
-    if not paths:
-        raise SeipError(
-            f"there is no run of traffic (.npz) in {folder}: choose another folder, or make two or more runs with "
-            "headless/traffic.py, a seed each"
-        )
-    return (yield from read_runs(paths, layout))
 
 
 class SEIP_OT_add_rule(bpy.types.Operator):

@@ -10,7 +10,6 @@ from pathlib import Path
 import bpy
 
 from .. import live_scan, preferences, scene_status, scene_survey
-from ..core.errors import SeipError
 from ..core.placement.objective import target_weights
 from ..core.progress import Progress, finish
 from ..core.results.placement_record import parsed_record, versions
@@ -24,6 +23,7 @@ from ..core.traffic.source import TrafficFiles, load_traffic
 from ..core.traffic.trajectories import LoadedTraffic
 from ..core.workflows.recording import RecordingSettings, make_run, record, simulation_of
 from ..core.workflows.survey import surroundings
+from ..properties.conversion import output_folder
 from ..scene import contract
 from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
@@ -234,7 +234,7 @@ class SEIP_OT_write_dataset(_Scanning[tuple[Record, tuple[str, ...]]], bpy.types
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[Record, tuple[str, ...]]]:
         """Read what is recorded."""
         self._scene_read = _SceneRead(scene)
-        self._folder = _folder(scene)
+        self._folder = output_folder(scene.seip.traffic.folder, "the scans")
         return _recorded(self._scene_read, self._folder)
 
     def conclude(self, scene: bpy.types.Scene, result: tuple[Record, tuple[str, ...]]) -> None:
@@ -281,15 +281,6 @@ class _SceneRead:
         """Hold what was read from files, so that the next scan need not."""
         if self._files is not None and self._trajectories is not None:
             session.traffic[scene.session_uid] = SceneTraffic(self._files, self._changed, self._trajectories)
-
-
-def _folder(scene: bpy.types.Scene) -> Path:
-    named = scene.seip.traffic.folder
-    if not named:
-        raise SeipError("name a folder to write the scans to")
-    if named.startswith("//") and not bpy.data.filepath:
-        raise SeipError(f"the folder {named} is beside the file, and the file has not been saved: save it first")
-    return Path(bpy.path.abspath(named))
 
 
 def _facts(trajectories: Trajectories) -> list[str]:

@@ -8,7 +8,9 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
+from ..core.errors import SeipError
 from ..core.settings import settings_of
+from ..core.workflows.traffic import traffic_folder
 
 _KINDS = {bool: BoolProperty, int: IntProperty, float: FloatProperty, str: EnumProperty}
 _UNITS = {"m": {"unit": "LENGTH"}, "rad": {"subtype": "ANGLE"}}
@@ -35,6 +37,42 @@ def of_setting(kind: type, field: str, name: str, **more: Any) -> Any:  # noqa: 
 def absolute(text: str) -> Path:
     """Return a path that may be relative to the .blend."""
     return Path(bpy.path.abspath(text))
+
+
+def runs_folder(named: str) -> Path:
+    """Return the folder with runs of traffic: the one that is named, else that beside the file.
+
+    Raises
+    ------
+    SeipError
+        It is beside the file, and the file has not been saved.
+    """
+    if not bpy.data.filepath and (not named or named.startswith("//")):
+        raise SeipError(
+            "the runs of traffic are beside the file, and the file has not been saved: save it first, or choose "
+            "another folder"
+        )
+    return absolute(named) if named else traffic_folder(Path(bpy.data.filepath))
+
+
+def output_folder(named: str, what: str) -> Path:
+    """Return the folder that results are written to.
+
+    Parameters
+    ----------
+    what : str
+        Is written there.
+
+    Raises
+    ------
+    SeipError
+        None is named, or it is beside the file, and the file has not been saved.
+    """
+    if not named:
+        raise SeipError(f"name a folder to write {what} to")
+    if named.startswith("//") and not bpy.data.filepath:
+        raise SeipError(f"the folder {named} is beside the file, and the file has not been saved: save it first")
+    return absolute(named)
 
 
 def as_typed(value: float) -> float:

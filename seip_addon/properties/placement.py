@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Literal
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from .. import selection
-from ..core.errors import SeipError
 from ..core.placement.objective import DEFAULT_COUNT, Objective
 from ..core.robustness.pose_errors import MAX_ANGLE_STD, PoseErrors
 from ..core.robustness.risk import Risk
 from ..core.robustness.robust_study import RobustnessSettings
 from ..core.robustness.traffic_study import LAYER_NAMES
-from ..core.workflows.traffic import TrafficSettings, traffic_folder
-from .conversion import absolute, as_typed, of_setting
+from ..core.workflows.traffic import TrafficSettings
+from .conversion import as_typed, of_setting
 
 TAILS = {"EXPECTED": 1.0, "CVAR": 0.25, "WORST": 0.0}
 """Share of the scenarios, the worst ones, that count, by objective."""
@@ -161,21 +159,6 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         if self.objective != "TRAFFIC":
             return None
         return TrafficSettings(self.layer, self.weights_from_traffic, self.instants, self.evaluation_instants)
-
-    def runs_folder(self) -> Path:
-        """Return the folder with the runs of traffic.
-
-        Raises
-        ------
-        SeipError
-            It is beside the file, and the file has not been saved.
-        """
-        if not bpy.data.filepath and (not self.runs or self.runs.startswith("//")):
-            raise SeipError(
-                "the runs of traffic are beside the file, and the file has not been saved: save it first, or choose "
-                "another folder"
-            )
-        return absolute(self.runs) if self.runs else traffic_folder(Path(bpy.data.filepath))
 
     def _weight(self) -> float | Literal["scene"] | None:
         if self.weighting == "SCENE":

@@ -6,6 +6,7 @@ import bpy
 from bpy.props import CollectionProperty, IntProperty, PointerProperty
 
 from ..scene_status import FILE_VERSION
+from .detection import SEIP_PG_detection
 from .placement import SEIP_PG_goal
 from .results import SEIP_PG_placement, SEIP_PG_result
 from .site import SEIP_PG_site
@@ -26,6 +27,7 @@ class SEIP_PG_scene(bpy.types.PropertyGroup):
     active_kept: IntProperty(name="Kept Placement", description="The one that the present placement is compared with")
     view: PointerProperty(type=SEIP_PG_view)
     traffic: PointerProperty(type=SEIP_PG_traffic)
+    detection: PointerProperty(type=SEIP_PG_detection)
 
 
 CLASSES = (SEIP_PG_scene,)

@@ -115,6 +115,10 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         """Say what is wrong with the tilts, or nothing."""
         return _complaint(lambda: CandidateSettings(tilts=tilts_of(self.tilts.split())))
 
+    def weather(self) -> Weather:
+        """Return the weather that sensors look through."""
+        return Weather(as_typed(self.rain), as_typed(self.visibility) if self.fog else math.inf, self.wet_road)
+
     def settings(self) -> SurveySettings:
         """Return what is asked, as the core takes it.
 
@@ -137,7 +141,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
                 assumed_poles=self.assumed_poles,
             ),
             visibility=VisibilitySettings(as_typed(self.delta), as_typed(self.min_intensity), as_typed(self.detection)),
-            weather=Weather(as_typed(self.rain), as_typed(self.visibility) if self.fog else math.inf, self.wet_road),
+            weather=self.weather(),
             grid_spacing=as_typed(self.grid),
             catalogue=catalogue_files(),
             engine=self.engine,

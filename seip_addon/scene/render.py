@@ -6,10 +6,8 @@ import json
 import math
 import os
 import re
-import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,11 +18,12 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ..core.arrays import Boolean, Float
+from ..core.child_process import run_logged
 from ..core.errors import SeipError
 from ..core.pictures.labelled_view import Sight, save_labelled_view
 from ..core.pictures.viewpoint import Viewpoint, frame
 from ..core.placement.deployment import Deployment
-from ..core.progress import REPORT_INTERVAL, Progress
+from ..core.progress import Progress
 from ..core.site.site import Site
 from . import contract
 from .daylight import add_daylight
@@ -36,7 +35,7 @@ AZIMUTH, ELEVATION = math.radians(-115.0), math.radians(52.0)  # of the camera, 
 FIELD_OF_VIEW = math.radians(35.0)  # across the picture
 ROOM = 1.04  # around the region
 SENSOR_ROOM = 0.5  # metres round a sensor that its own body and bracket take up
-SAMPLE = re.compile(rb"Sample (\d+)/")
+SAMPLE = re.compile(r"Sample (\d+)/")
 """How Cycles tells of its progress."""
 UNSEEN_TYPES = {"LIGHT", "CAMERA", "SPEAKER", "LIGHT_PROBE"}
 
@@ -130,7 +129,7 @@ def render_elsewhere(
         job.write_text(
             json.dumps({"path": sys.path, "blend": str(blend), "scene": scene, "raw": str(raw), "shot": shot.as_json()})
         )
-        yield from _waited_for(_command(job), log)
+        yield from run_logged(_command(job), log, _samples)
         try:
             hidden = np.array(json.loads(raw.with_suffix(".json").read_text()), dtype=bool)
         except OSError as error:
@@ -148,18 +147,9 @@ def _command(job: Path) -> list[str]:
     return [sys.executable, script, "--", str(job)]
 
 
-def _waited_for(command: list[str], log: Path) -> Generator[Progress, None, None]:
-    """Run a command to its end, its lines to a file, and report the samples that it tells of."""
-    with log.open("wb") as lines:
-        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=lines, stderr=subprocess.STDOUT)  # noqa: S603  # Blender itself, or this Python
-    try:
-        while process.poll() is None:
-            told = SAMPLE.findall(log.read_bytes())
-            yield Progress(int(told[-1]) if told else 0, SAMPLES, "rendering")
-            time.sleep(REPORT_INTERVAL)
-    finally:
-        process.kill()
-        process.wait()
+def _samples(said: str) -> Progress:
+    told = SAMPLE.findall(said)
+    return Progress(int(told[-1]) if told else 0, SAMPLES, "rendering")
 
 
 def take(shot: Shot, scene: bpy.types.Scene, raw: Path) -> Boolean:

@@ -175,7 +175,7 @@ def test_windows_of_a_deleted_building_go_with_it(scene):
     assert any(obj.name.endswith(" windows") for obj in scene.objects)
 
 
-@pytest.mark.parametrize("name", ["visibility", "placement", "view", "scan", "dataset"])
+@pytest.mark.parametrize("name", ["visibility", "placement", "view", "scan", "dataset", "detection"])
 def test_a_panel_says_one_line_where_there_is_nothing_yet(scene, name, monkeypatch):
     panel = getattr(bpy.types, f"SEIP_PT_{name}")
     module = sys.modules[panel.__module__]

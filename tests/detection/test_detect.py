@@ -13,6 +13,7 @@ from headless import detect
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, TrainingRecord
 from headless.detection.settings import NetworkSettings
 
+import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -21,7 +22,9 @@ from small_junction import make_example
 
 from seip_addon.core.datasets.detection_files import kitti_results, openpcdet_results
 from seip_addon.core.errors import SeipError
-from seip_addon.scene.blend_file import save_blend
+from seip_addon.scene import contract
+from seip_addon.scene.blend_file import open_blend, save_blend
+from seip_addon.scene.sensors import labelled_sensors
 from seip_addon.scene.write import write_result
 
 
@@ -104,6 +107,16 @@ def test_mistakes_are_named(folder, tmp_path):
     with pytest.raises(SeipError, match=r"nobody of the run of traffic \(by hand, -3\.5\) is ever in the region"):
         detect.main(arguments(folder, "x", str(tmp_path / "far.npz")))
     assert not (folder / "x" / "detection.json").exists()
+
+
+def test_sensors_with_other_beams_than_they_were_placed_with_are_told_of_in_the_record(folder, tmp_path):
+    open_blend(folder / "placed.blend")
+    for empty in labelled_sensors(bpy.context.scene).values():
+        empty[contract.BEAMS] = "others"
+    save_blend(tmp_path / "changed.blend")
+    detect.main(arguments(folder, "changed", "first.npz", scene=tmp_path / "changed.blend"))
+    record = json.loads((folder / "changed" / "detection.json").read_text(encoding="utf-8"))
+    assert any("was placed with other beams" in sentence for sentence in record["warnings"])
 
 
 def test_the_same_run_twice_is_refused(folder):

@@ -182,8 +182,10 @@ class Window:
             yield from self._hover(heading, 10 * BEAT)
             yield from self.press("LEFTMOUSE", heading)
             yield 0.5
-            if (yield from self._find_here(inside, (0.6,))):
-                return
+            for pages in (0, 1):  # what opens may lie below the foot
+                yield from self._scroll(pages)
+                if (yield from self._find_here(inside, (0.6,))):
+                    return
         raise LookupError(f"there is no panel with {inside} below {what}")
 
     def beside(self, place: tuple[int, int], what: str) -> Generator[float, None, tuple[int, int]]:

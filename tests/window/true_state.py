@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import bpy
 from bl_ext.user_default.seip.seip_addon import preferences
 from bl_ext.user_default.seip.seip_addon.core.visibility import ray_casting
-from bl_ext.user_default.seip.seip_addon.panels import placement, results, site
+from bl_ext.user_default.seip.seip_addon.panels import detection, placement, results, site
 from bl_ext.user_default.seip.seip_addon.session import session
 from driver import Steps, Window, play
 from mathutils import Vector
@@ -44,6 +44,7 @@ def scenario(window: Window) -> Steps:
         _poles_have_feet,
         _moved_sensors_stay,
         _exports_leave_the_window_alone,
+        _detection_runs_in_another_python,
     )
     for part in parts:
         if asked and part.__name__ not in asked:
@@ -232,6 +233,54 @@ def _exports_leave_the_window_alone(window: Window) -> Steps:
     assert {path.name: path.read_bytes() for path in FOLDER.iterdir()} == before, "a stopped export left something"
 
 
+DETECT = """
+import json, pathlib, sys, time
+output = pathlib.Path(sys.argv[sys.argv.index("-o") + 1])
+for done in range(30):
+    print(f"detect in run-1:  {done / 30:.0%}|##   | {done}/30 [00:02<00:06]", file=sys.stderr, flush=True)
+    time.sleep(0.3)
+output.mkdir()
+figure = {"average_precision": 0.7125, "interval": [0.66, 0.775], "road_users": 1234}
+rules = ("bev_0.7", "car_van_0.7", "truck_bus_0.7", "motorcycle_bicycle_0.5", "pedestrian_0.5")
+warnings = ["the detector has learnt from clouds of type1, not of type2"]
+record = {"schema": "seip-detection/1", "average_precision": dict.fromkeys(rules, figure), "warnings": warnings}
+(output / "errors.png").write_bytes(b"picture")
+(output / "detection.json").write_text(json.dumps(record))
+"""
+"""What stands in for the command: there is no PyTorch in every Python."""
+
+
+def _detection_runs_in_another_python(window: Window) -> Steps:
+    yield from _press(window, "seip.solve_placement(")
+    asked, runs = _scene().seip.detection, (Path("scenes") / "junction_traffic").resolve()
+    _scene().seip.traffic.file, asked.runs = str(runs / "run-1.npz"), str(runs)
+    asked.folder = str(OUT / "detection")
+    shutil.rmtree(OUT / "detection", ignore_errors=True)
+    yield from window.open_below("seip.scan_frame(", "preferences.addon_show(", skip=1)
+    assert (yield from _says(window, "needs a Python with PyTorch"))
+    yield from window.picture("no-torch")
+    package, python = OUT / "project" / "headless", OUT / "project" / ".venv" / "bin" / "python"
+    for folder in (package, python.parent):
+        folder.mkdir(parents=True, exist_ok=True)
+    (package / "__init__.py").touch()
+    (package / "__main__.py").write_text(DETECT, encoding="utf-8")
+    python.unlink(missing_ok=True)
+    python.symlink_to(sys.executable)
+    preferences.own().python = str(python)
+    yield from window.click("seip.detect(")
+    yield from window.until(lambda: session.running.work.progress.done > 5, 30)
+    yield from window.picture("detecting")
+    bpy.ops.seip.stop()
+    yield from window.until(lambda: session.running is None, 1)
+    yield from window.until(lambda: not (OUT / "detection").exists(), 2)
+    yield from _press(window, "seip.detect(")
+    assert {path.name for path in (OUT / "detection").iterdir()} == {"detection.json", "errors.png"}
+    assert (yield from _says(window, "has learnt from clouds"))
+    yield from window.find("wm.path_open(")
+    yield from window.picture("detected")
+    preferences.own().python = ""
+
+
 class _Gaps:
     """The longest time for which the window did nothing else."""
 
@@ -291,7 +340,7 @@ def _says(window: Window, words: str) -> Generator[float, None, bool]:
 
 
 def _listen() -> None:
-    for module in (placement, results, site):
+    for module in (placement, results, site, detection):
 
         def drawn(layout: Any, text: str, *, then: Callable[..., None] = module.draw_sentence, **more: object) -> None:
             _said.append(text)

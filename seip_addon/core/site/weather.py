@@ -66,6 +66,12 @@ class Weather:
         """Whether roads and ground are wet."""
         return self.wet_road or self.rain > 0
 
+    def words(self) -> tuple[str, ...]:
+        """Return the words of which `weather_of` makes this weather."""
+        rain = (f"rain={self.rain!r}",) if self.rain > 0 else ()
+        fog = (f"visibility={self.visibility!r}",) if math.isfinite(self.visibility) else ()
+        return (*rain, *fog, *(("wet",) if self.wet_road else ()))
+
     def through(self, model: LidarModel) -> LidarModel:
         """Return a sensor that looks through this weather."""
         return model.in_air(self.extinction) if self.extinction > 0 else model

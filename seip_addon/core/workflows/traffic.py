@@ -113,6 +113,23 @@ def runs_in(folder: Path) -> list[Path]:
     return sorted(folder.glob("*.npz"), key=by_number)
 
 
+def found_runs(folder: Path) -> list[Path]:
+    """Return the files of runs in a folder, one or more.
+
+    Raises
+    ------
+    SeipError
+        There is none.
+    """
+    paths = runs_in(folder)
+    if not paths:
+        raise SeipError(
+            f"there is no run of traffic (.npz) in {folder}: choose another folder, or make two or more runs with "
+            "headless/traffic.py, a seed each"
+        )
+    return paths
+
+
 def load_runs(paths: Sequence[Path], origin: Float) -> list[Trajectories]:
     """Read runs, in the local axes of an origin."""
     return [Trajectories.load(path).moved_to(origin) for path in paths]

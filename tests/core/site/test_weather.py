@@ -19,6 +19,13 @@ def test_words_are_weather():
 
 
 @pytest.mark.parametrize(
+    "weather", [Weather(), Weather(rain=0.1), Weather(visibility=150.5), Weather(7.0, 80.0, wet_road=True)]
+)
+def test_weather_in_words_is_the_same_weather(weather):
+    assert weather_of(weather.words()) == weather
+
+
+@pytest.mark.parametrize(
     "words", [["sun"], ["rain"], ["rain=hard"], ["rain=nan"], ["visibility=inf"], ["wet=1"], ["fog=3"]]
 )
 def test_other_words_are_refused(words):

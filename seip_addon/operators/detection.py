@@ -1,0 +1,107 @@
+"""The operator that evaluates the sensors by what a trained detector finds with them in traffic."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import bpy
+
+from .. import preferences, scene_status
+from ..core.errors import SeipError
+from ..core.progress import Progress
+from ..core.results.detection_record import MAIN_RULE, parsed_detection
+from ..core.storage.files import check_folder, digest
+from ..core.workflows.detection import INSTALL, DetectionJob, detect_elsewhere
+from ..core.workflows.traffic import found_runs
+from ..properties.conversion import absolute, output_folder, runs_folder
+from ..scene import contract
+from ..scene.blend_file import save_blend
+from ..scene.sensors import labelled_sensors, pose_of
+from .base import LongWork, started
+
+NO_SENSORS = "There is no sensor to detect road users with: place sensors first."
+NO_PYTHON = f"Detection needs a Python with PyTorch: {INSTALL}, and name its Python in the extension's preferences."
+
+
+def why_no_detection(scene: bpy.types.Scene) -> str:
+    """Return why nothing can be detected; nothing where it can."""
+    if not labelled_sensors(scene):
+        return NO_SENSORS
+    return scene_status.obstacle(scene) or ("" if preferences.detecting_python() is not None else NO_PYTHON)
+
+
+def sensors_key(scene: bpy.types.Scene) -> str:
+    """Return a digest of the types and poses of a scene's sensors; empty where one has no proper transform."""
+    try:
+        each = [(label, str(obj.get(contract.SENSOR)), *pose_of(obj)) for label, obj in labelled_sensors(scene).items()]
+    except SeipError:
+        return ""
+    return digest(*(part for parts in each for part in parts))
+
+
+class SEIP_OT_detect(LongWork[str], bpy.types.Operator):
+    """Scan runs of traffic with the sensors as they hang, and see which road users a trained detector finds; it runs in a Python with PyTorch of its own"""  # noqa: E501  # a tooltip is one line
+
+    bl_idname = "seip.detect"
+    bl_label = "Detect"
+    stopped_message = "stopped; nothing was written"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether there are sensors, and a Python with PyTorch."""
+        sentence = why_no_detection(context.scene)
+        if sentence:
+            cls.poll_message_set(sentence)
+        return not sentence
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, str]:
+        """Save the scene as it is, for the process that detects."""
+        asked, python = scene.seip.detection, preferences.detecting_python()
+        if python is None:
+            raise SeipError(NO_PYTHON)
+        job = DetectionJob(
+            python,
+            tuple(found_runs(runs_folder(asked.runs))),
+            absolute(asked.detector) if asked.detector else None,
+            preferences.catalogue_files(),
+            scene.seip.survey.weather(),
+        )
+        self._folder = output_folder(asked.folder, "the figures")
+        self._sensors = sensors_key(scene)
+        return started(_detected(job, self._folder))
+
+    def conclude(self, scene: bpy.types.Scene, result: str) -> None:
+        """Keep the figures with the scene."""
+        scene.seip.detection.record, scene.seip.detection.sensors = result, self._sensors
+        found = parsed_detection(result)
+        for sentence in found.warnings:
+            self.report({"WARNING"}, sentence)
+        precision = found.average_precision[MAIN_RULE]
+        self.report({"INFO"}, f"average precision {precision.average_precision:.1%}; written to {self._folder}")
+
+
+def _detected(job: DetectionJob, folder: Path) -> Generator[Progress, None, str]:
+    with _folder_of_result(folder), TemporaryDirectory(prefix=".seip-detection-", dir=folder) as temporary:
+        scene = Path(temporary) / "placed.blend"
+        save_blend(scene)
+        yield Progress(0, 0, "starting PyTorch")
+        return (yield from detect_elsewhere(job, scene, folder))
+
+
+@contextmanager
+def _folder_of_result(folder: Path) -> Iterator[None]:
+    """Make a folder where it is missing, and take it away again where nothing was written to it."""
+    new = not folder.exists()
+    check_folder(folder)
+    try:
+        yield
+    finally:
+        if new:
+            with suppress(OSError):  # it holds something
+                folder.rmdir()
+
+
+CLASSES = (SEIP_OT_detect,)

@@ -1,0 +1,103 @@
+"""The panel of detection: what a trained detector finds with the sensors in traffic."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from .. import preferences
+from ..core.errors import SeipError
+from ..core.results.detection_record import MAIN_RULE, DetectionRecord, parsed_detection
+from ..core.workflows.detection import ERRORS
+from ..core.workflows.traffic import traffic_folder
+from ..operators.detection import NO_PYTHON, SEIP_OT_detect, sensors_key, why_no_detection
+from ..properties.conversion import absolute
+from .run_button import draw_run
+from .sidebar import Sidebar, settings_column
+from .traffic import SEIP_PT_traffic
+from .wrapped_text import draw_sentence
+
+NAMES = {
+    MAIN_RULE: "AP of all",
+    "car_van_0.7": "Cars, vans",
+    "truck_bus_0.7": "Trucks, buses",
+    "motorcycle_bicycle_0.5": "Two-wheelers",
+    "pedestrian_0.5": "Pedestrians",
+}
+"""Of road users, by the rule that average precision is taken by."""
+MEANING = (
+    "AP, average precision, is 100% where every road user is found and nothing else is reported. A road user is found "
+    "where its box and the detected one, seen from above, share 70% of the area that they cover together (50% for "
+    "two-wheelers and pedestrians). In brackets the 95% interval over other traffic."
+)
+CHANGED = "The sensors have changed since: detect again."
+
+
+class SEIP_PT_detection(Sidebar, bpy.types.Panel):
+    """Average precision of the sensors as they hang."""
+
+    bl_idname = "SEIP_PT_detection"
+    bl_label = "Detection"
+    bl_parent_id = SEIP_PT_traffic.bl_idname
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw what is detected with what, and the last figures."""
+        scene, layout = context.scene, self.layout
+        detection = scene.seip.detection
+        why_not = why_no_detection(scene)
+        if why_not:
+            draw_sentence(layout, why_not, icon="INFO")
+            if why_not == NO_PYTHON and preferences.own() is not None:
+                layout.operator("preferences.addon_show", text="Preferences").module = preferences.ADDON_ID
+        else:
+            column = settings_column(layout)
+            column.prop(detection, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
+            column.prop(detection, "detector", placeholder="Shipped")
+            column.prop(detection, "folder")
+            draw_run(layout, SEIP_OT_detect.bl_idname)
+        if detection.record:
+            _draw_found(layout, scene)
+
+
+def _draw_found(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Draw the figures, for as long as they are of the sensors as they hang, and where the files are."""
+    detection, box = scene.seip.detection, layout.box()
+    try:
+        found = parsed_detection(detection.record)
+    except SeipError as error:
+        draw_sentence(box, str(error), icon="ERROR")
+        return
+    column = box.column()
+    if sensors_key(scene) != detection.sensors:
+        draw_sentence(column, CHANGED, icon="ERROR")
+        column = box.column()
+        column.active = False
+    table = column.column(align=True)
+    for name, figure in figures(found):
+        row = table.split(factor=0.42)
+        row.label(text=name)
+        row.label(text=figure)
+    draw_sentence(column, MEANING)
+    for sentence in found.warnings:
+        draw_sentence(column, sentence, icon="INFO")
+    folder = absolute(detection.folder)
+    if (folder / ERRORS).is_file():
+        row = box.row(align=True)
+        row.operator("wm.path_open", text="Picture of Errors", icon="IMAGE_DATA").filepath = str(folder / ERRORS)
+        row.operator("wm.path_open", text="", icon="FILE_FOLDER").filepath = str(folder)
+
+
+def figures(found: DetectionRecord) -> list[tuple[str, str]]:
+    """Return how many road users there were, and the average precision of each kind with its interval, as text."""
+    precisions = {NAMES[rule]: one for rule, one in found.average_precision.items() if rule in NAMES}
+    lines = [(name, f"{one.average_precision:.1%}{_between(one.interval)}") for name, one in precisions.items()]
+    return [("Road users", f"{precisions[NAMES[MAIN_RULE]].road_users:,}"), *lines]
+
+
+def _between(interval: tuple[float, float] | None) -> str:
+    return "" if interval is None else " ({:.1f}–{:.1f})".format(*(100.0 * end for end in interval))
+
+
+CLASSES = (SEIP_PT_detection,)

@@ -1,0 +1,70 @@
+"""Detection from the panel, with the detector itself."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("torch", reason="torch is not installed: make detection")
+
+from headless import detect
+from headless.detection.detector import Detector
+from headless.detection.rules import RULES
+from headless.detection.settings import CLASS_CATEGORIES, NetworkSettings
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from small_junction import make_example
+
+import seip_addon
+from seip_addon.core.results.detection_record import MAIN_RULE
+from seip_addon.panels.detection import NAMES
+from seip_addon.scene.write import write_result
+
+
+def test_the_panel_names_rules_that_there_are():
+    assert next(iter(RULES)) == MAIN_RULE
+    categories = {rule: RULES[rule].categories for rule in NAMES if rule != MAIN_RULE}
+    assert list(categories.values()) == list(CLASS_CATEGORIES.values())
+
+
+@pytest.fixture
+def placed(small_scene, tmp_path):
+    """The small junction with two sensors, open and saved, with the add-on, and a detector that has learnt nothing."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    seip_addon.register()
+    bpy.ops.wm.open_mainfile(filepath=str(small_scene))
+    example = make_example()
+    write_result(bpy.context.scene, example.site, example.deployment)
+    Detector(NetworkSettings(width=8, blocks=(1, 1, 1))).save(tmp_path / "detector.pt")
+    detection = bpy.context.scene.seip.detection
+    detection.folder, detection.detector = str(tmp_path / "panel"), str(tmp_path / "detector.pt")
+    yield bpy.context.scene
+    seip_addon.unregister()
+
+
+@pytest.mark.slow
+def test_panel_and_command_give_the_same_files(placed, small_scene, tmp_path):
+    assert bpy.ops.seip.detect() == {"FINISHED"}
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "placed.blend"), copy=True)
+    runs = [str(small_scene.parent / "small_traffic" / f"run-{number}.npz") for number in (1, 2, 3, 4)]
+    asked = [str(tmp_path / "placed.blend"), "--detector", placed.seip.detection.detector, "--traffic", *runs]
+    record = placed.seip.detection.record
+    detect.main([*asked, "-o", str(tmp_path / "command")])
+    assert record == (tmp_path / "command" / "detection.json").read_text(encoding="utf-8")
+    panel, command = (
+        {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+        for folder in (tmp_path / "panel", tmp_path / "command")
+    )
+    assert {path.suffix for path in panel} == {".json", ".png", ".txt"}
+    assert panel == command
+
+
+@pytest.mark.slow
+def test_a_damaged_detector_has_its_sentence_and_nothing_is_written(placed, tmp_path):
+    (tmp_path / "detector.pt").write_bytes(b"no detector")
+    with pytest.raises(RuntimeError, match=r"Error: .*detector\.pt"):
+        bpy.ops.seip.detect()
+    assert not (tmp_path / "panel").exists()
+    assert not placed.seip.detection.record
