@@ -8,7 +8,7 @@ Needs torch (make detection). An evaluation that was stopped goes on where it wa
 
 import argparse
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -20,7 +20,7 @@ from headless.coverage_study.cells import COUNTS
 from headless.detection import case_study, study_results
 from headless.detection.average_precision import too_few_runs
 from headless.detection.claims import detection_claims
-from headless.detection.detector import check_device
+from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
 from headless.detection.placements_study.criteria import criteria_of, weights_of_targets
 from headless.detection.placements_study.drawing import PlacementsStudySettings, draw_placements
 from headless.detection.placements_study.occupancy import require_vehicles
@@ -28,7 +28,7 @@ from headless.detection.placements_study.precision import detectors_of, learnt_c
 from headless.detection.placements_study.results import PlacementsStudy, save_study
 from headless.detection.read_placements import read_placements, records_in
 from headless.detection.recordings import SensorConfiguration, Simulator
-from headless.detection.settings import NetworkSettings, TrainingSettings
+from headless.detection.settings import FINE_TUNING, NetworkSettings, TrainingSettings
 from headless.options import add_rolling_shutter, new_parser
 
 import bpy
@@ -54,12 +54,9 @@ def main(argv: list[str]) -> None:
     network = NetworkSettings()
     steps = case_study.simulate_training_set(simulator, study.configurations, study.traffic, network)
     training_set = watch.run("simulation", steps)
+    training, start = _training(options)
     models = case_study.model_configurations(
-        study.configurations,
-        network,
-        TrainingSettings(steps=options.steps),
-        seeds=options.seeds,
-        separate=options.separate,
+        study.configurations, network, training, seeds=options.seeds, separate=options.separate, start=start
     )
     if options.ablation:
         models += case_study.padded(models)
@@ -75,6 +72,7 @@ def main(argv: list[str]) -> None:
         study_results.save_charts(folder, results, trained)
         study_results.save_table(folder / "detection.csv", results)
         settings = study.surveyed.settings.as_record() | {"seeds": options.seeds, "frames_every_s": options.every}
+        settings["from_scratch"] = options.from_scratch
         study_results.save_record(
             folder / "evaluation.json", results, claims, settings, versions(blender=bpy.app.version_string)
         )
@@ -87,16 +85,24 @@ def main(argv: list[str]) -> None:
     runtime.print_line(f"written to {folder}/")
 
 
+def _training(options: argparse.Namespace) -> tuple[TrainingSettings, Detector | None]:
+    """Return how detectors are trained, and the one that they begin with."""
+    begun = TrainingSettings() if options.from_scratch else FINE_TUNING
+    steps = begun.steps if options.steps is None else options.steps
+    return replace(begun, steps=steps), None if options.from_scratch else Detector.load(SHIPPED_DETECTOR)
+
+
 def _evaluate_placements(options: argparse.Namespace) -> None:
     """Evaluate placements of one type and number, and write how well coverage and others foretell detection."""
     if options.placement:
         raise SeipError("name either --placements, to draw placements, or --placement, to evaluate some of your own")
+    training, start = _training(options)
     settings = PlacementsStudySettings(
         placements=options.placements,
         count=options.count,
         learnt=options.learnt_placements,
         trainings=options.seeds,
-        steps=options.steps,
+        steps=training.steps,
         seed=options.placement_seed,
     )
     settings.check(options.sensor)
@@ -107,7 +113,7 @@ def _evaluate_placements(options: argparse.Namespace) -> None:
         "placements", draw_placements(site.surveyed, settings, weights_of_targets(site.surveyed, site.traffic))
     )
     simulator = site.simulator
-    models = detectors_of(drawn, settings)
+    models = detectors_of(drawn, settings, training, start)
     training_set = watch.run("simulation", learnt_clouds(simulator, drawn, site.traffic))
     trained = watch.run("training", case_study.train_all(models, training_set, folder, device=options.device))
     detectors = [one.detector for one in trained]
@@ -116,6 +122,7 @@ def _evaluate_placements(options: argparse.Namespace) -> None:
     study = PlacementsStudy(site.surveyed.site.name, settings, options.sensor[0], drawn, precise, judged)
     with runtime.incomplete_if_interrupted(folder):
         asked = site.surveyed.settings.as_record() | {"frames_every_s": options.every}
+        asked["from_scratch"] = options.from_scratch
         save_study(folder, study, asked, site.traffic, versions(blender=bpy.app.version_string))
     for line in study.sentences():
         runtime.print_line(line)
@@ -196,7 +203,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     detection.add_argument(
         "--every", type=float, default=2.5, metavar="S", help="time from frame to frame; twice that in tests"
     )
-    detection.add_argument("--steps", type=int, default=TrainingSettings().steps, help="of each training")
+    detection.add_argument("--steps", type=int, help="of each training")
     detection.add_argument("--scan-seed", type=int, default=0, help="of noise and lost returns")
     add_rolling_shutter(detection)
     detection.add_argument("--device", default="cpu", help="of torch: cpu or cuda")
@@ -217,6 +224,12 @@ def _parser() -> argparse.ArgumentParser:
     add_options(parser)
     parser.add_argument(
         "--seeds", "--trainings", type=int, default=3, metavar="N", help="trainings, each with a seed of its own"
+    )
+    parser.add_argument(
+        "--from-scratch",
+        action="store_true",
+        help=f"begin trainings with random weights ({TrainingSettings().steps:,} steps), not with those of the "
+        f"detector that ships ({FINE_TUNING.steps})",
     )
     parser.add_argument("--separate", action="store_true", help="a detector for each placement, not one for all")
     parser.add_argument("--ablation", action="store_true", help="claim 9: also train with zero-padded pillars")

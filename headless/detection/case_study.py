@@ -19,7 +19,6 @@ import numpy as np
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, side_by_side, within
-from seip_addon.core.storage.files import digest
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.parked import shared_bays
 from seip_addon.core.traffic.run_overlap import MATCH_RADIUS, require_independent, vehicle_positions
@@ -139,12 +138,15 @@ class ModelConfiguration:
         Also of its file.
     configurations : tuple of SensorConfiguration
         Whose clouds it learns from, and is evaluated with.
+    start : Detector, optional
+        Whose weights it begins with, in place of random ones.
     """
 
     name: str
     configurations: tuple[SensorConfiguration, ...]
     network: NetworkSettings
     training: TrainingSettings
+    start: Detector | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,13 +199,14 @@ def model_configurations(
     *,
     seeds: int,
     separate: bool,
+    start: Detector | None = None,
 ) -> list[ModelConfiguration]:
     """Return the models to be trained: one detector for all configurations, or one for each, with every seed."""
     groups = (
         {one.name.replace(" × ", "x"): (one,) for one in configurations} if separate else {"": tuple(configurations)}
     )
     return [
-        ModelConfiguration(f"detector{name and '-'}{name}-{seed}", group, network, replace(training, seed=seed))
+        ModelConfiguration(f"detector{name and '-'}{name}-{seed}", group, network, replace(training, seed=seed), start)
         for name, group in groups.items()
         for seed in range(1, seeds + 1)
     ]
@@ -285,6 +288,7 @@ def training(
         model.training,
         device=device,
         store=store,
+        start=model.start,
     )
 
 
@@ -350,12 +354,6 @@ def detect_in_runs(
                 own.append(frame_result(frame, cloud, found, run=run.name, parked=run.parked, **known))
     yield Progress(total, total, f"detect with {configuration.name}")
     return results
-
-
-def detector_key(detector: Detector) -> str:
-    """Return a digest of a detector's weights and settings."""
-    weights = [one for name, value in detector.state_dict().items() for one in (name, value.cpu().numpy())]
-    return digest(repr(detector.settings), *weights)
 
 
 def suitability_by_configuration(

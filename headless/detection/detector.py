@@ -11,7 +11,7 @@ import threading
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -49,6 +49,10 @@ class TrainingRecord:
 
     sensors: tuple[str, ...] = ()
     sites: tuple[str, ...] = ()
+
+    def with_that_of(self, other: TrainingRecord) -> TrainingRecord:
+        """Return both together, for a detector that goes on from where another has ended."""
+        return TrainingRecord(*(tuple(sorted({*getattr(self, f.name), *getattr(other, f.name)})) for f in fields(self)))
 
 
 class Detector(nn.Module):
@@ -94,6 +98,12 @@ class Detector(nn.Module):
         with torch.autocast(self.device.type, torch.bfloat16, enabled=has_bfloat16(self.device)):
             output: Tensor = self.head(self.feature_map(features, pillar, shape))
         return output.float()
+
+    @property
+    def key(self) -> str:
+        """Digest of its weights and its settings."""
+        weights = [part for name, value in self.state_dict().items() for part in (name, value.cpu().numpy())]
+        return digest(repr(self.settings), *weights)
 
     def save(self, path: str | os.PathLike[str], *, half: bool = False) -> None:
         """Write settings and weights; the same detector gives the same bytes.

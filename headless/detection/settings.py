@@ -139,3 +139,7 @@ class TrainingSettings:
             "torch needs 1 thread or more": self.threads >= 1,
         }
         _require(rules)
+
+
+FINE_TUNING = TrainingSettings(steps=450, learning_rate=2e-3, validate_every=150)
+"""Of a training that begins with the weights of the detector that ships."""

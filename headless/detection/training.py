@@ -80,7 +80,7 @@ class TrainedDetector:
     curve: LearningCurve
 
 
-def train(
+def train(  # noqa: PLR0913  # what is learnt from, how, on what, and where it begins
     recordings: Sequence[SampledRecording],
     validation: Sequence[SampledRecording],
     network: NetworkSettings,
@@ -88,6 +88,7 @@ def train(
     *,
     device: str = "cpu",
     store: str | os.PathLike[str] | None = None,
+    start: Detector | None = None,
 ) -> Generator[Progress, None, TrainedDetector]:
     """Train a PointPillars detector until its precision on recordings set aside stops growing.
 
@@ -99,6 +100,8 @@ def train(
         PyTorch device: ``cpu``, ``cuda``.
     store : path, optional
         Checkpoint: written at each validation; training resumes from it if it exists.
+    start : Detector, optional
+        Whose weights the training begins with, in place of random ones.
 
     Yields
     ------
@@ -117,7 +120,7 @@ def train(
     """
     splits = {"training": recordings, "validation": validation}
     require_separate({what: [sampled.recording for sampled in some] for what, some in splits.items()})
-    run = _Run(recordings, validation, network, settings, device)
+    run = _Run(recordings, validation, network, settings, device, start)
     if store is not None and Path(store).exists():
         run.restore(store)
     yield run.progress()
@@ -142,11 +145,17 @@ class _Run:
         network: NetworkSettings,
         settings: TrainingSettings,
         device: str,
+        start: Detector | None,
     ) -> None:
         self.settings = settings
         self.training_set, self.aside = _with_frames(recordings), _with_frames(validation)
         training_record = training_record_of([sampled.recording for sampled in self.training_set])
+        if start is not None:
+            training_record = training_record.with_that_of(start.training_record)
         self.detector = Detector(network, settings.seed, training_record).to(device)
+        self.start = "" if start is None else start.key
+        if start is not None:
+            self.detector.load_state_dict(start.state_dict())
         self.optimiser = torch.optim.AdamW(
             self.detector.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay
         )
@@ -218,6 +227,7 @@ class _Run:
                 "training": {
                     "settings": asdict(self.settings),
                     "recordings": self._sources(),
+                    "start": self.start,
                     "step": self.step,
                     "curve": asdict(self.curve),
                     "weights": _copied(self.detector.state_dict()),
@@ -236,6 +246,7 @@ class _Run:
             and isinstance(earlier, dict)
             and earlier.get("settings") == asdict(self.settings)
             and earlier.get("recordings") == self._sources()
+            and earlier.get("start") == self.start
         )
         if not same:
             raise SeipError(

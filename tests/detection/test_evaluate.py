@@ -12,7 +12,7 @@ pytest.importorskip("torch", reason="torch is not installed: make detection")
 from headless import evaluate
 from headless.detection import suitability
 from headless.detection.case_study import read_traffic
-from headless.detection.detector import Detector
+from headless.detection.detector import SHIPPED_DETECTOR, Detector, TrainingRecord
 from headless.detection.rules import RULES
 
 import numpy as np
@@ -44,7 +44,7 @@ def run(small_scene, runs):
 @pytest.fixture(scope="module")
 def folder(run, tmp_path_factory):
     folder = tmp_path_factory.mktemp("evaluation")
-    run(folder, "--ablation")
+    run(folder, "--ablation", "--from-scratch")
     return folder
 
 
@@ -73,10 +73,15 @@ def test_the_table_has_a_row_for_each_detector_and_placement(folder):
     assert {row["road_users_pedestrian_0.5"] for row in rows} == {"0"}
 
 
-def test_detectors_know_what_they_have_learnt_from(folder):
-    training_record = Detector.load(folder / "detector-1.pt").training_record
-    assert training_record.sensors == ("type1",)
-    assert training_record.sites == ("Small junction",)
+def test_detectors_know_what_they_have_learnt_from(run, tmp_path):
+    run(tmp_path, "--seeds", "1")
+    before, after = (Detector.load(path).training_record for path in (SHIPPED_DETECTOR, tmp_path / "detector-1.pt"))
+    assert set(after.sensors) == {*before.sensors, "type1"}
+    assert set(after.sites) == {*before.sites, "Small junction"}
+
+
+def test_trainings_from_scratch_know_this_site_alone(folder):
+    assert Detector.load(folder / "detector-1.pt").training_record == TrainingRecord(("type1",), ("Small junction",))
 
 
 def test_the_record_says_what_was_for_what(folder):
@@ -95,7 +100,7 @@ def test_an_evaluation_goes_on_and_ends_the_same(run, folder, tmp_path, capsys, 
     for name in ("visibility.npz", "detector-1.pt"):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     monkeypatch.setattr(suitability, "MAX_OVERFULL_SHARE", -1.0)  # so that every cloud is worth a warning
-    run(tmp_path, "--ablation")
+    run(tmp_path, "--ablation", "--from-scratch")
     said = capsys.readouterr().out
     assert all(f"warning: {count} × type1: " in said for count in (1, 2, 4))
     assert "vehicles of one run within 1 m of one of another at the same instant: run-1 and run-2 4%, " in said

@@ -16,7 +16,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.results.placement_record import save_placement_record
 
 COARSE = ["--heights", "5.4", "--grid", "8", "--spacing", "20"]
-BRIEF = ["--every", "14", "--steps", "2"]
+BRIEF = ["--every", "14", "--steps", "2", "--from-scratch"]
 DRAWN = ["--sensor", "type1", "--placements", "5", "--count", "2", "--learnt-placements", "2", "--trainings", "2"]
 
 

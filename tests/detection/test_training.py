@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from headless.detection.average_precision import evaluate
 from headless.detection.detection_area import DetectionArea
-from headless.detection.detector import Detector
+from headless.detection.detector import Detector, TrainingRecord
 from headless.detection.frames import LazyFrames, Recording, SampledRecording, require_separate, sample_of, spread
 from headless.detection.inference import detect, detect_on_level
 from headless.detection.matching import Rule
@@ -138,6 +138,20 @@ def test_frames_without_road_users_and_without_points_are_learnt_from_too(aside)
     assert len(empty.labels) == 0
     result = trained([sampled("quiet", "run 1", [empty, blind])], aside)
     assert all(np.isfinite(result.curve.loss))
+
+
+def test_a_training_goes_on_from_another_detector(learning, aside, tmp_path):
+    record = TrainingRecord(("type9",), ("Elsewhere",))
+    start = Detector(SMALL, seed=9, training_record=record)
+    once = replace(BRIEF, steps=1, learning_rate=1e-12)
+    begun = finish(train(learning, aside, SMALL, once, start=start, store=tmp_path / "begun.pt")).detector
+    weights = begun.state_dict()
+    for name, value in start.named_parameters():
+        torch.testing.assert_close(weights[name], value, atol=1e-9, rtol=1e-6)
+    assert set(record.sites) <= set(begun.training_record.sites)
+    assert set(record.sensors) <= set(begun.training_record.sensors)
+    with pytest.raises(SeipError, match="other settings or other recordings"):
+        next(train(learning, aside, SMALL, once, store=tmp_path / "begun.pt"))
 
 
 def test_an_empty_cloud_has_nobody_in_it():

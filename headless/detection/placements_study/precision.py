@@ -1,7 +1,7 @@
 """Average precision of one detector with each of several placements, on the same test runs."""
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
@@ -18,7 +18,6 @@ from headless.detection.case_study import (
     Traffic,
     TrainingSet,
     detect_in_runs,
-    detector_key,
     simulate_training_set,
 )
 from headless.detection.detector import Detector
@@ -142,11 +141,17 @@ class Precisions:
         )
 
 
-def detectors_of(drawn: DrawnPlacements, settings: PlacementsStudySettings) -> list[ModelConfiguration]:
+def detectors_of(
+    drawn: DrawnPlacements, settings: PlacementsStudySettings, training: TrainingSettings, start: Detector | None
+) -> list[ModelConfiguration]:
     """Return the detectors to be trained, each on all placements to learn from."""
     return [
         ModelConfiguration(
-            f"detector-{seed}", drawn.learnt, NetworkSettings(), TrainingSettings(steps=settings.steps, seed=seed)
+            f"detector-{seed}",
+            drawn.learnt,
+            NetworkSettings(),
+            replace(training, steps=settings.steps, seed=seed),
+            start,
         )
         for seed in range(1, settings.trainings + 1)
     ]
@@ -173,7 +178,7 @@ def precisions(
     folder : path
         Of results: what was detected is kept in it, under a digest of all that it follows from.
     """
-    detector_keys = [detector_key(detector) for detector in detectors]
+    detector_keys = [detector.key for detector in detectors]
     evaluations = []
     runs: Text = np.repeat([run.name for run in traffic.test], [len(run.times) for run in traffic.test])
     for done, placement in enumerate(placements):

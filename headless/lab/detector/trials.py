@@ -8,7 +8,6 @@ from functools import cached_property
 from pathlib import Path
 
 from headless.detection.average_precision import CountedTruth, EvaluatedDetections, Evaluation, evaluate
-from headless.detection.case_study import detector_key
 from headless.detection.cloud_in_plan import CloudInPlan
 from headless.detection.detector import Detector
 from headless.detection.frame_results import FrameResult, frame_result
@@ -91,7 +90,7 @@ class EvaluatedDetector:
     @cached_property
     def key(self) -> str:
         """Digest of its weights and its settings."""
-        return detector_key(self.detector)
+        return self.detector.key
 
 
 @dataclass(frozen=True, eq=False)
