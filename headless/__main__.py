@@ -17,6 +17,7 @@ VERBS = {
     "simulate": "scan traffic with the sensors of a scene",
     "generate-sites": "generate random sites with traffic, to train detectors on",
     "evaluate": "average precision of types × numbers",
+    "paper-case": "redo the paper's case study on its map and traffic",
     "train": "train and test one detector",
     "detect": "judge a placement by what a detector finds with its sensors",
     "compare-detectors": "average precision against time of other detector settings",
