@@ -55,6 +55,7 @@ def main(argv: list[str]) -> None:
         raise SeipError(f"ask for one training or more, not {options.seeds}")
     training = TrainingSettings(steps=options.steps)
     check_device(options.device)
+    evaluate.check_every(options.every)
     settings = RunSettings(options.runs, options.duration, options.warm_up, options.seed)
     find_sumo()
     for path in (options.map, options.routes, *options.types, options.network):
