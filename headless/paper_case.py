@@ -43,9 +43,11 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import whole_file
 from seip_addon.core.traffic.sumo_programs import find_sumo
+from seip_addon.core.workflows.survey import Survey
 from seip_addon.scene.read import read_scene
 
 PAGE, PICTURES = "paper.md", "pictures"
+COPIES_TESTED = 4  # of the runs with fixed departures
 
 
 def main(argv: list[str]) -> None:
@@ -75,8 +77,8 @@ def main(argv: list[str]) -> None:
     surveyed, watch = site.surveyed, site.stopwatch
     limits = surveyed.settings.limits
     study = watch.run("study", coverage_study(surveyed.site, surveyed.models, surveyed.grid.visible, limits))
-    few = fixed[: max(case_study.MIN_RUNS, len(fixed) // 2)]
-    copies = NearCopies(*case_study.split_runs(few, geometry.origin, options.every))
+    learnt, aside, tests = case_study.split_runs(fixed, geometry.origin, options.every)
+    copies = NearCopies(learnt, aside, tests[:COPIES_TESTED])
     steps = detection_of_case(
         site.simulator,
         placed(study),
@@ -88,7 +90,7 @@ def main(argv: list[str]) -> None:
         device=options.device,
     )
     found = watch.run("detection", steps)
-    facts = _facts(options, geometry, traffic, (overlaps(drawn), overlaps(few)), found)
+    facts = _facts(options, surveyed, traffic, (overlaps(drawn), overlaps(fixed)), found)
     claims = (*coverage_claims(study), *found.claims)
     with runtime.incomplete_if_interrupted(options.output):
         charts = _charts(options.output, study, found)
@@ -123,12 +125,13 @@ def _evaluation(options: argparse.Namespace, scene: Path, runs: list[Path]) -> a
 
 def _facts(
     options: argparse.Namespace,
-    geometry: SceneGeometry,
+    surveyed: Survey,
     traffic: SiteTraffic,
     shares: tuple[tuple[float, ...], tuple[float, ...]],
     found: DetectionOfCase,
 ) -> CaseFacts:
-    demand, runs = traffic.demand, found.results.traffic
+    geometry, demand = surveyed.geometry, traffic.demand
+    runs = found.results.traffic
     bare = not geometry.occluders
     hidden = "nothing on it hides anything" if bare else f"{len(geometry.occluders)} objects hide what is behind them"
     doubts = []
@@ -144,10 +147,14 @@ def _facts(
             f"seip paper-case {options.map.name} --junction {junction} --routes {options.routes.name} "
             + (f"--types {' '.join(path.name for path in options.types)} " if options.types else "")
             + f"--network {options.network.name} --steps {options.steps} --seeds {options.seeds} "
-            f"--every {options.every:g} --runs {options.runs} --duration {options.duration:g} -o docs"
+            f"--every {options.every:g} --runs {options.runs} --duration {options.duration:g} "
+            f"--time-limit {options.time_limit:g} -o docs"
         ),
         scene=f"the OpenDRIVE map alone, {geometry.region.area:,.0f} m² about junction {junction}; {hidden}",
-        criterion="δ = 1 m, a grid of 1 m, candidates on pavements and signal poles",
+        criterion=(
+            f"δ = {surveyed.settings.visibility.delta:g} m, a grid of {surveyed.settings.grid_spacing:g} m, "
+            f"{len(surveyed.site.candidates.position)} positions on pavements and poles"
+        ),
         traffic=(
             f"SUMO alone, {demand.rate:,.0f} vehicles per hour ({traffic.through:,.0f} through the junction) in "
             f"{len(demand.flows)} flows; departures, ways, lanes, {len(demand.models)} models and gaps drawn anew for "

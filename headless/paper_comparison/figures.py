@@ -21,8 +21,10 @@ class PlacementFigures:
     name, sensor : str
     count : int
     coverage : float, 0 to 1
-    returns : float, 0 to 1
-        Share of the vehicles of the test frames with `ENOUGH_RETURNS` returns and more.
+    enough : float, 0 to 1
+        Share of the vehicles of the test frames with `ENOUGH_RETURNS` returns or more.
+    returns : float
+        From a vehicle of the test frames, in the middle (the median).
     precision : float, 0 to 1
         AP of runs drawn anew, learnt from such: the mean over the trainings.
     interval : (float, float) or None
@@ -41,6 +43,7 @@ class PlacementFigures:
     sensor: str
     count: int
     coverage: float
+    enough: float
     returns: float
     precision: float
     interval: Interval | None
@@ -62,7 +65,7 @@ class Reversal:
     gain : float
         In AP, with its 95 % interval over runs where there is one.
     more_returns : bool
-        Whether more vehicles have `ENOUGH_RETURNS` with it than with the other.
+        Whether vehicles give more returns with it than with the other.
     """
 
     better: PlacementFigures
@@ -85,10 +88,20 @@ def reversals(placements: Sequence[PlacementFigures]) -> tuple[Reversal, ...]:
     """Return the pairs of which that which covers less detects more, the largest gain first."""
     found = [
         Reversal(better, worse, better.precision - worse.precision, _interval(better, worse))
-        for better, worse in permutations(placements, 2)
-        if better.coverage < worse.coverage - MIN_DIFFERENCE and better.precision > worse.precision
+        for better, worse in reversed_pairs(placements, "precision")
     ]
     return tuple(sorted(found, key=lambda one: -one.gain))
+
+
+def reversed_pairs(
+    placements: Sequence[PlacementFigures], figure: str
+) -> list[tuple[PlacementFigures, PlacementFigures]]:
+    """Return the pairs of which the first covers less and has more of a figure: of one of the average precisions."""
+    return [
+        (better, worse)
+        for better, worse in permutations(placements, 2)
+        if better.coverage < worse.coverage - MIN_DIFFERENCE and getattr(better, figure) > getattr(worse, figure)
+    ]
 
 
 def _interval(better: PlacementFigures, worse: PlacementFigures) -> Interval | None:

@@ -56,21 +56,32 @@ def study():
     return CoverageStudy(TYPES, HEIGHTS, tuple(cell(*key) for key in keys), TARGETS)
 
 
-def placement(sensor, count, coverage, precision, returns=0.5, runs=None, copies=0.9, unfamiliar=0.7):
+def placement(sensor, count, coverage, precision, returns=0.5, enough=0.85, runs=None, copies=0.9, unfamiliar=0.7):
     without = None if runs is None else np.array(runs)
     interval = (precision - 0.03, precision + 0.02)
     name, false_positives = f"{count} × {sensor}", 0.25
     return PlacementFigures(
-        name, sensor, count, coverage, returns, precision, interval, without, false_positives, copies, unfamiliar
+        name,
+        sensor,
+        count,
+        coverage,
+        enough,
+        returns,
+        precision,
+        interval,
+        without,
+        false_positives,
+        copies,
+        unfamiliar,
     )
 
 
 SPREAD = np.array([0.01, -0.01, 0.01, -0.01])
 PLACEMENTS = (
-    placement("type1", 1, 0.20, 0.60, 0.30, 0.60 + 0.01 * SPREAD),
-    placement("type1", 2, 0.30, 0.80, 0.60, 0.80 + 0.01 * SPREAD, 0.98, 0.90),
-    placement("type1", 4, 0.50, 0.70, 0.50, 0.70 - 0.01 * SPREAD),
-    placement("type2", 1, 0.504, 0.65, 0.70, 0.65 + 8 * SPREAD),
+    placement("type1", 1, 0.20, 0.60, 30, 0.85, 0.60 + 0.01 * SPREAD),
+    placement("type1", 2, 0.30, 0.80, 60, 0.95, 0.80 + 0.01 * SPREAD, 0.98, 0.90),
+    placement("type1", 4, 0.50, 0.70, 50, 0.95, 0.70 - 0.01 * SPREAD),
+    placement("type2", 1, 0.504, 0.65, 70, 0.95, 0.65 + 8 * SPREAD),
 )
 
 
@@ -136,9 +147,8 @@ def test_figures_stand_beside_those_of_the_paper():
     assert ["type3", "3.5 m", *["no placement"] * 3] in rows(text, "type3")
     assert ["type1", "50.0%", "50.0%", "30.0%", "30.0%"] in rows(text, "type1")
     (second,) = rows(text[: text.index("## Leak")], "2 × type1")
-    assert second == [
-        "2 × type1", "30.0%", "80.0% (77.0% to 82.0%)", "+ about 20 %", "+20.0 points", "60%", "0.25", "98.0%", "90.0%"
-    ]  # fmt: skip
+    assert second[:5] == ["2 × type1", "30.0%", "80.0% (77.0% to 82.0%)", "+ about 20 %", "+20.0 points"]
+    assert second[5:] == ["60, 95%", "0.25", "98.0%", "90.0%"]
     (third,) = rows(text[: text.index("## Leak")], "4 × type1")
     assert third[3:5] == ["+ 7 %", "-10.0 points"]
 
@@ -147,7 +157,7 @@ def test_sensors_of_the_catalogue_are_those_of_the_paper():
     text = made()
     for one in PUBLISHED_SENSORS:
         row = next(row for row in rows(text, one.key) if len(row) == 3)
-        assert row[1] == row[2]
+        assert row[2] == "the same"
 
 
 def test_the_page_says_what_was_doubted_copied_and_bare():
@@ -155,10 +165,11 @@ def test_the_page_says_what_was_doubted_copied_and_bare():
     assert "**One training.**" in text
     assert "2% to 15% (8% in the middle)" in text
     assert "50% to 70% (60% in the middle)" in text
-    assert "8.0 to 20.0 points less (17.0 on average" in text
+    assert "+8.0 to +20.0 points, +17.0 on average" in text
     assert "Nothing in this scene hides anything" in text
     assert "Nothing in this scene hides anything" not in made(bare=False, scene="the map, 5 buildings")
     assert "In 2 pairs the placement that covers less detects more (1 of them" in text
+    assert "on near copies it does in 2 pairs where they were learnt, and in 2 where they were not" in text
     assert "![A chart](pictures/a.png)" in text
     assert "{" not in text
     assert text.endswith("\n")
