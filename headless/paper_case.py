@@ -135,10 +135,10 @@ def _facts(
     bare = not geometry.occluders
     hidden = "nothing on it hides anything" if bare else f"{len(geometry.occluders)} objects hide what is behind them"
     doubts = []
-    if found.copies_rising or any(curve.still_rises for curve in found.results.curves):
-        doubts.append(
-            "Validation still rose when a training ended: more --steps would change the figures of detection."
-        )
+    if any(curve.still_rises for curve in found.results.curves):
+        doubts.append("Validation still rose when a training ended: more --steps would change figures of detection.")
+    if found.copies_rising:
+        doubts.append("Validation still rose when training on near copies ended: leak may be larger than it seems.")
     if options.seeds == 1:
         doubts.append("One training: claims 5 to 8 get no verdict, which takes three (--seeds 3).")
     junction = " ".join(options.junction)

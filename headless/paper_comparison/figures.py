@@ -65,7 +65,7 @@ class Reversal:
     gain : float
         In AP, with its 95 % interval over runs where there is one.
     more_returns : bool
-        Whether vehicles give more returns with it than with the other.
+        Whether more vehicles give `ENOUGH_RETURNS` with it than with the other.
     """
 
     better: PlacementFigures
@@ -81,7 +81,7 @@ class Reversal:
     @property
     def more_returns(self) -> bool:
         """Whether returns on vehicles tell the two apart the right way round."""
-        return self.better.returns > self.worse.returns
+        return self.better.enough > self.worse.enough
 
 
 def reversals(placements: Sequence[PlacementFigures]) -> tuple[Reversal, ...]:

@@ -180,7 +180,7 @@ def _precisions(placements: Sequence[PlacementFigures]) -> Iterator[tuple[str, .
             f"{one.precision:.1%}{_between(one.interval)}",
             theirs,
             ours,
-            f"{one.returns:.0f}, {one.enough:.0%}",
+            f"{one.returns:.0f}, {one.enough:.1%}",
             f"{one.false_positives:.2f}",
             f"{one.copies:.1%}",
             f"{one.unfamiliar:.1%}",
@@ -253,17 +253,28 @@ def _reasons(facts: CaseFacts, placements: Sequence[PlacementFigures]) -> Iterat
     told = sum(one.more_returns for one in found)
     yield (
         f"**Criterion.** Over the {len(placements)} placements AP has a rank correlation of "
-        f"{agreement(placements, 'coverage'):.2f} with coverage and of {agreement(placements, 'returns'):.2f} with the "
-        f"returns from a vehicle in the middle. In {len(found)} pairs the placement that covers less detects more "
+        f"{agreement(placements, 'coverage'):.2f} with coverage, {agreement(placements, 'returns'):.2f} with the "
+        "median of returns from a vehicle, and "
+        f"{agreement(placements, 'enough'):.2f} with the share of vehicles that give "
+        f"{ENOUGH_RETURNS} returns or more. In {len(found)} pairs the placement that covers less detects more "
         f"({len(standing)} of them beyond the 95 % interval over test runs); on near copies it does in "
         f"{len(reversed_pairs(placements, 'copies'))} pairs where they were learnt, and in "
-        f"{len(reversed_pairs(placements, 'unfamiliar'))} where they were not. In {told} of the {len(found)} pairs "
-        "vehicles give more returns with the placement that covers less: there the criterion is at fault, which counts "
-        "a target as seen by one return on the road nearby, however many a vehicle would give. The other pairs returns "
-        "do not explain either: where on a vehicle they fall, the training, or chance does."
+        f"{len(reversed_pairs(placements, 'unfamiliar'))} where they were not. In {told} of the {len(found)} pairs, "
+        f"and {sum(one.more_returns for one in standing)} of the {len(standing)} beyond the interval, more vehicles "
+        f"give {ENOUGH_RETURNS} returns with the placement that covers less: there the criterion is at fault, coverage "
+        "of an empty road, which knows neither that vehicles hide each other nor how many returns one gives. The "
+        "others are left to the training or to chance."
     )
     if found:
-        head = ("covers less, detects more", "covers more, detects less", "coverage", "AP", "gain", "returns")
+        head = (
+            "covers less, detects more",
+            "covers more, detects less",
+            "coverage",
+            "AP",
+            "gain",
+            "returns",
+            f"{ENOUGH_RETURNS} or more",
+        )
         yield _table(head, [_reversal(one) for one in found[:MOST_NAMED]])
 
 
@@ -277,6 +288,7 @@ def _reversal(one: Reversal) -> tuple[str, ...]:
         f"{better.precision:.1%} and {worse.precision:.1%}",
         f"{100 * one.gain:+.1f} points{between}",
         f"{better.returns:.0f} and {worse.returns:.0f}",
+        f"{better.enough:.1%} and {worse.enough:.1%}",
     )
 
 
