@@ -62,7 +62,7 @@ sumo: environment
 
 test-traffic: sumo
 	$(PY) -m pytest tests/core/opendrive/test_shipped_maps.py tests/headless/test_traffic_simulation.py tests/headless/test_traffic.py \
-	  tests/core/openstreetmap/test_sites.py tests/headless/test_training_sites.py tests/headless/test_training_sites.py
+	  tests/core/openstreetmap/test_sites.py tests/headless/test_training_sites.py tests/headless/test_paper_traffic.py
 
 # Runs of one scene differ by their seed, and by the second of the signals' cycle of 60 s at which they begin; dense ones
 # have twice the vehicles. They are many and short, as whole runs alone are independent of each other.

@@ -17,6 +17,7 @@ VERBS = {
     "simulate": "scan traffic with the sensors of a scene",
     "generate-sites": "generate random sites with traffic, to train detectors on",
     "evaluate": "average precision of types × numbers",
+    "paper-case": "redo the paper's case study on its map and traffic",
     "train": "train and test one detector",
     "train-on-sites": "train a detector for any placement on several sites",
     "detect": "judge a placement by what a detector finds with its sensors",

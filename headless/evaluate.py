@@ -173,8 +173,7 @@ def prepare_study(options: argparse.Namespace) -> DetectionStudy:
 def prepare_site(options: argparse.Namespace, count: int) -> DetectionSite:
     """Survey a scene that can carry so many sensors, and read its traffic."""
     check_device(options.device)
-    if options.every <= 0:
-        raise SeipError(f"the time between frames must be above 0 s, not {options.every:g} s")
+    check_every(options.every)
     surveyed, watch = survey.survey(
         options, lambda layout: check_objective(layout.site, layout.models, Objective(count=count))
     )
@@ -186,6 +185,12 @@ def prepare_site(options: argparse.Namespace, count: int) -> DetectionSite:
     runtime.warn(filter(None, [too_few_runs(len(traffic.test))]))
     scans = ScanSettings(seed=options.scan_seed, rolling_shutter=options.rolling_shutter, engine=options.engine)
     return DetectionSite(surveyed, watch, traffic, Simulator(surveyed.geometry, scans))
+
+
+def check_every(seconds: float) -> None:
+    """Raise SeipError where there is no time from frame to frame."""
+    if not seconds > 0:
+        raise SeipError(f"the time between frames must be above 0 s, not {seconds:g} s")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -103,6 +103,11 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     SeipError
         There are too few, or one is too short.
     """
+    return Traffic(*split_runs(paths, origin, every))
+
+
+def split_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[tuple[SampledRun, ...], ...]:
+    """Return the runs to learn from, for validation and for tests, whether they are independent or not."""
     if len(paths) < MIN_RUNS:
         raise SeipError(
             f"{len(paths)} runs of traffic are too few: name {MIN_RUNS} or more with --traffic, better "
@@ -112,7 +117,7 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     tested = len(runs) // RUNS_PER_TEST
     learnt = len(runs) - tested - max(1, len(runs) // RUNS_PER_VALIDATION)
     sparse = tuple(replace(run, times=run.times[::TEST_STRIDE]) for run in runs[learnt:])
-    return Traffic(runs[:learnt], sparse[:-tested], sparse[-tested:])
+    return runs[:learnt], sparse[:-tested], sparse[-tested:]
 
 
 def read_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[SampledRun, ...]:

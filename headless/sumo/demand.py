@@ -168,7 +168,7 @@ def write_routes(
     free = set(network.edges) - {edge.id for edge, lane, _ in bays if lane.use == DRIVING}
     for number, arm in enumerate(arms, start=1):
         random = np.random.default_rng([seed, 1, number])
-        for depart in _departures(demand.flow, random, duration):
+        for depart in poisson_departures(demand.flow, random, duration):
             route = _route(network, arm, demand.turns, random)
             entries.append(_vehicle(f"{seed}.{arm.id}.{len(entries)}", depart, route, demand.shares, free, random))
     entries += _walkers(network, demand.pedestrians * len(arms), seed, duration)
@@ -235,7 +235,7 @@ def _pick(models: dict[str, RoadUserModel], random: np.random.Generator) -> str:
     return str(random.choice(list(models), p=shares / shares.sum()))
 
 
-def _departures(rate: float, random: np.random.Generator, duration: float) -> Iterator[float]:
+def poisson_departures(rate: float, random: np.random.Generator, duration: float) -> Iterator[float]:
     """Yield the times of a Poisson process, ``rate`` per hour."""
     time = 0.0
     while rate > 0.0:
@@ -353,7 +353,7 @@ def _walkers(network: StreetNetwork, rate: float, seed: int, duration: float) ->
         return
     length = np.array([lane.length for _, lane in pavements])
     middle = np.array([lane.line.mean(axis=0) for _, lane in pavements])
-    for number, depart in enumerate(_departures(rate, random, duration)):
+    for number, depart in enumerate(poisson_departures(rate, random, duration)):
         start = int(random.choice(len(pavements), p=length / length.sum()))
         within = np.hypot(*(middle - middle[start]).T) < _MAX_WALK
         within[start] = False

@@ -96,12 +96,30 @@ def simulate(
     recorded, routes, network = (folder / f"traffic.{kind}.xml" for kind in ("fcd", "rou", "net"))
     yield from _network(programs, map_path, network, scenario.signals, bounds)
     write_routes(routes, read_network(network), scenario.demand, scenario.seed, scenario.duration)
+    files = TrafficFiles(recorded, (routes,), network)
+    yield from run_sumo(programs, files, scenario.seed, scenario.duration)
+    return files
+
+
+def run_sumo(programs: Sumo, files: TrafficFiles, seed: int, duration: float) -> Generator[Progress, None, None]:
+    """Simulate the vehicles of route files on their network from 0 to ``duration`` seconds.
+
+    Parameters
+    ----------
+    files : TrafficFiles
+        The network, the routes, and the floating car data to be written.
+
+    Raises
+    ------
+    SeipError
+        SUMO refuses its input.
+    """
     yield from run(
         programs,
         programs.sumo,
         [
-            *("--net-file", network, "--route-files", routes, "--fcd-output", recorded),
-            *("--seed", scenario.seed, "--end", scenario.duration, "--step-length", STEP_SECONDS, "--precision", 3),
+            *("--net-file", files.net, "--route-files", ",".join(map(str, files.routes)), "--fcd-output", files.path),
+            *("--seed", seed, "--end", duration, "--step-length", STEP_SECONDS, "--precision", 3),
             *("--device.fcd.period", SAMPLING_SECONDS, "--person-device.fcd.period", SAMPLING_SECONDS),
             *("--lanechange.duration", _LANE_CHANGE_SECONDS, "--time-to-teleport", -1),
             *("--collision.action", "warn", "--collision.check-junctions", "true", "--ignore-route-errors", "true"),
@@ -109,7 +127,6 @@ def simulate(
         ],
         "simulating traffic",
     )
-    return TrafficFiles(recorded, (routes,), network)
 
 
 def _network(

@@ -16,7 +16,7 @@ from seip_addon.core.traffic.floating_car_data import Extent
 from seip_addon.core.traffic.overlaps import without_overlaps
 from seip_addon.core.traffic.road_fit import fit_to_road
 from seip_addon.core.traffic.smooth_walks import smooth_walks
-from seip_addon.core.traffic.source import ROAD_MARGIN, read_sumo, road_bounds
+from seip_addon.core.traffic.source import ROAD_MARGIN, TrafficFiles, read_sumo, road_bounds
 
 from .simulation import Scenario, simulate
 
@@ -63,12 +63,31 @@ def simulate_run(
     with tempfile.TemporaryDirectory() as folder:
         files = yield from simulate(map_path, Path(folder), scenario, road_bounds(geometry, 0.0))
         source = f"SUMO on {map_path.name}, {demand.flow:g} vehicles per hour and arm, seed {scenario.seed}"
-        window = Extent(warm_up, scenario.duration, road_bounds(geometry, ROAD_MARGIN))
-        read = yield from read_sumo(files, window, geometry, source)
+        return (yield from recorded_run(files, (warm_up, scenario.duration), geometry, source))
+
+
+def recorded_run(
+    files: TrafficFiles, span: tuple[float, float], geometry: SceneGeometry, source: str
+) -> Generator[Progress, None, SimulatedRun]:
+    """Read what SUMO recorded and fit it to the road of a scene.
+
+    Parameters
+    ----------
+    span : (float, float), seconds
+        Begin and end of the run in the simulation.
+    source : str
+        What the trajectories come from, for people.
+
+    Raises
+    ------
+    SeipError
+        Nobody is on the road.
+    """
+    read = yield from read_sumo(files, Extent(*span, road_bounds(geometry, ROAD_MARGIN)), geometry, source)
     fit = fit_to_road(smooth_walks(read.trajectories), geometry)
     apart, collided = yield from without_overlaps(fit.trajectories)
     return SimulatedRun(
-        trajectories=replace(apart, time=np.round(apart.time - warm_up, 3)),
+        trajectories=replace(apart, time=np.round(apart.time - span[0], 3)),
         simulated=len(fit.trajectories),
         collided=collided,
         warnings=(*read.warnings, *fit.warnings),
