@@ -25,6 +25,7 @@ from headless.sumo.traffic_run import simulate_run
 
 import bpy
 
+from seip_addon.core.errors import SeipError
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.floating_car_data import listed
@@ -57,6 +58,8 @@ def _imported(options: argparse.Namespace, geometry: SceneGeometry) -> Trajector
 
 
 def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
+    if not 0.0 < options.duration < math.inf or not 0.0 <= options.warm_up < math.inf:
+        raise SeipError("--duration must be above 0 s, and --warm-up not below 0 s")
     demand = Demand(options.flow, tuple(options.turns), options.pedestrians)
     end = options.warm_up + options.duration
     scenario = Scenario(demand, SignalPlan(options.green), options.seed, end)

@@ -1,6 +1,5 @@
 """A run of simulated traffic on the road of a scene."""
 
-import math
 import tempfile
 from collections.abc import Generator
 from dataclasses import dataclass, replace
@@ -8,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.traffic import Trajectories
@@ -55,10 +53,8 @@ def simulate_run(
     Raises
     ------
     SeipError
-        The times are none, SUMO is missing or refuses the map, or nobody is on the road.
+        SUMO is missing or refuses the map, or nobody is on the road.
     """
-    if not 0.0 <= warm_up < math.inf or not warm_up < scenario.duration < math.inf:
-        raise SeipError("--duration must be above 0 s, and --warm-up not below 0 s")
     demand = scenario.demand
     with tempfile.TemporaryDirectory() as folder:
         files = yield from simulate(map_path, Path(folder), scenario, road_bounds(geometry, 0.0))
