@@ -4,7 +4,7 @@
 # make lint        set up, and check style and types
 # make scenes      rebuild the shipped scenes from their sources
 # make detection   install PyTorch, for the detector; make test-detection tests it
-# make study       redo the study on the shipped junction: coverage, then detection (half an hour)
+# make study       redo the study on the shipped junction: coverage, then detection (ten minutes)
 # make detector    train the detector that ships: random placements at 20 random sites (half an hour)
 # make settings    chart what other settings of the detector cost and gain (an hour)
 # make stability   drive every method to where it fails, and write docs/stability.md (two hours)
