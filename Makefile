@@ -91,7 +91,7 @@ study: detection
 
 detector: detection sumo
 	$(PY) -m headless.generate_sites -o out/sites --sites 20
-	$(PY) -m headless.train_on_sites out/sites/site-*/site.blend -o out/detector
+	$(PY) -m headless.train_on_sites out/sites/site-*/site.blend --steps 3600 -o out/detector
 	cp out/detector/detector.pt headless/detection/shipped_detector.pt
 
 settings: detection
