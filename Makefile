@@ -90,7 +90,7 @@ study: detection
 	$(PY) -m headless.evaluate scenes/junction.blend -o out/study
 
 detector: detection sumo
-	$(PY) -m headless.generate_sites -o out/sites --sites 20
+	$(PY) -m headless.generate_sites -o out/sites --sites 20 --seed 1
 	$(PY) -m headless.train_on_sites out/sites/site-*/site.blend --steps 3600 -o out/detector
 	cp out/detector/detector.pt headless/detection/shipped_detector.pt
 
