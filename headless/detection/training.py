@@ -6,6 +6,7 @@ number of the step: a training that was stopped goes on as if it had not been.
 
 import math
 import os
+import threading
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
@@ -354,16 +355,46 @@ def _copied(state: dict[str, Any]) -> dict[str, Tensor]:
     return {name: value.detach().clone() for name, value in state.items()}
 
 
+class _Torch:
+    """What torch keeps for all threads: set by the first that asks for it, and as it was before after the last."""
+
+    def __init__(self) -> None:
+        self._lock, self._users = threading.Lock(), 0
+        self._before = (0, False, False)
+
+    def enter(self, threads: int) -> None:
+        with self._lock:
+            if not self._users:
+                self._before = (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled(), _fills())
+                self._set(threads, deterministic=True, fill=False)  # filling is a debugging aid, and takes a tenth
+            self._users += 1
+
+    def leave(self) -> None:
+        with self._lock:
+            self._users -= 1
+            if not self._users:
+                threads, deterministic, fill = self._before
+                self._set(threads, deterministic=deterministic, fill=fill)
+
+    def _set(self, threads: int, *, deterministic: bool, fill: bool) -> None:
+        torch.set_num_threads(threads)
+        torch.use_deterministic_algorithms(deterministic)
+        torch.utils.deterministic.fill_uninitialized_memory = fill  # type: ignore[attr-defined]  # torch types lack it
+
+
+def _fills() -> bool:
+    return bool(torch.utils.deterministic.fill_uninitialized_memory)  # type: ignore[attr-defined]
+
+
+_TORCH = _Torch()
+
+
 @contextmanager
 def deterministic(threads: int) -> Iterator[None]:
-    """Have torch do every sum in the same order, every time."""
+    """Have torch do every sum in the same order, every time; within another such block the number of threads stays."""
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # what CUDA asks for to do so
-    before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
-    torch.set_num_threads(threads)
-    torch.use_deterministic_algorithms(mode=True)
-    torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]  # debugging aid: a tenth
+    _TORCH.enter(threads)
     try:
         yield
     finally:
-        torch.set_num_threads(before[0])
-        torch.use_deterministic_algorithms(before[1])
+        _TORCH.leave()

@@ -11,7 +11,7 @@ from headless.detection.inference import detect, detect_on_level
 from headless.detection.matching import Rule
 from headless.detection.pillars import fill_pillars, grid_over
 from headless.detection.settings import CLASSES, NetworkSettings, TrainingSettings
-from headless.detection.training import LearningCurve, result_of_sample, train, vary
+from headless.detection.training import LearningCurve, deterministic, result_of_sample, train, vary
 
 import numpy as np
 import pytest
@@ -113,6 +113,19 @@ def test_training_leaves_torch_as_it_was(learning, aside):
         assert not torch.are_deterministic_algorithms_enabled()
     assert (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()) == before[:2]
     assert (torch.random.get_rng_state() == before[2]).all()
+
+
+def test_whoever_leaves_last_puts_torch_back():
+    """A thread that goes on after its work was given up must not leave torch as others had set it."""
+    before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+    outer, late = deterministic(1), deterministic(1)
+    outer.__enter__()
+    late.__enter__()
+    outer.__exit__(None, None, None)
+    assert torch.are_deterministic_algorithms_enabled()
+    late.__exit__(None, None, None)
+    assert (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()) == before
+    assert torch.utils.deterministic.fill_uninitialized_memory
 
 
 def test_runs_of_traffic_are_in_one_split_alone(learning, aside):
