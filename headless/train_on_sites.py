@@ -10,9 +10,10 @@ when to stop. A training that was stopped goes on where it was.
 import argparse
 import math
 import sys
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -22,7 +23,7 @@ from headless.charts.detection import save_training_chart
 from headless.detection.case_study import AT_ONCE, read_runs, simulated
 from headless.detection.detector import check_device
 from headless.detection.frames import SampledRecording
-from headless.detection.random_placements import random_placement
+from headless.detection.learnt_site import LearntSite
 from headless.detection.recordings import Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import train
@@ -57,6 +58,9 @@ TYPES = (
     "at128",
 )
 ASIDE = 8  # one site in so many is set aside
+MIN_SITES = 2
+
+Site = TypeVar("Site")
 
 
 def main(argv: list[str]) -> None:
@@ -64,15 +68,16 @@ def main(argv: list[str]) -> None:
     options = _parser().parse_args(argv)
     network, training = read_settings(NetworkSettings, options), read_settings(TrainingSettings, options)
     learning = LearningSettings(tuple(options.sensor), options.placements, options.every, training.seed)
-    if len(options.scenes) < 2:
-        raise SeipError("name two sites or more: the last is set aside, to see when to stop")
     check_device(options.device)
     runtime.check_folder(options.output)
-    recordings: list[list[SampledRecording]] = []
-    for number, scene in enumerate(options.scenes):
-        recordings.append(runtime.finish_with_bar(_recordings(scene, number, network, learning)))
-    aside = max(1, len(recordings) // ASIDE)
-    learnt, validation = ([one for site in some for one in site] for some in (recordings[:-aside], recordings[-aside:]))
+    learnt, validation = (
+        [
+            recording
+            for number, scene in scenes
+            for recording in runtime.finish_with_bar(_sampled(read_site(scene, learning), number, network, learning))
+        ]
+        for scenes in set_aside(list(enumerate(options.scenes)))
+    )
     store = options.output / "training.pt"
     trained = runtime.finish_with_bar(train(learnt, validation, network, training, device=options.device, store=store))
     best = trained.curve.best
@@ -96,18 +101,24 @@ class LearningSettings:
         Random ones for each run of traffic.
     every : float, seconds
         From frame to frame.
+    seed : int
+        Of random placements, and of the noise of scans.
     """
 
-    sensors: tuple[str, ...]
-    placements: int
-    every: float
-    seed: int
+    sensors: tuple[str, ...] = TYPES
+    placements: int = 1
+    every: float = 2.5
+    seed: int = 1
 
 
-def _recordings(
-    scene: Path, site: int, network: NetworkSettings, learning: LearningSettings
-) -> Generator[Progress, None, list[SampledRecording]]:
-    """Simulate scans of random placements in all runs of a site."""
+def read_site(scene: Path, learning: LearningSettings) -> LearntSite:
+    """Read a scene with the runs of traffic beside it.
+
+    Raises
+    ------
+    SeipError
+        There are none, or the scene is none.
+    """
     runtime.open_scene(scene)
     reading = read_scene(bpy.context.scene)
     candidates = CandidateSettings(sensors=learning.sensors, heights=HEIGHTS, tilts=TILTS)
@@ -116,16 +127,32 @@ def _recordings(
     if not runs:
         raise SeipError(f"{scene} has no runs of traffic beside it: simulate some with headless/traffic.py")
     simulator = Simulator(layout.geometry, ScanSettings(seed=learning.seed))
-    area = simulator.area(network.pillar)
-    random = np.random.default_rng([learning.seed, site])
-    recordings = []
-    for run in runs:
-        for number in range(1, learning.placements + 1):
-            name = f"{scene.parent.name}/{scene.stem}, placement {number}"
-            placement = random_placement(name, layout.site.candidates, layout.models, random)
-            recordings.append(SampledRecording(simulator.record(placement, run), area, network.most_points))
+    return LearntSite(f"{scene.parent.name}/{scene.stem}", layout, runs, simulator)
+
+
+def set_aside(sites: Sequence[Site]) -> tuple[Sequence[Site], Sequence[Site]]:
+    """Return the sites to learn from, and the last ones, to see when to stop.
+
+    Raises
+    ------
+    SeipError
+        There are fewer than two.
+    """
+    if len(sites) < MIN_SITES:
+        raise SeipError("name two sites or more: the last is set aside, to see when to stop")
+    aside = max(1, len(sites) // ASIDE)
+    return sites[:-aside], sites[-aside:]
+
+
+def _sampled(
+    site: LearntSite, number: int, network: NetworkSettings, learning: LearningSettings
+) -> Generator[Progress, None, list[SampledRecording]]:
+    """Simulate scans of random placements in all runs of a site."""
+    area = site.simulator.area(network.pillar)
+    scans = site.scans(learning.placements, np.random.default_rng([learning.seed, number]))
+    recordings = [SampledRecording(one, area, network.most_points) for one in scans]
     yield from side_by_side([simulated([one]) for one in recordings], AT_ONCE)
-    simulator.forget()
+    site.simulator.forget()
     return recordings
 
 
@@ -134,9 +161,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE", help="each with its traffic beside it")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the detector")
     learning = parser.add_argument_group("what is learnt from")
-    learning.add_argument("--sensor", nargs="+", default=list(TYPES), metavar="KEY", help="types in the placements")
-    learning.add_argument("--placements", type=int, default=1, metavar="N", help="random ones for each run of traffic")
-    learning.add_argument("--every", type=float, default=2.5, metavar="S", help="time from frame to frame")
+    default = LearningSettings()
+    learning.add_argument(
+        "--sensor", nargs="+", default=list(default.sensors), metavar="KEY", help="types in the placements"
+    )
+    learning.add_argument(
+        "--placements", type=int, default=default.placements, metavar="N", help="random ones for each run of traffic"
+    )
+    learning.add_argument("--every", type=float, default=default.every, metavar="S", help="time from frame to frame")
     net = parser.add_argument_group("network")
     add_settings(net, NetworkSettings, "head", "pillar", "most_points", "width", "blocks")
     work = parser.add_argument_group("training")

@@ -99,7 +99,7 @@ def varied(trajectories: Trajectories, seed: int) -> Generator[Progress, None, T
     """
     random = _generator(seed)
     drawn = [_size_within_kinds(user, random) for user in trajectories.users]
-    return (yield from _with_sizes(shaped(trajectories, seed), np.array(drawn)))
+    return (yield from with_sizes(shaped(trajectories, seed), np.array(drawn)))
 
 
 def shaped(trajectories: Trajectories, seed: int) -> Trajectories:
@@ -126,7 +126,38 @@ def resized(trajectories: Trajectories, change: float, seed: int) -> Generator[P
         raise SeipError(f"sizes change by a share of 0 to {MAX_CHANGE:g}, not {change:g}")
     sizes = np.array([_size(user) for user in trajectories.users])
     factors = 1.0 + change * _generator(seed).uniform(-1.0, 1.0, sizes.shape)
-    return (yield from _with_sizes(trajectories, sizes * factors))
+    return (yield from with_sizes(trajectories, sizes * factors))
+
+
+def with_sizes(trajectories: Trajectories, wanted: Float) -> Generator[Progress, None, Trajectories]:
+    """Give each road user a size; one that would run into another grows by less, down to its own size.
+
+    Parameters
+    ----------
+    wanted : (u, 3) float64, metres
+        Length, width and height of each.
+
+    Returns
+    -------
+    Trajectories
+        In which no two overlap that did not before.
+    """
+    users = trajectories.users
+    own = np.array([_size(user) for user in users])
+    before = yield from find_overlaps(trajectories)
+    known = {tuple(pair) for pair in before.pair.tolist()}
+    growth = np.ones(len(users))
+    found = trajectories
+    for halvings in range(_HALVINGS + 1):
+        sizes = np.where(wanted > own, own + growth[:, None] * (wanted - own), wanted)
+        sizes = np.where(sizes == own, own, sizes.round(3))
+        found = replace(trajectories, users=tuple(map(_with_size, users, sizes.tolist())))
+        overlaps = yield from find_overlaps(found)
+        pairs = [pair for pair in overlaps.pair.tolist() if tuple(pair) not in known]
+        if not pairs:
+            break
+        growth[np.unique(pairs)] *= 0.5 if halvings < _HALVINGS - 1 else 0.0
+    return found
 
 
 def draw_size(category: str, random: np.random.Generator) -> tuple[float, float, float]:
@@ -157,26 +188,6 @@ def _size_within_kinds(user: RoadUser, random: np.random.Generator) -> tuple[flo
     size = draw_size(user.category, random)
     longest = max(kind.length[0] + REACH * kind.length[1] for kind in KINDS[user.category].values())
     return size if user.length <= longest else _size(user)
-
-
-def _with_sizes(trajectories: Trajectories, wanted: Float) -> Generator[Progress, None, Trajectories]:
-    """Return trajectories with the sizes (u, 3) that are wanted, where no two overlap that did not before."""
-    users = trajectories.users
-    own = np.array([_size(user) for user in users])
-    before = yield from find_overlaps(trajectories)
-    known = {tuple(pair) for pair in before.pair.tolist()}
-    growth = np.ones(len(users))
-    found = trajectories
-    for halvings in range(_HALVINGS + 1):
-        sizes = np.where(wanted > own, own + growth[:, None] * (wanted - own), wanted)
-        sizes = np.where(sizes == own, own, sizes.round(3))
-        found = replace(trajectories, users=tuple(map(_with_size, users, sizes.tolist())))
-        overlaps = yield from find_overlaps(found)
-        pairs = [pair for pair in overlaps.pair.tolist() if tuple(pair) not in known]
-        if not pairs:
-            break
-        growth[np.unique(pairs)] *= 0.5 if halvings < _HALVINGS - 1 else 0.0
-    return found
 
 
 def _with_size(user: RoadUser, size: list[float]) -> RoadUser:

@@ -1,0 +1,45 @@
+"""A site to learn from: its runs of traffic, and scans of them by random or given placements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from seip_addon.core.workflows.survey import Layout
+
+from .frames import Recording
+from .random_placements import random_placement
+from .recordings import PlacedSensors, SampledRun, Simulator
+
+
+@dataclass(frozen=True, eq=False)
+class LearntSite:
+    """A site to learn from.
+
+    Parameters
+    ----------
+    name : str
+        For messages.
+    layout : Layout
+        Whose candidates random placements are drawn from.
+    runs : tuple of SampledRun
+    """
+
+    name: str
+    layout: Layout
+    runs: tuple[SampledRun, ...]
+    simulator: Simulator
+
+    def random_placement(self, number: int, random: np.random.Generator) -> PlacedSensors:
+        """Draw a placement; see `random_placements.random_placement`."""
+        name = f"{self.name}, placement {number}"
+        return random_placement(name, self.layout.site.candidates, self.layout.models, random)
+
+    def scans(self, placements: int, random: np.random.Generator) -> list[Recording]:
+        """Return the scans of each run by so many random placements of its own."""
+        return [
+            self.simulator.record(self.random_placement(number, random), run)
+            for run in self.runs
+            for number in range(1, placements + 1)
+        ]

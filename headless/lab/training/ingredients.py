@@ -1,0 +1,100 @@
+"""Ingredients of the training of a detector for sites that it has never seen, each of which can be left out."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, replace
+
+from headless.detection.detection_area import DetectionArea
+from headless.detection.recordings import SampledRun
+from headless.sumo.demand import MODELS
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seip_addon.core.geometry.height_raster import HeightRaster
+from seip_addon.core.progress import Progress
+from seip_addon.core.scans.frame import Frame
+from seip_addon.core.traffic import RoadUser
+from seip_addon.core.traffic.varied_bodies import with_sizes
+
+FEW_SITES = 2  # to learn from, where many sites are left out
+
+
+@dataclass(frozen=True)
+class ScanIngredients:
+    """Ingredients that decide of what scans a detector learns from.
+
+    Parameters
+    ----------
+    varied_bodies : bool
+        Whether road users have the sizes and shapes of their runs; else each has those of the nearest model.
+    random_placements : bool
+        Whether each run is scanned by random sensors; else all of a site are by those that cover most.
+    many_sites : bool
+        Whether all sites are learnt from; else the first `FEW_SITES`, with as many scans more of each.
+    """
+
+    varied_bodies: bool = True
+    random_placements: bool = True
+    many_sites: bool = True
+
+
+@dataclass(frozen=True)
+class Ingredients:
+    """What is done for a detector to carry to sites that it has never seen.
+
+    Parameters
+    ----------
+    foreground : bool
+        Whether the background is taken out of clouds.
+    levelled : bool
+        Whether heights are above the road under each point; else above the mean height of the site's roads.
+    """
+
+    foreground: bool = True
+    levelled: bool = True
+    scans: ScanIngredients = ScanIngredients()
+
+    def area(self, area: DetectionArea) -> DetectionArea:
+        """Return where a detector looks at a site, and what it takes out of clouds."""
+        road = area.road if self.levelled else _mean_level(area.road)
+        kind = DetectionArea if self.foreground else _AllReturns
+        return kind(area.grid, road, area.site)
+
+
+ALL = "all"
+VARIANTS: Mapping[str, Ingredients] = {
+    ALL: Ingredients(),
+    "background left in": Ingredients(foreground=False),
+    "heights above one level": Ingredients(levelled=False),
+    "bodies of few models": Ingredients(scans=ScanIngredients(varied_bodies=False)),
+    "one placement at each site": Ingredients(scans=ScanIngredients(random_placements=False)),
+    f"{FEW_SITES} sites": Ingredients(scans=ScanIngredients(many_sites=False)),
+}
+"""Variants of the training by name: with all ingredients, and without each."""
+
+
+class _AllReturns(DetectionArea):
+    """An area whose clouds keep their background."""
+
+    def cloud(self, frame: Frame) -> NDArray[np.float32]:
+        """Return the returns over the grid."""
+        return super().cloud(replace(frame, foreground=np.ones(len(frame), dtype=np.bool_)))
+
+
+def _mean_level(road: HeightRaster) -> HeightRaster:
+    return HeightRaster(road.low, road.step, np.full_like(road.heights, road.heights.mean()))
+
+
+def with_bodies_of_models(run: SampledRun) -> Generator[Progress, None, SampledRun]:
+    """Give each road user of a run the size of the nearest model of traffic simulations, and no shape of its own."""
+    users = tuple(replace(user, shape=RoadUser.shape) for user in run.trajectories.users)
+    sizes = np.array([_nearest_model(user) for user in users])
+    return replace(run, trajectories=(yield from with_sizes(replace(run.trajectories, users=users), sizes)))
+
+
+def _nearest_model(user: RoadUser) -> tuple[float, float, float]:
+    own = np.array((user.length, user.width, user.height))
+    sizes = [(model.length, model.width, model.height) for model in MODELS[user.category].values()]
+    return min(sizes, key=lambda size: float((np.log(own / size) ** 2).sum()))

@@ -1,0 +1,131 @@
+"""Tests of detectors on sites that none of them has learnt from: traffic and sensors there, and what is found."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from headless.detection.average_precision import Evaluation, evaluate
+from headless.detection.case_study import AT_ONCE
+from headless.detection.cloud_in_plan import CloudInPlan
+from headless.detection.detector import Detector
+from headless.detection.frame_results import FrameResult, frame_result
+from headless.detection.inference import detect
+from headless.detection.learnt_site import LearntSite
+from headless.detection.recordings import PlacedSensors, SampledRun, Simulator
+from headless.detection.rules import MAIN_RULE
+from headless.detection.settings import CLASS_CATEGORIES
+from headless.detection.training import deterministic
+from headless.lab.detector.paired_change import ResampledPrecision, change, level
+
+import numpy as np
+
+from seip_addon.core.estimates import IntervalEstimate
+from seip_addon.core.progress import Progress, finish, side_by_side
+from seip_addon.core.traffic.varied_bodies import resized
+
+from .ingredients import ALL, Ingredients
+
+SIZE_CHANGE = 0.15  # share by which each dimension of each road user differs at most, in the test of that
+
+
+@dataclass(frozen=True, eq=False)
+class UnseenTest:
+    """Runs of traffic at a site, each with the sensors that scan it."""
+
+    name: str
+    simulator: Simulator
+    scanned: tuple[tuple[SampledRun, PlacedSensors], ...]
+
+
+def unseen_tests(site: LearntSite, best: PlacedSensors, seed: int, *, full: bool) -> tuple[UnseenTest, ...]:
+    """Return the tests at a site: with one placement; in full also with random ones, and road users of other sizes."""
+    runs = site.runs
+    tests = [UnseenTest(f"{site.simulator.site}, {best.name}", site.simulator, tuple((run, best) for run in runs))]
+    if full:
+        random = np.random.default_rng([seed, len(runs)])
+        drawn = tuple((run, site.random_placement(number, random)) for number, run in enumerate(runs, start=1))
+        tests.append(UnseenTest(f"{site.simulator.site}, random placements", site.simulator, drawn))
+        others = tuple(
+            (replace(run, trajectories=finish(resized(run.trajectories, SIZE_CHANGE, seed))), best) for run in runs
+        )
+        tests.append(UnseenTest(f"{tests[0].name}, sizes ±{SIZE_CHANGE:.0%}", site.simulator, others))
+    return tuple(tests)
+
+
+@dataclass(frozen=True, eq=False)
+class IngredientEffect:
+    """Average precision of a variant in a test.
+
+    Parameters
+    ----------
+    precision : IntervalEstimate
+        Over test runs and trainings.
+    change : IntervalEstimate or None
+        Against the training with all ingredients, pair by pair; None of that itself.
+    """
+
+    variant: str
+    test: str
+    precision: IntervalEstimate
+    change: IntervalEstimate | None
+
+
+def effects(
+    tests: Sequence[UnseenTest], variants: Mapping[str, Ingredients], detectors: Mapping[str, Sequence[Detector]]
+) -> Generator[Progress, None, list[IngredientEffect]]:
+    """Evaluate the detectors of all variants on the same frames, and compare them with those of all ingredients."""
+    works = [_detected(test, run, sensors, variants, detectors) for test in tests for run, sensors in test.scanned]
+    with deterministic(1):  # all the time, as torch keeps one such setting for all threads
+        found = iter((yield from side_by_side(works, AT_ONCE)))
+    rows = []
+    for test in tests:
+        runs = [next(found) for _ in test.scanned]
+        resampled = {
+            name: [ResampledPrecision(_evaluated([run[name][number] for run in runs])) for number in range(len(own))]
+            for name, own in detectors.items()
+        }
+        rows += [
+            IngredientEffect(
+                name, test.name, level(own), None if name == ALL else change(own, resampled[ALL], same_traffic=True)
+            )
+            for name, own in resampled.items()
+        ]
+    return rows
+
+
+def _evaluated(runs: Sequence[Sequence[FrameResult]]) -> Evaluation:
+    return evaluate([frame for run in runs for frame in run], MAIN_RULE)
+
+
+def _detected(
+    test: UnseenTest,
+    run: SampledRun,
+    sensors: PlacedSensors,
+    variants: Mapping[str, Ingredients],
+    detectors: Mapping[str, Sequence[Detector]],
+) -> Generator[Progress, None, dict[str, list[list[FrameResult]]]]:
+    """Detect in a run; return the frames' results by variant and training."""
+    simulator = test.simulator
+    results: dict[str, list[list[FrameResult]]] = {name: [[] for _ in own] for name, own in detectors.items()}
+    for number in range(len(run.times)):
+        yield Progress(number, len(run.times), f"detect at {test.name}")
+        frame = simulator.frame(sensors, run, number)
+        cloud = CloudInPlan(frame.points)
+        for name, own in detectors.items():
+            for detector, frames in zip(own, results[name], strict=True):
+                area = variants[name].area(simulator.area(detector.settings.pillar))
+                found = detect(detector, area, frame)
+                frames.append(
+                    frame_result(
+                        frame,
+                        cloud,
+                        found,
+                        classes=tuple(CLASS_CATEGORIES.values()),
+                        region=simulator.static.region,
+                        sensors=sensors.places,
+                        run=run.name,
+                        parked=run.parked,
+                    )
+                )
+    return results
