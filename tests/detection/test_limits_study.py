@@ -60,9 +60,9 @@ def store(tmp_path_factory):
 def asked(store):
     two = (one_tested(1), one_tested(2))
     padded = (one_tested(3, replace(NETWORK, padded=True)),)
-    candidates = EvaluatedDetectors(two, {"type1": one_tested(5), "type2": one_tested(6)}, padded, two[:1])
-    away = OtherSite(ground("away", seed=4), (Hung(),), two, two)
-    denser = OtherSite(ground("denser", seed=5), (Hung(),), two)
+    by_type = {"type1": one_tested(5), "type2": one_tested(6)}
+    candidates = EvaluatedDetectors(two, by_type, (one_tested(8),), padded, two[:1])
+    away, denser = (OtherSite(ground(name, seed=seed), (Hung(),)) for name, seed in (("away", 4), ("denser", 5)))
     return ground(), [Hung()], candidates, [away, denser], store, 0.1
 
 
@@ -80,7 +80,7 @@ def test_every_disturbance_is_tried_at_every_size(study, store):
     assert all(0 <= point.precision.value <= 1 for curve in study.curves for point in curve.points)
     assert all(-1 <= point.change.value <= 1 for curve in study.curves for point in curve.points)
     trials_at_home = 2 * (1 + 2 + sum(map(len, series))) + 2 + 1  # by two detectors; by type; padded
-    assert len(list(store.glob("*.npz"))) == trials_at_home + 2 + 2
+    assert len(list(store.glob("*.npz"))) == trials_at_home + 2 + 2 + 3  # that which ships: at home and twice away
 
 
 def test_progress_ends_at_its_total(asked):
@@ -134,7 +134,15 @@ def test_there_is_a_row_for_each_question(study):
     rows = limit_rows(study)
     regimes = [row.regime for row in rows]
     assert len(set(regimes)) == len(regimes)
-    for words in ("seeds", "rain or fog", "yaw wrong (S", "sensor lost with", "learnt from type2", "away", "denser"):
+    for words in (
+        "seeds",
+        "rain or fog",
+        "yaw wrong (S",
+        "sensor lost with",
+        "learnt from type2",
+        "random sites",
+        "away",
+    ):
         assert any(words in regime for regime in regimes), words
     for words in ("few returns", "border of the region", "over-full", "padded with zeros"):
         assert any(words in regime for regime in regimes), words

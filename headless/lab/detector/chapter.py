@@ -9,6 +9,7 @@ from pathlib import Path
 from headless import runtime, survey
 from headless.detection import case_study
 from headless.detection.average_precision import balanced_score
+from headless.detection.detector import SHIPPED_DETECTOR, Detector
 from headless.detection.recordings import SensorConfiguration, Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import TrainedDetector
@@ -66,7 +67,8 @@ def detector_limits(
     simulator = _studio(surveyed)
     asked = training_plan(configurations, network, TrainingSettings(steps=steps), seeds=seeds, padding=True)
     trained = yield from _trained(asked, simulator, configurations, traffic, folder)
-    candidates = asked.candidates([one.detector for one in trained])
+    shipped = EvaluatedDetector("shipped", Detector.load(SHIPPED_DETECTOR))
+    candidates = asked.candidates([one.detector for one in trained], shipped=(shipped,))
 
     main = _most(configurations)
     home = TrialSite(simulator.site, simulator, traffic.test)
@@ -75,9 +77,9 @@ def detector_limits(
     elsewhere = []
     dense = case_study.read_runs(survey.runs_beside(scene, "_dense"), origin, TEST_INTERVAL)
     if dense:
-        elsewhere.append(OtherSite(TrialSite("denser traffic", simulator, dense), (main,), candidates.tested))
+        elsewhere.append(OtherSite(TrialSite("denser traffic", simulator, dense), (main,)))
     for other in others:
-        there = yield from _on_other_scene(other, surveyed, main, candidates.tested, folder)
+        there = yield from _on_other_scene(other, surveyed, main, folder)
         elsewhere.append(there)
     return (
         yield from limits_study(home, [main], candidates, elsewhere, folder, score=balanced_score(tried.evaluation))
@@ -97,9 +99,9 @@ def _trained(
 
 
 def _on_other_scene(
-    scene: Path, surveyed: Survey, main: SensorConfiguration, tested: Sequence[EvaluatedDetector], folder: Path
+    scene: Path, surveyed: Survey, main: SensorConfiguration, folder: Path
 ) -> Generator[Progress, None, OtherSite]:
-    """Place as many sensors of the same type there, and bring the detectors."""
+    """Place as many sensors of the same type there."""
     settings = surveyed.settings
     runtime.open_scene(scene)
     reading = read_scene(bpy.context.scene)
@@ -107,7 +109,7 @@ def _on_other_scene(
     layout = lay_out(reading.geometry, replace(settings, candidates=candidates), reading.warnings)
     there = yield from case_study.place_all((yield from see(layout, folder / f"visibility_{scene.stem}.npz")))
     runs = case_study.read_runs(survey.runs_beside(scene), layout.geometry.origin, TEST_INTERVAL)
-    return OtherSite(TrialSite(layout.site.name, _studio(layout), runs), (_most(there),), tuple(tested))
+    return OtherSite(TrialSite(layout.site.name, _studio(layout), runs), (_most(there),))
 
 
 def _studio(layout: Layout) -> Simulator:

@@ -27,6 +27,7 @@ from .disturbances import (
     YawError,
 )
 from .study import (
+    AT_HOME,
     BorderResults,
     DisturbanceCurve,
     DisturbanceEffect,
@@ -136,7 +137,7 @@ def _transfer_row(one: TransferResult) -> Row:
         METHOD,
         f"learnt from {one.trained_on}, used on {one.tested_on}",
         f"{points_in_words(one.change)} against {one.against}: {one.precision.describe(1)}",
-        "the same frames, paired" if one.against != "at home" else "other frames: compared as a whole",
+        "the same frames, paired" if one.against != AT_HOME else "other frames: compared as a whole",
         "a detector's file says of which sensor types and sites it has learnt; on other types, or away from its only "
         "site, a warning says so",
     )

@@ -48,6 +48,9 @@ Series = tuple[Disturbance, ...]
 BORDER_EDGES = (0.0, 2.0, 5.0, 10.0, 20.0, 40.0, np.inf)
 """Metres from the border of the region of interest, between which road users are counted."""
 
+AT_HOME = "at home"
+"""Against what detectors are compared on other sites: themselves, on the frames of the site that they learnt from."""
+
 COUNTED_FRAMES = 8  # frames in which pillars are counted
 
 
@@ -200,16 +203,12 @@ class OtherSite:
 
     Parameters
     ----------
-    tested : tuple of EvaluatedDetector
-        The detectors from home, on this site's grid.
-    trained_there : tuple of EvaluatedDetector
-        Detectors that have learnt there, as many or none.
+    configurations : tuple of SensorConfiguration
+        With the names of some at home.
     """
 
     site: TrialSite
     configurations: tuple[SensorConfiguration, ...]
-    tested: tuple[EvaluatedDetector, ...]
-    trained_there: tuple[EvaluatedDetector, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,12 +221,15 @@ class EvaluatedDetectors:
         Alike but for their seeds.
     by_type : mapping of str to EvaluatedDetector
         Those that have learnt from one sensor type alone.
+    shipped : tuple of EvaluatedDetector
+        That which ships, which has learnt from random sites; empty where it is not to be tried.
     padded : tuple of EvaluatedDetector
         With pillars padded with zeros, and ``unpadded``, trained as long, to compare them with.
     """
 
     tested: tuple[EvaluatedDetector, ...]
     by_type: Mapping[str, EvaluatedDetector]
+    shipped: tuple[EvaluatedDetector, ...] = ()
     padded: tuple[EvaluatedDetector, ...] = ()
     unpadded: tuple[EvaluatedDetector, ...] = ()
 
@@ -255,8 +257,10 @@ class TrainingPlan:
         """All, as `case_study.train_all` takes them."""
         return (*self.alike, *self.by_type.values(), *self.padded)
 
-    def candidates(self, detectors: Sequence[Detector]) -> EvaluatedDetectors:
-        """Return what the study tries, from the detectors of all models in their order."""
+    def candidates(
+        self, detectors: Sequence[Detector], shipped: tuple[EvaluatedDetector, ...] = ()
+    ) -> EvaluatedDetectors:
+        """Return what the study tries, from the detectors of all models in their order, and that which ships."""
         trained = {
             model.name: EvaluatedDetector(model.name, detector)
             for model, detector in zip(self.models, detectors, strict=True)
@@ -264,6 +268,7 @@ class TrainingPlan:
         return EvaluatedDetectors(
             tested=tuple(trained[model.name] for model in self.alike),
             by_type={sensor: trained[model.name] for sensor, model in self.by_type.items()},
+            shipped=shipped,
             padded=tuple(trained[model.name] for model in self.padded),
             unpadded=tuple(trained[model.name] for model in self.alike[: len(self.padded)]),
         )
@@ -427,13 +432,12 @@ class _TrialRunner:
         candidates: EvaluatedDetectors,
         elsewhere: Sequence[OtherSite],
     ) -> Generator[Progress, None, list[TransferResult]]:
-        """Evaluate detectors of one type on the others, and all detectors on other sites."""
+        """Evaluate detectors of one type on the others, all of them on other sites, and there that which ships."""
         found = []
         for configuration in configurations:
             tried = {}
             for sensor, one_tested in candidates.by_type.items():
-                made = yield from self.run(configuration, Disturbance(), [one_tested])
-                tried[sensor] = [ResampledPrecision(made[0].evaluation)]
+                tried[sensor] = yield from self._undisturbed(configuration, [one_tested])
             native = tried.pop(configuration.sensor, None)
             for sensor, those in tried.items() if native else ():
                 against = f"learnt from {configuration.sensor}"
@@ -442,31 +446,31 @@ class _TrialRunner:
                 )
         for other in elsewhere:
             for configuration in other.configurations:
-                there = yield from self._elsewhere(other, configuration, candidates, configurations)
-                found.append(there)
+                tested_on = f"{configuration.name}, {other.site.name}"
+                there = yield from self._undisturbed(configuration, candidates.tested, other.site)
+                twin = next(one for one in configurations if one.name == configuration.name)
+                own = yield from self._undisturbed(twin, candidates.tested)
+                difference = change(there, own, same_traffic=False)
+                found.append(TransferResult(self._home.simulator.site, tested_on, level(there), difference, AT_HOME))
+        places = [(configuration, self._home) for configuration in configurations]
+        places += [(configuration, other.site) for other in elsewhere for configuration in other.configurations]
+        for configuration, site in places if candidates.shipped else ():
+            shipped = yield from self._undisturbed(configuration, candidates.shipped, site)
+            own = yield from self._undisturbed(configuration, candidates.tested, site)
+            difference = change(len(own) * shipped, own)
+            against = f"learnt from {self._home.simulator.site}"
+            found.append(
+                TransferResult(
+                    "random sites", f"{configuration.name}, {site.name}", level(shipped), difference, against
+                )
+            )
         return found
 
-    def _elsewhere(
-        self,
-        other: OtherSite,
-        configuration: SensorConfiguration,
-        candidates: EvaluatedDetectors,
-        configurations: Sequence[SensorConfiguration],
-    ) -> Generator[Progress, None, TransferResult]:
-        """Compare with detectors trained there on the same frames, or else with these at home, on other frames."""
-        made = yield from self.run(configuration, Disturbance(), other.tested, other.site)
-        there = [ResampledPrecision(trial.evaluation) for trial in made]
-        if other.trained_there:
-            own = yield from self.run(configuration, Disturbance(), other.trained_there, other.site)
-            against = "learnt there"
-        else:
-            twin = next(one for one in configurations if one.name == configuration.name)
-            own = yield from self.run(twin, Disturbance(), candidates.tested)
-            against = "at home"
-        before = [ResampledPrecision(trial.evaluation) for trial in own]
-        tried = f"{configuration.name}, {other.site.name}"
-        difference = change(there, before, same_traffic=bool(other.trained_there))
-        return TransferResult(self._home.simulator.site, tried, level(there), difference, against)
+    def _undisturbed(
+        self, configuration: SensorConfiguration, tested: Sequence[EvaluatedDetector], site: TrialSite | None = None
+    ) -> Generator[Progress, None, list[ResampledPrecision]]:
+        made = yield from self.run(configuration, Disturbance(), tested, site)
+        return [ResampledPrecision(trial.evaluation) for trial in made]
 
     def padding(
         self, configurations: Sequence[SensorConfiguration], candidates: EvaluatedDetectors
@@ -495,7 +499,9 @@ def _length(
     full, brief = (sum(map(len, series(0))) for series in (full_series, brief_series))
     each = 1 + len(candidates.by_type) + bool(candidates.padded)
     at_home = sum(each + len(one.sensors) for one in configurations) + full + brief * (len(configurations) - 1)
-    return at_home + sum(2 * len(other.configurations) for other in elsewhere)
+    away = sum(len(other.configurations) for other in elsewhere)
+    of_shipped = 2 * (len(configurations) + away) if candidates.shipped else 0
+    return at_home + 2 * away + of_shipped
 
 
 def _borders(name: str, trial: DisturbedTrial, score: float) -> BorderResults:

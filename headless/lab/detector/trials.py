@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from headless.detection.average_precision import CountedTruth, EvaluatedDetections, Evaluation, evaluate
+from headless.detection.case_study import AT_ONCE
 from headless.detection.cloud_in_plan import CloudInPlan
 from headless.detection.detector import Detector
 from headless.detection.frame_results import FrameResult, frame_result
@@ -22,7 +23,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.progress import Progress, finish
+from seip_addon.core.progress import Progress, finish, side_by_side
 from seip_addon.core.scans import Frame, prepare
 from seip_addon.core.storage.array_file import ArrayFile, ArrayRule, ContentError
 from seip_addon.core.storage.files import digest
@@ -160,39 +161,50 @@ def trial_of(frames: Sequence[FrameResult], region: BaseGeometry) -> DisturbedTr
 
 
 def disturbed_frames(
-    site: TrialSite, configuration: SensorConfiguration, disturbance: Disturbance
-) -> Generator[tuple[SampledRun, Frame], None, None]:
-    """Simulate the test frames as they are under a disturbance."""
-    simulator = site.simulator
+    simulator: Simulator, run: SampledRun, configuration: SensorConfiguration, disturbance: Disturbance
+) -> Generator[Frame, None, None]:
+    """Simulate the frames of a run as they are under a disturbance."""
     sensors = disturbance.disturbed_sensors(configuration.sensors)
-    for run in site.runs:
-        trajectories = disturbance.disturbed_traffic(run.trajectories)
-        bodies = [fitted_body(user) for user in trajectories.users]
-        simulation = finish(prepare(simulator.static, sensors, trajectories, bodies, simulator.settings))
-        for number, time in enumerate(run.times.tolist()):
-            random = np.random.default_rng([simulator.settings.seed, int(run.key, 16), number])
-            scan = disturbance.disturbed_scan(simulation, number, time)
-            yield run, disturbance.disturbed_frame(scan, sensors, random)
+    trajectories = disturbance.disturbed_traffic(run.trajectories)
+    bodies = [fitted_body(user) for user in trajectories.users]
+    simulation = finish(prepare(simulator.static, sensors, trajectories, bodies, simulator.settings))
+    for number, time in enumerate(run.times.tolist()):
+        random = np.random.default_rng([simulator.settings.seed, int(run.key, 16), number])
+        scan = disturbance.disturbed_scan(simulation, number, time)
+        yield disturbance.disturbed_frame(scan, sensors, random)
 
 
 def _results(
     site: TrialSite, configuration: SensorConfiguration, disturbance: Disturbance, detectors: Sequence[Detector]
 ) -> Generator[Progress, None, list[list[FrameResult]]]:
+    """Return the results of all frames by detector."""
+    works = [_results_of_run(site, run, configuration, disturbance, detectors) for run in site.runs]
+    with deterministic(1):  # all the time, as torch keeps one such setting for all threads
+        by_run = yield from side_by_side(works, AT_ONCE)
+    return [[frame for run in by_run for frame in run[number]] for number in range(len(detectors))]
+
+
+def _results_of_run(
+    site: TrialSite,
+    run: SampledRun,
+    configuration: SensorConfiguration,
+    disturbance: Disturbance,
+    detectors: Sequence[Detector],
+) -> Generator[Progress, None, list[list[FrameResult]]]:
     results: list[list[FrameResult]] = [[] for _ in detectors]
-    total = sum(len(run.times) for run in site.runs)
-    for done, (run, frame) in enumerate(disturbed_frames(site, configuration, disturbance)):
-        yield Progress(done, total, f"{configuration.name}, {disturbance.name} {disturbance.size:g}")
+    region = site.simulator.static.region
+    for number, frame in enumerate(disturbed_frames(site.simulator, run, configuration, disturbance)):
+        yield Progress(number, len(run.times), f"{configuration.name}, {disturbance.name} {disturbance.size:g}")
         cloud = CloudInPlan(frame.points)
         for detector, own in zip(detectors, results, strict=True):
-            with deterministic(1):
-                found = detect(detector, site.simulator.area(detector.settings.pillar), frame)
+            found = detect(detector, site.simulator.area(detector.settings.pillar), frame)
             own.append(
                 frame_result(
                     frame,
                     cloud,
                     found,
                     classes=tuple(CLASS_CATEGORIES.values()),
-                    region=site.simulator.static.region,
+                    region=region,
                     sensors=configuration.places,
                     run=run.name,
                 )
