@@ -14,6 +14,7 @@ from headless.detection.average_precision import (
     part,
 )
 from headless.detection.case_study import (
+    AT_ONCE,
     ModelConfiguration,
     Traffic,
     TrainingSet,
@@ -21,15 +22,16 @@ from headless.detection.case_study import (
     simulate_training_set,
 )
 from headless.detection.detector import Detector
-from headless.detection.recordings import SensorConfiguration, Simulator
+from headless.detection.recordings import SampledRun, SensorConfiguration, Simulator
 from headless.detection.rules import MAIN_RULE
 from headless.detection.settings import NetworkSettings, TrainingSettings
+from headless.detection.training import deterministic
 
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Text
 from seip_addon.core.estimates import RESAMPLES, Interval, percentiles
-from seip_addon.core.progress import Progress, in_detail
+from seip_addon.core.progress import Progress, side_by_side
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
 
@@ -178,17 +180,25 @@ def precisions(
     folder : path
         Of results: what was detected is kept in it, under a digest of all that it follows from.
     """
-    detector_keys = [detector.key for detector in detectors]
-    evaluations = []
+    works = [_evaluated(simulator, placement, detectors, traffic.test, folder / FOLDER) for placement in placements]
+    with deterministic(1):  # all the time, as torch keeps one such setting for all threads
+        evaluations = yield from side_by_side(works, AT_ONCE)
     runs: Text = np.repeat([run.name for run in traffic.test], [len(run.times) for run in traffic.test])
-    for done, placement in enumerate(placements):
-        scene = digest(source_digest(detect_in_runs.__module__), simulator.key(placement, traffic.test))
-        paths = [folder / FOLDER / f"{digest(scene, key)[:32]}.npz" for key in detector_keys]
-        missing = [number for number, path in enumerate(paths) if not path.exists()]
-        if missing:
-            steps = detect_in_runs(simulator, placement, traffic.test, [detectors[number] for number in missing], 1)
-            found = yield from in_detail(Progress(done, len(placements), "detect"), steps)
-            for number, frames in zip(missing, found, strict=True):
-                save_frames(paths[number], frames)
-        evaluations.append(tuple(evaluate(load_frames(path), MAIN_RULE) for path in paths))
     return Precisions(runs, tuple(evaluations))
+
+
+def _evaluated(
+    simulator: Simulator,
+    placement: SensorConfiguration,
+    detectors: Sequence[Detector],
+    runs: Sequence[SampledRun],
+    store: Path,
+) -> Generator[Progress, None, tuple[Evaluation, ...]]:
+    scene = digest(source_digest(detect_in_runs.__module__), simulator.key(placement, runs))
+    paths = [store / f"{digest(scene, detector.key)[:32]}.npz" for detector in detectors]
+    missing = [number for number, path in enumerate(paths) if not path.exists()]
+    if missing:
+        found = yield from detect_in_runs(simulator, placement, runs, [detectors[number] for number in missing], 1)
+        for number, frames in zip(missing, found, strict=True):
+            save_frames(paths[number], frames)
+    return tuple(evaluate(load_frames(path), MAIN_RULE) for path in paths)
