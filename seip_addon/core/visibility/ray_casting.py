@@ -6,6 +6,7 @@ its caster is made. Embree (embreex) is used when it is installed.
 
 from __future__ import annotations
 
+import functools
 import gc
 import importlib.util
 import itertools
@@ -173,7 +174,7 @@ class EmbreeRayCaster:
             raise SeipError("the ray-casting engine embree is not installed; choose bvh or install embreex") from error
         self.triangles = triangles
         self._index, self._centre, corners = _rebased(triangles, keep)
-        self._scene = EmbreeScene(robust=True)  # no leaks along shared edges
+        self._scene = EmbreeScene(_embree_device(), robust=True)  # robust: no leaks along shared edges
         self._mesh = TriangleMesh(self._scene, corners.astype(np.float32)) if len(corners) else None
         self._needle = _needles(corners)
         self._any_needle = bool(self._needle.any())
@@ -192,6 +193,18 @@ class EmbreeRayCaster:
             met = self.triangles[self._index[face[needle]]]
             distance[needle] = _to_plane(np.broadcast_to(origin, directions.shape)[needle], directions[needle], met)
         return _result(distance, face, self._index, max_range)
+
+
+@functools.cache
+def _embree_device() -> object:
+    """Return the one Embree device of all casters.
+
+    Each device holds one of the some thousand keys of thread-local storage that a process has; Embree crashes where
+    there is none left.
+    """
+    from embreex.rtcore import EmbreeDevice  # noqa: PLC0415 - an extra that need not be installed
+
+    return EmbreeDevice()
 
 
 def _rebased(triangles: Float, keep: Boolean | None) -> tuple[Integer, Float, Float]:

@@ -150,3 +150,10 @@ def test_an_unknown_engine_names_the_known() -> None:
 @needs_embree
 def test_auto_takes_embree_where_it_is() -> None:
     assert make_ray_caster(SQUARE).name == "embree"
+
+
+@needs_embree
+def test_there_may_be_more_casters_than_embree_may_have_devices() -> None:
+    casters = [make_ray_caster(SQUARE, "embree") for _ in range(1100)]  # a device each ends the process at 1,024
+    above, down = SQUARE.mean(axis=(0, 1)) + np.array([0.0, 0.0, 1.0]), np.array([[0.0, 0.0, -1.0]])
+    assert all(caster.cast(above, down, 2.0)[1].item() >= 0 for caster in casters)
