@@ -23,9 +23,9 @@ from headless.detection.average_precision import precision_recall, too_few_runs
 from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
 from headless.detection.case_study import read_runs
 from headless.detection.chart_data import error_view, parts
-from headless.detection.detection_area import area_of
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
 from headless.detection.judgement import Judgement, figures, judge
+from headless.detection.recordings import MountedSensors, Simulator
 from headless.detection.rules import MAIN_RULE
 from headless.detection.suitability import suitability_warnings
 from headless.options import add_rolling_shutter, add_settings, new_parser, read_settings
@@ -39,8 +39,7 @@ from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.results.detection_record import FORMATS, SCHEMA
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.robustness.traffic_instants import check_runs
-from seip_addon.core.scans import MountedSensor, ScanSettings, static_scene
-from seip_addon.core.scans.static_scene import StaticScene
+from seip_addon.core.scans import MountedSensor, ScanSettings
 from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.files import digest, save_json, whole_file
 from seip_addon.core.traffic.run_overlap import require_independent, vehicle_positions
@@ -72,20 +71,18 @@ def main(argv: list[str]) -> None:
     if len(runs) > 1:
         moved = [vehicle_positions(run.name, run.trajectories) for run in runs]
         runtime.LOG.info(require_independent(combinations(moved, 2)))
-    static = static_scene(geometry, sensors)
-    check_runs([run.trajectories for run in runs], static.region)
     scans = read_settings(
         ScanSettings, options, weather=tuple(options.weather), reflectivity=tuple(options.reflectivity)
     )
-    area = area_of(geometry, detector.settings.pillar)
-    steps = judge(detector, area, static, sensors, runs, scans, threads=options.threads)
-    judgement = runtime.finish_with_bar(steps)
-    types = sorted({sensor.model.key for sensor in sensors})
-    doubts = suitability_warnings(detector, types, area, judgement.scan)
+    simulator, placed = Simulator(geometry, scans, sensors), MountedSensors("sensors", tuple(sensors))
+    check_runs([run.trajectories for run in runs], simulator.static.region)
+    judgement = runtime.finish_with_bar(judge(detector, simulator, placed, runs))
+    area = simulator.area(detector.settings.pillar)
+    doubts = suitability_warnings(detector, placed.types, area, judgement.scan)
     doubts = (*doubts, *filter(None, [too_few_runs(len(runs))]))
     runtime.warn(doubts)
     with runtime.incomplete_if_interrupted(options.output):
-        _save(options.output, judgement, static, sensors, geometry.name)
+        _save(options.output, judgement, simulator, sensors)
         record = {
             "schema": SCHEMA,
             "site": geometry.name,
@@ -95,6 +92,7 @@ def main(argv: list[str]) -> None:
             "scans": {"seed": scans.seed, "rolling_shutter": scans.rolling_shutter},
             "average_precision": figures(judgement),
             "score": judgement.score,
+            "recall": judgement.recall,
             "warnings": [*changed, *doubts],
             "versions": versions(blender=bpy.app.version_string),
         }
@@ -102,12 +100,16 @@ def main(argv: list[str]) -> None:
     for name, value, interval, users in judgement.precisions():
         between = "" if interval is None else f" ({interval[0]:.1%} to {interval[1]:.1%})"
         runtime.print_line(f"{name}: AP {value:.1%}{between} of {users:,} road users")
+    found = (f"{name} {one['recall']:.0%} of {one['road_users']:,}" for name, one in judgement.recall.items())
+    runtime.print_line(
+        f"found at an overlap of {MAIN_RULE.iou:g} with a score of {judgement.score:.2f} or more: {', '.join(found)}"
+    )
     runtime.print_line(f"written to {options.output}/")
 
 
-def _save(folder: Path, judgement: Judgement, static: StaticScene, sensors: list[MountedSensor], name: str) -> None:
+def _save(folder: Path, judgement: Judgement, simulator: Simulator, sensors: list[MountedSensor]) -> None:
     """Write the charts, and the detections of each frame."""
-    evaluation, score = judgement.evaluation, judgement.score
+    evaluation, score, name = judgement.evaluation, judgement.score, simulator.site
     far = "distance to the nearest sensor (m)"
     panels = [
         parts(far, "average precision", {name: average_precision_by(evaluation, "distance", DISTANCE_EDGES)}),
@@ -123,7 +125,7 @@ def _save(folder: Path, judgement: Judgement, static: StaticScene, sensors: list
     places = np.array([sensor.xyz for sensor in sensors])
     title = f"{len(sensors)} × {types}: AP {evaluation.average_precision:.2f} over all frames"
     cloud = judgement.scan.points
-    view = error_view(title, frame, MAIN_RULE, score=score, cloud=cloud, region=static.region, sensors=places)
+    view = error_view(title, frame, MAIN_RULE, score=score, cloud=cloud, region=simulator.static.region, sensors=places)
     save_error_view(folder / "errors.png", [view], f"{name}, {frame.run} at {frame.time:.1f} s")
     for number, one in enumerate(judgement.frames):
         boxes, categories, scores = one.detected.boxes, one.detected.category.tolist(), one.detected.score
@@ -146,7 +148,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--every", type=float, default=2.5, metavar="S", help="time from frame to frame")
     parser.add_argument("--device", default="cpu", help="of torch: cpu or cuda")
-    parser.add_argument("--threads", type=int, default=1, help="of torch")
     add_settings(parser, SurveySettings, "catalogue")
     how = parser.add_argument_group("measurement")
     add_settings(how, ScanSettings, "seed")

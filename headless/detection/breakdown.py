@@ -75,6 +75,13 @@ def recall_by(evaluation: Evaluation, quantity: str, edges: Sequence[float], sco
     return tuple(bins)
 
 
+def recall_by_category(evaluation: Evaluation, score: float) -> dict[str, tuple[float, int]]:
+    """Return the share of road users found with at least some score, and their number, by category."""
+    wanted = evaluation.wanted
+    found = {name: wanted.score[wanted.category == name] >= score for name in evaluation.rule.categories}
+    return {name: (float(some.mean()), len(some)) for name, some in found.items() if len(some)}
+
+
 def false_by(evaluation: Evaluation, quantity: str, edges: Sequence[float], score: float) -> tuple[Bin, ...]:
     """Return the false detections per frame with at least some score, in parts.
 

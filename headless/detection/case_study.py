@@ -336,7 +336,7 @@ def evaluate_all(
 
 def detect_in_runs(
     simulator: Simulator,
-    configuration: SensorConfiguration,
+    configuration: PlacedSensors,
     runs: Sequence[SampledRun],
     detectors: Sequence[Detector],
     threads: int,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,27 +12,14 @@ from seip_addon.core.lidar import LidarModel
 from seip_addon.core.scans import MountedSensor
 from seip_addon.core.site.candidates import Candidates
 
-from .recordings import PlacedSensors
+from .recordings import MountedSensors
 
 MAX_SENSORS = 5  # of a random placement
 
 
-@dataclass(frozen=True, eq=False)
-class RandomPlacement(PlacedSensors):
-    """Sensors of any types, heights and tilts at random positions of a site."""
-
-    name: str
-    mounted: tuple[MountedSensor, ...]
-
-    @property
-    def sensors(self) -> tuple[MountedSensor, ...]:
-        """The sensors where they hang."""
-        return self.mounted
-
-
 def random_placement(
     name: str, candidates: Candidates, models: Mapping[str, LidarModel], random: np.random.Generator
-) -> RandomPlacement:
+) -> MountedSensors:
     """Return 1 to `MAX_SENSORS` sensors at different positions; positions, and then their poses, are equally likely.
 
     One in two placements has sensors of one type alone.
@@ -60,4 +46,4 @@ def random_placement(
         pose = int(poses[int(random.integers(len(poses)))])
         turn = orientation(float(candidates.yaw[pose]), float(candidates.tilt[pose]))
         sensors.append(MountedSensor(f"S{number}", models[str(candidates.sensor[pose])], candidates.xyz[pose], turn))
-    return RandomPlacement(name, tuple(sensors))
+    return MountedSensors(name, tuple(sensors))

@@ -81,6 +81,19 @@ class PlacedSensors(ABC):
 
 
 @dataclass(frozen=True, eq=False)
+class MountedSensors(PlacedSensors):
+    """Sensors of any types, wherever they hang."""
+
+    name: str
+    mounted: tuple[MountedSensor, ...]
+
+    @property
+    def sensors(self) -> tuple[MountedSensor, ...]:
+        """The sensors where they hang."""
+        return self.mounted
+
+
+@dataclass(frozen=True, eq=False)
 class SensorConfiguration(PlacedSensors):
     """Sensors of a placement, however it came about.
 
@@ -128,14 +141,19 @@ class Simulator:
     kept until some others were asked for: ask for the frames of one after the
     other, in no more threads than there are cores and one.
 
+    Parameters
+    ----------
+    sensors : sequence of MountedSensor
+        What lies beyond the range of all of them is left out; nothing is where none are given.
+
     Attributes
     ----------
     area : callable
         From the width of a pillar in metres to the `DetectionArea` of the scene.
     """
 
-    def __init__(self, geometry: SceneGeometry, settings: ScanSettings) -> None:
-        self.static, self.settings, self.site = static_scene(geometry), settings, geometry.name
+    def __init__(self, geometry: SceneGeometry, settings: ScanSettings, sensors: Sequence[MountedSensor] = ()) -> None:
+        self.static, self.settings, self.site = static_scene(geometry, sensors), settings, geometry.name
         self.area = functools.cache(functools.partial(area_of, geometry))
         self._simulation = functools.lru_cache(maxsize=(os.cpu_count() or 1) + 1)(self._prepared)
 

@@ -14,6 +14,7 @@ from headless.detection.breakdown import (
     false_by,
     false_positives,
     recall_by,
+    recall_by_category,
 )
 from headless.detection.matching import Rule
 
@@ -40,6 +41,14 @@ def told():
 
 def values(bins):
     return [None if math.isnan(one.value) else pytest.approx(one.value) for one in bins]
+
+
+def test_recall_by_category():
+    there = truth([box(0), box(20), box(40), box(60)], category=["car", "truck", "truck", "pedestrian"])
+    found = detected([box(0), box(20), box(40)], [0.9, 0.6, 0.4], category=["car", "truck", "truck"])
+    evaluation = evaluate([frame(there, found)], AT_07)
+    assert recall_by_category(evaluation, 0.5) == {"car": (1.0, 1), "truck": (0.5, 2)}
+    assert recall_by_category(evaluation, 0.95) == {"car": (0.0, 1), "truck": (0.0, 2)}
 
 
 def test_average_precision_by_distance():

@@ -15,10 +15,17 @@ from headless.detection.detection_area import area_of
 from headless.detection.learnt_site import LearntSite
 from headless.detection.recordings import SampledRun, Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
-from headless.lab.training.ingredients import ALL, FEW_SITES, VARIANTS, Ingredients, ScanIngredients
-from headless.lab.training.ingredients import with_bodies_of_models as bodies_of_models
+from headless.lab.training.ingredients import (
+    ALL,
+    FEW_SITES,
+    SIZE_CHANGE,
+    VARIANTS,
+    Ingredients,
+    ScanIngredients,
+    with_bodies,
+)
 from headless.lab.training.learning import COUNT, SENSOR, TrainingSites, train_variants
-from headless.lab.training.unseen_sites import SIZE_CHANGE, unseen_tests
+from headless.lab.training.unseen_sites import unseen_tests
 from headless.sumo.demand import MODELS
 
 import numpy as np
@@ -68,10 +75,18 @@ def placements(scans):
 
 def test_each_variant_leaves_out_one_ingredient():
     assert VARIANTS[ALL] == Ingredients()
-    flat = [{**vars(one), **vars(one.scans)} for one in VARIANTS.values()]
-    ingredients = [{name: kept for name, kept in one.items() if name != "scans"} for one in flat]
-    assert [sum(not kept for kept in one.values()) for one in ingredients] == [0, 1, 1, 1, 1, 1]
-    assert all(any(not one[name] for one in ingredients) for name in ingredients[0])
+    whole = Ingredients()
+    changed = [
+        {
+            name
+            for one, other in ((whole, variant), (whole.scans, variant.scans))
+            for name in vars(one)
+            if name != "scans" and vars(one)[name] != vars(other)[name]
+        }
+        for variant in VARIANTS.values()
+    ]
+    assert list(map(len, changed)) == [0, 1, 1, 1, 1, 1, 1]
+    assert set.union(*changed) == {*vars(whole), *vars(whole.scans)} - {"scans"}
 
 
 def test_without_the_background_taken_out_clouds_keep_all_returns():
@@ -94,15 +109,24 @@ def test_heights_above_one_level_are_those_above_the_mean_of_the_road():
 def test_bodies_of_models_are_those_of_the_nearest_model():
     trajectories = make_run(3, 30.0)
     shaped = tuple(replace(user, shape=(0.1, 0.0, 0.1, 0.0)) for user in trajectories.users)
-    run = finish(bodies_of_models(SampledRun("run", replace(trajectories, users=shaped), TIMES)))
+    before = SampledRun("run", replace(trajectories, users=shaped), TIMES)
+    run = finish(with_bodies(before, ScanIngredients(varied_bodies=False), 1))
     known = {category: {model[2:5] for model in models.values()} for category, models in MODELS.items()}
-    for before, user in zip(shaped, run.trajectories.users, strict=True):
+    for own, user in zip(shaped, run.trajectories.users, strict=True):
         size = (user.length, user.width, user.height)
-        assert size in known[user.category] | {(before.length, before.width, before.height)}
+        assert size in known[user.category] | {(own.length, own.width, own.height)}
         assert user.shape == (0.0, 0.0, 0.0, 0.0)
-        nearest = min(known[user.category], key=lambda other: abs(np.log(other[0] / before.length)))
+        nearest = min(known[user.category], key=lambda other: abs(np.log(other[0] / own.length)))
         assert abs(user.length - nearest[0]) < 0.5
     np.testing.assert_array_equal(run.trajectories.position, trajectories.position)
+    assert finish(with_bodies(before, ScanIngredients(), 1)) is before
+
+
+def test_resized_bodies_differ_by_the_share_at_most():
+    run = SampledRun("run", make_run(3, 30.0), TIMES)
+    other = finish(with_bodies(run, ScanIngredients(resized=SIZE_CHANGE), 1))
+    ratios = [b.width / a.width for a, b in zip(run.trajectories.users, other.trajectories.users, strict=True)]
+    assert 0.02 < max(map(abs, np.array(ratios) - 1)) <= SIZE_CHANGE + 1e-3
 
 
 def test_few_sites_are_scanned_as_often_as_many(sites):

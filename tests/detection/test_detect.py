@@ -60,6 +60,8 @@ def test_figures_charts_and_detections_are_written(folder, capsys):
     users = {name: figure["road_users"] for name, figure in record["average_precision"].items()}
     assert users["bev_0.7_moving"] + users["bev_0.7_parked"] == users["bev_0.7"]
     assert users["bev_0.7_parked"] == users["truck_bus_0.7"]  # the bus alone stands
+    assert set(record["recall"]) == {"car", "bus"}
+    assert sum(one["road_users"] for one in record["recall"].values()) == users["bev_0.7"]
     assert record["scans"]["rolling_shutter"] is True
     assert all(figure["interval"] is None for figure in record["average_precision"].values())
     assert any(line.startswith("2 test runs of traffic give no interval") for line in record["warnings"])
@@ -70,6 +72,7 @@ def test_figures_charts_and_detections_are_written(folder, capsys):
         assert (folder / "out" / chart).read_bytes().startswith(b"\x89PNG")
     said = capsys.readouterr()
     assert "bev_0.7: AP" in said.out
+    assert "with a score of" in said.out
     assert any("has learnt from clouds of vlp16" in sentence for sentence in record["warnings"])
 
 

@@ -16,8 +16,9 @@ from seip_addon.core.geometry.height_raster import HeightRaster
 from seip_addon.core.progress import Progress
 from seip_addon.core.scans.frame import Frame
 from seip_addon.core.traffic import RoadUser
-from seip_addon.core.traffic.varied_bodies import with_sizes
+from seip_addon.core.traffic.varied_bodies import resized, with_sizes
 
+SIZE_CHANGE = 0.15  # share by which dimensions of road users are changed at most, in a training and in a test
 FEW_SITES = 2  # to learn from, where many sites are left out
 
 
@@ -29,6 +30,8 @@ class ScanIngredients:
     ----------
     varied_bodies : bool
         Whether road users have the sizes and shapes of their runs; else each has those of the nearest model.
+    resized : float
+        Share by which each dimension of each road user is changed at most, beyond the spread of real ones.
     random_placements : bool
         Whether each run is scanned by random sensors; else all of a site are by those that cover most.
     many_sites : bool
@@ -36,6 +39,7 @@ class ScanIngredients:
     """
 
     varied_bodies: bool = True
+    resized: float = 0.0
     random_placements: bool = True
     many_sites: bool = True
 
@@ -71,8 +75,9 @@ VARIANTS: Mapping[str, Ingredients] = {
     "bodies of few models": Ingredients(scans=ScanIngredients(varied_bodies=False)),
     "one placement at each site": Ingredients(scans=ScanIngredients(random_placements=False)),
     f"{FEW_SITES} sites": Ingredients(scans=ScanIngredients(many_sites=False)),
+    f"bodies changed by ±{SIZE_CHANGE:.0%} as well": Ingredients(scans=ScanIngredients(resized=SIZE_CHANGE)),
 }
-"""Variants of the training by name: with all ingredients, and without each."""
+"""Variants of the training by name: with all ingredients, without each, and with one that the default has not."""
 
 
 class _AllReturns(DetectionArea):
@@ -87,7 +92,16 @@ def _mean_level(road: HeightRaster) -> HeightRaster:
     return HeightRaster(road.low, road.step, np.full_like(road.heights, road.heights.mean()))
 
 
-def with_bodies_of_models(run: SampledRun) -> Generator[Progress, None, SampledRun]:
+def with_bodies(run: SampledRun, ingredients: ScanIngredients, seed: int) -> Generator[Progress, None, SampledRun]:
+    """Return a run whose road users have the bodies that a detector is to learn from."""
+    if not ingredients.varied_bodies:
+        run = yield from _with_bodies_of_models(run)
+    if ingredients.resized:
+        run = replace(run, trajectories=(yield from resized(run.trajectories, ingredients.resized, seed)))
+    return run
+
+
+def _with_bodies_of_models(run: SampledRun) -> Generator[Progress, None, SampledRun]:
     """Give each road user of a run the size of the nearest model of traffic simulations, and no shape of its own."""
     users = tuple(replace(user, shape=RoadUser.shape) for user in run.trajectories.users)
     sizes = np.array([_nearest_model(user) for user in users])

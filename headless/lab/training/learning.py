@@ -23,7 +23,7 @@ from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.workflows.survey import SurveySettings, lay_out, see
 
-from .ingredients import FEW_SITES, Ingredients, ScanIngredients, with_bodies_of_models
+from .ingredients import FEW_SITES, Ingredients, ScanIngredients, with_bodies
 
 SENSOR, COUNT = "type2", 4  # of the placement that covers most
 
@@ -54,9 +54,7 @@ class TrainingSites:
         scans: Scans = []
         for number, site in enumerate(sites):
             yield Progress(number, len(sites), f"draw scans of {site.name}")
-            runs = site.runs
-            if not ingredients.varied_bodies:
-                runs = tuple(finish(with_bodies_of_models(run)) for run in runs)
+            runs = tuple(finish(with_bodies(run, ingredients, self.seed)) for run in site.runs)
             if ingredients.random_placements:
                 recordings = replace(site, runs=runs).scans(len(self.learnt) // len(sites), self._random(number))
             else:

@@ -24,9 +24,7 @@ from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.progress import Progress, finish, side_by_side
 from seip_addon.core.traffic.varied_bodies import resized
 
-from .ingredients import ALL, Ingredients
-
-SIZE_CHANGE = 0.15  # share by which each dimension of each road user differs at most, in the test of that
+from .ingredients import ALL, SIZE_CHANGE, Ingredients
 
 
 @dataclass(frozen=True, eq=False)
