@@ -127,6 +127,9 @@ def _save(folder: Path, judgement: Judgement, simulator: Simulator, sensors: lis
     cloud = judgement.scan.points
     view = error_view(title, frame, MAIN_RULE, score=score, cloud=cloud, region=simulator.static.region, sensors=places)
     save_error_view(folder / "errors.png", [view], f"{name}, {frame.run} at {frame.time:.1f} s")
+    for form in FORMATS:
+        for stale in (folder / form).glob("*.txt"):  # of an earlier, longer run
+            stale.unlink()
     for number, one in enumerate(judgement.frames):
         boxes, categories, scores = one.detected.boxes, one.detected.category.tolist(), one.detected.score
         for form, lines in zip(FORMATS, (kitti_results, openpcdet_results), strict=True):

@@ -92,6 +92,14 @@ def test_the_same_inputs_give_the_same_figures(folder):
     assert one == other
 
 
+def test_detections_of_an_earlier_longer_run_do_not_stay(folder):
+    counts = []
+    for runs in (("first.npz", "second.npz"), ("first.npz",)):
+        detect.main(arguments(folder, "again", *runs))
+        counts.append({form: len(list((folder / "again" / form).glob("*.txt"))) for form in ("kitti", "openpcdet")})
+    assert counts[0] == {form: 2 * count for form, count in counts[1].items()}
+
+
 def test_mistakes_are_named(folder, tmp_path):
     broken = tmp_path / "broken.pt"
     broken.write_bytes(b"no detector")
