@@ -28,6 +28,7 @@ from .average_precision import ADVISED_TEST_RUNS, Evaluation, balanced_score, ev
 from .breakdown import false_positives
 from .claims import SeedResult
 from .cloud_in_plan import CloudInPlan
+from .detection_area import DetectionArea
 from .detector import Detector
 from .frame_results import FrameResult, frame_result
 from .frames import SampledRecording
@@ -334,30 +335,38 @@ def evaluate_all(
     return [outcome for model in models for outcome in _outcomes(model, validated, tested)]
 
 
-def detect_in_runs(
+def detect_in_runs(  # what measures where, what looks at it, and how
     simulator: Simulator,
-    configuration: PlacedSensors,
+    placed: PlacedSensors,
     runs: Sequence[SampledRun],
     detectors: Sequence[Detector],
     threads: int,
+    areas: Sequence[DetectionArea] | None = None,
 ) -> Generator[Progress, None, list[list[FrameResult]]]:
-    """Detect road users in every frame of some runs; return the frames' results by detector."""
-    known: dict[str, Any] = {"region": simulator.static.region, "sensors": configuration.places}
+    """Detect road users in every frame of some runs; return the frames' results by detector.
+
+    Parameters
+    ----------
+    areas : sequence of DetectionArea, optional
+        Where each detector looks, where that is not the scene's own.
+    """
+    known: dict[str, Any] = {"region": simulator.static.region, "sensors": placed.places}
     known["classes"] = tuple(CLASS_CATEGORIES.values())
+    looking = areas or [simulator.area(detector.settings.pillar) for detector in detectors]
     results: list[list[FrameResult]] = [[] for _ in detectors]
     total = sum(len(run.times) for run in runs)
     done = 0
     for run in runs:
         for number in range(len(run.times)):
-            yield Progress(done, total, f"detect with {configuration.name}")
+            yield Progress(done, total, f"detect with {placed.name}")
             done += 1
-            frame = simulator.frame(configuration, run, number)
+            frame = simulator.frame(placed, run, number)
             cloud = CloudInPlan(frame.points)
-            for detector, own in zip(detectors, results, strict=True):
+            for detector, area, own in zip(detectors, looking, results, strict=True):
                 with deterministic(threads):
-                    found = detect(detector, simulator.area(detector.settings.pillar), frame)
+                    found = detect(detector, area, frame)
                 own.append(frame_result(frame, cloud, found, run=run.name, parked=run.parked, **known))
-    yield Progress(total, total, f"detect with {configuration.name}")
+    yield Progress(total, total, f"detect with {placed.name}")
     return results
 
 

@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from headless.detection.average_precision import Evaluation, evaluate
-from headless.detection.case_study import AT_ONCE
-from headless.detection.cloud_in_plan import CloudInPlan
+from headless.detection.average_precision import evaluate
+from headless.detection.case_study import AT_ONCE, detect_in_runs
 from headless.detection.detector import Detector
-from headless.detection.frame_results import FrameResult, frame_result
-from headless.detection.inference import detect
 from headless.detection.learnt_site import LearntSite
 from headless.detection.recordings import PlacedSensors, SampledRun, Simulator
 from headless.detection.rules import MAIN_RULE
-from headless.detection.settings import CLASS_CATEGORIES
 from headless.detection.training import deterministic
 from headless.lab.detector.paired_change import ResampledPrecision, change, level
 
@@ -73,57 +69,26 @@ def effects(
     tests: Sequence[UnseenTest], variants: Mapping[str, Ingredients], detectors: Mapping[str, Sequence[Detector]]
 ) -> Generator[Progress, None, list[IngredientEffect]]:
     """Evaluate the detectors of all variants on the same frames, and compare them with those of all ingredients."""
-    works = [_detected(test, run, sensors, variants, detectors) for test in tests for run, sensors in test.scanned]
+    names = [name for name, own in detectors.items() for _ in own]
+    looking = [detector for own in detectors.values() for detector in own]
+    works = []
+    for test in tests:
+        areas = [
+            variants[name].area(test.simulator.area(detector.settings.pillar))
+            for name, detector in zip(names, looking, strict=True)
+        ]
+        works += [detect_in_runs(test.simulator, sensors, [run], looking, 1, areas) for run, sensors in test.scanned]
     with deterministic(1):  # all the time, as torch keeps one such setting for all threads
         found = iter((yield from side_by_side(works, AT_ONCE)))
     rows = []
     for test in tests:
-        runs = [next(found) for _ in test.scanned]
-        resampled = {
-            name: [ResampledPrecision(_evaluated([run[name][number] for run in runs])) for number in range(len(own))]
-            for name, own in detectors.items()
-        }
+        by_run = [next(found) for _ in test.scanned]
+        frames = [[frame for run in by_run for frame in run[number]] for number in range(len(looking))]
+        resampled: dict[str, list[ResampledPrecision]] = {name: [] for name in detectors}
+        for name, own in zip(names, frames, strict=True):
+            resampled[name].append(ResampledPrecision(evaluate(own, MAIN_RULE)))
         rows += [
-            IngredientEffect(
-                name, test.name, level(own), None if name == ALL else change(own, resampled[ALL], same_traffic=True)
-            )
+            IngredientEffect(name, test.name, level(own), None if name == ALL else change(own, resampled[ALL]))
             for name, own in resampled.items()
         ]
     return rows
-
-
-def _evaluated(runs: Sequence[Sequence[FrameResult]]) -> Evaluation:
-    return evaluate([frame for run in runs for frame in run], MAIN_RULE)
-
-
-def _detected(
-    test: UnseenTest,
-    run: SampledRun,
-    sensors: PlacedSensors,
-    variants: Mapping[str, Ingredients],
-    detectors: Mapping[str, Sequence[Detector]],
-) -> Generator[Progress, None, dict[str, list[list[FrameResult]]]]:
-    """Detect in a run; return the frames' results by variant and training."""
-    simulator = test.simulator
-    results: dict[str, list[list[FrameResult]]] = {name: [[] for _ in own] for name, own in detectors.items()}
-    for number in range(len(run.times)):
-        yield Progress(number, len(run.times), f"detect at {test.name}")
-        frame = simulator.frame(sensors, run, number)
-        cloud = CloudInPlan(frame.points)
-        for name, own in detectors.items():
-            for detector, frames in zip(own, results[name], strict=True):
-                area = variants[name].area(simulator.area(detector.settings.pillar))
-                found = detect(detector, area, frame)
-                frames.append(
-                    frame_result(
-                        frame,
-                        cloud,
-                        found,
-                        classes=tuple(CLASS_CATEGORIES.values()),
-                        region=simulator.static.region,
-                        sensors=sensors.places,
-                        run=run.name,
-                        parked=run.parked,
-                    )
-                )
-    return results
