@@ -6,6 +6,7 @@
 # make detection   install PyTorch, for the detector; make test-detection tests it
 # make study       redo the study on the shipped junction: coverage, then detection (ten minutes)
 # make detector    train the detector that ships: random placements at 20 random sites (half an hour)
+# make ingredients what each ingredient of its training gains at sites never learnt from (an hour)
 # make settings    chart what other settings of the detector cost and gain (an hour)
 # make stability   drive every method to where it fails, and write docs/stability.md (two hours)
 # make traffic     simulate the shipped traffic again (installs Eclipse SUMO in the environment: 230 MB)
@@ -24,7 +25,7 @@ SPREAD := -n auto --maxprocesses 4
 DEMO := scenes/junction.blend -o out/junction
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo site test test-slow lint scenes sumo test-traffic traffic detection test-detection study detector settings stability benchmark extension lock clean distclean
+.PHONY: help environment demo site test test-slow lint scenes sumo test-traffic traffic detection test-detection study detector ingredients settings stability benchmark extension lock clean distclean
 
 help:
 	@sed -n '/^# /s/^# //p' Makefile
@@ -93,6 +94,10 @@ detector: detection sumo
 	$(PY) -m headless.generate_sites -o out/sites --sites 20 --seed 1
 	$(PY) -m headless.train_on_sites out/sites/site-*/site.blend --steps 3600 -o out/detector
 	cp out/detector/detector.pt headless/detection/shipped_detector.pt
+
+ingredients: detection sumo
+	$(PY) -m headless.generate_sites -o out/sites --sites 20 --seed 1
+	$(PY) -m headless.compare_ingredients out/sites/site-*/site.blend --unseen scenes/junction.blend scenes/corridor.blend -o out/ingredients
 
 settings: detection
 	$(PY) -m headless.compare_detectors scenes/junction.blend -o out/detectors

@@ -22,6 +22,7 @@ VERBS = {
     "train-on-sites": "train a detector for any placement on several sites",
     "detect": "judge a placement by what a detector finds with its sensors",
     "compare-detectors": "average precision against time of other detector settings",
+    "compare-ingredients": "what each ingredient of train-on-sites gains (laboratory)",
     "calibrate": "compare LiDAR models with measured sweeps",
     "stability": "drive every method to where it fails (laboratory)",
     "benchmark": "measure speed and error (laboratory)",

@@ -89,7 +89,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--placement-seed", type=int, default=1, metavar="N", help="of random placements")
     add_settings(parser, TrainingSettings, "steps", "batch")
     parser.add_argument("--trainings", type=int, default=3, metavar="N", help="of each variant, with a seed each")
-    parser.set_defaults(steps=1200)
+    parser.set_defaults(steps=600)
     return parser
 
 
