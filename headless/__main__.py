@@ -45,8 +45,8 @@ def _usage() -> str:
     width = max(map(len, VERBS))
     verbs = "\n".join(f"  {verb:{width}}  {what}" for verb, what in VERBS.items())
     return (
-        "usage: seip COMMAND [options]\n\nChoose and evaluate roadside LiDAR sensors.\n\n"
-        f"{verbs}\n\nseip COMMAND --help lists the options of a command.\n"
+        "usage: seip COMMAND [options]    (seip COMMAND --help lists them)\n\n"
+        f"Choose and evaluate roadside LiDAR sensors.\n\n{verbs}\n"
     )
 
 
