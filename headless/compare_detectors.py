@@ -15,7 +15,7 @@ from headless import evaluate, runtime
 from headless.charts.detection import DetectorSetting, save_setting_chart
 from headless.detection import case_study
 from headless.detection.detector import Detector
-from headless.detection.inference import detect
+from headless.detection.inference import seconds_of
 from headless.detection.recordings import Simulator
 from headless.detection.settings import PUBLISHED_NETWORK, NetworkSettings, TrainingSettings
 from headless.detection.training import deterministic
@@ -39,8 +39,6 @@ NETWORKS = {
     ("head", "anchors"): replace(DEFAULT_NETWORK, head="anchor"),
 }
 """Networks compared, by family and name of the setting."""
-
-TIMED_RUNS = 5  # timed inferences per frame, of which the median is taken
 
 
 def main(argv: list[str]) -> None:
@@ -101,18 +99,13 @@ def _train(
 
 def _inference_seconds(study: evaluate.DetectionStudy, detector: Detector) -> float:
     """Return the CPU time of inference on a merged frame: the median of runs, averaged over configurations."""
-    medians = []
+    seconds = []
     for configuration in study.configurations:
         frame = study.simulator.frame(configuration, study.traffic.test[0], 0)
         area = study.simulator.area(detector.settings.pillar)
-        times = []
-        for _ in range(TIMED_RUNS):
-            begin = time.thread_time()
-            with deterministic(1):
-                detect(detector, area, frame)
-            times.append(time.thread_time() - begin)
-        medians.append(np.median(times))
-    return float(np.mean(medians))
+        with deterministic(1):
+            seconds.append(seconds_of(detector, area, frame, time.thread_time))
+    return float(np.mean(seconds))
 
 
 def _parser() -> argparse.ArgumentParser:

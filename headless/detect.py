@@ -8,6 +8,7 @@ detector that ships with the project has learnt from random placements at random
 """
 
 import argparse
+import os
 import sys
 from dataclasses import replace
 from itertools import combinations
@@ -24,10 +25,12 @@ from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_pr
 from headless.detection.case_study import read_runs
 from headless.detection.chart_data import error_view, parts
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
+from headless.detection.inference import seconds_of
 from headless.detection.judgement import Judgement, figures, judge
 from headless.detection.recordings import MountedSensors, Simulator
 from headless.detection.rules import MAIN_RULE
 from headless.detection.suitability import suitability_warnings
+from headless.detection.training import deterministic
 from headless.options import add_rolling_shutter, add_settings, new_parser, read_settings
 
 import bpy
@@ -104,6 +107,11 @@ def main(argv: list[str]) -> None:
     runtime.print_line(
         f"found at an overlap of {MAIN_RULE.iou:g} with a score of {judgement.score:.2f} or more: {', '.join(found)}"
     )
+    cores = os.cpu_count() or 1
+    with deterministic(cores):
+        seconds = seconds_of(detector, area, judgement.scan)
+    where = options.device if options.device != "cpu" else f"{cores} cores"
+    runtime.print_line(f"detection in the fullest frame, {len(judgement.scan):,} returns: {seconds:.2f} s on {where}")
     runtime.print_line(f"written to {options.output}/")
 
 

@@ -1,6 +1,7 @@
 """The command that judges a placement by what a trained detector finds."""
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -73,6 +74,7 @@ def test_figures_charts_and_detections_are_written(folder, capsys):
     said = capsys.readouterr()
     assert "bev_0.7: AP" in said.out
     assert "with a score of" in said.out
+    assert re.search(r"fullest frame, [\d,]+ returns: \d+\.\d\d s on \d+ cores", said.out)
     assert any("has learnt from clouds of vlp16" in sentence for sentence in record["warnings"])
 
 
