@@ -43,7 +43,7 @@ def main(argv: list[str]) -> None:
     tests: list[UnseenTest] = []
     for number, scene in enumerate(options.unseen):
         site = read_site(scene, replace(learning, every=TEST_STRIDE * learning.every))
-        best = runtime.finish_with_bar(covering_most(site.layout.geometry, folder / f"visibility-{scene.stem}.npz"))
+        best = runtime.finish_with_bar(covering_most(site.geometry, folder / f"visibility-{scene.stem}.npz"))
         tests += unseen_tests(site, best, learning.seed, full=number == 0)
     detectors = runtime.finish_with_bar(train_variants(sites, VARIANTS, NetworkSettings(), training, options.trainings))
     found = runtime.finish_with_bar(effects(tests, VARIANTS, detectors))

@@ -36,7 +36,8 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, side_by_side
 from seip_addon.core.scans import ScanSettings
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.workflows.survey import SurveySettings, lay_out
+from seip_addon.core.site.site import make_site
+from seip_addon.core.workflows.survey import SurveySettings
 from seip_addon.scene.read import read_scene
 
 HEIGHTS = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)  # metres
@@ -120,14 +121,15 @@ def read_site(scene: Path, learning: LearningSettings) -> LearntSite:
         There are none, or the scene is none.
     """
     runtime.open_scene(scene)
-    reading = read_scene(bpy.context.scene)
-    candidates = CandidateSettings(sensors=learning.sensors, heights=HEIGHTS, tilts=TILTS)
-    layout = lay_out(reading.geometry, SurveySettings(candidates=candidates), ())
-    runs = read_runs(survey.runs_beside(scene), layout.geometry.origin, learning.every)
+    geometry = read_scene(bpy.context.scene).geometry
+    asked = SurveySettings(candidates=CandidateSettings(sensors=learning.sensors, heights=HEIGHTS, tilts=TILTS))
+    models = asked.models()
+    candidates = make_site(geometry, asked.candidates, asked.grid_spacing, asked.reach(), models).candidates
+    runs = read_runs(survey.runs_beside(scene), geometry.origin, learning.every)
     if not runs:
         raise SeipError(f"{scene} has no runs of traffic beside it: simulate some with headless/traffic.py")
-    simulator = Simulator(layout.geometry, ScanSettings(seed=learning.seed))
-    return LearntSite(f"{scene.parent.name}/{scene.stem}", layout, runs, simulator)
+    simulator = Simulator(geometry, ScanSettings(seed=learning.seed))
+    return LearntSite(f"{scene.parent.name}/{scene.stem}", geometry, candidates, models, runs, simulator)
 
 
 def set_aside(sites: Sequence[Site]) -> tuple[Sequence[Site], Sequence[Site]]:

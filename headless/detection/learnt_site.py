@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from seip_addon.core.workflows.survey import Layout
+from seip_addon.core.lidar import LidarModel
+from seip_addon.core.site.candidates import Candidates
+from seip_addon.core.site.scene_geometry import SceneGeometry
 
 from .frames import Recording
 from .random_placements import random_placement
@@ -21,20 +24,24 @@ class LearntSite:
     ----------
     name : str
         For messages.
-    layout : Layout
-        Whose candidates random placements are drawn from.
+    candidates : Candidates
+        That random placements are drawn from.
+    models : mapping of str to LidarModel
+        The candidates' sensor types.
     runs : tuple of SampledRun
     """
 
     name: str
-    layout: Layout
+    geometry: SceneGeometry
+    candidates: Candidates
+    models: Mapping[str, LidarModel]
     runs: tuple[SampledRun, ...]
     simulator: Simulator
 
     def random_placement(self, number: int, random: np.random.Generator) -> PlacedSensors:
         """Draw a placement; see `random_placements.random_placement`."""
         name = f"{self.name}, placement {number}"
-        return random_placement(name, self.layout.site.candidates, self.layout.models, random)
+        return random_placement(name, self.candidates, self.models, random)
 
     def scans(self, placements: int, random: np.random.Generator) -> list[Recording]:
         """Return the scans of each run by so many random placements of its own."""

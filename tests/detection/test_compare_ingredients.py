@@ -54,7 +54,14 @@ def a_site(number, runs=2):
         SampledRun(f"run-{run}", make_run(10 * number + run, 30.0).moved_to(geometry.origin), TIMES)
         for run in range(runs)
     )
-    return LearntSite(f"site {number}", layout, sampled, Simulator(geometry, ScanSettings(seed=1)))
+    return LearntSite(
+        f"site {number}",
+        geometry,
+        layout.site.candidates,
+        layout.models,
+        sampled,
+        Simulator(geometry, ScanSettings(seed=1)),
+    )
 
 
 @pytest.fixture(scope="module")

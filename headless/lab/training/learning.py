@@ -58,7 +58,7 @@ class TrainingSites:
             if ingredients.random_placements:
                 recordings = replace(site, runs=runs).scans(len(self.learnt) // len(sites), self._random(number))
             else:
-                placement = yield from covering_most(site.layout.geometry, self.store / f"visibility-{number}.npz")
+                placement = yield from covering_most(site.geometry, self.store / f"visibility-{number}.npz")
                 recordings = [site.simulator.record(placement, run) for run in runs]
             scans += [(site, recording) for recording in recordings]
         return scans
