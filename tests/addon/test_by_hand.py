@@ -93,6 +93,7 @@ def test_moved_sensors_are_judged_where_they_hang(placed):
     assert violations(now, schema) == []
 
 
+@pytest.mark.slow
 def test_a_judged_deployment_is_kept_compared_ranked_and_exported(placed, tmp_path):
     bpy.ops.seip.keep_placement(name="placed")
     move(placed)

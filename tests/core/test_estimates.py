@@ -80,6 +80,7 @@ def test_rank_correlation(pairs):
         assert rank_correlation(x, y) == pytest.approx(scipy.stats.spearmanr(x, y).statistic, abs=1e-12)
 
 
+@pytest.mark.slow
 @settings(max_examples=4, deadline=None)
 @given(st.integers(0, 1000))
 def test_interval_of_rank_correlation(seed):

@@ -45,6 +45,7 @@ def opened(path):
     return bpy.context.scene
 
 
+@pytest.mark.slow
 def test_the_command_runs_as_a_file(road, tmp_path):
     output = tmp_path / "site.blend"
     command = [sys.executable, "headless/build_scene.py", str(road), "--near", "1100", "2000", "--radius", "30"]

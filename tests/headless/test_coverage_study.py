@@ -156,6 +156,7 @@ def read_table(path):
     return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
 
 
+@pytest.mark.slow
 def test_pictures_and_tables_are_the_same_bytes_each_time(study, tmp_path):
     for name in ("one", "two"):
         write_all(tmp_path / name, study)

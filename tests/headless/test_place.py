@@ -132,6 +132,7 @@ def rays(monkeypatch):
     return counts
 
 
+@pytest.mark.slow
 def test_another_goal_casts_no_ray_again(folder, tmp_path, rays, run):
     (tmp_path / "visibility.npz").write_bytes((folder / "visibility.npz").read_bytes())
     run(tmp_path, "--count", "3")

@@ -48,6 +48,7 @@ def test_buildings_are_darker_the_higher_they_are(example):
     assert high.mean() < low.mean() - 0.1
 
 
+@pytest.mark.slow
 def test_the_same_placement_gives_the_same_bytes_whatever_the_users_style(example, tmp_path):
     save_plan_view(tmp_path / "a.png", example.geometry, example.site, example.deployment)
     save_plan_view(tmp_path / "b.png", example.geometry, example.site, example.deployment)

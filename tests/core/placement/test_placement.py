@@ -113,6 +113,7 @@ def test_reverse_with_equal_prices_takes_the_fewest() -> None:
     assert (placement.chosen.tolist(), placement.objective, placement.bound) == ([0, 1], 12000, 12000)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 def test_scaling_all_weights_changes_nothing(scale: float) -> None:
     problem = street_problem(20, 300, blocks=1, count=3)
@@ -392,6 +393,7 @@ def hard_problem() -> PlacementProblem:
     return replace(street_problem(150, 900, heights=1), visible=visible, count=8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["highs", "cbc"])
 def test_the_same_effort_gives_the_same_answer_again(solver: str) -> None:
     first, again = (finish(solve(hard_problem(), SolverLimits(solver, math.inf, 0.3))) for _ in range(2))

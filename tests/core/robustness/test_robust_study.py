@@ -44,6 +44,7 @@ def study(laid_out):
     return finish(robust_study(*laid_out, SETTINGS, [Risk(), Risk(tail=0.0)], LIMITS))
 
 
+@pytest.mark.slow
 def test_all_are_judged_by_draws_that_none_was_chosen_on(laid_out, study):
     around, problem = laid_out
     (nominal,) = study.nominal
@@ -57,6 +58,7 @@ def test_all_are_judged_by_draws_that_none_was_chosen_on(laid_out, study):
         assert not problem.forbidden[chosen].any()
 
 
+@pytest.mark.slow
 def test_a_search_that_found_worse_than_the_nominal_optimum_is_not_followed(laid_out, monkeypatch):
     around, problem = laid_out
     worst = int(np.flatnonzero(problem.allowed)[problem.visible[problem.allowed].sum(axis=1).argmin()])
@@ -73,6 +75,7 @@ def test_a_search_that_found_worse_than_the_nominal_optimum_is_not_followed(laid
     assert found.saving(contender).value == 0
 
 
+@pytest.mark.slow
 def test_robustness_costs_what_was_planned(study):
     for contender in study.robust:
         assert study.price(contender) >= 0
@@ -118,6 +121,7 @@ def test_who_was_chosen_for_a_loss_is_judged_by_that_loss_as_is_the_nominal_opti
         assert (contender.unseen < contender.planned).any()
 
 
+@pytest.mark.slow
 def test_it_says_what_is_compared(study, study_of_losses, tmp_path):
     low = study.robust[0].low.describe()
     assert f"5 % quantile of coverage {low} against" in robust_rows(study)[0].begins

@@ -142,6 +142,7 @@ def test_a_search_cut_short_returns_nothing_worse_than_the_placement_for_the_emp
     assert (better.gap, better.covered, better.price, better.status) == (pytest.approx(1 / 3), 7.0, 8.0, "feasible")
 
 
+@pytest.mark.slow
 def test_without_anyone_on_the_road_nothing_is_lost(laid_out):
     around, problem = laid_out
     runs = [parked((0.0, 3000.0, 0.0, 0.0, 0.0))]  # somewhere else

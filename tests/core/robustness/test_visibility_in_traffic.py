@@ -132,6 +132,7 @@ def beams_past(bodies, pose):
     return passed
 
 
+@pytest.mark.slow
 @each_engine
 @cases(15, 3)
 @given(bodies=crowds)

@@ -91,6 +91,7 @@ def test_scans_have_another_key_where_their_code_has_changed(copy):
     assert key(copy, "scans.run_folder") != before
 
 
+@pytest.mark.slow
 def test_it_is_the_same_in_an_archive_and_under_the_name_that_blender_gives(copy):
     expected = key(ROOT)
     assert key(copy) == expected

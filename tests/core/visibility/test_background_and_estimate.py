@@ -66,6 +66,7 @@ def test_stopped_visibility_ends_soon(engine):
     assert time.perf_counter() - began < 0.5
 
 
+@pytest.mark.slow
 def test_one_thread_finds_the_same():
     site = junction_site(positions=20, heights=[4.0], spacing=2.0)
     grids = [finish(compute_visibility(site, MODELS, VisibilitySettings(), ANY, threads=n)) for n in (None, 1)]

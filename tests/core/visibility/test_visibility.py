@@ -159,7 +159,7 @@ def test_same_as_the_full_scan_in_a_soup(engine: Engine, seed: int, delta: float
 
 
 @each_engine
-@pytest.mark.parametrize("key", ["type1", "type3", "vls128"])
+@pytest.mark.parametrize("key", ["type1", pytest.param("type3", marks=pytest.mark.slow), "vls128"])
 def test_same_as_the_full_scan_on_a_junction(engine: Engine, key: str) -> None:
     models = load_catalogue()
     site = junction_site(positions=1, sensors=[key], heights=[5.4])
@@ -514,6 +514,7 @@ def test_warnings_name_the_radius_from_which_a_rosette_leaves_gaps() -> None:
     assert resolution_warnings(site, models, VisibilitySettings(80.0)) == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("height", "delta", "tilt"), [(5.4, 1.0, 0.0), (8.0, 2.0, 0.2)])
 def test_no_road_nearer_than_a_rosettes_gaps_is_missed(height: float, delta: float, tilt: float) -> None:
     """Of random points on a level road in view, hardly any before the radius that is named is far from all rays."""
