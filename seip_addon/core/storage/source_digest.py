@@ -4,6 +4,7 @@ import ast
 import functools
 import importlib.util
 import sys
+import threading
 from collections.abc import Iterator
 from importlib.machinery import ModuleSpec, PathFinder
 
@@ -14,8 +15,9 @@ CORE = __package__.rpartition(".")[0]  # the core's full name: Blender gives ext
 
 _OURS = (CORE, "headless")
 
+_ONE_AT_A_TIME = threading.Lock()  # before Python 3.11.8 sources parsed in two threads at once end in a SystemError
 
-@functools.cache
+
 def source_digest(module: str) -> str:
     """Return a digest of the sources of a module and of all that it imports, directly or not.
 
@@ -32,6 +34,12 @@ def source_digest(module: str) -> str:
     SeipError
         A source is not there.
     """
+    with _ONE_AT_A_TIME:
+        return _digest(module)
+
+
+@functools.cache
+def _digest(module: str) -> str:
     sources = _sources(module)
     return digest(*(part for name in sorted(sources) for part in (name.removeprefix(CORE), sources[name])))
 

@@ -105,3 +105,22 @@ def test_it_is_the_same_in_an_archive_and_under_the_name_that_blender_gives(copy
     extension.parent.mkdir(parents=True)
     shutil.copytree(copy / "seip_addon", extension / "seip_addon")
     assert key(copy, package="bl_ext.user_default.seip.seip_addon") == expected
+
+
+def test_threads_that_ask_at_once_get_the_same():
+    script = """
+import gc, sys, time
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+from seip_addon.core.storage.source_digest import source_digest
+gc.callbacks.append(lambda *_: time.sleep(1e-5))  # threads change amid a collection, amid the parsing of a source
+begin = Barrier(8)
+def ask(number):
+    begin.wait()
+    return source_digest(sys.argv[1 + number % 2])
+with ThreadPoolExecutor(8) as pool:
+    print(*pool.map(ask, range(8)))
+"""
+    one, other, *rest = output(script, *ENTRIES).split()
+    assert rest == [one, other] * 3
+    assert [one, other] == [output(DIGEST.format("seip_addon"), entry.removeprefix(f"{CORE}.")) for entry in ENTRIES]
