@@ -135,8 +135,8 @@ def side_by_side(
             return finish(work, report)
 
     pool = ThreadPoolExecutor(threads)
-    futures = [pool.submit(run, number) for number in range(len(works))]
     try:
+        futures = [pool.submit(run, number) for number in range(len(works))]
         while any(not future.done() for future in futures):
             for ended in wait(futures, REPORT_INTERVAL, FIRST_EXCEPTION).done:
                 ended.result()  # raises here what went wrong there

@@ -1,6 +1,7 @@
 """Work in steps: several pieces at the same time."""
 
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -70,6 +71,22 @@ def test_stopping_stops_all():
     next(steps)
     steps.close()
     assert all(one.wait(10) for one in stopped)
+
+
+def test_an_interruption_while_works_begin_stops_those_that_have_begun(monkeypatch):
+    stopped, begun = threading.Event(), []
+
+    def interrupted(pool, *work):
+        if begun:
+            raise KeyboardInterrupt
+        begun.append(submit(pool, *work))
+        return begun[0]
+
+    submit = ThreadPoolExecutor.submit
+    monkeypatch.setattr(ThreadPoolExecutor, "submit", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        finish(side_by_side([endless(stopped), endless(threading.Event())], 2))
+    assert stopped.wait(10)
 
 
 def test_work_in_detail_counts_what_is_done_within_its_unit():

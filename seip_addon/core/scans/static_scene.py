@@ -35,6 +35,12 @@ class StaticScene:
     region: BaseGeometry
     warnings: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Have GEOS index the region before threads share it: it does so with the second point, without a lock."""
+        if not self.region.is_empty:
+            point = self.region.representative_point()
+            shapely.contains_xy(self.region, [point.x, point.x], [point.y, point.y])
+
     def inside(self, xyz: Float) -> Boolean:
         """Return which points (k, 3) are in the region of interest in plan, (k,)."""
         return np.asarray(shapely.contains_xy(self.region, xyz[:, 0], xyz[:, 1]), dtype=bool)

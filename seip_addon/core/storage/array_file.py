@@ -1,5 +1,7 @@
 """Files of named arrays with a header, validated before use."""
 
+from __future__ import annotations
+
 import io
 import json
 import math
@@ -11,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, NoReturn
+from typing import Any, BinaryIO, Literal, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +25,12 @@ MAX_BYTES = 1 << 32  # bytes of all arrays of a file together at most: 4 GiB
 MAX_HEADER_BYTES = 1 << 27  # bytes of the header, four for each of its characters: 128 MiB
 MAX_TEXT_LENGTH = 256  # characters of an entry of an array of text at most
 _OLD_VERSION = 1  # the version of files that hold no digest
+_READ_AT_ONCE = 1 << 18  # bytes
 _MAX_DEFLATE_RATIO = 1032  # bytes that one byte of DEFLATE can stand for (RFC 1951)
 
 _NPY = re.compile(
     rb"\x93NUMPY\x01\x00.."
-    rb"\{'descr': '([<|][a-zA-Z]\d{1,9})', 'fortran_order': (?:True|False), 'shape': \(([\d, ]*)\), \} *\n",
+    rb"\{'descr': '([<|][a-zA-Z]\d{1,9})', 'fortran_order': (True|False), 'shape': \(([\d, ]*)\), \} *\n",
     re.DOTALL,
 )
 """How NumPy begins an array in a file, with its type and shape."""
@@ -158,11 +161,11 @@ class ArrayFile:
             rule.check(name, arrays[name])
         return arrays
 
-    def _check_claims(self, claims: Mapping[str, tuple[np.dtype[Any], tuple[int, ...]]]) -> None:
+    def _check_claims(self, claims: Mapping[str, _Claim]) -> None:
         """Check types and lengths against the rules, and that all arrays fit into memory."""
         lengths: dict[str, int] = {}
         for name, rule in self.arrays.items():
-            dtype, shape = claims[name]
+            dtype, shape = claims[name].dtype, claims[name].shape
             text = dtype.kind == rule.dtype == "U" and dtype.itemsize <= 4 * MAX_TEXT_LENGTH
             if not text and dtype != np.dtype(rule.dtype):
                 raise ContentError(f"{name} is of the type {dtype}")
@@ -172,7 +175,7 @@ class ArrayFile:
                 other = wanted if isinstance(wanted, int) else lengths.setdefault(wanted, length)
                 if length != other:
                     raise ContentError(f"{name} has the length {length} in place of {other}")
-        if sum(math.prod(shape) * dtype.itemsize for dtype, shape in claims.values()) > MAX_BYTES:
+        if sum(claim.size for claim in claims.values()) > MAX_BYTES:
             raise ContentError(f"it holds more than {MAX_BYTES >> 30} GiB")
 
 
@@ -184,8 +187,8 @@ def _archive(file: BinaryIO) -> zipfile.ZipFile:
 
 
 def _read_header(archive: zipfile.ZipFile) -> dict[str, Any]:
-    dtype, shape = _claim(archive, "header.npy")
-    if dtype.kind != "U" or shape != () or dtype.itemsize > MAX_HEADER_BYTES:
+    claim = _claim(archive, "header.npy")
+    if claim.dtype.kind != "U" or claim.shape != () or claim.size > MAX_HEADER_BYTES:
         raise ContentError("it has no header")
     text = str(_array(archive, "header.npy"))
     header = json.loads(text, parse_constant=_refuse_constant)
@@ -194,8 +197,23 @@ def _read_header(archive: zipfile.ZipFile) -> dict[str, Any]:
     return header
 
 
-def _claim(archive: zipfile.ZipFile, member: str) -> tuple[np.dtype[Any], tuple[int, ...]]:
-    """Return the type and the shape that a member claims, once its size bears them out."""
+@dataclass(frozen=True)
+class _Claim:
+    """What a member says of its array, and at which byte that begins."""
+
+    dtype: np.dtype[Any]
+    shape: tuple[int, ...]
+    order: Literal["C", "F"]
+    begin: int
+
+    @property
+    def size(self) -> int:
+        """Bytes of the array."""
+        return math.prod(self.shape) * self.dtype.itemsize
+
+
+def _claim(archive: zipfile.ZipFile, member: str) -> _Claim:
+    """Return what a member claims, once its size bears it out."""
     info = archive.getinfo(member)
     if info.flag_bits & 1 or info.compress_type not in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}:
         raise ContentError(f"{member} is packed as NumPy packs none")
@@ -203,18 +221,27 @@ def _claim(archive: zipfile.ZipFile, member: str) -> tuple[np.dtype[Any], tuple[
         begin = _NPY.match(stream.read(256))
     if begin is None:
         raise ContentError(f"{member} is no array")
-    dtype = np.dtype(begin[1].decode())
-    shape = tuple(int(length) for length in begin[2].decode().split(",") if length.strip())
-    size = begin.end() + math.prod(shape) * dtype.itemsize
+    shape = tuple(int(length) for length in begin[3].decode().split(",") if length.strip())
+    claim = _Claim(np.dtype(begin[1].decode()), shape, "F" if begin[2] == b"True" else "C", begin.end())
+    size = claim.begin + claim.size
     if size != info.file_size or size > _MAX_DEFLATE_RATIO * (info.compress_size + 1):
         raise ContentError(f"{member} claims {size:,} bytes and has none of them")
-    return dtype, shape
+    return claim
 
 
 def _array(archive: zipfile.ZipFile, member: str) -> NDArray[Any]:
+    """Read an array. NumPy parses the claim as a source, which older Pythons cannot do in two threads at once."""
+    claim = _claim(archive, member)
+    array = np.empty(math.prod(claim.shape), claim.dtype)
+    rest = memoryview(array.view(np.uint8))
     with archive.open(member) as stream:
-        array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)  # type: ignore[no-untyped-call]
-    return array
+        stream.read(claim.begin)
+        while rest:
+            count = stream.readinto(rest[:_READ_AT_ONCE])
+            if not count:
+                raise ContentError(f"{member} ends too early")
+            rest = rest[count:]
+    return array.reshape(claim.shape, order=claim.order)
 
 
 def _digest(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str:

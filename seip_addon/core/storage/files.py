@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 
 from ..errors import SeipError
 
+_UMASK = os.umask(0)  # once: to read it is to change it, for all threads
+os.umask(_UMASK)
+
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
@@ -49,7 +52,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
-        temporary.chmod(0o666 & ~_umask())
+        temporary.chmod(0o666 & ~_UMASK)
         temporary.replace(target)
     except OSError as error:
         raise _unwritable(target, error) from error
@@ -185,12 +188,6 @@ def _is_nobodys(entry: os.DirEntry[str], process: int) -> bool:
     except PermissionError:  # somebody else's, alive
         return False
     return False
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 _SPACE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import resource
 import struct
 import subprocess
@@ -16,6 +17,7 @@ from traffic_by_hand import USERS, make_trajectories
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.storage import array_file
+from seip_addon.core.storage.array_file import _array
 from seip_addon.core.traffic import Trajectories
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -217,3 +219,37 @@ def test_a_flipped_bit_is_a_sentence_or_nothing_lost(tmp_path):
             assert Trajectories.load(path).key == key
         except SeipError as error:
             assert "\n" not in str(error)  # noqa: PT017  # whatever is refused is refused in a sentence
+
+
+THREADS = """
+import gc, sys, time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from seip_addon.core.traffic import Trajectories
+gc.set_threshold(50)
+gc.callbacks.append(lambda *_: time.sleep(1e-5))  # threads change amid a collection, wherever that begins
+with ThreadPoolExecutor(4) as pool:
+    print(*set(pool.map(lambda _: Trajectories.load(Path(sys.argv[1])).key, range(60))))
+"""
+
+
+def test_files_are_read_in_threads():
+    command = [sys.executable, "-c", THREADS, str(SHIPPED)]
+    read = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)  # noqa: S603
+    assert read.stdout.split() == [Trajectories.load(SHIPPED).key]
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("packed", [np.savez, np.savez_compressed])
+def test_arrays_are_as_numpy_reads_them(order, packed):
+    random = np.random.default_rng(3)
+    for shape in ((), (0,), (3, 0), (200_000,), (5, 7), (2, 3, 4)):
+        for dtype in ("<f4", "<f8", "<i8", "|b1", "|u1", "<U5"):
+            array = np.asarray(random.integers(-99, 99, shape).astype(dtype), order=order)
+            file = io.BytesIO()
+            packed(file, one=array)
+            with zipfile.ZipFile(file) as archive:
+                found = _array(archive, "one.npy")
+            assert (found.dtype, found.shape, found.flags.writeable) == (array.dtype, shape, True)
+            assert found.flags.f_contiguous == array.flags.f_contiguous
+            np.testing.assert_array_equal(found, array)
