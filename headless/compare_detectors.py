@@ -92,6 +92,7 @@ def _train(
     training_set = yield from case_study.simulate_training_set(
         simulator, model.configurations, study.traffic, model.network
     )
+    simulator.forget()
     begin = time.thread_time()
     trained = yield from case_study.training(model, training_set, device=device)
     return trained.detector, time.thread_time() - begin

@@ -155,7 +155,7 @@ class Simulator:
     def __init__(self, geometry: SceneGeometry, settings: ScanSettings, sensors: Sequence[MountedSensor] = ()) -> None:
         self.static, self.settings, self.site = static_scene(geometry, sensors), settings, geometry.name
         self.area = functools.cache(functools.partial(area_of, geometry))
-        self._simulation = functools.lru_cache(maxsize=(os.cpu_count() or 1) + 1)(self._prepared)
+        self._simulation = functools.lru_cache(maxsize=2 * ((os.cpu_count() or 1) + 1))(self._prepared)
 
     def forget(self) -> None:
         """Free the memory of what was cast."""

@@ -19,6 +19,8 @@ from torch import Tensor
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress
+from seip_addon.core.storage.files import digest
+from seip_addon.core.storage.source_digest import source_digest
 
 from .average_precision import evaluate
 from .detection_area import DetectionArea
@@ -29,6 +31,7 @@ from .heads import TrainingTargets
 from .inference import detect_on_level
 from .matching import Rule
 from .pillars import PillarGrid, fill_pillars, grid_over, stacked
+from .recordings import SampledRun
 from .settings import BOTTOM, CLASS_CATEGORIES, TOP, NetworkSettings, TrainingSettings
 
 VALIDATION_FRAMES = 18  # frames of each validation, spread over the recordings set aside
@@ -117,7 +120,7 @@ def train(  # noqa: PLR0913  # what is learnt from, how, on what, and where it b
     Raises
     ------
     SeipError
-        Runs overlap, there is no frame, or ``store`` holds another training.
+        Runs overlap, there is no frame, or ``store`` holds another training, or one of another version.
     """
     splits = {"training": recordings, "validation": validation}
     require_separate({what: [sampled.recording for sampled in some] for what, some in splits.items()})
@@ -229,6 +232,7 @@ class _Run:
                     "settings": asdict(self.settings),
                     "recordings": self._sources(),
                     "start": self.start,
+                    "program": _program(),
                     "step": self.step,
                     "curve": asdict(self.curve),
                     "weights": _copied(self.detector.state_dict()),
@@ -248,10 +252,12 @@ class _Run:
             and earlier.get("settings") == asdict(self.settings)
             and earlier.get("recordings") == self._sources()
             and earlier.get("start") == self.start
+            and earlier.get("program") == _program()
         )
         if not same:
             raise SeipError(
-                f"{path} is of a training with other settings or other recordings: delete it, or choose another file"
+                f"{path} is of a training with other settings or recordings, or of another version of the program: "
+                "delete it, or choose another file"
             )
         with fault_of(path):
             self.step = int(earlier["step"])
@@ -265,6 +271,11 @@ class _Run:
         both = (*self.training_set, *self.aside)
         recordings = [(sampled.recording, len(sampled)) for sampled in both]
         return [[one.name, one.traffic, one.placement, count] for one, count in recordings]
+
+
+def _program() -> str:
+    """Return a digest of the code that a training follows from."""
+    return digest(*(source_digest(name) for name in (__name__, SampledRun.__module__)))
 
 
 def _with_frames(recordings: Sequence[SampledRecording]) -> list[SampledRecording]:

@@ -102,7 +102,7 @@ def test_a_study_that_was_stopped_goes_on_where_it_was(run, study, tmp_path, mon
 
 def test_other_placements_do_not_go_on_with_a_training(run, study, tmp_path):
     (tmp_path / "detector-1.pt").write_bytes((study / "detector-1.pt").read_bytes())
-    with pytest.raises(SeipError, match="other settings or other recordings"):
+    with pytest.raises(SeipError, match="other settings or recordings"):
         run(tmp_path, *DRAWN, "--placement-seed", "3")
 
 

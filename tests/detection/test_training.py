@@ -94,10 +94,18 @@ def test_a_training_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path, lea
 def test_another_training_is_not_continued(tmp_path, learning, aside):
     path = tmp_path / "state.pt"
     trained(learning, aside, store=path)
-    with pytest.raises(SeipError, match="other settings or other recordings"):
+    with pytest.raises(SeipError, match="other settings or recordings"):
         trained(learning, aside, replace(BRIEF, seed=9), store=path)
-    with pytest.raises(SeipError, match="other recordings"):
+    with pytest.raises(SeipError, match="or recordings"):
         trained(learning[:1], aside, store=path)
+
+
+def test_a_training_of_another_version_is_not_continued(tmp_path, learning, aside, monkeypatch):
+    path = tmp_path / "state.pt"
+    trained(learning, aside, store=path)
+    monkeypatch.setattr("headless.detection.training.source_digest", lambda module: f"other {module}")
+    with pytest.raises(SeipError, match="another version of the program"):
+        trained(learning, aside, store=path)
 
 
 def test_training_ends_when_it_no_longer_helps(learning, aside):
@@ -163,7 +171,7 @@ def test_a_training_goes_on_from_another_detector(learning, aside, tmp_path):
         torch.testing.assert_close(weights[name], value, atol=1e-9, rtol=1e-6)
     assert set(record.sites) <= set(begun.training_record.sites)
     assert set(record.sensors) <= set(begun.training_record.sensors)
-    with pytest.raises(SeipError, match="other settings or other recordings"):
+    with pytest.raises(SeipError, match="other settings or recordings"):
         next(train(learning, aside, SMALL, once, store=tmp_path / "begun.pt"))
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from seip_addon.core.geometry.height_raster import HeightRaster
 from seip_addon.core.progress import Progress
 from seip_addon.core.scans.frame import Frame
-from seip_addon.core.traffic import RoadUser
+from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.core.traffic.varied_bodies import resized, with_sizes
 
 SIZE_CHANGE = 0.15  # share by which dimensions of road users are changed at most, in a training and in a test
@@ -95,17 +95,17 @@ def _mean_level(road: HeightRaster) -> HeightRaster:
 def with_bodies(run: SampledRun, ingredients: ScanIngredients, seed: int) -> Generator[Progress, None, SampledRun]:
     """Return a run whose road users have the bodies that a detector is to learn from."""
     if not ingredients.varied_bodies:
-        run = yield from _with_bodies_of_models(run)
+        run = replace(run, trajectories=(yield from _with_bodies_of_models(run.trajectories)))
     if ingredients.resized:
         run = replace(run, trajectories=(yield from resized(run.trajectories, ingredients.resized, seed)))
     return run
 
 
-def _with_bodies_of_models(run: SampledRun) -> Generator[Progress, None, SampledRun]:
-    """Give each road user of a run the size of the nearest model of traffic simulations, and no shape of its own."""
-    users = tuple(replace(user, shape=RoadUser.shape) for user in run.trajectories.users)
+def _with_bodies_of_models(trajectories: Trajectories) -> Generator[Progress, None, Trajectories]:
+    """Give each road user the size of the nearest model of traffic simulations, and no shape of its own."""
+    users = tuple(replace(user, shape=RoadUser.shape) for user in trajectories.users)
     sizes = np.array([_nearest_model(user) for user in users])
-    return replace(run, trajectories=(yield from with_sizes(replace(run.trajectories, users=users), sizes)))
+    return (yield from with_sizes(replace(trajectories, users=users), sizes))
 
 
 def _nearest_model(user: RoadUser) -> tuple[float, float, float]:

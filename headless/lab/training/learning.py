@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -128,21 +128,23 @@ def _sampled(
 ) -> Generator[Progress, None, dict[str, list[SampledRecording]]]:
     """Simulate each frame once, and keep what each variant learns from it."""
     sampled: list[dict[str, SampledRecording]] = []
+    works: dict[LearntSite, list[Generator[Progress, None, None]]] = {}
     for site, recording in scans:
         area, latest = site.simulator.area(network.pillar), functools.lru_cache(1)(recording.frames.__getitem__)
         kept = replace(recording, frames=LazyFrames(len(recording.frames), latest))
-        sampled.append(
-            {name: SampledRecording(kept, one.area(area), network.most_points) for name, one in variants.items()}
-        )
-    yield from side_by_side([_simulated(list(of_one.values())) for of_one in sampled], AT_ONCE)
-    for site, _ in scans:
+        alike = {name: SampledRecording(kept, one.area(area), network.most_points) for name, one in variants.items()}
+        sampled.append(alike)
+        works.setdefault(site, []).append(_simulated(list(alike.values()), latest.cache_clear))
+    for site, of_site in works.items():
+        yield from side_by_side(of_site, AT_ONCE)
         site.simulator.forget()
     return {name: [of_one[name] for of_one in sampled] for name in variants}
 
 
-def _simulated(alike: Sequence[SampledRecording]) -> Generator[Progress, None, None]:
+def _simulated(alike: Sequence[SampledRecording], forget: Callable[[], None]) -> Generator[Progress, None, None]:
     total = len(alike[0])
     for number in range(total):
         yield Progress(number, total, f"simulate {alike[0].recording.name}")
         for one in alike:
             one.get(number)
+    forget()

@@ -115,7 +115,8 @@ def resized(trajectories: Trajectories, change: float, seed: int) -> Generator[P
     """Multiply each dimension of each road user by a factor of its own, uniform from 1 − ``change`` to 1 + ``change``.
 
     One that would run into another grows by less. A larger change of the same
-    seed changes each dimension the same way, and more.
+    seed changes each dimension the same way, and more; other traffic has other
+    factors.
 
     Raises
     ------
@@ -125,7 +126,7 @@ def resized(trajectories: Trajectories, change: float, seed: int) -> Generator[P
     if not 0.0 <= change <= MAX_CHANGE:
         raise SeipError(f"sizes change by a share of 0 to {MAX_CHANGE:g}, not {change:g}")
     sizes = np.array([_size(user) for user in trajectories.users])
-    factors = 1.0 + change * _generator(seed).uniform(-1.0, 1.0, sizes.shape)
+    factors = 1.0 + change * _generator(seed, int(trajectories.key, 16)).uniform(-1.0, 1.0, sizes.shape)
     return (yield from with_sizes(trajectories, sizes * factors))
 
 

@@ -208,6 +208,12 @@ def test_resized_dimensions_are_uniform_and_nested():
     assert finish(resized(users, 0.0, 9)).users == users.users
 
 
+def test_other_traffic_has_other_factors():
+    one, other = many("car", 20), many("car", 21)
+    factors = [sizes(finish(resized(users, 0.15, 9)))[:20] / sizes(users)[:20] for users in (one, other)]
+    assert np.abs(np.corrcoef(*(part.ravel() for part in factors))[0, 1]) < 0.5
+
+
 @pytest.mark.parametrize("change", [-0.1, 0.6, float("nan")])
 def test_no_change_of_sizes_is_one_sentence(change):
     with pytest.raises(SeipError, match=r"sizes change by a share of 0 to 0\.5, not"):
