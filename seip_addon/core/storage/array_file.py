@@ -233,14 +233,15 @@ def _array(archive: zipfile.ZipFile, member: str) -> NDArray[Any]:
     """Read an array. NumPy parses the claim as a source, which older Pythons cannot do in two threads at once."""
     claim = _claim(archive, member)
     array = np.empty(math.prod(claim.shape), claim.dtype)
-    rest = memoryview(array.view(np.uint8))
+    rest = array.view(np.uint8).data
     with archive.open(member) as stream:
         stream.read(claim.begin)
         while rest:
-            count = stream.readinto(rest[:_READ_AT_ONCE])
-            if not count:
+            part = stream.read(min(len(rest), _READ_AT_ONCE))
+            if not part:
                 raise ContentError(f"{member} ends too early")
-            rest = rest[count:]
+            rest[: len(part)] = part
+            rest = rest[len(part) :]
     return array.reshape(claim.shape, order=claim.order)
 
 
