@@ -155,7 +155,7 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         default=SHIPPED_DETECTOR,
         metavar="PT",
-        help="another than the shipped one, of `seip train`",
+        help="another than the shipped one, of `seip train` or `seip train-on-sites`",
     )
     parser.add_argument("--every", type=float, default=2.5, metavar="S", help="time from frame to frame")
     parser.add_argument("--device", default="cpu", help="of torch: cpu or cuda")

@@ -44,8 +44,8 @@ from seip_addon.core.workflows.survey import Survey
 def main(argv: list[str]) -> None:
     """Place, simulate, train, evaluate, and write charts and tables to a folder."""
     options = _parser().parse_args(argv)
-    if options.seeds < 1:
-        raise SeipError(f"ask for one training or more, not {options.seeds}")
+    if options.trainings < 1:
+        raise SeipError(f"ask for one training or more, not {options.trainings}")
     if options.placements is not None:
         _evaluate_placements(options)
         return
@@ -56,7 +56,7 @@ def main(argv: list[str]) -> None:
     training_set = watch.run("simulation", steps)
     training, start = _training(options)
     models = case_study.model_configurations(
-        study.configurations, network, training, seeds=options.seeds, separate=options.separate, start=start
+        study.configurations, network, training, seeds=options.trainings, separate=options.separate, start=start
     )
     if options.ablation:
         models += case_study.padded(models)
@@ -71,7 +71,7 @@ def main(argv: list[str]) -> None:
     with runtime.incomplete_if_interrupted(folder):
         study_results.save_charts(folder, results, trained)
         study_results.save_table(folder / "detection.csv", results)
-        settings = study.surveyed.settings.as_record() | {"seeds": options.seeds, "frames_every_s": options.every}
+        settings = study.surveyed.settings.as_record() | {"seeds": options.trainings, "frames_every_s": options.every}
         settings["from_scratch"] = options.from_scratch
         study_results.save_record(
             folder / "evaluation.json", results, claims, settings, versions(blender=bpy.app.version_string)
@@ -101,7 +101,7 @@ def _evaluate_placements(options: argparse.Namespace) -> None:
         placements=options.placements,
         count=options.count,
         learnt=options.learnt_placements,
-        trainings=options.seeds,
+        trainings=options.trainings,
         steps=training.steps,
         seed=options.placement_seed,
     )
@@ -227,9 +227,7 @@ def _parser() -> argparse.ArgumentParser:
     what = "Find out what 1, 2 and 4 sensors of each type detect; name types from the simplest to the best."
     parser = new_parser("evaluate", what)
     add_options(parser)
-    parser.add_argument(
-        "--seeds", "--trainings", type=int, default=3, metavar="N", help="trainings, each with a seed of its own"
-    )
+    parser.add_argument("--trainings", type=int, default=3, metavar="N", help="each with a seed of its own")
     parser.add_argument(
         "--from-scratch",
         action="store_true",

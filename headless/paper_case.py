@@ -53,8 +53,8 @@ COPIES_TESTED = 4  # of the runs with fixed departures
 def main(argv: list[str]) -> None:
     """Build the scene, draw traffic, place, train, evaluate, and write the page."""
     options = _parser().parse_args(argv)
-    if options.seeds < 1:
-        raise SeipError(f"ask for one training or more, not {options.seeds}")
+    if options.trainings < 1:
+        raise SeipError(f"ask for one training or more, not {options.trainings}")
     training = TrainingSettings(steps=options.steps)
     check_device(options.device)
     evaluate.check_every(options.every)
@@ -86,7 +86,7 @@ def main(argv: list[str]) -> None:
         copies,
         options.work,
         training=training,
-        seeds=options.seeds,
+        seeds=options.trainings,
         device=options.device,
     )
     found = watch.run("detection", steps)
@@ -139,14 +139,14 @@ def _facts(
         doubts.append("Validation still rose when a training ended: more --steps would change figures of detection.")
     if found.copies_rising:
         doubts.append("Validation still rose when training on near copies ended: leak may be larger than it seems.")
-    if options.seeds == 1:
-        doubts.append("One training: claims 5 to 8 get no verdict, which takes three (--seeds 3).")
+    if options.trainings == 1:
+        doubts.append("One training: claims 5 to 8 get no verdict, which takes three (--trainings 3).")
     junction = " ".join(options.junction)
     return CaseFacts(
         command=(
             f"seip paper-case {options.map.name} --junction {junction} --routes {options.routes.name} "
             + (f"--types {' '.join(path.name for path in options.types)} " if options.types else "")
-            + f"--network {options.network.name} --steps {options.steps} --seeds {options.seeds} "
+            + f"--network {options.network.name} --steps {options.steps} --trainings {options.trainings} "
             f"--every {options.every:g} --runs {options.runs} --duration {options.duration:g} "
             f"--time-limit {options.time_limit:g} -o docs"
         ),
@@ -161,9 +161,9 @@ def _facts(
             f"each of {options.runs} runs of {options.duration:g} s after {options.warm_up:g} s and more; "
             f"{len(runs.training)} to learn from, {len(runs.validation)} for validation, {len(runs.test)} for tests"
         ),
-        training=f"{options.steps} steps on frames {options.every:g} s apart, {options.seeds} training"
-        + ("" if options.seeds == 1 else "s"),
-        trainings=options.seeds,
+        training=f"{options.steps} steps on frames {options.every:g} s apart, {options.trainings} training"
+        + ("" if options.trainings == 1 else "s"),
+        trainings=options.trainings,
         bare=bare,
         most_overlap=MOST_OVERLAP,
         overlaps=shares[0],
@@ -212,7 +212,7 @@ def _parser() -> argparse.ArgumentParser:
     traffic.add_argument("--every", type=float, default=2.5, metavar="S", help="time from frame to frame")
     detection = parser.add_argument_group("detection")
     detection.add_argument("--steps", type=int, default=TrainingSettings().steps, metavar="N", help="of each training")
-    detection.add_argument("--seeds", type=int, default=3, metavar="N", help="trainings, each with a seed of its own")
+    detection.add_argument("--trainings", type=int, default=3, metavar="N", help="each with a seed of its own")
     detection.add_argument("--device", default="cpu", help="of torch: cpu or cuda")
     return parser
 

@@ -173,8 +173,11 @@ def _parser() -> argparse.ArgumentParser:
     learning.add_argument("--every", type=float, default=default.every, metavar="S", help="time from frame to frame")
     net = parser.add_argument_group("network")
     add_settings(net, NetworkSettings, "head", "pillar", "most_points", "width", "blocks")
+    learning.add_argument(
+        "--seed", type=int, default=default.seed, metavar="N", help="of placements, noise, weights and order"
+    )
     work = parser.add_argument_group("training")
-    add_settings(work, TrainingSettings, "steps", "batch", "seed")
+    add_settings(work, TrainingSettings, "steps", "batch")
     work.add_argument("--device", default="cpu", help="of torch: cpu, cuda")
     add_settings(work, TrainingSettings, "threads")
     return parser

@@ -24,7 +24,7 @@ from seip_addon.core.traffic import Trajectories
 from seip_addon.core.workflows.traffic import runs_in
 
 COARSE = ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "20"]
-BRIEF = ["--every", "29", "--steps", "2", "--seeds", "2"]
+BRIEF = ["--every", "29", "--steps", "2", "--trainings", "2"]
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def test_the_table_has_a_row_for_each_detector_and_placement(folder):
 
 
 def test_detectors_know_what_they_have_learnt_from(run, tmp_path):
-    run(tmp_path, "--seeds", "1")
+    run(tmp_path, "--trainings", "1")
     before, after = (Detector.load(path).training_record for path in (SHIPPED_DETECTOR, tmp_path / "detector-1.pt"))
     assert set(after.sensors) == {*before.sensors, "type1"}
     assert set(after.sites) == {*before.sites, "Small junction"}
@@ -146,7 +146,7 @@ def test_runs_beside_a_scene_are_ordered_by_their_numbers(tmp_path):
         ((), (0, 1, 2), "3 runs of traffic are too few"),
         ((), (0, 1, 2, 0), "run-1 and run-1 are nearly the same traffic"),
         (("--every", "0"), (0, 1, 2, 3), "time between frames"),
-        (("--seeds", "0"), (0, 1, 2, 3), "one training or more"),
+        (("--trainings", "0"), (0, 1, 2, 3), "one training or more"),
         (("--device", "abacus"), (0, 1, 2, 3), "torch cannot use the device 'abacus'"),
     ],
 )

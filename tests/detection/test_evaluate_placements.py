@@ -123,7 +123,7 @@ def test_what_cannot_be_studied_gets_a_sentence(run, tmp_path, options, sentence
 
 def test_folders_are_evaluated_alone(run, placed, tmp_path):
     mixed, alone = placed / "mixed", placed / "alone"
-    run(tmp_path, "--seeds", "1", "--sensor", "type1", "--only-placement", "--placement", str(mixed), str(alone))
+    run(tmp_path, "--trainings", "1", "--sensor", "type1", "--only-placement", "--placement", str(mixed), str(alone))
     record = json.loads((tmp_path / "evaluation.json").read_text(encoding="utf-8"))
     assert [one["name"] for one in record["configurations"]] == ["2 × mixed", "2 × alone"]
     assert record["claims"] == []
@@ -139,7 +139,7 @@ def test_folders_are_evaluated_alone(run, placed, tmp_path):
 
 @pytest.mark.slow
 def test_folders_are_evaluated_beside_numbers_and_types(run, placed, tmp_path):
-    run(tmp_path, "--seeds", "1", "--sensor", "type1", "--placement", str(placed / "mixed"))
+    run(tmp_path, "--trainings", "1", "--sensor", "type1", "--placement", str(placed / "mixed"))
     rows = list(csv.DictReader((tmp_path / "detection.csv").read_text(encoding="utf-8").splitlines()))
     assert [(row["sensor"], row["count"]) for row in rows] == [
         ("type1", "1"),

@@ -72,7 +72,7 @@ def test_routes_elsewhere_are_one_sentence(run, network):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--seeds", "0"], "ask for one training or more, not 0"),
+        (["--trainings", "0"], "ask for one training or more, not 0"),
         (["--steps", "0"], "training must have 1 step or more"),
         (["--runs", "3"], "ask for 4 to 999 runs of traffic, not 3"),
         (["--every", "0"], "the time between frames must be above 0 s, not 0 s"),
@@ -101,11 +101,11 @@ def test_the_page_is_written_with_its_charts(run, network, tmp_path, capsys):
     streets = read_network(network)
     arm = streets.arms[0]
     way = f"{arm.id} {streets.onward[arm.id][0][0]}"
-    brief = ["--runs", "4", "--duration", "12", "--warm-up", "30", "--every", "9", "--steps", "1", "--seeds", "1"]
+    brief = ["--runs", "4", "--duration", "12", "--warm-up", "30", "--every", "9", "--steps", "1", "--trainings", "1"]
     few = ["--approaches", "20", "--time-limit", "2"]
     run(*brief, *few, net=network.read_text(encoding="utf-8"), edges=way)
     text = (tmp_path / "docs" / "paper.md").read_text(encoding="utf-8")
-    assert "--steps 1 --seeds 1 --every 9" in text
+    assert "--steps 1 --trainings 1 --every 9" in text
     assert str(tmp_path) not in text
     assert "**Validation still rose" in text
     pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
