@@ -4,7 +4,7 @@
 # make lint        set up, and check style and types
 # make scenes      rebuild the shipped scenes from their sources
 # make detection   install PyTorch, for the detector; make test-detection tests it
-# make study       redo the study on the shipped junction: coverage, then detection (ten minutes)
+# make study       redo the study on the shipped junction: coverage and detection (make -j2 study: ten minutes)
 # make detector    train the detector that ships: random placements at 20 random sites (half an hour)
 # make ingredients what each ingredient of its training gains at sites never learnt from (an hour)
 # make settings    chart what other settings of the detector cost and gain (an hour)
@@ -25,10 +25,10 @@ SPREAD := -n auto --maxprocesses 4
 DEMO := scenes/junction.blend -o out/junction
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo site test test-slow lint scenes sumo test-traffic traffic detection test-detection study detector ingredients settings stability benchmark extension lock clean distclean
+.PHONY: help environment demo site test test-slow lint scenes sumo test-traffic traffic detection test-detection study coverage-study detection-study detector ingredients settings stability benchmark extension lock clean distclean
 
 help:
-	@sed -n '/^# /s/^# //p' Makefile
+	@sed -n '/^#/!q; s/^#\( \|$$\)//p' Makefile
 
 environment:
 	@$(PYTHON) -m headless.set_up "$(VENV)"
@@ -86,9 +86,14 @@ test-detection: detection
 	@$(PYTHON) -m headless.set_up "$(VENV)" second-opinion
 	$(PY) -m pytest tests/detection tests/core/storage/test_source_digest.py
 
-study: detection
-	$(PY) -m headless.study scenes/junction.blend -o out/study
-	$(PY) -m headless.evaluate scenes/junction.blend -o out/study
+# Two commands, which `make -j2 study` runs side by side.
+study: coverage-study detection-study
+
+coverage-study: detection
+	$(PY) -m headless.study scenes/junction.blend -o out/study/coverage
+
+detection-study: detection
+	$(PY) -m headless.evaluate scenes/junction.blend -o out/study/detection
 
 detector: detection sumo
 	$(PY) -m headless.generate_sites -o out/sites --sites 20 --seed 1

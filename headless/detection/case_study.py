@@ -5,7 +5,7 @@ Placements come from the integer program, clouds from simulated traffic. One det
 """
 
 import os
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -267,9 +267,21 @@ def simulate_training_set(
         {one.name: recordings(one, traffic.training) for one in configurations},
         {one.name: recordings(one, traffic.validation) for one in configurations},
     )
-    each = [(*training_set.training[one.name], *training_set.validation[one.name]) for one in configurations]
+    each = [
+        (*training_set.training[one.name], *training_set.validation[one.name])
+        for one in most_rays_first(configurations)
+    ]
     yield from side_by_side([simulated(some) for some in each], AT_ONCE)
     return training_set
+
+
+def most_rays_first(configurations: Iterable[SensorConfiguration]) -> list[SensorConfiguration]:
+    """Return them in an order in which no long work is left to one core at the end."""
+
+    def rays(placed: SensorConfiguration) -> int:
+        return sum(sensor.model.channels * sensor.model.azimuth_count for sensor in placed.sensors)
+
+    return sorted(configurations, key=rays, reverse=True)
 
 
 def simulated(recordings: Sequence[SampledRecording]) -> Generator[Progress, None, None]:
@@ -312,7 +324,7 @@ def evaluate_all(
     simulator: Simulator, models: Sequence[ModelConfiguration], detectors: Sequence[Detector], traffic: Traffic
 ) -> Generator[Progress, None, list[DetectorOutcome]]:
     """Evaluate every detector with each of its configurations; a frame is simulated once for all of them."""
-    configurations = {one.name: one for model in models for one in model.configurations}.values()
+    configurations = most_rays_first({one.name: one for model in models for one in model.configurations}.values())
     runs = (*traffic.validation, *traffic.test)
     threads = models[0].training.threads
     asked = [
