@@ -1,7 +1,7 @@
 """Build a Blender scene from an OpenDRIVE map or an extract of OpenStreetMap.
 
 blender -b --python-exit-code 1 -P headless/build_scene.py -- map.xodr --near -49 -1 --radius 80 -o site.blend
-python -m headless.build_scene place.osm --near-latlon 52.47391 13.44048 -o site.blend
+python -m headless.build_scene place.osm --near-latlon 52.47391,13.44048 -o site.blend
 python -m headless.build_scene place.osm --junction "One Street" "Other Street" -o site.blend
 python -m headless.build_scene map.xodr --junction 53 --site site.toml -o site.blend
 python -m headless.build_scene site.toml -o site.blend
@@ -20,10 +20,13 @@ from headless.charts.survey import save_merging_chart
 from headless.options import new_parser
 
 from seip_addon.core.citymodel.at_place import AskedBuildings
+from seip_addon.core.counts import counted
 from seip_addon.core.elevation.at_place import AskedTerrain
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
+from seip_addon.core.site.obstruction import NO_OBSTACLES_MESSAGE
 from seip_addon.core.site.sources import count_sources, source_lines
+from seip_addon.core.storage.files import locked_file
 from seip_addon.core.streetscape.mesh_place import mesh_place
 from seip_addon.core.workflows.site_building import AskedSite, build_site, save_map
 from seip_addon.scene.blend_file import check_name, new_file, save_blend
@@ -35,6 +38,11 @@ def main(argv: list[str]) -> None:
     """Read the source, model the site and save it."""
     asked = _parser().parse_args(argv)
     check_name(asked.output)
+    with locked_file(asked.output):
+        _build(asked)
+
+
+def _build(asked: argparse.Namespace) -> None:
     map_path = asked.output.with_suffix(".xodr")
     for path in (asked.output, map_path):
         if path.is_dir():
@@ -45,7 +53,7 @@ def main(argv: list[str]) -> None:
     for path in asked.mesh:
         check_mesh(path, up)
     with runtime.progress_bar() as report:
-        built = finish(build_site(asked.source, _asked_site(asked)), report)
+        built = finish(build_site(asked.source, _asked_site(asked), map_path), report)
         model = built.model
         scene = new_file()
         finish(build_scene(scene, model, built.map_name), report)
@@ -61,13 +69,13 @@ def main(argv: list[str]) -> None:
         runtime.print_line(f"{chart}: boxes of the survey, and which share of lines of sight they change")
     for note in model.notes:
         runtime.print_line(f"note: {note}")
-    runtime.warn(() if meshes else model.warnings)
+    runtime.warn(warning for warning in model.warnings if not (meshes and warning == NO_OBSTACLES_MESSAGE))
     for line in source_lines((*model.sources(), *count_sources(meshes))):
         runtime.print_line(line)
     x, y, z = model.origin + 0.0  # no negative zero
     runtime.print_line(
-        f"{asked.output}: {model.name}, {len(model.parts)} objects, region of interest {model.region.area:.0f} m², "
-        f"local origin at map ({x:.0f}, {y:.0f}, {z:.0f})"
+        f"{asked.output}: {model.name}, {counted(len(model.parts), 'object')}, "
+        f"region of interest {model.region.area:.0f} m², local origin at map ({x:.0f}, {y:.0f}, {z:.0f})"
     )
     if built.map_text is not None:
         runtime.print_line(f"{map_path}: the map of its streets, to simulate traffic on")
@@ -140,8 +148,8 @@ def _parser() -> argparse.ArgumentParser:
         "--level",
         nargs="+",
         default=[],
-        metavar="ROAD",
-        help="id of a road on the level to study, where roads cross above",
+        metavar="STREET",
+        help="name of a street on the level to study, or id of a road, where roads cross above",
     )
     parser.add_argument("--site", type=Path, metavar="TOML", help="site description: what the map does not have")
     parser.add_argument(

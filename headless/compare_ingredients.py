@@ -8,7 +8,6 @@ they were.
 """
 
 import argparse
-import csv
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,10 +17,11 @@ from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.lab.training.ingredients import ALL, VARIANTS
 from headless.lab.training.learning import TrainingSites, covering_most, train_variants
 from headless.lab.training.unseen_sites import IngredientEffect, UnseenTest, effects, unseen_tests
-from headless.options import add_settings, new_parser, read_settings
+from headless.options import add_settings, new_parser, read_settings, real_number
 from headless.train_on_sites import LearningSettings, read_site, set_aside
 
-from seip_addon.core.storage.files import whole_file
+from seip_addon.core.limits import TIME_STEP
+from seip_addon.core.storage.csv_table import save_csv
 
 TEST_STRIDE = 2  # frames to learn from for each to test on
 
@@ -65,17 +65,16 @@ def in_words(one: IngredientEffect) -> str:
 
 def save_table(path: Path, found: list[IngredientEffect]) -> None:
     """Write a row for each test and variant as CSV."""
-    with whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["test", "variant", "ap", "ap_low", "ap_high", "change", "change_low", "change_high"])
-        for one in found:
-            estimates = [one.precision, one.change]
-            figures = [
-                "" if estimate is None else f"{getattr(estimate, end):.4f}"
-                for estimate in estimates
-                for end in ("value", "low", "high")
-            ]
-            writer.writerow([one.test, one.variant, *figures])
+    rows = []
+    for one in found:
+        estimates = [one.precision, one.change]
+        figures = [
+            "" if estimate is None else f"{getattr(estimate, end):.4f}"
+            for estimate in estimates
+            for end in ("value", "low", "high")
+        ]
+        rows.append([one.test, one.variant, *figures])
+    save_csv(path, ["test", "variant", "ap", "ap_low", "ap_high", "change", "change_low", "change_high"], rows)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -85,7 +84,9 @@ def _parser() -> argparse.ArgumentParser:
         "--unseen", nargs="+", type=Path, required=True, metavar="SCENE", help="to try it at, each with its traffic"
     )
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for table, chart and trainings")
-    parser.add_argument("--every", type=float, default=2.5, metavar="S", help="time from frame to frame")
+    parser.add_argument(
+        "--every", type=real_number(TIME_STEP), default=2.5, metavar="S", help="time from frame to frame"
+    )
     parser.add_argument("--placement-seed", type=int, default=1, metavar="N", help="of random placements")
     add_settings(parser, TrainingSettings, "steps", "batch")
     parser.add_argument("--trainings", type=int, default=3, metavar="N", help="of each variant, with a seed each")

@@ -31,14 +31,14 @@ from headless.detection.recordings import MountedSensors, Simulator
 from headless.detection.rules import MAIN_RULE
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import deterministic
-from headless.options import add_rolling_shutter, add_settings, new_parser, read_settings
+from headless.options import add_rolling_shutter, add_settings, new_parser, read_settings, real_number
 
 import bpy
 import numpy as np
 
 from seip_addon.core.datasets.detection_files import kitti_results, openpcdet_results
-from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.limits import TIME_STEP
 from seip_addon.core.results.detection_record import FORMATS, SCHEMA
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.robustness.traffic_instants import check_runs
@@ -46,6 +46,7 @@ from seip_addon.core.scans import MountedSensor, ScanSettings
 from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.files import digest, save_json, whole_file
 from seip_addon.core.traffic.run_overlap import require_independent, vehicle_positions
+from seip_addon.core.traffic.source import require_own_traffic
 from seip_addon.core.workflows.survey import SurveySettings
 from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
@@ -56,8 +57,6 @@ def main(argv: list[str]) -> None:
     """Scan the runs, detect, and write figures, charts and detections to a folder."""
     options = _parser().parse_args(argv)
     check_device(options.device)
-    if options.every <= 0:
-        raise SeipError(f"the time between frames must be above 0 s, not {options.every:g} s")
     detector = Detector.load(options.detector, options.device)
     runtime.check_folder(options.output)
     runtime.open_scene(options.scene)
@@ -71,6 +70,8 @@ def main(argv: list[str]) -> None:
     changed = changed_beams(bpy.context.scene, sensors)
     runtime.warn(changed)
     runs = read_runs(options.traffic, geometry.origin, options.every)
+    for run in runs:
+        require_own_traffic(run.trajectories, geometry, run.name)
     if len(runs) > 1:
         moved = [vehicle_positions(run.name, run.trajectories) for run in runs]
         runtime.LOG.info(require_independent(combinations(moved, 2)))
@@ -134,7 +135,8 @@ def _save(folder: Path, judgement: Judgement, simulator: Simulator, sensors: lis
     title = f"{len(sensors)} × {types}: AP {evaluation.average_precision:.2f} over all frames"
     cloud = judgement.scan.points
     view = error_view(title, frame, MAIN_RULE, score=score, cloud=cloud, region=simulator.static.region, sensors=places)
-    save_error_view(folder / "errors.png", [view], f"{name}, {frame.run} at {frame.time:.1f} s")
+    where = f"{name}, {frame.run} at {frame.time:.1f} s"
+    save_error_view(folder / "errors.png", [view], where, simulator.static.attribution)
     for form in FORMATS:
         for stale in (folder / form).glob("*.txt"):  # of an earlier, longer run
             stale.unlink()
@@ -157,7 +159,9 @@ def _parser() -> argparse.ArgumentParser:
         metavar="PT",
         help="another than the shipped one, of `seip train` or `seip train-on-sites`",
     )
-    parser.add_argument("--every", type=float, default=2.5, metavar="S", help="time from frame to frame")
+    parser.add_argument(
+        "--every", type=real_number(TIME_STEP), default=2.5, metavar="S", help="time from frame to frame"
+    )
     parser.add_argument("--device", default="cpu", help="of torch: cpu or cuda")
     add_settings(parser, SurveySettings, "catalogue")
     how = parser.add_argument_group("measurement")

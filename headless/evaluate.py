@@ -29,16 +29,20 @@ from headless.detection.placements_study.results import PlacementsStudy, save_st
 from headless.detection.read_placements import read_placements, records_in
 from headless.detection.recordings import SensorConfiguration, Simulator
 from headless.detection.settings import FINE_TUNING, NetworkSettings, TrainingSettings
-from headless.options import add_rolling_shutter, new_parser
+from headless.options import add_rolling_shutter, new_parser, real_number, whole_number
 
 import bpy
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.limits import COUNT, SEED, SENSORS, TIME_STEP, Limits
 from seip_addon.core.placement.objective import Objective, check_objective
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.robustness.traffic_instants import check_runs
 from seip_addon.core.scans import ScanSettings
+from seip_addon.core.traffic.source import require_own_traffic
 from seip_addon.core.workflows.survey import Survey
+
+STEPS, TRAININGS = Limits(1, 10_000_000), Limits(1, 1_000)
 
 
 def main(argv: list[str]) -> None:
@@ -179,7 +183,10 @@ def prepare_site(options: argparse.Namespace, count: int) -> DetectionSite:
     )
     paths = options.traffic or survey.runs_beside(options.scene)
     traffic = case_study.read_traffic(paths, surveyed.geometry.origin, options.every)
-    check_runs([run.trajectories for runs in vars(traffic).values() for run in runs], surveyed.site.region)
+    runs = [run for runs in vars(traffic).values() for run in runs]
+    check_runs([run.trajectories for run in runs], surveyed.site.region)
+    for run in runs:
+        require_own_traffic(run.trajectories, surveyed.geometry, run.name)
     runtime.LOG.info(traffic.overlap())
     runtime.LOG.info(traffic.shared_bays())
     runtime.warn(filter(None, [too_few_runs(len(traffic.test))]))
@@ -188,9 +195,9 @@ def prepare_site(options: argparse.Namespace, count: int) -> DetectionSite:
 
 
 def check_every(seconds: float) -> None:
-    """Raise SeipError where there is no time from frame to frame."""
-    if not seconds > 0:
-        raise SeipError(f"the time between frames must be above 0 s, not {seconds:g} s")
+    """Raise SeipError where a time from frame to frame is not within its limits."""
+    if not TIME_STEP.allow(seconds):
+        raise SeipError(f"the time between frames must be {TIME_STEP}, not {seconds:g} s")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -206,10 +213,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help=f"runs of traffic: {case_study.SPLIT} (those in the folder SCENE_traffic beside the scene)",
     )
     detection.add_argument(
-        "--every", type=float, default=2.5, metavar="S", help="time from frame to frame; twice that in tests"
+        "--every",
+        type=real_number(TIME_STEP),
+        default=2.5,
+        metavar="S",
+        help="time from frame to frame; twice that in tests",
     )
-    detection.add_argument("--steps", type=int, help="of each training")
-    detection.add_argument("--scan-seed", type=int, default=0, help="of noise and lost returns")
+    detection.add_argument("--steps", type=whole_number(STEPS), help="of each training")
+    detection.add_argument("--scan-seed", type=whole_number(SEED), default=0, help="of noise and lost returns")
     add_rolling_shutter(detection)
     detection.add_argument("--device", default="cpu", help="of torch: cpu or cuda")
     detection.add_argument(
@@ -227,7 +238,9 @@ def _parser() -> argparse.ArgumentParser:
     what = "Find out what 1, 2 and 4 sensors of each type detect; name types from the simplest to the best."
     parser = new_parser("evaluate", what)
     add_options(parser)
-    parser.add_argument("--trainings", type=int, default=3, metavar="N", help="each with a seed of its own")
+    parser.add_argument(
+        "--trainings", type=whole_number(TRAININGS), default=3, metavar="N", help="each with a seed of its own"
+    )
     parser.add_argument(
         "--from-scratch",
         action="store_true",
@@ -237,10 +250,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--separate", action="store_true", help="a detector for each placement, not one for all")
     parser.add_argument("--ablation", action="store_true", help="claim 9: also train with zero-padded pillars")
     drawn = parser.add_argument_group("does coverage foretell detection? Placements of one type and number")
-    drawn.add_argument("--placements", type=int, metavar="N", help="evaluate the optimal one and others that are drawn")
-    drawn.add_argument("--count", type=int, default=2, metavar="N", help="sensors of each")
-    drawn.add_argument("--learnt-placements", type=int, default=12, metavar="N", help="others, to learn from")
-    drawn.add_argument("--placement-seed", type=int, default=0, metavar="SEED", help="of what is drawn")
+    drawn.add_argument(
+        "--placements", type=whole_number(COUNT), metavar="N", help="evaluate the optimal one and others that are drawn"
+    )
+    drawn.add_argument("--count", type=whole_number(SENSORS), default=2, metavar="N", help="sensors of each")
+    drawn.add_argument(
+        "--learnt-placements", type=whole_number(COUNT), default=12, metavar="N", help="others, to learn from"
+    )
+    drawn.add_argument("--placement-seed", type=whole_number(SEED), default=0, metavar="SEED", help="of what is drawn")
     return parser
 
 

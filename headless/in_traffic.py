@@ -16,6 +16,7 @@ from headless import runtime, survey
 from headless.charts.traffic import save_time_map, save_traffic_chart
 from headless.options import add_objective, add_settings, new_parser, read_objective, read_settings
 
+from seip_addon.core.counts import counted
 from seip_addon.core.placement.objective import Solution, check_objective
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.traffic_study import LAYER_NAMES, TrafficEvaluation, TrafficStudy
@@ -47,7 +48,7 @@ def main(argv: list[str]) -> None:
         save_time_map(
             options.output / CHARTS[0], surveyed.geometry, surveyed.site, solution.deployment, study.traffic, title
         )
-        sensors = f"{len(solution.deployment.sensors)} sensors"
+        sensors = counted(len(solution.deployment.sensors), "sensor")
         save_traffic_chart(options.output / CHARTS[1], [(sensors, study)], f"{name}: empty road and traffic")
         asked = {"render": not options.no_render, "traffic": asdict(settings)}
         survey.save_solution(surveyed, watch, solution, options.output, asked)
@@ -57,7 +58,7 @@ def main(argv: list[str]) -> None:
 def _in_words(study: TrafficStudy, solution: Solution) -> str:
     sensors = [survey.describe_sensor(sensor) for sensor in solution.deployment.sensors]
     seen = [f"chosen for {placed.name}: {_share(placed)}" for placed in (study.empty, study.traffic)]
-    return "\n".join([*sensors, *seen, solution.certificate, *solution.placement.notes])
+    return "\n".join([*sensors, *seen, solution.certificate, *solution.notes])
 
 
 def _share(placed: TrafficEvaluation) -> str:

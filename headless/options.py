@@ -4,15 +4,24 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable, Iterable, Sequence
+import os
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
 from types import NoneType
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.limits import Limits
 from seip_addon.core.placement.objective import Objective
 from seip_addon.core.settings import Setting, settings_of
 
 Options = TypeVar("Options")
+Number = TypeVar("Number", int, float)
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+NUMBER = "number"
+"""Name of the types of options that take a number within limits."""
 
 
 class _BriefHelp(argparse.HelpFormatter):
@@ -54,9 +63,103 @@ def _as_typed(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
+class _Parser(argparse.ArgumentParser):
+    """Parser that names the option of a refused value, and takes numbers as web maps copy them: ``-31.97, 115.86``."""
+
+    def _get_value(self, action: argparse.Action, arg_string: str) -> Any:  # noqa: ANN401 -- as argparse has it
+        try:
+            return super()._get_value(action, arg_string)
+        except argparse.ArgumentError as error:
+            if not isinstance(error.__context__, argparse.ArgumentTypeError):
+                raise
+            raise SeipError(f"{'/'.join(action.option_strings) or action.dest} {error.message}") from error
+
+    def parse_known_args(  # type: ignore[override]  # of its overloads only one is called
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """Parse arguments whose lists of numbers may have commas."""
+        given = sys.argv[1:] if args is None else args
+        return super().parse_known_args(list(self._with_numbers_apart(given)), namespace)
+
+    def _with_numbers_apart(self, args: Sequence[str]) -> Iterator[str]:
+        several = {
+            option
+            for action in self._actions
+            if action.nargs is not None and getattr(action.type, "__name__", "") in {"float", NUMBER}
+            for option in action.option_strings
+        }
+        takes_numbers = False
+        for arg in args:
+            option, equals, value = arg.partition("=")
+            numbers = _numbers(value if equals else arg)
+            if option in several:
+                takes_numbers = True
+                yield from (option, *numbers) if equals and numbers else (arg,)
+            elif takes_numbers and numbers:
+                yield from numbers
+            else:
+                takes_numbers = False
+                yield arg
+
+
+def _numbers(text: str) -> list[str]:
+    """Return the numbers of a text that consists of them, with commas, blanks and signs of degrees; else none."""
+    parts = [part for part in re.split(r"[\s,;°]+", text) if part]
+    return parts if parts and all(map(_NUMBER.fullmatch, parts)) else []
+
+
 def new_parser(prog: str, description: str) -> argparse.ArgumentParser:
-    """Return a parser whose help is brief and names defaults."""
-    return argparse.ArgumentParser(prog=prog, description=description, formatter_class=_BriefHelp)
+    """Return a parser with brief help that names defaults, and that takes only finite numbers and possible paths."""
+    parser = _Parser(prog=prog, description=description, formatter_class=_BriefHelp)
+    for kind, read in ((float, real_number(_ANY)), (int, whole_number(_ANY)), (Path, file_path)):
+        parser.register("type", kind, read)
+    return parser
+
+
+def real_number(limits: Limits) -> Callable[[str], float]:
+    """Return a type of options that takes a number within limits; NaN and infinity are outside."""
+
+    def read(text: str) -> float:
+        return _within(limits, text, float(text))
+
+    read.__name__ = NUMBER  # argparse says "invalid number value"
+    return read
+
+
+def whole_number(limits: Limits) -> Callable[[str], int]:
+    """Return a type of options that takes a whole number within limits."""
+
+    def read(text: str) -> int:
+        return _within(limits, text, int(text))
+
+    read.__name__ = "whole number"
+    return read
+
+
+def file_path(text: str) -> Path:
+    """Read a path: not empty, which would mean the working folder, and not longer than file systems allow."""
+    if not text:
+        raise argparse.ArgumentTypeError("must not be empty: name a file or folder")
+    if (
+        "\0" in text
+        or len(os.fsencode(text)) >= _MAX_PATH
+        or any(len(os.fsencode(part)) > _MAX_NAME for part in Path(text).parts)
+    ):
+        raise argparse.ArgumentTypeError(
+            f"is {text[:60]!r}…, longer than a path ({_MAX_PATH:,} bytes) or a name ({_MAX_NAME} bytes) can be"
+        )
+    return Path(text)
+
+
+def _within(limits: Limits, text: str, value: Number) -> Number:
+    if not limits.allow(value):
+        raise argparse.ArgumentTypeError(f"must be {limits}, not {text[:40]}")
+    return value
+
+
+_ANY = Limits(-1e15, 1e15)
+"""Of options whose own limits are checked where their numbers are used."""
+_MAX_PATH, _MAX_NAME = 4096, 255  # bytes, as Linux has them; others are within these
 
 
 def add_settings(group: argparse._ActionsContainer, kind: type, *names: str) -> None:
@@ -126,8 +229,24 @@ def _arguments(hint: Any, default: Any, about: Setting) -> dict[str, Any]:  # no
         return {"default": default, "choices": tuple(parts)}
     if get_origin(hint) is tuple:
         several = "+" if Ellipsis in parts else len(parts)
-        return arguments | {"nargs": several, "type": parts[0], "default": list(default) if default == () else default}
-    return arguments | {"type": parts[0] if parts else hint}
+        if get_origin(parts[0]) is Literal:
+            return arguments | {"nargs": several, "choices": get_args(parts[0]), "default": list(default)}
+        kind = _type(parts[0], about)
+        return arguments | {"nargs": several, "type": kind, "default": list(default) if default == () else default}
+    return arguments | {"type": _type(parts[0] if parts else hint, about)}
+
+
+def _type(kind: type, about: Setting) -> Callable[[str], Any]:
+    """Return the type of an option: numbers keep the limits of their setting."""
+    if kind not in {int, float}:
+        return file_path if kind is Path else kind
+    least = -_ANY.most if about.minimum is None else about.minimum
+    most = _ANY.most if about.maximum is None else about.maximum
+    if about.unit == "rad":  # options take degrees
+        limits = Limits(round(math.degrees(least), 1), round(math.degrees(most), 1), "degrees")
+    else:
+        limits = Limits(least, most, about.unit)
+    return real_number(limits) if kind is float else whole_number(limits)
 
 
 def _reading(read: Callable[[Sequence[str]], Any]) -> type[argparse.Action]:

@@ -23,7 +23,7 @@ from headless.detection import case_study
 from headless.detection.chart_data import cells
 from headless.detection.detector import check_device
 from headless.detection.settings import TrainingSettings
-from headless.options import new_parser
+from headless.options import new_parser, real_number
 from headless.paper_comparison.detection import DetectionOfCase, NearCopies, detection_of_case, placed
 from headless.paper_comparison.page import CaseFacts, page
 from headless.paper_comparison.published import HEIGHTS, PUBLISHED_SENSORS
@@ -39,7 +39,9 @@ from headless.paper_comparison.traffic_runs import (
 
 import bpy
 
+from seip_addon.core.counts import counted
 from seip_addon.core.errors import SeipError
+from seip_addon.core.limits import TIME_STEP
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import whole_file
 from seip_addon.core.traffic.sumo_programs import find_sumo
@@ -161,8 +163,7 @@ def _facts(
             f"each of {options.runs} runs of {options.duration:g} s after {options.warm_up:g} s and more; "
             f"{len(runs.training)} to learn from, {len(runs.validation)} for validation, {len(runs.test)} for tests"
         ),
-        training=f"{options.steps} steps on frames {options.every:g} s apart, {options.trainings} training"
-        + ("" if options.trainings == 1 else "s"),
+        training=f"{options.steps} steps on frames {options.every:g} s apart, {counted(options.trainings, 'training')}",
         trainings=options.trainings,
         bare=bare,
         most_overlap=MOST_OVERLAP,
@@ -209,7 +210,9 @@ def _parser() -> argparse.ArgumentParser:
     traffic.add_argument("--duration", type=float, default=runs.duration, metavar="S", help="of each run")
     traffic.add_argument("--warm-up", type=float, default=runs.warm_up, metavar="S", help="before each run")
     traffic.add_argument("--seed", type=int, default=runs.seed, metavar="N", help="of everything random in traffic")
-    traffic.add_argument("--every", type=float, default=2.5, metavar="S", help="time from frame to frame")
+    traffic.add_argument(
+        "--every", type=real_number(TIME_STEP), default=2.5, metavar="S", help="time from frame to frame"
+    )
     detection = parser.add_argument_group("detection")
     detection.add_argument("--steps", type=int, default=TrainingSettings().steps, metavar="N", help="of each training")
     detection.add_argument("--trainings", type=int, default=3, metavar="N", help="each with a seed of its own")

@@ -19,9 +19,12 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime, survey
 from headless.convergence import coarsest_settings
-from headless.options import add_objective, add_settings, new_parser, read_objective
+from headless.options import add_objective, add_settings, new_parser, read_objective, real_number
 
+from seip_addon.core.limits import SHARE
+from seip_addon.core.placement.deployment import price_text
 from seip_addon.core.placement.objective import Objective, Solution, check_objective
+from seip_addon.core.placement.returns_summary import share_reached
 from seip_addon.core.workflows.survey import place
 
 
@@ -49,23 +52,26 @@ def _in_words(solution: Solution) -> str:
         for sensor in deployment.sensors
     ]
     central = "" if deployment.central is None else f", central {deployment.central:.2%}"
-    installed = " installed" if any(sensor.installation is not None for sensor in deployment.sensors) else ""
-    lines.append(f"coverage {deployment.coverage:.2%}{central}, price ${deployment.price:,.0f}{installed}")
+    lines += [] if deployment.returns is None else [deployment.returns.describe()]
+    price = price_text(deployment.price, installed=deployment.installed)
+    lines.append(f"coverage {deployment.coverage:.2%}{central}, price {price}")
     lines.append(solution.certificate)
     if solution.greedy is not None and placement.objective > 0:
+        of_returns = deployment.returns is not None
+        reached = share_reached(solution.greedy.objective, placement.objective, of_returns=of_returns)
         lines.append(
-            f"the greedy algorithm reaches {solution.greedy.objective / placement.objective:.2%} of that objective"
+            f"the greedy algorithm reaches {reached:.2%} of {'those returns' if of_returns else 'that objective'}"
         )
-    return "\n".join([*lines, *placement.notes])
+    return "\n".join([*lines, *solution.notes])
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("place", "Place roadside LiDARs in a scene.")
     survey.add_options(parser, in_full=True)
-    add_settings(add_objective(parser), Objective, "coverage")
+    add_settings(add_objective(parser), Objective, "coverage", "criterion", "shares")
     parser.add_argument(
         "--tolerance",
-        type=float,
+        type=real_number(SHARE),
         metavar="SHARE",
         help="pick the coarsest --grid and --spacing whose placement covers as much but for this share",
     )

@@ -12,8 +12,9 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime
-from headless.options import new_parser
+from headless.options import new_parser, real_number
 
+from seip_addon.core import limits
 from seip_addon.core.report.evidence import load_evidence
 from seip_addon.core.report.write import EFFORT, write_report
 
@@ -32,7 +33,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("folder", type=Path, help="the folder that `seip place` has written")
     parser.add_argument(
         "--effort",
-        type=float,
+        type=real_number(limits.EFFORT),
         default=EFFORT,
         metavar="UNITS",
         help="counted work, a unit about a second of a core, for each other number of sensors; 0 leaves them out",

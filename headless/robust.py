@@ -14,8 +14,9 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime, survey
 from headless.charts.robust import save_frontier_chart, save_loss_chart, save_spread_chart
-from headless.options import add_objective, add_settings, new_parser, read_objective, read_settings
+from headless.options import add_objective, add_settings, new_parser, read_objective, read_settings, real_number
 
+from seip_addon.core.limits import SHARE
 from seip_addon.core.placement.objective import check_objective
 from seip_addon.core.robustness.pose_errors import PoseErrors
 from seip_addon.core.robustness.risk import Risk
@@ -57,7 +58,7 @@ def _in_words(robust: RobustSolution) -> str:
             f"5 % quantile {chosen.low.describe()}, the nominal optimum's {nominal.low.describe()}",
             f"the 5 % quantile is higher by {study.saving(chosen).describe()}",
             solution.certificate,
-            *solution.placement.notes,
+            *solution.notes,
         ]
     )
 
@@ -81,7 +82,9 @@ def _parser() -> argparse.ArgumentParser:
         default="cvar",
         help="coverage of all scenarios on average, of the worst of them, or of the very worst",
     )
-    risk.add_argument("--tail", type=float, default=0.25, metavar="SHARE", help="worst scenarios that cvar counts")
+    risk.add_argument(
+        "--tail", type=real_number(SHARE), default=0.25, metavar="SHARE", help="worst scenarios that cvar counts"
+    )
     add_settings(risk, Risk, "seen_by", "failure")
     errors = parser.add_argument_group("pose errors, standard deviations")
     add_settings(errors, PoseErrors, "position", "height", "yaw", "tilt")

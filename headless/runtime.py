@@ -21,7 +21,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from headless.system_libraries import complaint, missing_libraries
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress, finish
+from seip_addon.core.progress import Pace, Progress, finish
 from seip_addon.core.storage import files as storage
 
 try:
@@ -50,8 +50,10 @@ Result = TypeVar("Result")
 EXIT_STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl-C
 SECONDS_BETWEEN_LINES = float(os.environ.get("SEIP_SECONDS_BETWEEN_LINES", "10"))  # of progress, in a log
 ELAPSED_FORMAT = "{desc} [{elapsed}]"  # how progress of unknown length is shown
+STAGES_FORMAT = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}]"  # and that of units of unequal length
 LOG = logging.getLogger("headless")  # progress and warnings of commands and modules; results go through `print_line`
 _LOCKS: dict[Path, int] = {}  # folders that this process has locked, and what holds each lock
+_MADE: list[Path] = []  # folders that this process has made for results
 
 
 def in_blender() -> bool:
@@ -84,12 +86,14 @@ def open_scene(path: Path | None) -> None:
 def check_folder(folder: Path) -> None:
     """Check that a folder can be written, and lock it against other runs until this process ends.
 
+    The folder is made to be locked. Where nothing is written to it, `run` removes it again when the command ends.
+
     Raises
     ------
     SeipError
         It cannot, or another run does.
     """
-    storage.check_folder(folder)
+    _MADE.extend(storage.check_folder(folder))
     place = folder.resolve()
     if place not in _LOCKS:
         _LOCKS[place] = storage.lock_folder(place)
@@ -143,12 +147,23 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
     for number in (signal.SIGTERM, signal.SIGHUP):  # end in good order: half-written files are removed on the way out
         signal.signal(number, lambda which, _frame: sys.exit(128 + which))
     try:
-        main(arguments())
+        try:
+            main(arguments())
+        finally:
+            _leave_folders()
     except SeipError as error:
         _end(1, f"error: {error}")
     except KeyboardInterrupt as stop:
         _end(EXIT_STOPPED, str(stop) or "stopped, no result written")
     _end(0)
+
+
+def _leave_folders() -> None:
+    """Unlock the folders of results, and remove those that were made in vain."""
+    while _LOCKS:
+        storage.unlock_folder(*_LOCKS.popitem())
+    storage.remove_empty(_MADE)
+    _MADE.clear()
 
 
 def finish_with_bar(steps: Generator[Progress, None, Result]) -> Result:
@@ -173,9 +188,11 @@ def progress_bar() -> Iterator[Callable[[Progress], None]]:
         def report(progress: Progress) -> None:
             known = progress.total > 0
             bar.set_description(progress.what, refresh=False)
+            bar.bar_format = _format_of(progress)
             if (progress.total or None) != bar.total or (known and progress.done < bar.n):
-                bar.total, bar.bar_format = progress.total or None, None if known else ELAPSED_FORMAT
+                bar.total = progress.total or None
                 bar.reset()
+                bar.initial = bar.n = progress.done if known else 0  # what an earlier run has done took no time
             bar.update(progress.done - bar.n if known else 1)
 
         yield report
@@ -184,20 +201,36 @@ def progress_bar() -> Iterator[Callable[[Progress], None]]:
 def _line_reporter() -> Callable[[Progress], None]:
     """Return what writes a line on progress where `SECONDS_BETWEEN_LINES` have passed since the last one."""
     start = shown = time.monotonic()
+    pace = Pace()
 
     def report(progress: Progress) -> None:
         nonlocal shown
         now = time.monotonic()
+        pace.note(progress, now)
         if now - shown < SECONDS_BETWEEN_LINES:
             return
         shown = now
-        style = None if progress.total else ELAPSED_FORMAT
-        total = progress.total or None
-        meter = tqdm.format_meter(progress.done, total, now - start, prefix=progress.what, bar_format=style)
+        first = progress.done if pace.first is None else pace.first.done
+        timed = progress.counted and progress.total > 0
+        meter = tqdm.format_meter(
+            progress.done,
+            progress.total or None,
+            now - (pace.began if timed else start),
+            prefix=progress.what,
+            bar_format=_format_of(progress),
+            initial=first if timed else 0,
+        )
         sys.stderr.write(f"{meter}\n")
         sys.stderr.flush()
 
     return report
+
+
+def _format_of(progress: Progress) -> str | None:
+    """Return how progress is shown: with the time left, which is tqdm's default, only where the work is counted."""
+    if progress.total == 0:
+        return ELAPSED_FORMAT
+    return None if progress.counted else STAGES_FORMAT
 
 
 def _end(status: int, message: str = "") -> NoReturn:

@@ -20,11 +20,12 @@ from headless.options import add_settings, new_parser, read_settings
 
 import bpy
 
+from seip_addon.core.counts import counted
 from seip_addon.core.datasets import FORMATS, SPLITS
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.scans import ScanSettings
-from seip_addon.core.scans.run_folder import Record, Run, check_run_folder
+from seip_addon.core.scans.run_folder import Record, Run, check_no_placement, check_run_folder
 from seip_addon.core.site.weather import weather_of
 from seip_addon.core.traffic.source import load_trajectories
 from seip_addon.core.workflows.recording import RecordingSettings, dataset_folder, make_run, record, simulation_of
@@ -38,6 +39,7 @@ from seip_addon.scene.traffic import read_traffic
 def main(argv: list[str]) -> None:
     """Simulate the frames of a run and write them to a folder."""
     options = _parser().parse_args(argv)
+    check_no_placement(options.output)
     runtime.check_folder(options.output)
     if options.dataset is not None:
         runtime.check_folder(options.dataset)
@@ -92,8 +94,8 @@ def _in_words(run: Run) -> str:
         for sensor in run.sensors
     ]
     lines.append(
-        f"{len(run.times):,} frames from {run.times[0]:g} s to {run.times[-1]:g} s, "
-        f"{len(run.trajectories):,} road users, {len(run.static.triangles):,} static triangles"
+        f"{counted(len(run.times), 'frame')} from {run.times[0]:g} s to {run.times[-1]:g} s, "
+        f"{counted(len(run.trajectories), 'road user')}, {counted(len(run.static.triangles), 'static triangle')}"
     )
     return "\n".join(lines)
 
@@ -102,7 +104,7 @@ def _summary(manifest: Record) -> str:
     frames = manifest["frames"]
     points, users = (sum(frame[what] for frame in frames) / len(frames) for what in ("points", "road_users"))
     empty = sum(frame["road_users"] == 0 for frame in frames)
-    note = f"; {empty} frames have no road user" if empty else ""
+    note = f"; {counted(empty, 'frame has', 'frames have')} no road user" if empty else ""
     return f"{points:,.0f} points and {users:.1f} road users a frame{note}"
 
 

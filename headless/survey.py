@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-import math
 import time
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
@@ -19,10 +18,13 @@ from headless.options import add_settings, name_only, read_settings
 import bpy
 import numpy as np
 
+from seip_addon.core.counts import counted
+from seip_addon.core.errors import SeipError
 from seip_addon.core.placement.deployment import Sensor
 from seip_addon.core.placement.objective import Solution
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.results.placement_record import Provenance, versions
+from seip_addon.core.scans.run_folder import MANIFEST
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
 from seip_addon.core.site.scene_geometry import SceneGeometry
@@ -85,7 +87,7 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
     metres = parser.add_argument_group("grid and candidates, in metres")
     add_settings(metres, SurveySettings, "grid_spacing")
     add_settings(metres, VisibilitySettings, "delta")
-    add_settings(metres, CandidateSettings, "spacing", "setback", "clearance", "bracket")
+    add_settings(metres, CandidateSettings, "spacing", "setback", "clearance", "bracket", "allow")
     returns = parser.add_argument_group("returns")
     add_settings(returns, VisibilitySettings, "detection", "min_intensity")
     add_optics(returns)
@@ -97,10 +99,7 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
         help="Dask scheduler whose workers cast: tcp://host:8786, tls://host:8786",
     )
     add_settings(work, SurveySettings, "solver")
-    work.add_argument(
-        "--time-limit", type=float, metavar="S", help="for each answer, in seconds (default: 60, or none with --effort)"
-    )
-    add_settings(work, SurveySettings, "effort")
+    add_settings(work, SurveySettings, "effort", "time_limit")
     if not in_full:
         for group in (sensors, metres, returns, work):
             name_only(group, "see: seip place --help")
@@ -141,6 +140,10 @@ def survey(
     settings = _settings(options)
     settings.models()  # refuses unknown types before the scene is read
     runtime.check_folder(options.output)
+    if (options.output / MANIFEST).exists():
+        raise SeipError(
+            f"{options.output} holds a run of scans, which a placement is not written to: name another folder"
+        )
     runtime.open_scene(options.scene)
 
     set_reflectivity(options.reflectivity)
@@ -182,10 +185,7 @@ def describe_sensor(sensor: Sensor) -> str:
 
 
 def _settings(options: argparse.Namespace) -> SurveySettings:
-    """Return the settings that options name; where work is limited there is no limit of time unless it is asked for."""
-    limit = options.time_limit
-    if limit is None:
-        limit = math.inf if math.isfinite(options.effort) else SurveySettings().time_limit
+    """Return the settings that options name."""
     candidates = read_settings(CandidateSettings, options)
     visibility = read_settings(VisibilitySettings, options)
     return read_settings(
@@ -196,7 +196,6 @@ def _settings(options: argparse.Namespace) -> SurveySettings:
         weather=weather_of(options.weather),
         installed_cost=None if options.installed_cost is None else load_installed_cost(options.installed_cost),
         reflectivity=tuple(options.reflectivity),
-        time_limit=limit,
     )
 
 
@@ -205,6 +204,7 @@ def _in_words(site: Site) -> str:
     dropped = ", ".join(f"{count} {reason}" for reason, count in candidates.dropped.items())
     poles = np.count_nonzero(candidates.on_pole)
     return (
-        f"{site.name}: {len(site.targets):,} targets, {len(candidates.position)} positions ({poles} on poles), "
-        f"{len(candidates):,} poses, {len(site.triangles):,} triangles" + (f"; dropped: {dropped}" if dropped else "")
+        f"{site.name}: {counted(len(site.targets), 'target')}, {counted(len(candidates.position), 'position')} "
+        f"({poles} on poles), {counted(len(candidates), 'pose')}, {counted(len(site.triangles), 'triangle')}"
+        + (f"; dropped: {dropped}" if dropped else "")
     )

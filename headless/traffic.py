@@ -25,8 +25,10 @@ from headless.sumo.traffic_run import simulate_run
 
 import bpy
 
+from seip_addon.core.counts import counted
 from seip_addon.core.errors import SeipError
 from seip_addon.core.site.scene_geometry import SceneGeometry
+from seip_addon.core.storage.files import locked_file
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.floating_car_data import listed
 from seip_addon.core.traffic.source import TrafficFiles, describe_categories, load_traffic
@@ -40,6 +42,11 @@ def main(argv: list[str]) -> None:
     options = _parser().parse_args(argv)
     if options.animate is not None:
         check_name(options.animate)
+    with locked_file(options.output):
+        _make(options)
+
+
+def _make(options: argparse.Namespace) -> None:
     runtime.open_scene(options.scene)
     geometry = read_scene(bpy.context.scene).geometry
     trajectories = _simulated(options, geometry) if options.fcd is None else _imported(options, geometry)
@@ -67,7 +74,7 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
     runtime.warn(run.warnings)
     if run.collided:
         runtime.LOG.info(
-            f"{len(run.collided)} of {run.simulated} road users ran into others and are left out: "
+            f"left out of {counted(run.simulated, 'road user')}, having run into others: {len(run.collided)}, "
             f"{listed(run.collided)}"
         )
     return run.trajectories
@@ -77,8 +84,8 @@ def _in_words(trajectories: Trajectories) -> str:
     begin, end = trajectories.span
     present = len(trajectories.at((begin + end) / 2.0))
     return (
-        f"{len(trajectories)} road users ({describe_categories(trajectories)}) from {begin:g} to {end:g} s, "
-        f"{len(trajectories.time):,} samples, {present} at once halfway"
+        f"{counted(len(trajectories), 'road user')} ({describe_categories(trajectories)}) from {begin:g} to {end:g} s, "
+        f"{counted(len(trajectories.time), 'sample')}, {present} at once halfway"
     )
 
 

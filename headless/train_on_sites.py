@@ -27,16 +27,18 @@ from headless.detection.learnt_site import LearntSite
 from headless.detection.recordings import Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import train
-from headless.options import add_settings, new_parser, read_settings
+from headless.options import add_settings, new_parser, read_settings, real_number
 
 import bpy
 import numpy as np
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.limits import TIME_STEP
 from seip_addon.core.progress import Progress, side_by_side
 from seip_addon.core.scans import ScanSettings
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.site import make_site
+from seip_addon.core.traffic.source import require_own_traffic
 from seip_addon.core.workflows.survey import SurveySettings
 from seip_addon.scene.read import read_scene
 
@@ -128,6 +130,8 @@ def read_site(scene: Path, learning: LearningSettings) -> LearntSite:
     runs = read_runs(survey.runs_beside(scene), geometry.origin, learning.every)
     if not runs:
         raise SeipError(f"{scene} has no runs of traffic beside it: simulate some with headless/traffic.py")
+    for run in runs:
+        require_own_traffic(run.trajectories, geometry, run.name)
     simulator = Simulator(geometry, ScanSettings(seed=learning.seed))
     return LearntSite(f"{scene.parent.name}/{scene.stem}", geometry, candidates, models, runs, simulator)
 
@@ -170,7 +174,9 @@ def _parser() -> argparse.ArgumentParser:
     learning.add_argument(
         "--placements", type=int, default=default.placements, metavar="N", help="random ones for each run of traffic"
     )
-    learning.add_argument("--every", type=float, default=default.every, metavar="S", help="time from frame to frame")
+    learning.add_argument(
+        "--every", type=real_number(TIME_STEP), default=default.every, metavar="S", help="time from frame to frame"
+    )
     net = parser.add_argument_group("network")
     add_settings(net, NetworkSettings, "head", "pillar", "most_points", "width", "blocks")
     learning.add_argument(

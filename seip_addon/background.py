@@ -7,7 +7,7 @@ from concurrent.futures import CancelledError, Future
 from contextlib import closing
 from typing import Generic, TypeVar
 
-from .core.progress import Progress, finish
+from .core.progress import Pace, Progress, finish
 
 Result = TypeVar("Result")
 
@@ -71,26 +71,3 @@ class Background(Generic[Result]):
             self._end.set_exception(error)
         else:
             self._end.set_result(result)
-
-
-class Pace:
-    """How fast work goes, from its reports: each kind of work has a pace of its own."""
-
-    def __init__(self) -> None:
-        self._first: Progress | None = None
-        self._since = 0.0
-        self.seconds_left: float | None = None
-
-    def note(self, progress: Progress, now: float) -> None:
-        """Take a report.
-
-        Parameters
-        ----------
-        now : float, seconds
-            Reading of a monotonic clock.
-        """
-        if self._first is None or self._first.what != progress.what:
-            self._first, self._since, self.seconds_left = progress, now, None
-        gained = progress.done - self._first.done
-        if gained > 0:
-            self.seconds_left = (progress.total - progress.done) * (now - self._since) / gained

@@ -1,17 +1,18 @@
-"""Pieces of buildings, such as windows, go with the building that is deleted: Blender would leave them in the air."""
+"""Pieces go with the building or sensor that is deleted, such as windows and posts: Blender would leave them behind."""
 
 from __future__ import annotations
 
 import bpy
 
-from .scene.build import loose_pieces
+from .scene.pieces import copied_pieces, loose_pieces, tidy_pieces
 
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _on_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Note that something came loose: what is deleted from within a handler brings Blender down."""
     objects = [update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Object)]
-    if loose_pieces(objects) and not bpy.app.timers.is_registered(remove):
+    untidy = loose_pieces(objects) or copied_pieces(objects)
+    if untidy and not bpy.app.timers.is_registered(remove):
         bpy.app.timers.register(remove, first_interval=0.0)
 
 
@@ -19,11 +20,11 @@ def remove() -> None:
     """Remove what has come loose in any scene."""
     for scene in bpy.data.scenes:
         if scene.library is None:
-            bpy.data.batch_remove(loose_pieces(scene.objects))
+            tidy_pieces(scene)
 
 
 def attach() -> None:
-    """Watch for buildings that are deleted."""
+    """Watch for buildings and sensors that are deleted."""
     bpy.app.handlers.depsgraph_update_post.append(_on_update)
 
 

@@ -3,10 +3,12 @@
 import numpy as np
 from PIL import Image, TiffImagePlugin
 
-SCALE, TIE_POINT, TRANSFORMATION, KEYS, NO_DATA = 33550, 33922, 34264, 34735, 42113
+SCALE, TIE_POINT, TRANSFORMATION, KEYS, NO_DATA, COPYRIGHT = 33550, 33922, 34264, 34735, 42113, 33432
 
 
-def write_dem(path, heights, west, north, step=1.0, epsg=25833, *, point=False, no_data=None, leave_out=(), keys=None):
+def write_dem(
+    path, heights, west, north, step=1.0, epsg=25833, *, point=False, no_data=None, leave_out=(), keys=None, credit=None
+):
     """Write heights (rows, columns) from north to south, whose upper left corner is at (west, north)."""
     tags = TiffImagePlugin.ImageFileDirectory_v2()
     dx, dy = np.broadcast_to(step, 2).tolist()
@@ -19,6 +21,7 @@ def write_dem(path, heights, west, north, step=1.0, epsg=25833, *, point=False, 
         TIE_POINT: (0.0, 0.0, 0.0, float(west), float(north), 0.0),
         KEYS: (1, 1, 0, len(directory) // 4, *directory),
         NO_DATA: None if no_data is None else str(no_data),
+        COPYRIGHT: credit,
     }
     for tag, value in values.items():
         if value is not None and tag not in leave_out:

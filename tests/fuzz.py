@@ -1,7 +1,10 @@
 """Hostile files of each format, seeded: a reader gives a result or a SeipError, and nothing else.
 
+Numbers of a result are finite and within `core.limits`: an accepted file with any other number is a fault.
+
     python -m tests.fuzz --count 1000            # of each format
     python -m tests.fuzz map npz --count 5000 --seed 7
+    python -m tests.fuzz --minutes 60              # with further seeds, for an hour
 
 Inputs are read in a process of their own, so that one that hangs, crashes or fills the memory is counted and named
 like the rest; ``--keep DIR`` writes what was at fault. Crashes within Blender's own reader are counted, and no fault
@@ -12,6 +15,7 @@ then a result is a fault too. Status 1 where there was any.
 from __future__ import annotations
 
 import argparse
+import base64
 import gzip
 import io
 import json
@@ -21,19 +25,25 @@ import select
 import subprocess
 import sys
 import tempfile
+import time
 import traceback
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 SECONDS = 60.0
 """After which an input hangs."""
+
+SLOW_SECONDS = 400.0
+"""The same for formats that are read in a process of their own, which has 300 s."""
 
 MEMORY = 12 << 30
 """Bytes of address space that a reader may take."""
@@ -55,12 +65,13 @@ class Case:
 
 @dataclass(frozen=True)
 class Format:
-    """A format: the sound files that are mutated, how, and what reads them."""
+    """A format: the sound files that are mutated, how, what reads them, and which share of the inputs is tried."""
 
     suffixes: tuple[str, ...]
     samples: Callable[[Path], list[bytes]]
     mutate: Callable[[Random, bytes], Case]
     read: Callable[[Path, bytes], None]
+    share: float = 1.0
 
 
 def mutated_bytes(random: Random, content: bytes) -> bytes:
@@ -124,6 +135,43 @@ def _changed(random: Random, text: str, pattern: str, values: tuple[str, ...]) -
     return (text[: match.start(1)] + value + text[match.end(1) :]).encode()
 
 
+def _with_wrong_values(share: float, pattern: str, values: tuple[str, ...]) -> Callable[[Random, bytes], Case]:
+    """Return a mutation of texts: for a share of them a wrong value at a place of a pattern, for the others any."""
+
+    def mutate(random: Random, content: bytes) -> Case:
+        if random.random() < share:
+            return Case(_changed(random, content.decode(), pattern, values), contradicts=True)
+        return Case(mutated_text(random, content))
+
+    return mutate
+
+
+def require_physical(value: object, where: str = "result", *, most: float = 1e15) -> None:  # noqa: C901
+    """Check that all numbers in a result of a reader are finite and of a sensible size, through all its parts.
+
+    NaN stands for what is not known in `elevation` rasters, whose fields are named ``heights``.
+    """
+    if isinstance(value, np.ndarray):
+        if value.dtype.kind == "f":
+            known = value[~np.isnan(value)] if where.endswith(".heights") else value
+            assert np.isfinite(known).all(), f"{where} holds a number that is not finite"
+            assert not known.size or np.abs(known).max() <= most, f"{where} holds {np.abs(known).max():g}"
+    elif isinstance(value, float):
+        assert np.isfinite(value), f"{where} is {value}"
+        assert abs(value) <= most, f"{where} is {value:g}"
+    elif isinstance(value, Mapping):
+        for key, part in value.items():
+            require_physical(part, f"{where}.{str(key)[:20]}", most=most)
+    elif isinstance(value, tuple | list):
+        for part in value:
+            require_physical(part, where, most=most)
+    elif is_dataclass(value):
+        for each in fields(value):
+            require_physical(getattr(value, each.name), f"{where}.{each.name}", most=most)
+    elif isinstance(value, BaseGeometry):
+        require_physical(shapely.get_coordinates(value, include_z=value.has_z), where, most=most)
+
+
 NOT_FINITE = ("nan", "inf", "-inf", "1e999", "x", "")
 
 
@@ -149,11 +197,7 @@ def _maps(_: Path) -> list[bytes]:
     ]
 
 
-def _mutate_map(random: Random, content: bytes) -> Case:
-    if random.random() < 0.15:
-        pattern = r'<geometry [^>]*?(?:x|y|hdg|length)="([^"]*)"'
-        return Case(_changed(random, content.decode(), pattern, NOT_FINITE), contradicts=True)
-    return Case(mutated_text(random, content))
+_mutate_map = _with_wrong_values(0.15, r'<geometry [^>]*?(?:x|y|hdg|length)="([^"]*)"', NOT_FINITE)
 
 
 def _read_map(path: Path, _: bytes) -> None:
@@ -165,8 +209,7 @@ def _read_map(path: Path, _: bytes) -> None:
     _, description = describe_place(path, near=(0.0, 0.0), radius=30.0)
     model = finish(site_model(read_map(path), description))
     for part in model.parts:
-        assert np.isfinite(part.solid.vertices).all(), "a model with coordinates that are not finite"
-        assert np.isfinite([*part.foot, part.yaw]).all(), "a model at no place"
+        require_physical([part.solid.vertices, part.foot, part.yaw], "model part", most=1e6)
 
 
 def _descriptions(_: Path) -> list[bytes]:
@@ -183,25 +226,23 @@ def _mutate_description(random: Random, content: bytes) -> Case:
 def _read_description(path: Path, _: bytes) -> None:
     from seip_addon.core.streetscape.description import read_site_description  # noqa: PLC0415
 
-    read_site_description(path)
+    require_physical(read_site_description(path))
 
 
 def _catalogues(_: Path) -> list[bytes]:
     return [(ROOT / "seip_addon" / "core" / "lidar" / "catalogue.toml").read_bytes()]
 
 
-def _mutate_catalogue(random: Random, content: bytes) -> Case:
-    if random.random() < 0.15:
-        pattern = r"(?:points_per_second|rotation_rate_hz) = ([\d.]+)"
-        return Case(_changed(random, content.decode(), pattern, ("nan", "inf", "-1", "0", '"x"')), contradicts=True)
-    return Case(mutated_text(random, content))
+_mutate_catalogue = _with_wrong_values(
+    0.15, r"(?:points_per_second|rotation_rate_hz) = ([\d.]+)", ("nan", "inf", "-1", "0", '"x"')
+)
 
 
 def _read_catalogue(path: Path, _: bytes) -> None:
     from seip_addon.core.lidar import load_catalogue  # noqa: PLC0415
 
     for model in load_catalogue([path]).values():
-        assert np.isfinite([model.max_range, model.points_per_second, model.rotation_rate]).all(), "a model in no range"
+        require_physical(replace(model, price_range=model.price_range))
 
 
 # --- calibration files of units, and measurements of sensors
@@ -236,7 +277,7 @@ def _mutate_text(random: Random, content: bytes) -> Case:
 def _read_measurements(path: Path, _: bytes) -> None:
     from headless.calibration.reference import load_reference  # noqa: PLC0415
 
-    load_reference(path)
+    require_physical(load_reference(path))
 
 
 # --- SUMO's files
@@ -268,6 +309,7 @@ def _read_floating_car_data(path: Path, content: bytes) -> None:
     data = finish(read_floating_car_data(path))
     got, _ = read_trajectories(data, BUILT_IN, np.zeros(3), "fuzz")
     ground = replace(got, position=np.where(np.isnan(got.position), 0.0, got.position))
+    require_physical(ground, most=1e11)
     ground.save(path.with_suffix(".npz"))
     assert Trajectories.load(path.with_suffix(".npz")).key == ground.key, "trajectories other than those written"
 
@@ -291,9 +333,9 @@ def _read_routes(path: Path, content: bytes) -> None:
     from seip_addon.core.traffic.vehicle_types import read_vehicle_types  # noqa: PLC0415
 
     if b"netOffset" in content:
-        assert np.isfinite(read_net_offset(path)).all(), "an offset that is not finite"
+        require_physical(read_net_offset(path), most=1e8)
     else:
-        finish(read_vehicle_types([path]))
+        require_physical(finish(read_vehicle_types([path])), most=100.0)
 
 
 # --- files of arrays
@@ -309,6 +351,7 @@ def _arrays(folder: Path) -> list[bytes]:
     ways = [[(0.1 * step, step + 9.0 * user, 0.0, 0.0, 0.1 * step, 0.0) for step in range(4)] for user in range(2)]
     trajectories = make_trajectories(*ways, users=USERS)
     grid = VisibilityGrid(random.integers(0, 256, (9, 5)).astype(np.uint8), (9, 37), "0" * 64, {"delta": 1.0})
+    instance = np.where(random.random(50) < 0.5, -1, 3).astype(np.int32)
     labels = Labels(
         user=np.array([0, 3]),
         category=np.array(["car", "bus"]),
@@ -317,7 +360,7 @@ def _arrays(folder: Path) -> list[bytes]:
         yaw=np.zeros(2),
         pitch=np.zeros(2),
         speed=np.zeros(2),
-        points=np.ones((2, 2), dtype=np.int64),
+        points=np.array([[0, 0], [int(np.count_nonzero(instance == 3)), 0]]),
         visibility=np.ones(2),
         inside=np.array([True, False]),
     )
@@ -327,7 +370,7 @@ def _arrays(folder: Path) -> list[bytes]:
         sensor=np.zeros(50, dtype=np.int16),
         delay=np.zeros(50, dtype=np.float32),
         intensity=random.random(50).astype(np.float32),
-        instance=np.where(random.random(50) < 0.5, -1, 3).astype(np.int32),
+        instance=instance,
         foreground=random.random(50) < 0.5,
         labels=labels,
     )
@@ -387,6 +430,7 @@ def _read_arrays(path: Path, content: bytes) -> None:
             _sentence(str(error))
         else:
             read += 1
+            require_physical(found, most=1e11)
             found.save(path.with_suffix(".again.npz"))
             assert _values(path.with_suffix(".again.npz")) == _values(path), "arrays other than those written"
     if not read:
@@ -414,11 +458,9 @@ def _manifests(_: Path) -> list[bytes]:
     return [json.dumps(run, indent=1).encode()]
 
 
-def _mutate_manifest(random: Random, content: bytes) -> Case:
-    if random.random() < 0.15:
-        pattern = r'"(?:name|sensors|local_m|complete|frames)": ("\d+"|\[|true)'
-        return Case(_changed(random, content.decode(), pattern, ("NaN", '"../x"', "null", "7")), contradicts=True)
-    return Case(mutated_text(random, content))
+_mutate_manifest = _with_wrong_values(
+    0.15, r'"(?:name|sensors|local_m|complete|frames)": ("\d+"|\[|true)', ("NaN", '"../x"', "null", "7")
+)
 
 
 def _read_manifest(path: Path, _: bytes) -> None:
@@ -473,19 +515,15 @@ def _read_blend(path: Path, _: bytes) -> None:
 
     open_blend(path)
     geometry = read_scene(bpy.context.scene).geometry
-    assert all(np.isfinite(part.triangles).all() for part in geometry.roads), "a road at no place"
+    require_physical([part.triangles for part in geometry.roads], "road")
 
 
 def _detectors(folder: Path) -> list[bytes]:
     from headless.detection.detector import Detector, TrainingRecord  # noqa: PLC0415
-    from headless.detection.pillars import grid_over  # noqa: PLC0415
     from headless.detection.settings import NetworkSettings  # noqa: PLC0415
 
     network = NetworkSettings(width=8, blocks=(0, 0, 0), most_points=2)
-    grid = grid_over((0.0, 0.0, 16.0, 16.0), (0.0, 4.0), network.pillar)
-    Detector(network, grid, seed=1, training_record=TrainingRecord(("type1",), ("Junction",))).save(
-        folder / "sample.pt"
-    )
+    Detector(network, seed=1, training_record=TrainingRecord(("type1",), ("Junction",))).save(folder / "sample.pt")
     return [(folder / "sample.pt").read_bytes()]
 
 
@@ -500,7 +538,7 @@ def _mutate_detector(random: Random, content: bytes) -> Case:
         state["version"] = 1
     values = (None, -5, 1e300, "x", float("nan"), [], {}, torch.full((2,), float("nan")))
     value = values[int(random.integers(len(values)))]
-    table = ("settings", "grid", "weights", "experience", None)[int(random.integers(5))]
+    table = ("settings", "weights", "experience", None)[int(random.integers(4))]
     inner = state if table is None else state[table]
     names = [name for name in inner if name not in {"version", "digest"}]
     name = names[int(random.integers(len(names)))]
@@ -518,6 +556,397 @@ def _read_detector(path: Path, _: bytes) -> None:
     Detector.load(path)
 
 
+# --- records of placements, and the arrays beside them
+
+
+def _records(folder: Path) -> list[bytes]:
+    from core.report.report_folder import make_folder  # noqa: PLC0415
+
+    make_folder(folder / "sample")
+    return [(folder / "sample" / "placement.json").read_bytes()]
+
+
+_FAULTS = {
+    "height_m": ("-1e308", "1e308", "1e5"),
+    "price_usd": ("-5", "1e300", "3e10"),
+    "coverage_alone": ("3e29", "-0.5", "1.5"),
+    "coverage_added": ("3e29", "-0.5", "1.5"),
+    "whole": ("3e29", "-0.5", "1.5"),
+    "seen_twice": ("-1", "2"),
+    "yaw_deg": ("1e30", "-1e4"),
+    "targets": ("-1", "1e30"),
+    "value": ("-3", "1e300"),
+}
+
+
+def _mutate_record(random: Random, content: bytes) -> Case:
+    if random.random() < 0.3:
+        name = sorted(_FAULTS)[int(random.integers(len(_FAULTS)))]
+        pattern = rf'"{name}": (-?[\d.]+(?:e[-+]?\d+)?)'
+        return Case(_changed(random, content.decode(), pattern, _FAULTS[name]), contradicts=True)
+    if random.random() < 0.1:
+        return Case(_changed(random, content.decode(), r'"id": "(S[23])"', ("S1",)), contradicts=True)
+    return Case(mutated_text(random, content))
+
+
+def _read_record(path: Path, _: bytes) -> None:
+    from seip_addon.core.results.placement_record import load_placement_record  # noqa: PLC0415
+
+    record = load_placement_record(path)
+    require_physical(record.as_json() | {"settings": None}, "placement.json")
+    assert len({sensor.id for sensor in record.sensors}) == len(record.sensors), "two sensors of one label"
+
+
+def _site_files(folder: Path) -> list[bytes]:
+    from core.report.report_folder import make_folder  # noqa: PLC0415
+
+    make_folder(folder / "sample")
+    return [(folder / "sample" / "site.npz").read_bytes()]
+
+
+def _mutate_signed(random: Random, content: bytes) -> Case:
+    """Change a number of an array or of the header, and sign the file again."""
+    from seip_addon.core.storage.array_file import _digest  # noqa: PLC0415
+
+    with np.load(io.BytesIO(content)) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    header = json.loads(str(arrays.pop("header")))
+    del header["digest"]
+    floats = sorted(name for name, array in arrays.items() if array.dtype.kind == "f" and array.size)
+    if random.random() < 0.5 and floats:
+        name = floats[int(random.integers(len(floats)))]
+        arrays[name] = arrays[name].copy()
+        wrong = (np.nan, np.inf, -np.inf, 1e30, -1e30)
+        arrays[name].flat[int(random.integers(arrays[name].size))] = wrong[int(random.integers(len(wrong)))]
+    else:
+        numbers = sorted(name for name, value in header.items() if isinstance(value, int | float) and name != "version")
+        if not numbers:
+            return Case(mutated_bytes(random, content))
+        header[numbers[int(random.integers(len(numbers)))]] = (1e300, -1e300)[int(random.integers(2))]
+    header["digest"] = _digest(header, arrays)
+    file = io.BytesIO()
+    np.savez(file, header=np.array(json.dumps(header)), **arrays)
+    return Case(file.getvalue(), contradicts=True)
+
+
+def _read_site_file(path: Path, _: bytes) -> None:
+    from seip_addon.core.results.site_file import load_site_file  # noqa: PLC0415
+
+    require_physical(load_site_file(path))
+
+
+def _runs(folder: Path) -> list[bytes]:
+    """Return manifests of a run whose frames lie in the folder."""
+    from seip_addon.core.scans.frame import Frame  # noqa: PLC0415
+    from seip_addon.core.scans.run_folder import MANIFEST, _frame_record  # noqa: PLC0415
+
+    frames = folder / "run" / "frames"
+    _arrays(folder)
+    frame = Frame.load(folder / "sample.npz")
+    records = []
+    for number in range(2):
+        one = replace(frame, time=float(number))
+        one.save(frames / f"{number:06d}.npz")
+        records.append(_frame_record(number, one))
+    run = json.loads(_manifests(folder)[0]) | {"frames": records}
+    run["sensors"] = run["sensors"] * 2
+    run["trajectories"]["road_users"] = 4
+    (folder / "run" / MANIFEST).write_text(json.dumps(run))
+    return [json.dumps(run, indent=1).encode()]
+
+
+_mutate_run = _with_wrong_values(0.5, r'"(?:time_s|points)": ([\d.]+)', ("-7", "1e300", "99", "2.5"))
+
+
+def _read_run(path: Path, _: bytes) -> None:
+    from seip_addon.core.scans.run_folder import load_frames  # noqa: PLC0415
+
+    path.replace(path.parent / "run" / "manifest.json")
+    require_physical([frame for _, frame in load_frames(path.parent / "run")], most=1e11)
+
+
+# --- city models, elevation models and surveys
+
+
+def _cities(folder: Path) -> list[bytes]:
+    from city_text import CityModel, origin_at  # noqa: PLC0415
+
+    model = CityModel(origin_at(52.5, 13.4))
+    model.add("a", model.gabled(0, 0, 10, 8, 6, 9)).add("b", model.block(20, 0, 10, 8, 12))
+    return [model.write(folder / "sample.json").read_bytes()]
+
+
+def _read_city(path: Path, _: bytes) -> None:
+    from city_text import origin_at  # noqa: PLC0415
+
+    from seip_addon.core.citymodel.at_place import AskedBuildings, with_city_model  # noqa: PLC0415
+    from seip_addon.core.citymodel.cityjson import read_city_model  # noqa: PLC0415
+    from seip_addon.core.opendrive.geo_reference import GeoReference  # noqa: PLC0415
+    from seip_addon.core.progress import finish  # noqa: PLC0415
+    from seip_addon.core.streetscape.description import SiteDescription  # noqa: PLC0415
+
+    require_physical(read_city_model(path).vertices, "vertices", most=1e8)
+    x, y, _ = origin_at(52.5, 13.4)
+    place = GeoReference("+proj=utm +zone=33 +datum=WGS84", (x, y, 0.0, 0.0))
+    with np.errstate(all="raise", under="ignore"):
+        described, _ = finish(
+            with_city_model(SiteDescription(), AskedBuildings(path), place, shapely.box(-100, -100, 100, 100))
+        )
+    require_physical([one.solid.vertices for one in described.solids], "buildings", most=1e5)
+
+
+def _elevations(folder: Path) -> list[bytes]:
+    from city_text import origin_at  # noqa: PLC0415
+    from dem_files import sampled, write_dem  # noqa: PLC0415
+
+    x, y, _ = origin_at(52.5, 13.4)
+    slope = sampled(lambda a, b: 30 + 0.01 * (a - x), x - 100, y + 100, 40, 5.0)
+    degrees = np.full((20, 20), 31.0, dtype=np.float32)
+    return [
+        write_dem(folder / "sample.tif", slope, x - 100, y + 100, 5.0).read_bytes(),
+        write_dem(folder / "sample.tif", degrees, 13.39, 52.51, 0.001, 4326, no_data=-9999).read_bytes(),
+    ]
+
+
+def _mutate_elevation(random: Random, content: bytes) -> Case:
+    """Mostly other values in the tags, which are at the beginning or the end."""
+    if random.random() < 0.3:
+        return Case(mutated_bytes(random, content))
+    data = np.frombuffer(content, dtype=np.uint8).copy()
+    tags = len(data) - 600 if random.random() < 0.5 else 0
+    where = tags + random.integers(600, size=int(2 ** random.uniform(0, 4)))
+    data[np.clip(where, 0, len(data) - 1)] = random.integers(256, size=len(where))
+    return Case(data.tobytes())
+
+
+def _read_elevation(path: Path, _: bytes) -> None:
+    from seip_addon.core.elevation.geotiff import read_geotiff  # noqa: PLC0415
+
+    model = read_geotiff(path)
+    require_physical(model, most=1e8)
+    at = model.at(np.array([[model.corner[0], model.corner[1]], [0.0, 0.0], [1e9, 1e9]]))
+    require_physical({"heights": at}, "looked up", most=9000.0)
+    require_physical(model.middle, "middle", most=1e8)
+
+
+def _surveys(suffix: str) -> Callable[[Path], list[bytes]]:
+    def samples(folder: Path) -> list[bytes]:
+        from city_text import origin_at  # noqa: PLC0415
+        from survey_files import block_points, ground_points, write_survey  # noqa: PLC0415
+
+        random = np.random.default_rng(0)
+        x, y, _ = origin_at(52.5, 13.4)
+        parts = [ground_points(random, lambda a, b: 30 + 0 * a, 5.0), block_points(random, 0, 0, 3, 3, 38.0)]
+        wkt = 'PROJCS["UTM 33N",AUTHORITY["EPSG","25833"]]'
+        path = write_survey(folder / f"sample{suffix}", np.concatenate(parts), (x, y), wkt)
+        return [path.read_bytes()]
+
+    return samples
+
+
+def _mutate_survey(random: Random, content: bytes) -> Case:
+    """Mostly other values in the header and the records that follow it."""
+    if random.random() < 0.3:
+        return Case(mutated_bytes(random, content))
+    data = np.frombuffer(content, dtype=np.uint8).copy()
+    if random.random() < 0.4:  # number of records, sizes and counts
+        begin = (94, 96, 100, 105, 107, 131, 155, 179, 235, 243, 247)[int(random.integers(11))]
+        data[begin : begin + 4] = random.integers(256, size=4)
+        return Case(data.tobytes())
+    where = random.integers(500, size=int(2 ** random.uniform(0, 4)))
+    data[where] = random.integers(256, size=len(where))
+    return Case(data.tobytes())
+
+
+def _read_survey(path: Path, _: bytes) -> None:
+    from seip_addon.core.elevation.point_cloud import read_points, survey_system  # noqa: PLC0415
+    from seip_addon.core.progress import finish  # noqa: PLC0415
+
+    require_physical(survey_system(path)[1], "middle", most=1e8)
+    require_physical(finish(read_points(path, np.full(2, -1e8), np.full(2, 1e8))), most=1e8)
+
+
+# --- extracts, networks and routes
+
+
+def _extracts(_: Path) -> list[bytes]:
+    return [(ROOT / "scenes" / "harbour.osm").read_bytes()]
+
+
+def _mutate_extract(random: Random, content: bytes) -> Case:
+    if random.random() < 0.5:
+        pattern = r'(?:k="(?:height|width|lanes|building:levels|min_height|maxspeed|layer)" v|lat|lon)="([^"]*)"'
+        return Case(_changed(random, content.decode(), pattern, (*NUMBERS, "3;4", "40'", "1e400 m", "-2 m")))
+    return Case(mutated_text(random, content))
+
+
+def _read_extract(path: Path, _: bytes) -> None:
+    from seip_addon.core.openstreetmap.extract import read_extract  # noqa: PLC0415
+    from seip_addon.core.openstreetmap.quantities import count, metres  # noqa: PLC0415
+    from seip_addon.core.progress import finish  # noqa: PLC0415
+
+    extract = finish(read_extract(path))
+    require_physical([[node.latitude, node.longitude] for node in extract.nodes.values()], "nodes", most=540.0)
+    for way in extract.ways.values():
+        for value in way.tags.values():
+            require_physical([metres(value, 900.0) or 0.0, count(value, 200.0) or 0.0], "a length", most=900.0)
+
+
+_NETWORK = b"""<net version="1.20" junctionCornerDetail="5">
+ <location netOffset="0.00,0.00" convBoundary="-100,-100,100,100"/>
+ <edge id=":1_0" function="internal"><lane id=":1_0_0" index="0" speed="9" length="9.5" shape="0,0 9,3"/></edge>
+ <edge id="a" from="0" to="1"><lane id="a_0" index="0" allow="pedestrian" speed="1" length="90.25" shape="-99,5 -9,5"/>
+  <lane id="a_1" index="1" disallow="pedestrian" speed="13.9" length="90.25" shape="-99,2 -9,2"/></edge>
+ <edge id="b" from="1" to="2"><lane id="b_0" index="0" speed="13.9" length="80.5" shape="9,2 50,2,1 89,2"/></edge>
+ <junction id="1" type="traffic_light" x="0.00" y="0.00" incLanes="a_1" shape="0,0 1,1 0,2"/>
+ <connection from="a" to="b" fromLane="1" toLane="0" via=":1_0_0" dir="s" state="O"/>
+</net>"""
+
+
+def _networks(_: Path) -> list[bytes]:
+    return [_NETWORK]
+
+
+_mutate_network = _with_wrong_values(0.4, r'<edge id="[ab]".*?(?:length="([^"]*)")', (*NOT_FINITE, "-7", "1e300"))
+
+
+def _read_network(path: Path, _: bytes) -> None:
+    from headless.sumo.street_network import read_network  # noqa: PLC0415
+
+    network = read_network(path)
+    require_physical([edge.lanes for edge in network.edges.values()], "lanes", most=1e8)
+    require_physical(network.signalised, "junctions", most=1e8)
+    assert all(lane.length >= 0.0 for edge in network.edges.values() for lane in edge.lanes), "a negative length"
+    _ = network.arms
+
+
+def _flows(_: Path) -> list[bytes]:
+    text = (
+        b'<routes><vType id="t" vClass="passenger" length="4.5"/><route id="r" edges="a b"/>'
+        b'<flow id="f" type="t" route="r" begin="0" vehsPerHour="300"/>'
+        b'<flow id="g" begin="0" period="exp(0.1)"><route edges="a b"/></flow></routes>'
+    )
+    return [text]
+
+
+_mutate_flow = _with_wrong_values(0.2, r'vehsPerHour="([^"]*)"', (*NOT_FINITE, "-7", "1e300", "0"))
+
+
+def _read_flow(path: Path, _: bytes) -> None:
+    from headless.sumo.route_file import read_demand, write_run  # noqa: PLC0415
+
+    from seip_addon.core.progress import finish  # noqa: PLC0415
+
+    demand = finish(read_demand(path))
+    require_physical(demand, most=1e6)
+    write_run(path.with_suffix(".out.xml"), demand, 1, 60.0)
+
+
+def _costs(_: Path) -> list[bytes]:
+    from seip_addon.core.site.installed_cost import DEFAULTS  # noqa: PLC0415
+
+    return [DEFAULTS.read_bytes()]
+
+
+def _read_costs(path: Path, _: bytes) -> None:
+    from seip_addon.core.site.installed_cost import load_installed_cost  # noqa: PLC0415
+
+    require_physical(load_installed_cost(path), most=1e9)
+
+
+def _detections(_: Path) -> list[bytes]:
+    figure = {"average_precision": 0.5, "interval": [0.4, 0.6], "road_users": 12}
+    record = {"schema": "seip-detection/1", "average_precision": {"bev_0.7": figure}, "warnings": ["few runs"]}
+    return [json.dumps(record, indent=1).encode()]
+
+
+_mutate_detection = _with_wrong_values(
+    0.3, r'"(?:average_precision|road_users)": (\d[\d.]*)', ("-1", "1e30", "NaN", "-0.5")
+)
+
+
+def _read_detection(path: Path, _: bytes) -> None:
+    from seip_addon.core.results.detection_record import parsed_detection  # noqa: PLC0415
+
+    require_physical(parsed_detection(path.read_bytes().decode("utf-8", "replace")), most=1e15)
+
+
+# --- meshes, which Blender's importers read
+
+
+def _meshes(suffix: str) -> Callable[[Path], list[bytes]]:
+    def samples(folder: Path) -> list[bytes]:
+        import headless.runtime  # noqa: F401, PLC0415
+
+        import bpy  # noqa: PLC0415
+
+        from seip_addon.scene.blend_file import new_file  # noqa: PLC0415
+
+        new_file()
+        bpy.ops.mesh.primitive_cube_add(size=4.0)
+        contents = []
+        for options in _EXPORTS[suffix]:
+            path = folder / f"sample{suffix}"
+            _exporter(suffix)(filepath=str(path), **options)
+            content = path.read_bytes()
+            if suffix == ".gltf":  # its buffer within it, as the file that is read lies alone in its folder
+                buffer = base64.b64encode((folder / "sample.bin").read_bytes()).decode()
+                content = content.replace(b"sample.bin", f"data:application/octet-stream;base64,{buffer}".encode())
+            contents.append(content)
+        return contents
+
+    return samples
+
+
+_EXPORTS: dict[str, list[dict[str, object]]] = {
+    ".ply": [{"ascii_format": True}, {"ascii_format": False}],
+    ".stl": [{"ascii_format": True}, {"ascii_format": False}],
+    ".obj": [{}],
+    ".glb": [{"export_format": "GLB"}],
+    ".gltf": [{"export_format": "GLTF_SEPARATE"}],
+    ".usda": [{}],
+    ".usdc": [{}],
+}
+
+
+def _exporter(suffix: str) -> Callable[..., object]:
+    import bpy  # noqa: PLC0415
+
+    if suffix in {".glb", ".gltf"}:
+        import addon_utils  # noqa: PLC0415
+
+        addon_utils.enable("io_scene_gltf2")
+        return bpy.ops.export_scene.gltf
+    if suffix.startswith(".usd"):
+        return bpy.ops.wm.usd_export
+    return {".ply": bpy.ops.wm.ply_export, ".stl": bpy.ops.wm.stl_export, ".obj": bpy.ops.wm.obj_export}[suffix]
+
+
+def _mutate_mesh(random: Random, content: bytes) -> Case:
+    if random.random() < 0.1 and b"element vertex" in content:
+        return Case(re.sub(rb"element vertex \d+", b"element vertex 2147483648", content), contradicts=True)
+    text = not (content[:4] == b"glTF" or b"\0" in content)
+    return Case(mutated_text(random, content) if text and random.random() < 0.7 else mutated_bytes(random, content))
+
+
+def _read_mesh(path: Path, _: bytes) -> None:
+    import headless.runtime  # noqa: F401, PLC0415
+
+    import bpy  # noqa: PLC0415
+
+    from seip_addon.core.streetscape.mesh_place import MeshPlace  # noqa: PLC0415
+    from seip_addon.scene.blend_file import new_file  # noqa: PLC0415
+    from seip_addon.scene.imported import import_mesh  # noqa: PLC0415
+
+    scene = new_file()
+    import_mesh(scene, path, MeshPlace((0.0, 0.0, 0.0), 0.0))
+    for mesh in bpy.data.meshes:
+        places = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+        mesh.vertices.foreach_get("co", places)
+        if mesh.polygons:
+            require_physical(places, "vertices", most=20_000.0)
+
+
 FORMATS = {
     "map": Format((".xodr",), _maps, _mutate_map, _read_map),
     "site": Format((".toml",), _descriptions, _mutate_description, _read_description),
@@ -530,7 +959,25 @@ FORMATS = {
     "fcd": Format((".xml",), _floating_car_data, _mutate_floating_car_data, _read_floating_car_data),
     "routes": Format((".xml",), _routes, _mutate_routes, _read_routes),
     "npz": Format((".npz",), _arrays, _mutate_arrays, _read_arrays),
+    "npz.signed": Format((".npz",), _arrays, _mutate_signed, _read_arrays),
+    "site.npz": Format((".npz",), _site_files, _mutate_signed, _read_site_file),
+    "placement": Format((".json",), _records, _mutate_record, _read_record),
+    "detection": Format((".json",), _detections, _mutate_detection, _read_detection),
+    "cost": Format((".toml",), _costs, _mutate_text, _read_costs),
+    "network": Format((".xml",), _networks, _mutate_network, _read_network),
+    "flows": Format((".xml",), _flows, _mutate_flow, _read_flow),
+    "osm": Format((".osm",), _extracts, _mutate_extract, _read_extract),
+    "city": Format((".json",), _cities, _mutate_text, _read_city),
+    "dem": Format((".tif",), _elevations, _mutate_elevation, _read_elevation),
+    **{
+        f"survey{suffix}": Format((suffix,), _surveys(suffix), _mutate_survey, _read_survey)
+        for suffix in (".las", ".laz")
+    },
     "manifest": Format((".json",), _manifests, _mutate_manifest, _read_manifest),
+    "run": Format((".json",), _runs, _mutate_run, _read_run),
+    **{
+        f"mesh{suffix}": Format((suffix,), _meshes(suffix), _mutate_mesh, _read_mesh, share=0.05) for suffix in _EXPORTS
+    },
     "blend": Format((".blend",), _blends, _mutate_blend, _read_blend),
     "pt": Format((".pt",), _detectors, _mutate_detector, _read_detector),
 }
@@ -591,6 +1038,7 @@ def _work(key: str, seed: int, begin: int, count: int) -> None:
 def fuzz(key: str, seed: int, count: int) -> list[str]:
     """Return how each of some inputs of a format went."""
     went: list[str] = []
+    limit = SECONDS if FORMATS[key].share == 1.0 else SLOW_SECONDS
     while len(went) < count:
         command = [
             sys.executable,
@@ -614,7 +1062,7 @@ def fuzz(key: str, seed: int, count: int) -> list[str]:
         assert process.stdout is not None
         ready = False
         while True:
-            waited, _, _ = select.select([process.stdout], [], [], SECONDS)
+            waited, _, _ = select.select([process.stdout], [], [], limit)
             line = process.stdout.readline() if waited else ""
             if not line:
                 break
@@ -627,7 +1075,7 @@ def fuzz(key: str, seed: int, count: int) -> list[str]:
         if not ready:
             raise RuntimeError(f"the reader of {key} does not start: status {status}")
         if len(went) < count:
-            went.append(f"hang: after {SECONDS:g} s" if not waited else f"crash: status {status}")
+            went.append(f"hang: after {limit:g} s" if not waited else f"crash: status {status}")
     return went
 
 
@@ -637,25 +1085,41 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("formats", nargs="*", choices=[*FORMATS, []], help="which (all)")
     parser.add_argument("--count", type=int, default=300, help="inputs of each format (%(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of all that is random (%(default)s)")
+    parser.add_argument(
+        "--minutes", type=float, default=0.0, help="go on with the next seeds for so long (%(default)s: one round)"
+    )
     parser.add_argument("--keep", type=Path, metavar="DIR", help="folder for inputs that were at fault")
     parser.add_argument("--worker", type=int, metavar="BEGIN", help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
     if options.worker is not None:
         _work(options.formats[0], options.seed, options.worker, options.count)
+    faults, seed, end = 0, options.seed, time.monotonic() + 60.0 * options.minutes
+    while True:
+        faults += _round(options, seed)
+        seed += 1
+        if time.monotonic() >= end:
+            return 1 if faults else 0
+
+
+def _round(options: argparse.Namespace, seed: int) -> int:
+    """Fuzz all formats asked for with one seed, print counts, and return the number of faults."""
     faults = 0
     for key in options.formats or FORMATS:
-        went = fuzz(key, options.seed, options.count)
+        count = max(1, round(options.count * FORMATS[key].share))
+        went = fuzz(key, seed, count)
         counts = Counter(line.partition(":")[0] for line in went)
         wrong = {number: line for number, line in enumerate(went) if line not in {"result", "refused"}}
-        lines = [f"{key}: {options.count} inputs, {', '.join(f'{counts[kind]} {kind}' for kind in sorted(counts))}"]
+        lines = [
+            f"seed {seed}, {key}: {count} inputs, {', '.join(f'{counts[kind]} {kind}' for kind in sorted(counts))}"
+        ]
         for line, number in Counter(wrong.values()).most_common(20):
             lines.append(f"  {number} × {line}, first input {next(n for n, other in wrong.items() if other == line)}")
         sys.stdout.write("\n".join([*lines, ""]))
         faults += sum(is_fault(key, line) for line in wrong.values())
         if options.keep is not None:
-            _keep(key, options.seed, list(wrong), options.keep)
+            _keep(key, seed, list(wrong), options.keep)
         sys.stdout.flush()
-    return 1 if faults else 0
+    return faults
 
 
 def _keep(key: str, seed: int, numbers: list[int], folder: Path) -> None:

@@ -20,6 +20,8 @@ def section(*lanes, s=0.0):
 
 
 def geometry(shape="<line/>", length=100.0, s=0.0, x=0.0, y=0.0, hdg=0.0):
+    # Plain floats: NumPy 2 writes its own scalars as "np.float64(…)".
+    s, x, y, hdg, length = (float(number) for number in (s, x, y, hdg, length))
     return f'<geometry s="{s!r}" x="{x!r}" y="{y!r}" hdg="{hdg!r}" length="{length!r}">{shape}</geometry>'
 
 

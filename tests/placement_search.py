@@ -54,6 +54,7 @@ class Subsets:
     number: Integer
     unit: Fraction
     total: int
+    seen: int
 
     def members(self, subset: int) -> list[int]:
         return [candidate for bit, candidate in enumerate(self.order) if subset >> bit & 1]
@@ -95,7 +96,10 @@ def enumerate_subsets(problem: PlacementProblem) -> Subsets:
     of_mask = np.zeros(1, np.int64)
     for weight in weights:
         of_mask = np.concatenate([of_mask, of_mask + weight])
-    return Subsets(order, allowed, of_mask[once], of_mask[twice], price, count, unit, sum(weights))
+    # what counts as equal is a share of all weight that the candidates together see
+    every = sum(1 << place for place, i in enumerate(order) if problem.forbidden is None or not problem.forbidden[i])
+    covered = of_mask[once]
+    return Subsets(order, allowed, covered, of_mask[twice], price, count, unit, sum(weights), int(covered[every]))
 
 
 def _whole(values: list[float]) -> tuple[list[int], Fraction]:
@@ -137,6 +141,16 @@ WEIGHTS: dict[str, Callable[[np.random.Generator, int], NDArray[np.float64]]] = 
 }
 
 
+DUST = "any, some of about the tolerance"
+"""Every eleventh problem has weights that differ by about as much as the sums that count as equal."""
+
+
+def _with_dust(random: np.random.Generator, n: int) -> NDArray[np.float64]:
+    heavy = np.rint(random.uniform(0.5, 2.0, n) * 2**50)
+    light = np.rint(random.uniform(0.05, 1.2, n) * n * 2**20)
+    return np.where(random.random(n) < 0.6, light, heavy) / 2**50
+
+
 def draw_problem(seed: int) -> tuple[str, PlacementProblem]:
     """Draw a problem of up to 18 candidates, full of ties and constraints."""
     random = np.random.default_rng((12, seed))
@@ -146,6 +160,8 @@ def draw_problem(seed: int) -> tuple[str, PlacementProblem]:
     if random.random() < 0.3:  # copies, which tie
         visible[number // 2 :] = visible[: number - number // 2]
     weights = WEIGHTS[kind](random, targets)
+    if seed % 11 == 10:
+        kind, weights = DUST, _with_dust(random, targets)
     prices = random.choice([[0.0], [1.0], [1.0, 2.0], [0.0, 0.5, 2.0], [0.7, 1.0, 1.1]][random.integers(5)], number)
     limits = random.random(6) < 0.4
     forbidden = random.random(number) < 0.15 if limits[0] else np.zeros(number, bool)
@@ -192,7 +208,7 @@ def faults(seed: int) -> tuple[str, list[str]]:
 
 def _slack(subsets: Subsets) -> int:
     """What may be lost: nothing where the weights are whole numbers of an exact sum, else the stated tolerance."""
-    return 0 if _is_whole(subsets) else math.ceil(TIE * subsets.total)
+    return 0 if _is_whole(subsets) else int(TIE * subsets.seen)
 
 
 def _is_whole(subsets: Subsets) -> bool:
@@ -240,10 +256,9 @@ def _of_ties(subsets: Subsets, chosen: int) -> list[str]:
     slack = _slack(subsets)
     covered = subsets.covered
     best = int(covered[subsets.allowed].max())
-    near = subsets.allowed & (covered >= best - 4 * slack)
-    if slack and (covered[near] < best - slack // 4).any():
-        return []  # so near that rounding decides what is a tie
-    ties = np.flatnonzero(near & (covered >= best - slack))
+    if slack and (np.abs(covered[subsets.allowed] - (best - slack)) < slack // 1000).any():
+        return []  # so near the tolerance that rounding decides what is a tie
+    ties = np.flatnonzero(subsets.allowed & (covered >= best - slack))
     ties = ties[subsets.number[ties] == subsets.number[ties].min()]
     for what, figures in (("number", subsets.number), ("price", subsets.price), ("double coverage", -subsets.doubly)):
         least = int(figures[ties].min())

@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.pictures.drawing import SENSOR_MARK, draw_polygons
+from seip_addon.core.pictures.drawing import SENSOR_MARK, draw_attribution, draw_polygons
 from seip_addon.core.pictures.palette import INK, SOFT_INK
 
 TRUTH_COLOUR, DETECTED_COLOUR, IGNORED_COLOUR = "#00875a", "#d1242f", "#a9b1b8"
@@ -62,8 +62,16 @@ class ErrorView:
     false: Boolean
 
 
-def save_error_view(path: str | os.PathLike[str], views: Sequence[ErrorView], title: str) -> None:
-    """Draw frames from above: the cloud grey, road users green, detections red, errors ringed, as PNG."""
+def save_error_view(
+    path: str | os.PathLike[str], views: Sequence[ErrorView], title: str, attribution: Sequence[str] = ()
+) -> None:
+    """Draw frames from above: the cloud grey, road users green, detections red, errors ringed, as PNG.
+
+    Parameters
+    ----------
+    attribution : sequence of str
+        Credits that the sources of the scene demand.
+    """
     if not views:
         raise SeipError("there is no frame to draw the errors of: evaluate a detector on at least one frame")
     limits, shape = limits_around(shapely.total_bounds([view.region for view in views]), MARGIN_SHARE)
@@ -71,6 +79,7 @@ def save_error_view(path: str | os.PathLike[str], views: Sequence[ErrorView], ti
     for panel, view in zip(panels, views, strict=True):
         panel.set(**limits)
         _draw(panel, view)
+        draw_attribution(panel, attribution)
     columns = 6 if len(views) > 1 else 3  # one frame is too narrow for all in a row
     legend = figure.legend(handles=_legend(), frameon=False, fontsize=9, loc="outside lower center", ncols=columns)
     for text in legend.get_texts():

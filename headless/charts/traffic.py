@@ -14,7 +14,7 @@ from matplotlib.ticker import PercentFormatter
 
 from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.geometry.plan import closed, outline
-from seip_addon.core.pictures.drawing import draw_polygons, draw_sensors
+from seip_addon.core.pictures.drawing import draw_attribution, draw_polygons, draw_sensors
 from seip_addon.core.pictures.palette import INK, SEEN_COLOURS, SOFT_INK
 from seip_addon.core.pictures.plan_view import MAX_GAP, draw_area
 from seip_addon.core.placement.deployment import Deployment
@@ -56,6 +56,7 @@ def save_time_map(  # what is drawn, and where
         figure.draw_without_rendering()
         where = np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2)
         draw_sensors(panel, deployment, where, site.targets.xyz[:, :2], zorder=4)
+        draw_attribution(panel, site.attribution)
     bar = figure.colorbar(ScalarMappable(Normalize(0, 1), TIME_CMAP), ax=list(panels), shrink=0.7, pad=0.01)
     bar.ax.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
     bar.set_label("share of time for which it is seen", color=INK)

@@ -1,10 +1,9 @@
 """Table of a coverage study: every cell as CSV."""
 
-import csv
 import os
 
 from seip_addon.core.results.headings import tilt_degrees
-from seip_addon.core.storage.files import whole_file
+from seip_addon.core.storage.csv_table import save_csv
 
 from .cells import Case, CoverageStudy, EmptyCell
 
@@ -17,11 +16,8 @@ COLUMNS = (
 
 def save_study_table(path: str | os.PathLike[str], study: CoverageStudy) -> None:
     """Write one row for each cell as CSV; one without a placement has its reason in the column ``note``."""
-    with whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
-        writer.writeheader()
-        for cell in study.cells:
-            writer.writerow(_key(cell) | (_figures(cell) if isinstance(cell, Case) else {"note": cell.note}))
+    rows = [_key(cell) | (_figures(cell) if isinstance(cell, Case) else {"note": cell.note}) for cell in study.cells]
+    save_csv(path, COLUMNS, [[row.get(column, "") for column in COLUMNS] for row in rows])
 
 
 def _key(cell: Case | EmptyCell) -> dict[str, str]:

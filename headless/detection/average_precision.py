@@ -7,6 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer, Text
+from seip_addon.core.counts import counted
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import Interval, share_interval
 
@@ -181,8 +182,8 @@ def too_few_runs(count: int) -> str:
     if count >= MIN_TEST_RUNS:
         return ""
     return (
-        f"{count} test run{'' if count == 1 else 's'} of traffic give no interval over traffic: whole runs alone are "
-        f"independent of each other, so test on {MIN_TEST_RUNS} or more, better {ADVISED_TEST_RUNS}"
+        f"{counted(count, 'test run of traffic gives', 'test runs of traffic give')} no interval over traffic: only "
+        f"whole runs are independent of each other, so test on {MIN_TEST_RUNS} or more, better {ADVISED_TEST_RUNS}"
     )
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
+from seip_addon.core.limits import FRAMES, TIME_STEP
 from seip_addon.core.progress import Progress, side_by_side, within
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.parked import shared_bays
@@ -123,10 +124,16 @@ def split_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[tupl
 
 def read_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[SampledRun, ...]:
     """Read runs, each looked at from `WARM_UP` on; see `read_traffic`."""
+    if not TIME_STEP.allow(every):
+        raise SeipError(f"the time between frames must be {TIME_STEP}, not {every:g} s")
     runs = []
     for path in paths:
         trajectories = Trajectories.load(path).moved_to(origin)
         begin, end = trajectories.span
+        if not FRAMES.allow(max((end - begin) / every, 1.0)):
+            raise SeipError(
+                f"{path} lasts {end - begin:g} s, too long for a frame each {every:g} s: take {FRAMES} frames"
+            )
         times = np.arange(begin + WARM_UP, end, every)
         if not len(times):
             raise SeipError(f"{path} is shorter than {WARM_UP:g} s: simulate more traffic")

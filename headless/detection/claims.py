@@ -15,6 +15,7 @@ from headless.coverage_study.cells import COUNTS
 
 import numpy as np
 
+from seip_addon.core.counts import counted
 from seip_addon.core.estimates import ANYTHING, CHANGE_OF_SHARE, COUNT, SHARE, Interval, mean_interval
 
 FACTOR = 2.0  # factor up to which a figure is about another
@@ -250,7 +251,7 @@ def _per_price(results: Sequence[SeedResult], sensor: str) -> str:
 
 def _seeds(gains: Sequence[_Mean]) -> str:
     fewest = min(gain.seeds for gain in gains)
-    return f"{fewest} seed{'' if fewest == 1 else 's'}"
+    return counted(fewest, "seed")
 
 
 def _about(mean: _Mean, expected: float) -> str:

@@ -1,6 +1,5 @@
 """Charts, tables and records of the detection study."""
 
-import csv
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -22,7 +21,8 @@ from headless.claims import Claim
 import numpy as np
 
 from seip_addon.core.estimates import SHARE, Interval, mean_interval, rank_correlation, rank_correlation_interval
-from seip_addon.core.storage.files import save_json, whole_file
+from seip_addon.core.storage.csv_table import save_csv
+from seip_addon.core.storage.files import save_json
 
 from .breakdown import (
     DENSITY_EDGES,
@@ -151,16 +151,14 @@ def _save_errors(path: Path, results: StudyResults, outcomes: Sequence[DetectorO
         )
         for one in outcomes
     ]
-    save_error_view(path, views, f"{results.name}, {run.name} at {run.times[number]:.1f} s")
+    where = f"{results.name}, {run.name} at {run.times[number]:.1f} s"
+    save_error_view(path, views, where, results.simulator.static.attribution)
 
 
 def save_table(path: Path, results: StudyResults) -> None:
     """Write one row for each detector and configuration as CSV."""
     rows = [_row(outcome) for outcome in results.outcomes]
-    with whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    save_csv(path, list(rows[0]), [list(row.values()) for row in rows])
 
 
 def _row(outcome: DetectorOutcome) -> dict[str, str]:

@@ -83,7 +83,7 @@ def detection_of_case(  # noqa: PLR0913  # a site, two kinds of traffic, and how
     copied = [replace(models[0], name="detector-of-copies")]
     trained: list[TrainedDetector] = []
     for half, (own, runs) in enumerate(((models, traffic), (copied, copies))):
-        progress = Progress(2 * half, PARTS, "learn from near copies" if half else "learn")
+        progress = Progress(2 * half, PARTS, "learn from near copies" if half else "learn", counted=False)
         simulating = case_study.simulate_training_set(simulator, configurations, runs, network)
         training_set = yield from in_detail(progress, simulating)
         learning = case_study.train_all(own, training_set, folder, device=device)
@@ -91,10 +91,10 @@ def detection_of_case(  # noqa: PLR0913  # a site, two kinds of traffic, and how
         del training_set
     detectors = [one.detector for one in trained]
     steps_drawn = case_study.evaluate_all(simulator, models, detectors[: len(models)], traffic)
-    outcomes = yield from in_detail(Progress(4, PARTS, "evaluate"), steps_drawn)
+    outcomes = yield from in_detail(Progress(4, PARTS, "evaluate", counted=False), steps_drawn)
     both = [models[0], *copied], [detectors[0], detectors[-1]]
     steps_copied = case_study.evaluate_all(simulator, *both, copies)
-    on_copies = yield from in_detail(Progress(5, PARTS, "evaluate near copies"), steps_copied)
+    on_copies = yield from in_detail(Progress(5, PARTS, "evaluate near copies", counted=False), steps_copied)
     curves = tuple(one.curve for one in trained)
     results = StudyResults(simulator.site, simulator, traffic, tuple(models), tuple(outcomes), curves[: len(models)])
     placements = tuple(_figures(one, outcomes, on_copies) for one in configurations)

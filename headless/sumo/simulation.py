@@ -13,6 +13,7 @@ from seip_addon.core.opendrive import read_map
 from seip_addon.core.opendrive.road_map import RoadMap
 from seip_addon.core.progress import Progress
 from seip_addon.core.storage.files import whole_file
+from seip_addon.core.streetscape.road_surface import GROUPS
 from seip_addon.core.traffic.source import TrafficFiles
 from seip_addon.core.traffic.sumo_programs import Sumo, find_sumo, run
 
@@ -31,9 +32,10 @@ _PERMISSIONS = {
     "biking": 'allow="bicycle"',
     "parking": f'allow="{PARKED_CLASS}"',
 }
-"""Permissions of lane types; all others are closed."""
-
-_CLOSED_LANES = ("shoulder", "restricted", "median", "stop", "none", "border")
+"""Permissions of groups of lane types; all others are closed: SUMO leaves a type that it is not told of open to all."""
+_OWN_PERMISSIONS = {"bus": 'allow="bus"', "taxi": 'allow="taxi bus"'}
+_LANES = {lane: _PERMISSIONS.get(group, 'disallow="all"') for lane, group in GROUPS.items()} | _OWN_PERMISSIONS
+"""Permissions of all lane types of OpenDRIVE that have a surface."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,7 @@ def _network(
     """Write the network of a map: driving lanes, pavements, crossings where there are traffic lights, parking lanes."""
     road_map = read_map(map_path)
     types, plain, nodes = (network.with_name(name) for name in ("lanes.typ.xml", "plain.net.xml", "shapes.nod.xml"))
-    allowed = _PERMISSIONS | dict.fromkeys(_CLOSED_LANES, 'disallow="all"')
+    allowed = _LANES | {"none": 'disallow="all"'}
     _write(types, "types", [f'<type id="{lane}" speed="13.89" {who}/>' for lane, who in allowed.items()])
     common: list[object] = [
         *("--offset.disable-normalization", "true", "--no-turnarounds", "true", "--xml-validation", "never"),

@@ -2,12 +2,15 @@
 
 import os
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from seip_addon.core.arrays import Float
+from seip_addon.core.errors import SeipError
+from seip_addon.core.limits import MAP_COORDINATE, ROAD_LENGTH, Limits
 from seip_addon.core.progress import finish
-from seip_addon.core.storage.xml_stream import Attributes, read_tags
+from seip_addon.core.storage.xml_stream import Attributes, quoted, read_tags
 
 WALKING, PARKING, DRIVING, OTHER = "walking", "parking", "driving", "other"  # uses of lanes
 PARKED_CLASS = "custom1"  # the vClass that alone may stand in a parking lane
@@ -68,41 +71,87 @@ class StreetNetwork:
 
 
 def read_network(path: str | os.PathLike[str]) -> StreetNetwork:
-    """Read a SUMO network."""
-    edges: dict[str, NetworkEdge] = {}
-    onward: dict[str, list[tuple[str, str]]] = {}
-    signalised: dict[str, Float] = {}
-    current: list[str] = []  # the edge whose lanes come now; none within a junction
+    """Read a SUMO network.
 
-    def take(tag: str, attributes: Attributes) -> None:
-        if tag == "edge":
-            current[:] = [] if attributes.get("function") else [attributes["id"]]
-            if current:
-                edges[attributes["id"]] = NetworkEdge(attributes["id"], attributes["to"], ())
-        elif tag == "lane" and current:
-            edge = edges[current[0]]
-            edges[current[0]] = NetworkEdge(edge.id, edge.end, (*edge.lanes, _lane(attributes)))
-        elif tag == "connection" and attributes["from"] in edges:
-            way = (attributes["to"], attributes["dir"].lower())
-            drives = edges[attributes["from"]].lanes[int(attributes["fromLane"])].use == DRIVING
-            ways = onward.setdefault(attributes["from"], [])
-            if drives and way[1] in "lsr" and way not in ways:
-                ways.append(way)
-        elif tag == "junction" and attributes.get("type", "").startswith("traffic_light"):
-            signalised[attributes["id"]] = np.array([float(attributes["x"]), float(attributes["y"])])
+    Raises
+    ------
+    SeipError
+        The file cannot be read, is not a SUMO network, or has lanes with lengths or coordinates out of their limits.
+    """
+    reader = _Reader(Path(path).name)
+    finish(read_tags(path, reader.take))
+    if not reader.edges:
+        raise SeipError(f"{reader.name} is not a SUMO network: it has no edges; name a .net.xml")
+    return StreetNetwork(reader.edges, reader.onward, reader.signalised)
 
-    finish(read_tags(path, take))
-    return StreetNetwork(edges, onward, signalised)
+
+class _Reader:
+    """Handler of a stream of XML that collects edges, connections and junctions."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.edges: dict[str, NetworkEdge] = {}
+        self.onward: dict[str, list[tuple[str, str]]] = {}
+        self.signalised: dict[str, Float] = {}
+        self._current = ""  # the edge whose lanes come now; "" within a junction
+
+    def take(self, tag: str, attributes: Attributes) -> None:
+        """Take an element, and name the file and the element where it is faulty."""
+        take = {"edge": self._edge, "lane": self._lane, "connection": self._connection, "junction": self._junction}
+        if tag not in take:
+            return
+        try:
+            take[tag](attributes)
+        except (KeyError, IndexError, ValueError) as error:
+            named = f"{self.name}: <{tag}> {quoted(attributes.get('id', ''))}"
+            fault = f"has no {error}" if isinstance(error, KeyError) else str(error)
+            raise SeipError(f"{named} {fault}; let netconvert write the network again") from error
+
+    def _edge(self, attributes: Attributes) -> None:
+        self._current = "" if attributes.get("function") else attributes["id"]
+        if self._current:
+            self.edges[self._current] = NetworkEdge(self._current, attributes["to"], ())
+
+    def _lane(self, attributes: Attributes) -> None:
+        if self._current:
+            edge = self.edges[self._current]
+            self.edges[self._current] = NetworkEdge(edge.id, edge.end, (*edge.lanes, _lane(attributes)))
+
+    def _connection(self, attributes: Attributes) -> None:
+        begin = attributes["from"]
+        if begin not in self.edges:
+            return
+        way, lane = (attributes["to"], attributes["dir"].lower()), int(attributes["fromLane"])
+        if not 0 <= lane < len(self.edges[begin].lanes):
+            raise ValueError(f"begins on lane {lane} of an edge with {len(self.edges[begin].lanes)}")
+        ways = self.onward.setdefault(begin, [])
+        # a lane that is also walked on leads to where people cross, which is no edge for vehicles
+        onward = way[0] in self.edges and way[1] in {"l", "s", "r"}
+        if onward and self.edges[begin].lanes[lane].use == DRIVING and way not in ways:
+            ways.append(way)
+
+    def _junction(self, attributes: Attributes) -> None:
+        if attributes.get("type", "").startswith("traffic_light"):
+            place = np.array([float(attributes["x"]), float(attributes["y"])])
+            self.signalised[attributes["id"]] = _within(MAP_COORDINATE, "a coordinate", place)
 
 
 def _lane(attributes: Attributes) -> NetworkLane:
     corners = [corner.split(",")[:2] for corner in attributes["shape"].split()]
-    return NetworkLane(
-        index=int(attributes["index"]),
-        use=_use(attributes),
-        length=float(attributes["length"]),
-        line=np.array(corners, dtype=np.float64),
-    )
+    line = np.array(corners, dtype=np.float64)
+    if line.ndim != 2 or len(line) < 2 or line.shape[1] != 2:
+        raise ValueError("has a shape that is not a line of points x,y")
+    index = int(attributes["index"])
+    if index < 0:
+        raise ValueError(f"has the index {index}")
+    length = _within(ROAD_LENGTH, "length", np.array(float(attributes["length"])))
+    return NetworkLane(index, _use(attributes), float(length), _within(MAP_COORDINATE, "a coordinate", line))
+
+
+def _within(limits: Limits, what: str, values: Float) -> Float:
+    if fault := limits.fault(values):
+        raise ValueError(f"has a lane or node of which {what} {fault}")
+    return values
 
 
 def _use(attributes: Attributes) -> str:

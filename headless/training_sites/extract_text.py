@@ -79,7 +79,10 @@ class _Extract:
         self._ways.append(f'<way id="{len(self._ways) + 1}">{body}</way>')
 
     def as_xml(self) -> str:
-        head = ['<?xml version="1.0" encoding="UTF-8"?>', '<osm version="0.6" generator="SEIP training sites">']
+        head = [
+            '<?xml version="1.0" encoding="UTF-8"?>',
+            '<osm version="0.6" generator="SEIP training sites" copyright="SEIP for Blender">',
+        ]
         return "\n".join([*head, *self._nodes, *self._ways, "</osm>", ""])
 
 

@@ -9,6 +9,28 @@ from pathlib import Path
 from .progress import REPORT_INTERVAL, Progress
 
 
+def exit_status(command: Sequence[str], seconds: float) -> int | None:
+    """Run a program without output and return its exit status, None where it takes longer than some seconds.
+
+    Raises
+    ------
+    OSError
+        It cannot be started.
+    """
+    try:
+        process = subprocess.run(  # noqa: S603  # callers name their own programs
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            timeout=seconds,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return None
+    return process.returncode
+
+
 def run_logged(
     command: Sequence[str],
     log: Path,

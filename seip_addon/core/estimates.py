@@ -51,6 +51,15 @@ class IntervalEstimate:
         value, low, high = (f"{100 * part:.{decimals}f}" for part in (self.value, self.low, self.high))
         return f"{value} points [{low}, {high}]"
 
+    def as_change(self, decimals: int = 2) -> str:
+        """Return a difference of shares, in percentage points, as so much more or less: a loss is called a loss."""
+        gain = self.value >= 0.0
+        size = self if gain else IntervalEstimate(-self.value, -self.high, -self.low)
+        word = "more" if gain else "less"
+        if not math.isfinite(self.high - self.low):
+            return f"{100 * size.value:.{decimals}f} points {word} [too few data for an interval]"
+        return f"{size.as_points(decimals)} {word}"
+
 
 def mean_of(values: Float) -> IntervalEstimate:
     """Estimate a mean; its interval is that of the normal approximation, for some thirty draws and more.

@@ -26,11 +26,50 @@ class Progress:
         Finished and all units of work, ``0 <= done <= total``; a total of 0 means that it is not known.
     what : str
         What is being worked on, for the person who waits.
+    counted : bool
+        Whether the units take about the same time, so that the time left follows from their number. Stages of work do
+        not; a search, which may end at any step, has a total of 0.
     """
 
     done: int
     total: int
     what: str
+    counted: bool = True
+
+
+class Pace:
+    """Time left of counted work, from its reports: each count of units has a pace of its own.
+
+    Attributes
+    ----------
+    first : Progress or None
+        The report that the count began with.
+    began : float, seconds
+        When that was.
+    seconds_left : float or None
+        None where the work cannot be counted, or no unit has been finished yet.
+    """
+
+    def __init__(self) -> None:
+        self.first: Progress | None = None
+        self.began = 0.0
+        self.seconds_left: float | None = None
+        self._done = 0
+
+    def note(self, progress: Progress, now: float) -> None:
+        """Take a report.
+
+        Parameters
+        ----------
+        now : float, seconds
+            Reading of a monotonic clock.
+        """
+        if self.first is None or self.first.total != progress.total or progress.done < self._done:
+            self.first, self.began = progress, now
+        self._done = progress.done
+        gained = progress.done - self.first.done
+        known = progress.counted and progress.total > 0 and gained > 0
+        self.seconds_left = (progress.total - progress.done) * (now - self.began) / gained if known else None
 
 
 def finish(steps: Generator[Progress, None, Result], report: Callable[[Progress], object] | None = None) -> Result:
@@ -64,7 +103,8 @@ def in_detail(whole: Progress, steps: Generator[Progress, None, Result]) -> Gene
         except StopIteration as stop:
             result: Result = stop.value
             return result
-        yield Progress(whole.done * step.total + step.done, whole.total * step.total, step.what)
+        done, total = whole.done * step.total + step.done, whole.total * step.total
+        yield Progress(done, total, step.what, whole.counted and step.counted)
 
 
 def in_thread(work: Callable[[threading.Event], Result], what: str) -> Generator[Progress, None, Result]:
@@ -155,4 +195,5 @@ def _sum_of(parts: Sequence[Progress], works: int) -> Progress:
     if not parts:
         return Progress(0, 0, "begin")
     done, total = sum(part.done for part in parts), sum(part.total for part in parts)
-    return Progress(done, total * works // len(parts), parts[-1].what)
+    counted = all(part.counted and part.total for part in parts)
+    return Progress(done, total * works // len(parts), parts[-1].what, counted)

@@ -13,7 +13,7 @@ from .. import preferences, scene_status
 from ..core.errors import SeipError
 from ..core.progress import Progress
 from ..core.results.detection_record import MAIN_RULE, parsed_detection
-from ..core.storage.files import check_folder, digest
+from ..core.storage.files import check_folder, digest, unfinished_name
 from ..core.workflows.detection import INSTALL, DetectionJob, detect_elsewhere
 from ..core.workflows.traffic import found_runs
 from ..properties.conversion import absolute, output_folder, runs_folder
@@ -84,7 +84,10 @@ class SEIP_OT_detect(LongWork[str], bpy.types.Operator):
 
 
 def _detected(job: DetectionJob, folder: Path) -> Generator[Progress, None, str]:
-    with _folder_of_result(folder), TemporaryDirectory(prefix=".seip-detection-", dir=folder) as temporary:
+    with (
+        _folder_of_result(folder),
+        TemporaryDirectory(prefix=unfinished_name(folder, "detection-").name, dir=folder) as temporary,
+    ):
         scene = Path(temporary) / "placed.blend"
         save_blend(scene)
         yield Progress(0, 0, "starting PyTorch")

@@ -63,7 +63,7 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneState], bpy.types.Ope
         write_result(scene, survey.site, deployment)
         keep_result(scene, result, record)
         coverage.show_colours(scene)
-        self.report({"INFO"}, f"coverage {deployment.coverage:.2%}, price ${deployment.price:,.0f}")
+        self.report({"INFO"}, f"coverage {deployment.coverage:.2%}, price {record.price_text}")
 
 
 def _placed(

@@ -27,6 +27,8 @@ from ..core.workflows.moved_sensors import evaluate_moved_sensors
 from ..core.workflows.survey import Survey, record_of
 from ..scene.blend_file import save_blend
 from ..scene.gltf import save_glb
+from ..scene.pieces import tidy_pieces
+from ..scene.read import attribution_of
 from ..scene.render import render_elsewhere
 from ..scene.result_folder import result_files, write_tables
 from ..scene.sensors import labelled_sensors, read_sensors
@@ -370,9 +372,10 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
     finding = scene_survey.with_placement(scene)
     if coverage_of(scene) is not None:
         show_seen_by(scene, unpacked_counts(scene.seip.result.seen))  # it may show a comparison, or sensors on the move
+    tidy_pieces(scene)
     with result_files(folder) as part:
         save_blend(part["placed.blend"])
-        save_glb(part["scene.glb"])
+        save_glb(part["scene.glb"], attribution_of(scene))
         yield Progress(0, 0, "reading the scene")
         state = yield from finding
         survey, solution = state.placed()

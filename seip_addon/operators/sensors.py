@@ -8,6 +8,7 @@ import bpy
 from bl_operators.presets import AddPresetBase
 
 from .. import preferences, sensor_types
+from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.lidar import load_catalogue
 from ..session import session
@@ -28,7 +29,7 @@ class SEIP_OT_list_sensor_types(bpy.types.Operator):
         if session.catalogue_error:
             self.report({"ERROR"}, session.catalogue_error)
             return {"CANCELLED"}
-        self.report({"INFO"}, f"{len(session.sensor_types)} sensor types")
+        self.report({"INFO"}, counted(len(session.sensor_types), "sensor type"))
         return {"FINISHED"}
 
 
@@ -121,7 +122,7 @@ class SEIP_OT_empty_cache(bpy.types.Operator):
 
     def _empty(self) -> None:
         count = preferences.empty_cache()
-        self.report({"INFO"}, f"{count} files deleted")
+        self.report({"INFO"}, f"{counted(count, 'file')} deleted")
 
 
 class SEIP_OT_preview_beams(bpy.types.Operator):

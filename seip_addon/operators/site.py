@@ -9,6 +9,7 @@ import bpy
 from shapely.geometry.base import BaseGeometry
 
 from .. import scene_status, sensor_types
+from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.progress import Progress, finish
 from ..core.site.check import Problem, SiteCheck, check_site
@@ -81,7 +82,7 @@ class SEIP_OT_choose_map(LongWork[SitePlaces], bpy.types.Operator):
         for place in result.places:
             one = site.junctions.add()
             one.name, one.id = place.name, place.key
-        self.report({"INFO"}, f"{len(site.junctions):,} junction{'s' * (len(site.junctions) != 1)}")
+        self.report({"INFO"}, counted(len(site.junctions), "junction"))
         if self._by_hand and not bpy.app.background:
             site.junction = result.places[0].name if len(result.places) == 1 else ""
             bpy.ops.seip.choose_place("INVOKE_DEFAULT")
@@ -116,7 +117,7 @@ class _BuildsSite(LongWork[BuiltSite]):
             report({"INFO"}, note)
         for warning in result.model.warnings:
             report({"WARNING"}, warning)
-        report({"INFO"}, f"{len(result.model.parts)} objects, region {result.model.region.area:,.0f} m²")
+        report({"INFO"}, f"{counted(len(result.model.parts), 'object')}, region {result.model.region.area:,.0f} m²")
 
 
 class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
@@ -354,7 +355,7 @@ def in_short(problems: tuple[Problem, ...]) -> str:
     """Return how many errors and warnings there are, in words."""
     errors = sum(problem.severity == "ERROR" for problem in problems)
     warnings = len(problems) - errors
-    return f"{errors} error{'s' * (errors != 1)}, {warnings} warning{'s' * (warnings != 1)}"
+    return f"{counted(errors, 'error')}, {counted(warnings, 'warning')}"
 
 
 class SEIP_OT_show_problem(bpy.types.Operator):

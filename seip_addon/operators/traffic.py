@@ -10,6 +10,7 @@ from pathlib import Path
 import bpy
 
 from .. import live_scan, preferences, scene_status, scene_survey
+from ..core.counts import counted
 from ..core.placement.objective import target_weights
 from ..core.progress import Progress, finish
 from ..core.results.placement_record import parsed_record, versions
@@ -106,7 +107,7 @@ class SEIP_OT_load_traffic(LongWork[LoadedTraffic], bpy.types.Operator):
         scene.seip.traffic.loaded = "\n".join((*_facts(result.trajectories), *result.warnings))
         for sentence in result.warnings:
             self.report({"WARNING"}, sentence)
-        self.report({"INFO"}, f"{len(result.trajectories)} road users; press play")
+        self.report({"INFO"}, f"{counted(len(result.trajectories), 'road user')}; press play")
 
 
 class SEIP_OT_clear_traffic(bpy.types.Operator):
@@ -198,7 +199,7 @@ class SEIP_OT_scan_frame(_Scanning[LastScan], bpy.types.Operator):
         live_scan.keep(scene, result)
         for sentence in result.simulation.warnings:
             self.report({"WARNING"}, sentence)
-        self.report({"INFO"}, f"{len(result.frame):,} points in {1e3 * result.seconds:.0f} ms")
+        self.report({"INFO"}, f"{counted(len(result.frame), 'point')} in {1e3 * result.seconds:.0f} ms")
 
 
 def _scanned(read: _SceneRead, at: float, before: LastScan | None) -> Generator[Progress, None, LastScan]:
@@ -243,7 +244,7 @@ class SEIP_OT_write_dataset(_Scanning[tuple[Record, tuple[str, ...]]], bpy.types
         written, warnings = result
         for sentence in warnings:
             self.report({"WARNING"}, sentence)
-        self.report({"INFO"}, f"{len(written['frames']):,} frames in {self._folder}")
+        self.report({"INFO"}, f"{counted(len(written['frames']), 'frame')} in {self._folder}")
 
 
 def _recorded(read: _SceneRead, folder: Path) -> Generator[Progress, None, tuple[Record, tuple[str, ...]]]:
@@ -287,7 +288,7 @@ def _facts(trajectories: Trajectories) -> list[str]:
     begin, end = trajectories.span
     counts = Counter(user.category for user in trajectories.users)
     kinds = [f"{counts[category]} {category}" for category in CATEGORIES if counts[category]]
-    return [f"{len(trajectories)} road users, {begin:g} to {end:g} s", ", ".join(kinds)]
+    return [f"{counted(len(trajectories), 'road user')}, {begin:g} to {end:g} s", ", ".join(kinds)]
 
 
 CLASSES = (

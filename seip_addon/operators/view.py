@@ -113,7 +113,7 @@ def _sensors(_operator: object, context: bpy.types.Context | None) -> list[tuple
 
 
 class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneState], bpy.types.Operator):
-    """Draw lines from a sensor to the targets that it sees, and dark squares on those in its range that it does not"""
+    """Draw lines from a sensor to the targets that it sees, and squares on those in its range that it does not see"""
 
     bl_idname = "seip.show_sight_lines"
     bl_label = "Show Sight Lines"
@@ -136,7 +136,9 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneState], bpy.types.Ope
         pose = pose_at(survey.site.candidates, key, *pose_of(obj))
         if pose is None:
             raise SeipError(f"{self.sensor} hangs at no candidate pose: put it back, or place again")
-        sight = sight_lines(survey.site, pose, survey.models[key], survey.grid.sees(pose))
+        settings = survey.settings
+        row = survey.grid.sees(pose)
+        sight = sight_lines(survey.site, pose, survey.models[key], row, settings.visibility.delta, settings.engine)
         overlays.show(scene, SIGHT, sight_overlay(sight, self.sensor))
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import bpy
 
 from .. import scene_survey
+from ..core.counts import counted
 from ..core.progress import Progress
 from ..core.workflows.survey import estimate
 from ..session import SceneState, session
@@ -29,9 +30,8 @@ class SEIP_OT_compute_visibility(ForReadyScene, LongWork[SceneState], bpy.types.
         """Hold the grid."""
         session.keep_state(scene, result)
         site = result.layout.site
-        self.report(
-            {"INFO"}, f"visibility of {len(site.targets):,} targets from {len(site.candidates):,} poses is known"
-        )
+        targets, poses = counted(len(site.targets), "target"), counted(len(site.candidates), "pose")
+        self.report({"INFO"}, f"visibility of {targets} from {poses} is known")
 
 
 class SEIP_OT_estimate_visibility(ForReadyScene, LongWork[SceneState], bpy.types.Operator):

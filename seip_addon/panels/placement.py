@@ -7,6 +7,8 @@ from pathlib import Path
 import bpy
 
 from .. import scene_status
+from ..core.placement.objective import certificate, purpose
+from ..core.placement.returns_summary import returns_text
 from ..core.results.placement_record import PlacementRecord, parsed_record, relevant_warnings
 from ..core.workflows.traffic import traffic_folder
 from ..operators.placement import SEIP_OT_solve_placement
@@ -49,7 +51,10 @@ class SEIP_PT_placement(Sidebar, bpy.types.Panel):
         layout = settings_column(self.layout)
         row = layout.row()
         row.use_property_split = False  # else there is no room for three words
-        row.prop(goal, "limit", text="", expand=not is_narrow(context))
+        if is_narrow(context):
+            row.prop(goal, "limit", text="")
+        else:
+            row.prop(goal, "limit", expand=True)  # an empty text would leave each segment without its name
         column = layout.column()
         column.prop(goal, goal.limit.lower())
         row = column.row()
@@ -80,6 +85,7 @@ class SEIP_PT_placement_precaution(OfSite, bpy.types.Panel):
         layout = settings_column(self.layout)
         layout.prop(goal, "objective")
         if goal.objective == "PLANNED":
+            layout.prop(goal, "criterion")
             layout.prop(goal, "pose_errors")
             return
         in_traffic = goal.objective == "TRAFFIC"
@@ -126,9 +132,9 @@ class SEIP_PT_placement_solver(OfSite, bpy.types.Panel):
         layout.prop(context.scene.seip.survey, "solver")
         limits = layout.column(align=True)
         row = limits.row(align=True)
-        row.active = context.scene.seip.survey.effort == 0
-        row.prop(context.scene.seip.survey, "time_limit")
-        limits.prop(context.scene.seip.survey, "effort")
+        row.active = context.scene.seip.survey.time_limit == 0
+        row.prop(context.scene.seip.survey, "effort")
+        limits.prop(context.scene.seip.survey, "time_limit")
 
 
 def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
@@ -150,8 +156,10 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         row.label(text=name)
         row.label(text=value)
     if column.active:
-        proven = record.objective.status == "optimal"
-        draw_sentence(box, record.objective.certificate, icon="CHECKMARK" if proven else "INFO")
+        objective, notes_of_it = record.objective, record.notes
+        sentence = certificate(objective.status, objective.gap, cheapest=objective.cheapest, notes=notes_of_it)
+        proven = objective.status == "optimal" and not purpose(notes_of_it)  # of the coverage that is shown above
+        draw_sentence(box, sentence, icon="CHECKMARK" if proven else "INFO")
     notes = box.column()
     notes.active = column.active
     for note in (*record.notes, *_warnings(record)):
@@ -161,12 +169,16 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
 def figures(record: PlacementRecord) -> list[tuple[str, str]]:
     """Return what a placement is evaluated by, as text."""
     coverage, objective = record.coverage, record.objective
-    lines = [("Coverage", f"{coverage.whole:.2%}")]
+    of_each = {} if record.returns is None else record.returns.of_each
+    lines = [(f"Returns, {name}", returns_text(number)) for name, number in of_each.items()]
+    lines.append(("Coverage", f"{coverage.whole:.2%}"))
+    if coverage.gain_band is not None and coverage.gain_band.sheets:
+        lines.append(("Over plausible gains", f"{coverage.gain_band.low:.0%} to {coverage.gain_band.high:.0%}"))
     if coverage.central is not None:
         lines.append(("Central", f"{coverage.central:.2%}"))
     if objective.kind == "weighted":
         lines.append(("Weighted", f"{coverage.weighted:.2%}"))
-    lines += [("Price", f"${record.price_usd:,.0f}"), ("Sensors", str(len(record.sensors)))]
+    lines += [("Price", record.price_text), ("Sensors", str(len(record.sensors)))]
     if objective.bound is not None and objective.gap is not None:
         unit = "${:,.0f}" if objective.cheapest else "{:,.6g}"
         lines.append(("Objective", unit.format(objective.value)))

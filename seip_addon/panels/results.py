@@ -147,7 +147,7 @@ def _draw_table(layout: bpy.types.UILayout, kept: PlacementRecord, present: Plac
     for name, one, other in (
         ("Coverage", _share(kept.coverage.whole), _share(present.coverage.whole)),
         ("Central", _share(kept.coverage.central), _share(present.coverage.central)),
-        ("Price", f"${kept.price_usd:,.0f}", f"${present.price_usd:,.0f}"),
+        ("Price", kept.price_text, present.price_text),
         ("Sensors", str(len(kept.sensors)), str(len(present.sensors))),
     ):
         for text in (name, one, other):

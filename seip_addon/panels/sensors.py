@@ -122,6 +122,7 @@ class SEIP_PT_sensor_details(Sidebar, bpy.types.Panel):
             split.scale_y = 0.8
             split.label(text=what)
             split.label(text=value)
+        draw_sentence(self.layout, f"Detection: {model.evidence}")
         draw_sentence(self.layout, f"Figures: {model.source}")
         if model.assumed:
             draw_sentence(self.layout, f"Assumed: {model.assumed}")

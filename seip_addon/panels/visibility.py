@@ -50,6 +50,7 @@ class SEIP_PT_visibility_details(OfSite, bpy.types.Panel):
         column = layout.column(heading="Positions")
         for name in ("spacing", "setback", "clearance", "bracket", "assumed_poles"):
             column.prop(survey, name)
+        layout.column().prop(survey, "allow")
         column = layout.column(heading="Returns")
         for name in ("detection", "min_intensity", "rain", "wet_road", "fog"):
             column.prop(survey, name)

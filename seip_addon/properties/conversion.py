@@ -30,6 +30,8 @@ def of_setting(kind: type, field: str, name: str, **more: Any) -> Any:  # noqa: 
     limits = {"min": about.minimum, "max": about.maximum}
     given = {name: limit for name, limit in limits.items() if limit is not None}
     description = about.help[0].upper() + about.help[1:]
+    if isinstance(default, tuple):  # several of the items of a choice
+        return EnumProperty(name=name, description=description, default=set(default), options={"ENUM_FLAG"}, **more)
     arguments = {"default": default} | given | _UNITS.get(about.unit, {}) | more
     return _KINDS[type(default)](name=name, description=description, **arguments)
 

@@ -67,6 +67,16 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         name="Weight", description="Of targets in weighted regions, where others have 1", default=2.0, min=0.001
     )
     min_distance: of_setting(Objective, "min_distance", "Min. Distance")
+    criterion: of_setting(
+        Objective,
+        "criterion",
+        "Criterion",
+        items=(
+            ("auto", "By Sensor", "Returns if a sensor has a range law, as real ones have; otherwise road seen"),
+            ("road", "Road Seen", "The share of the road that sensors see"),
+            ("returns", "Returns", "The expected returns from cars, cyclists and pedestrians"),
+        ),
+    )
     objective: EnumProperty(
         name="Optimise for",
         description="Whether the placement trusts the map, or is chosen for what may go wrong",
@@ -136,6 +146,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             coverage=as_typed(self.coverage) / 100 if self.limit == "COVERAGE" else None,
             central_weight=self._weight(),
             min_distance=as_typed(self.min_distance),
+            criterion=self.criterion if self.objective == "PLANNED" and self.limit != "COVERAGE" else "auto",
             forbidden=tuple(one.name for one in self.rules if one.rule == "FORBIDDEN"),
             mandatory=tuple(one.name for one in self.rules if one.rule == "MANDATORY"),
         )

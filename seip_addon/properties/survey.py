@@ -9,7 +9,9 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..core.errors import SeipError
+from ..core.placement.search_limits import DEFAULT_EFFORT
 from ..core.site.candidates import MAX_SENSOR_HEIGHT, CandidateSettings, heights_of, tilts_of
+from ..core.site.post_rules import RULES
 from ..core.site.weather import Weather
 from ..core.visibility.settings import VisibilitySettings
 from ..core.workflows.survey import SurveySettings
@@ -66,6 +68,12 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
     clearance: of_setting(CandidateSettings, "clearance", "Clearance", soft_max=5.0, step=10)
     bracket: of_setting(CandidateSettings, "bracket", "Bracket", soft_max=5.0, step=10)
     assumed_poles: of_setting(CandidateSettings, "assumed_poles", "Assumed Poles")
+    allow: of_setting(
+        CandidateSettings,
+        "allow",
+        "Allow",
+        items=[(name, rule.title, f"Positions {rule.reason}") for name, rule in RULES.items()],
+    )
     engine: EnumProperty(
         name="Ray Caster",
         description="What casts the rays",
@@ -89,21 +97,24 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
     )
     time_limit: FloatProperty(
         name="Time Limit",
-        description="For the search of a placement, in seconds",
+        description=(
+            "Limit the search by time instead of counted work. What is found and proven then depends on the machine "
+            "and on what else runs on it. 0: no limit of time"
+        ),
         subtype="TIME_ABSOLUTE",
         unit="TIME_ABSOLUTE",
-        default=SurveySettings().time_limit,
-        min=1.0,
+        default=0.0,
+        min=0.0,
         soft_max=3600.0,
     )
     effort: FloatProperty(
         name="Effort",
         description=(
-            "Limit the search by counted work instead of time: about a second of one processor core for each unit, "
-            "and the same placement again on every run. 0: limit the time"
+            "Limit of the search in counted work, about a second of one processor core for each unit. The same "
+            "inputs give the same placement on every machine"
         ),
-        default=0.0,
-        min=0.0,
+        default=DEFAULT_EFFORT,
+        min=0.1,
         soft_max=3600.0,
     )
 
@@ -139,6 +150,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
                 clearance=as_typed(self.clearance),
                 bracket=as_typed(self.bracket),
                 assumed_poles=self.assumed_poles,
+                allow=tuple(name for name in RULES if name in self.allow),
             ),
             visibility=VisibilitySettings(as_typed(self.delta), as_typed(self.min_intensity), as_typed(self.detection)),
             weather=self.weather(),
@@ -146,8 +158,8 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
             catalogue=catalogue_files(),
             engine=self.engine,
             solver=self.solver,
-            time_limit=math.inf if self.effort else as_typed(self.time_limit),
-            effort=as_typed(self.effort) if self.effort else math.inf,
+            time_limit=as_typed(self.time_limit) or None,
+            effort=None if self.time_limit else as_typed(self.effort),
         )
 
 

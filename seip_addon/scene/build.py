@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Iterable
+from collections.abc import Generator
 
 import bpy
 import numpy as np
@@ -17,6 +17,7 @@ from . import contract
 from .daylight import add_daylight
 from .meshes import mesh_of
 from .named_places import places_text
+from .pieces import attach_piece
 from .views import CLIP_END, CLIP_START
 
 DRESSING = "Dressing"
@@ -82,24 +83,15 @@ def _describe(scene: bpy.types.Scene, model: SiteModel, map_name: str) -> None:
     scene[contract.GEO_REFERENCE] = model.geo_reference or ""
     scene[contract.HEADER_OFFSET] = model.header_offset.tolist()
     scene[contract.PLACES] = places_text(model.places)
+    scene[contract.ATTRIBUTION] = "\n".join(model.attribution)
     scene.unit_settings.system = "METRIC"
     scene.unit_settings.scale_length = 1.0
 
 
 def _attach(piece: bpy.types.Object, whole: bpy.types.Object) -> None:
     """Have a piece go where the whole goes, from where it stands."""
-    piece.parent = whole
+    attach_piece(piece, whole)
     piece.matrix_parent_inverse = whole.matrix_basis.inverted()
-    piece[contract.PIECE_OF] = whole.name
-
-
-def loose_pieces(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Return the pieces among objects whose whole is gone; one that was only taken off its whole is not among them."""
-    return [
-        obj
-        for obj in objects
-        if obj.parent is None and contract.PIECE_OF in obj and obj[contract.PIECE_OF] not in bpy.data.objects
-    ]
 
 
 def _add(scene: bpy.types.Scene, part: Part, meshes: dict[str, bpy.types.Mesh]) -> bpy.types.Object:
@@ -115,8 +107,12 @@ def _add(scene: bpy.types.Scene, part: Part, meshes: dict[str, bpy.types.Mesh]) 
         obj[contract.WEIGHT] = part.weight
     if part.source:
         obj[contract.SOURCE] = part.source
+    if part.keep_off is not None:
+        obj[contract.KEEP_OFF] = part.keep_off
     if part.height_assumed:
         obj[contract.HEIGHT_ASSUMED] = True
+    if part.width_assumed:
+        obj[contract.WIDTH_ASSUMED] = True
     obj.hide_render = AREA_OVERLAYS.keys() >= set(part.roles)  # the viewport shows what only means an area
     for role in part.roles:
         contract.find_or_make(scene, COLLECTIONS[role]).objects.link(obj)

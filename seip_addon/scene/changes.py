@@ -16,6 +16,12 @@ import bpy
 from ..core.storage.files import digest
 from . import contract
 
+SCENE_PROPERTIES = (
+    *(contract.ORIGIN, contract.MAP, contract.GEO_REFERENCE, contract.HEADER_OFFSET),
+    *(contract.PLACES, contract.ATTRIBUTION),
+)
+"""Custom properties of the scene itself that are read with it."""
+
 
 @dataclass(eq=False)
 class Watch:
@@ -89,9 +95,10 @@ def _fingerprint(sources: Iterable[bpy.types.Object], scene: bpy.types.Scene) ->
     lines = sorted(
         repr((_traits(obj, layer), [n for n, objects in roles.items() if obj in objects])) for obj in sources
     )
-    stored = [scene.get(name) for name in (contract.ORIGIN, contract.GEO_REFERENCE, contract.HEADER_OFFSET)]
+    stored = [scene.get(name) for name in SCENE_PROPERTIES]
     place = (repr(value.to_list() if hasattr(value, "to_list") else value) for value in stored)
-    return digest(*place, repr(scene.get(contract.TITLE, scene.name)), *lines)
+    units = repr((scene.unit_settings.system, scene.unit_settings.scale_length))
+    return digest(*place, units, repr(scene.get(contract.TITLE, scene.name)), *lines)
 
 
 def _traits(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> tuple[object, ...]:

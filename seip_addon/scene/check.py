@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from ..core.arrays import Float
+from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.site.check import Problem, SceneContents, Surface
 from ..core.site.scene_geometry import SceneGeometry
@@ -25,6 +26,7 @@ from .read import (
     missing_libraries,
     origin_of,
     poles_of,
+    rule_fault,
     shown_parts,
 )
 
@@ -82,8 +84,9 @@ def _faults(parts: list[Shown]) -> Iterator[Problem]:
     instancers = {part.source for part in parts if part.triangles is not None}
     for part in parts:
         surfaces = part.collections & ROLES.keys()
-        if part.fault:
-            yield _error(part.fault, part)
+        fault = part.fault or rule_fault(part)
+        if fault:
+            yield _error(fault, part)
         elif part.triangles is None and surfaces and part.source not in instancers:
             yield _error(f"{part.name!r} in {min(surfaces)!r} has no faces: give it some or take it out", part)
         for name in NAMED_AREAS:
@@ -148,7 +151,8 @@ def _without_role(
             name,
         )
     if len(large) > MOST_NAMED:
-        yield Problem("WARNING", f"{len(large) - MOST_NAMED:,} more large objects have no role: no ray ends on them.")
+        more = counted(len(large) - MOST_NAMED, "more large object has", "more large objects have")
+        yield Problem("WARNING", f"{more} no role: no ray ends there.")
 
 
 def _needs_no_role(obj: bpy.types.Object) -> bool:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import io
+import json
+import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,15 +15,18 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..core.child_process import exit_status
 from ..core.errors import SeipError
+from ..core.limits import MODEL_COORDINATE
 from ..core.site.scene_geometry import FROM_MESH
+from ..core.streetscape.mesh_header import check_mesh_header
 from ..core.streetscape.mesh_place import MeshPlace
 from . import contract
 from .read import shown_parts
 
 MAX_FACES = 2_000_000
-MAX_COORDINATE = 20_000.0  # metres from the zero of a mesh, beyond which its 32 bits are coarser than some millimetres
 UP_AXES = ("y", "z")
+IMPORT_SECONDS = 300.0  # for an import in a process of its own
 _FORWARD = {"y": "NEGATIVE_Z", "z": "Y"}
 
 
@@ -58,7 +64,7 @@ def check_mesh(path: Path, up: str | None = None) -> None:
     Raises
     ------
     SeipError
-        It is not, or names its own axes where others are given.
+        It is not, names its own axes where others are given, or as for `check_mesh_header`.
     """
     if not path.is_file():
         raise SeipError(f"no such file: {path}; check its path")
@@ -67,6 +73,7 @@ def check_mesh(path: Path, up: str | None = None) -> None:
         raise SeipError(f"{path.name} is of no kind that is imported: {', '.join(sorted(IMPORTERS))}; convert it")
     if up is not None and kind not in (".obj", ".ply", ".stl"):
         raise SeipError(f"{path.name} says itself which axis points up: leave out --mesh-up")
+    check_mesh_header(path)
 
 
 def import_mesh(
@@ -92,17 +99,7 @@ def import_mesh(
         The file cannot be imported, holds no face, too many, faulty ones, or its coordinates are far from its zero.
     """
     check_mesh(path, up)
-    before = set(bpy.data.objects)
-    try:
-        with contextlib.redirect_stdout(io.StringIO()):  # where importers tell of every mesh
-            IMPORTERS[path.suffix.lower()](str(path.resolve()), up)
-    except Exception as error:  # importers raise whatever a broken file makes them
-        first = (str(error).strip().splitlines() or ["no reason given"])[-1]
-        raise SeipError(f"Blender cannot import {path.name}: {first[:160]}; write the file again") from error
-    made = [obj for obj in bpy.data.objects if obj not in before]
-    meshes = _own_meshes(made, path)
-    for obj in made:
-        bpy.data.objects.remove(obj)
+    meshes = _imported_apart(path, up)
     into = contract.find_or_make(scene, contract.OCCLUDERS)
     matrix = Matrix.Translation(place.position) @ Matrix.Rotation(place.heading, 4, "Z")
     objects = set()
@@ -116,6 +113,61 @@ def import_mesh(
         if part.fault:
             raise SeipError(f"{path.name}: {part.fault}")
     return [(f"Mesh {path.stem}", FROM_MESH, False)] * len(objects)
+
+
+def imported_meshes(path: Path, up: str | None = None) -> list[bpy.types.Mesh]:
+    """Import a file into the open scene and return its meshes about the zero of the file, without their objects.
+
+    Raises
+    ------
+    SeipError
+        As for `import_mesh`.
+    """
+    before = set(bpy.data.objects)
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):  # where importers tell of every mesh
+            IMPORTERS[path.suffix.lower()](str(path.resolve()), up)
+    except Exception as error:  # importers raise whatever a broken file makes them
+        first = (str(error).strip().splitlines() or ["no reason given"])[-1]
+        raise SeipError(f"Blender cannot import {path.name}: {first[:160]}; write the file again") from error
+    made = [obj for obj in bpy.data.objects if obj not in before]
+    for mesh in {obj.data for obj in made if obj.type == "MESH"}:
+        mesh.validate()  # faces of vertices that are not there, which would end the process later on
+    meshes = _own_meshes(made, path)
+    for obj in made:
+        bpy.data.objects.remove(obj)
+    return meshes
+
+
+def _imported_apart(path: Path, up: str | None) -> list[bpy.types.Mesh]:
+    """Import a file as `imported_meshes` does, in a Blender of its own: damaged files crash importers.
+
+    Raises
+    ------
+    SeipError
+        As for `import_mesh`; or that Blender crashed or did not come to an end.
+    """
+    script = str(Path(__file__).with_name("import_job.py"))
+    if bpy.app.binary_path:
+        start = [bpy.app.binary_path, "-b", "--factory-startup", "--python-exit-code", "1", "-P", script]
+    else:
+        start = [sys.executable, script]
+    with tempfile.TemporaryDirectory(prefix="seip-") as folder:
+        output = Path(folder) / "meshes.blend"
+        try:
+            command = [*start, "--", json.dumps([str(path.resolve()), up, str(output), sys.path])]
+            status = exit_status(command, IMPORT_SECONDS)
+        except OSError as error:
+            raise SeipError(f"Blender cannot be started to import {path.name}: {error.strerror or error}") from error
+        if status is None:
+            raise SeipError(f"Blender takes more than {IMPORT_SECONDS:g} s to import {path.name}: simplify the mesh")
+        if output.with_suffix(".txt").is_file():
+            raise SeipError(output.with_suffix(".txt").read_text(encoding="utf-8"))
+        if status != 0 or not output.is_file():
+            raise SeipError(f"Blender crashes when it imports {path.name}: the file is damaged, write it again")
+        with bpy.data.libraries.load(str(output)) as (there, here):
+            here.meshes = there.meshes
+        return list(here.meshes)
 
 
 def _own_meshes(made: list[bpy.types.Object], path: Path) -> list[bpy.types.Mesh]:
@@ -139,7 +191,7 @@ def _own_meshes(made: list[bpy.types.Object], path: Path) -> list[bpy.types.Mesh
             "a metre is fine enough"
         )
     far = max(_farthest(mesh) for mesh in meshes)
-    if far > MAX_COORDINATE:
+    if not MODEL_COORDINATE.allow(far):
         raise SeipError(
             f"{path.name} has vertices {far:,.0f} m from its zero, where 32 bits are too coarse: move its zero to the "
             "place (or set its units to metres)"

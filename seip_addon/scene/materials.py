@@ -10,7 +10,15 @@ import bpy
 import numpy as np
 
 from ..core.errors import SeipError
-from ..core.pictures.palette import INK, rgb
+from ..core.pictures.palette import (
+    FORBIDDEN_VEIL,
+    INK,
+    MANDATORY_VEIL,
+    REGION_VEIL,
+    SENSOR_BODY,
+    WEIGHTED_VEIL,
+    rgb,
+)
 from ..core.site.scene_geometry import DEFAULT_REFLECTIVITY
 from . import contract
 
@@ -52,10 +60,6 @@ COLOURS = {
     "trousers": (0.045, 0.055, 0.085),
     "bark": (0.160, 0.110, 0.075),
     "leaves": (0.105, 0.210, 0.065),
-    "region veil": (0.100, 0.450, 0.900),
-    "weighted veil": (0.950, 0.600, 0.100),
-    "forbidden veil": (0.900, 0.100, 0.100),
-    "mandatory veil": (0.100, 0.700, 0.250),
     "candidate veil": (0.650, 0.650, 0.600),
 }
 """Linear RGB of each material that `core.streetscape.street_furniture` and `core.traffic.bodies` name."""
@@ -105,8 +109,15 @@ VEIL_OPACITY = 0.25
 ROUGHNESS = {"glass": 0.15, "steel": 0.4, "rim": 0.35, "headlamp": 0.2, "tail lamp": 0.3}
 ROUGHNESS |= {f"paint {name}": 0.35 for name in PAINT_COLOURS}
 
-RESULT_COLOURS = {"sensor": "#f2c230", "post": INK}
+RESULT_COLOURS = {"sensor": SENSOR_BODY, "post": INK}
 """Web colour of the materials of sensors: matt, and the same in the viewport and in renders."""
+AREA_COLOURS = {
+    "region veil": REGION_VEIL,
+    "weighted veil": WEIGHTED_VEIL,
+    "forbidden veil": FORBIDDEN_VEIL,
+    "mandatory veil": MANDATORY_VEIL,
+}
+"""Web colour of areas that mean something."""
 
 
 def material(name: str) -> bpy.types.Material:
@@ -116,9 +127,10 @@ def material(name: str) -> bpy.types.Material:
         return existing
     if name in RESULT_COLOURS:
         return matt(name, RESULT_COLOURS[name])
+    colour = linear(AREA_COLOURS[name])[:3] if name in AREA_COLOURS else COLOURS[name]
     opacity = VEIL_OPACITY if name.endswith("veil") else 1.0
-    shown = (*(value**VIEWPORT_GAMMA for value in COLOURS[name]), opacity)
-    return _made(name, (*COLOURS[name], 1.0), shown, roughness=ROUGHNESS.get(name, 0.9), specular=0.5)
+    shown = (*(value**VIEWPORT_GAMMA for value in colour), opacity)
+    return _made(name, (*colour, 1.0), shown, roughness=ROUGHNESS.get(name, 0.9), specular=0.5)
 
 
 def matt(name: str, web_colour: str) -> bpy.types.Material:

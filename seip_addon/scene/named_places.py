@@ -13,11 +13,20 @@ from ..core.site.scene_geometry import NamedArea
 from . import contract
 
 DECIMALS = 3  # of metres, to which outlines are rounded
+KIND = "crossing"
 
 
 def places_text(places: Iterable[NamedArea]) -> str:
-    """Return places as the scene property `contract.PLACES` holds them: JSON, name and outline (WKT) of each."""
-    return json.dumps([[one.name, shapely.to_wkt(one.polygon, rounding_precision=DECIMALS)] for one in places])
+    """Return places as the text of the scene property `contract.PLACES`: JSON, name, outline (WKT) and kind of each.
+
+    The kind is ``crossing`` for pedestrian crossings and missing for streets.
+    """
+    return json.dumps(
+        [
+            [one.name, shapely.to_wkt(one.polygon, rounding_precision=DECIMALS), *([KIND] if one.crossing else [])]
+            for one in places
+        ]
+    )
 
 
 def places_of(scene: bpy.types.Scene) -> tuple[NamedArea, ...]:
@@ -30,9 +39,12 @@ def places_of(scene: bpy.types.Scene) -> tuple[NamedArea, ...]:
     """
     text = scene.get(contract.PLACES, "[]")
     try:
-        pairs = [(str(name), shapely.make_valid(shapely.from_wkt(outline))) for name, outline in json.loads(text)]
+        places = [
+            NamedArea(str(name), shapely.make_valid(shapely.from_wkt(outline)), crossing=kind == [KIND])
+            for name, outline, *kind in json.loads(text)
+        ]
     except (TypeError, ValueError, RecursionError, shapely.errors.ShapelyError) as error:
         raise SeipError(
             f"scene property {contract.PLACES} holds no named places: delete it, or build the scene again"
         ) from error
-    return tuple(NamedArea(name, area) for name, area in pairs)
+    return tuple(places)

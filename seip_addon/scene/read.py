@@ -11,9 +11,12 @@ import bpy
 import numpy as np
 
 from ..core.arrays import Boolean, Float, Integer
+from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.geometry.plan import outline
+from ..core.limits import LOCAL_COORDINATE, MAP_COORDINATE, WEIGHT
 from ..core.opendrive.geo_reference import GeoReference
+from ..core.site.post_rules import RULES, KeepOffArea, RuleName
 from ..core.site.scene_geometry import DEFAULT_WEIGHT, Mesh, NamedArea, Pole, SceneGeometry, joined
 from . import contract
 from .materials import reflectivity
@@ -26,6 +29,9 @@ FOUNDATION = 0.5
 SAME_LEVEL = 0.1
 """Metres above a pole's lowest point within which its faces stand on the ground."""
 MOST_NAMED = 3
+
+_KEEPING_OFF = {contract.ROADS, contract.GROUND, contract.FORBIDDEN_AREAS}
+"""Collections of which an object may name a rule that keeps new posts off it."""
 
 _SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 """Types of object that Blender can turn into faces."""
@@ -101,8 +107,9 @@ def read_scene(scene: bpy.types.Scene) -> SceneReading:
 def geometry_of(scene: bpy.types.Scene, parts: list[Shown], hidden: dict[str, list[str]]) -> SceneReading:
     """Sort what a scene shows by what it means; see `read_scene`."""
     for part in parts:
-        if part.fault:
-            raise SeipError(part.fault)
+        fault = part.fault or rule_fault(part)
+        if fault:
+            raise SeipError(fault)
     region = outline(joined(_meshes(parts, contract.REGION)))
     if region.is_empty:
         raise SeipError(
@@ -130,11 +137,13 @@ def geometry_of(scene: bpy.types.Scene, parts: list[Shown], hidden: dict[str, li
         region=region,
         candidate_areas=outline(joined(_meshes(parts, contract.CANDIDATE_AREAS))),
         weighted_regions=_areas(parts, contract.WEIGHTED_REGIONS),
-        forbidden_areas=_areas(parts, contract.FORBIDDEN_AREAS),
+        forbidden_areas=_areas([part for part in parts if _rule(part) is None], contract.FORBIDDEN_AREAS),
         mandatory_areas=_areas(parts, contract.MANDATORY_AREAS),
         poles=poles_of(parts),
         geo_reference=geo_reference_of(scene),
         places=places_of(scene),
+        attribution=attribution_of(scene),
+        keep_off_areas=_keep_off_areas(parts),
     )
     hidden_sentences = (hidden_sentence(name, objects) for name, objects in hidden.items())
     return SceneReading(geometry, (*hidden_sentences, *foot_sentences(parts)))
@@ -210,7 +219,11 @@ def _local_faces(evaluated: bpy.types.Object) -> _Faces | None:
         return None
     is_copied = evaluated.type != "MESH" or evaluated.data.is_editmode  # Edit Mode keeps its own mesh, and shows none
     mesh = evaluated.to_mesh() if is_copied else evaluated.data
-    if mesh is None or not len(mesh.loop_triangles):
+    if mesh is None:
+        return None
+    if _is_damaged(mesh):
+        raise SeipError(f"object {evaluated.name!r} has damaged faces: repair or delete it")
+    if not len(mesh.loop_triangles):
         return None
     corners = np.empty(len(mesh.loop_triangles) * 3, dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", corners)
@@ -220,10 +233,27 @@ def _local_faces(evaluated: bpy.types.Object) -> _Faces | None:
     mesh.loop_triangles.foreach_get("material_index", material)
     if is_copied:
         evaluated.to_mesh_clear()
-    vertices = np.append(places.reshape(-1, 3).astype(np.float64), [[np.nan] * 3], axis=0)
+    with np.errstate(invalid="ignore"):  # of numbers that a damaged file holds; they are refused below
+        vertices = np.append(places.reshape(-1, 3).astype(np.float64), [[np.nan] * 3], axis=0)
     known = (corners >= 0) & (corners < len(vertices) - 1)  # a damaged file names vertices that are not there
     triangles = vertices[np.where(known, corners, -1)].reshape(-1, 3, 3)
     return _Faces(triangles, material.astype(np.int64))
+
+
+def _is_damaged(mesh: bpy.types.Mesh) -> bool:
+    """Return whether faces lack corners or vertices, so that Blender would crash when it cuts them into triangles."""
+    first, count = (np.empty(len(mesh.polygons), dtype=np.int32) for _ in range(2))
+    vertex = np.empty(len(mesh.loops), dtype=np.int32)
+    try:
+        mesh.polygons.foreach_get("loop_start", first)
+        mesh.polygons.foreach_get("loop_total", count)
+        mesh.loops.foreach_get("vertex_index", vertex)
+    except TypeError:  # their arrays are missing
+        return True
+    end = first.astype(np.int64) + count
+    whole = (first >= 0) & (count >= 3) & (end <= len(vertex))
+    known = (vertex >= 0) & (vertex < len(mesh.vertices))
+    return not (whole.all() and known.all())
 
 
 def _reflectivity(shown: bpy.types.Object, material: Integer) -> Float:
@@ -239,8 +269,8 @@ def _reflectivity(shown: bpy.types.Object, material: Integer) -> Float:
 def _place(local: Float, matrix: Float, name: str) -> tuple[Float, Boolean]:
     """Return the corners in site axes of the triangles that have an area, and which have one."""
     world = local @ matrix[:3, :3].T + matrix[:3, 3]
-    if not np.isfinite(world).all():
-        raise SeipError(f"object {name!r} has a vertex or transform that is no finite number: repair or delete it")
+    if fault := LOCAL_COORDINATE.fault(world):
+        raise SeipError(f"object {name!r} has a vertex or transform that {fault}: repair or delete it")
     area = np.linalg.norm(np.cross(world[:, 1] - world[:, 0], world[:, 2] - world[:, 0]), axis=1) / 2
     solid = area > 0
     if not solid.any():
@@ -256,8 +286,8 @@ def _meshes(parts: list[Shown], collection: str) -> tuple[Mesh, ...]:
             continue
         if part.triangles is not None:
             source = str(part.source.get(contract.SOURCE, ""))
-            assumed = bool(part.source.get(contract.HEIGHT_ASSUMED, False))
-            meshes.append(Mesh(part.name, part.triangles, part.reflectivity, source, assumed))
+            assumed = (bool(part.source.get(key, False)) for key in (contract.HEIGHT_ASSUMED, contract.WIDTH_ASSUMED))
+            meshes.append(Mesh(part.name, part.triangles, part.reflectivity, source, *assumed))
         elif part.source not in instancers and collection != contract.POLES:
             raise SeipError(
                 f"object {part.name!r} in {collection!r} has no mesh: give it faces or take it out of the collection"
@@ -267,6 +297,31 @@ def _meshes(parts: list[Shown], collection: str) -> tuple[Mesh, ...]:
 
 def _areas(parts: list[Shown], collection: str) -> tuple[NamedArea, ...]:
     return tuple(area_of(part, collection) for part in parts if collection in part.collections)
+
+
+def _keep_off_areas(parts: list[Shown]) -> tuple[KeepOffArea, ...]:
+    """Return the areas of the objects that name a rule: surfaces of the street, and areas that are there for it."""
+    areas = []
+    for part in parts:
+        rule = _rule(part)
+        if rule is not None and part.collections & _KEEPING_OFF and part.triangles is not None:
+            areas.append(KeepOffArea(part.name, outline(part.triangles), rule))
+    return tuple(areas)
+
+
+def _rule(part: Shown) -> RuleName | None:
+    """Return the rule that an object names, None where it names none."""
+    named = part.source.get(contract.KEEP_OFF)
+    return next((rule for rule in RULES if rule == named), None)
+
+
+def rule_fault(part: Shown) -> str:
+    """Return what is wrong with the rule that an object names, or ""."""
+    named = part.source.get(contract.KEEP_OFF)
+    if named is None or _rule(part) is not None:
+        return ""
+    known = ", ".join(RULES)
+    return f"property {contract.KEEP_OFF} of object {part.name!r} is {named!r}: it must be one of {known}"
 
 
 def area_of(part: Shown, collection: str) -> NamedArea:
@@ -288,6 +343,8 @@ def _weight(part: Shown) -> float:
     weight = part.source.get(contract.WEIGHT, DEFAULT_WEIGHT)
     if isinstance(weight, bool) or not isinstance(weight, int | float):
         raise SeipError(f"property {contract.WEIGHT} of object {part.name!r} must be a number, not {weight!r}")
+    if fault := WEIGHT.fault(weight):
+        raise SeipError(f"property {contract.WEIGHT} of object {part.name!r} {fault}: correct it")
     return float(weight)
 
 
@@ -337,6 +394,7 @@ def _pole(part: Shown, corners: Float | None) -> Pole:
         forbidden=bool(part.source.get(contract.FORBIDDEN, False)),
         mandatory=bool(part.source.get(contract.MANDATORY, False)),
         source=str(part.source.get(contract.SOURCE, "")),
+        keep_off=_rule(part),
     )
 
 
@@ -367,8 +425,8 @@ def _foot(origin: Float, corners: Float | None) -> Float:
 
 def _finite_origin(part: Shown) -> Float:
     origin: Float = part.matrix[:3, 3]
-    if not np.isfinite(origin).all():
-        raise SeipError(f"pole {part.name!r} stands at a place that is no finite number: set its location")
+    if fault := LOCAL_COORDINATE.fault(origin):
+        raise SeipError(f"a coordinate of pole {part.name!r} {fault}: set its location")
     return origin
 
 
@@ -398,6 +456,14 @@ def geo_reference_of(scene: bpy.types.Scene) -> GeoReference:
     return GeoReference(text, (x, y, z, heading))
 
 
+def attribution_of(scene: bpy.types.Scene) -> tuple[str, ...]:
+    """Return the credits that the sources of a scene demand, one for each line of its property."""
+    text = scene.get(contract.ATTRIBUTION, "")
+    if not isinstance(text, str):
+        raise SeipError(f"scene property {contract.ATTRIBUTION} must be a text, one credit on each line, not {text!r}")
+    return tuple(line.strip() for line in text.splitlines() if line.strip())
+
+
 def _numbers(scene: bpy.types.Scene, name: str, many: tuple[str, int], units: str) -> list[float]:
     """Return the numbers that a property of a scene holds; zeros where there is none."""
     word, count = many
@@ -406,7 +472,7 @@ def _numbers(scene: bpy.types.Scene, name: str, many: tuple[str, int], units: st
         values = [] if isinstance(stored, str) else [float(value) for value in stored]
     except (TypeError, ValueError):
         values = []
-    if len(values) != count or not all(map(math.isfinite, values)):
+    if len(values) != count or not MAP_COORDINATE.allow(values):
         raise SeipError(f"scene property {name} must be {word} finite numbers {units}, not {stored!r}")
     return values
 
@@ -427,5 +493,5 @@ def _is_visible(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
 
 def hidden_sentence(collection: str, hidden: list[str]) -> str:
     """Say that objects of a collection do not count because the viewport does not show them."""
-    objects = f"{len(hidden)} hidden object{'s' * (len(hidden) > 1)}"
+    objects = counted(len(hidden), "hidden object")
     return f"{objects} in {collection!r} did not count: show them if they should"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,8 +24,10 @@ from ..core.results.placement_record import PlacementRecord, relevant_warnings, 
 from ..core.results.site_file import save_site_file
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
+from ..core.storage.files import unfinished_name
 from .blend_file import save_blend
 from .gltf import save_glb
+from .pieces import tidy_pieces
 from .render import save_rendered_view
 from .write import write_result
 
@@ -56,8 +57,7 @@ def result_files(folder: Path) -> Iterator[dict[str, Path]]:
     SeipError
         A file cannot be written.
     """
-    mark = secrets.token_hex(4)
-    part = {name: folder / f".{mark}.{name}" for name in (*MAY_BE_MISSING, *FILES)}
+    part = {name: unfinished_name(folder, name) for name in (*MAY_BE_MISSING, *FILES)}
     try:
         yield part
         (folder / FILES[-1]).unlink(missing_ok=True)
@@ -103,9 +103,10 @@ def write_result_folder(  # noqa: PLR0913  # everything that a result is made of
     """
     deployment = solution.deployment
     with result_files(folder) as part:
+        tidy_pieces(scene)
         write_result(scene, site, deployment)
         save_blend(part["placed.blend"])
-        save_glb(part["scene.glb"])
+        save_glb(part["scene.glb"], site.attribution)
         finish(write_tables(part, geometry, site, solution, record, visible, models))
         if render:
             save_rendered_view(part["view.png"], scene, site, deployment)
@@ -122,10 +123,10 @@ def write_tables(  # noqa: PLR0913, PLR0917  # as above
 ) -> Generator[Progress, None, None]:
     """Write all of a result that takes no look at Blender's data; see `write_result_folder`."""
     deployment = solution.deployment
-    yield Progress(0, 3, "writing tables")
+    yield Progress(0, 3, "writing tables", counted=False)
     save_placement_record(part["placement.json"], record)
     save_carla_spawns(part["carla_spawn.json"], deployment, site.origin)
-    yield Progress(1, 3, "writing tables")
+    yield Progress(1, 3, "writing tables", counted=False)
     save_candidate_table(part["candidates.csv"], site, models, visible, deployment)
     problem = placement_problem(site, visible, models, solution.objective)
     save_site_file(part["site.npz"], record.inputs["visibility"], geometry, site, solution, problem)
@@ -133,6 +134,6 @@ def write_tables(  # noqa: PLR0913, PLR0917  # as above
     if placed is not None:
         save_geojson(part["placement.geojson"], placed)
         save_kml(part["placement.kml"], placed)
-    yield Progress(2, 3, "drawing the plan")
+    yield Progress(2, 3, "drawing the plan", counted=False)
     warnings = relevant_warnings(record.warnings, models, (sensor.model.key for sensor in deployment.sensors))
     save_plan_view(part["plan.png"], geometry, site, deployment, [*solution.caption, *warnings])

@@ -19,6 +19,7 @@ from ..core.streetscape.street_furniture import Solid, join, prism, tube
 from . import contract
 from .materials import linear, matt
 from .meshes import mesh_of
+from .pieces import attach_piece, rename_whole
 
 MARK = "seip_result"
 """Custom property of every object made here, so that the next result replaces it and nothing else."""
@@ -27,6 +28,8 @@ SEEN_BY, TARGET_WEIGHT, COLOUR = "seip_seen", "seip_weight", "seip_colour"
 """Attributes of the coverage mesh, the first two of each target's square."""
 CLASS_WORDS, CLASS_COLOURS, SHARES, ASPECT = "seip_classes", "seip_class_colours", "seip_shares", "seip_aspect"
 """Custom properties of the coverage: what its colours mean; the aspect is empty where they are another's."""
+AS_PLACED: Aspect = "times"
+"""Aspect that a new placement is coloured by."""
 
 LIFT = max(height for height, _ in AREA_OVERLAYS.values()) + 0.02
 """Metres of the coverage above the road: over the veils of areas, under the top of a kerb, which cuts it off."""
@@ -77,7 +80,7 @@ def take_over(
         _remove(old)
     for sensor in deployment.sensors:
         if sensor.label in empties:  # nobody has deleted it meanwhile
-            empties[sensor.label].name = _name(sensor)
+            rename_whole(empties[sensor.label], _name(sensor))
             _describe(empties[sensor.label], sensor)
     _write_coverage(contract.find_or_make(scene, contract.COVERAGE), site.targets, deployment)
 
@@ -105,7 +108,7 @@ def _write_sensors(collection: bpy.types.Collection, sensors: Sequence[Sensor]) 
         name = f"{sensor.label} body"
         body = bpy.data.objects.new(name, mesh_of(name, _hardware(sensor)))
         body[MARK] = True
-        body.parent = empty
+        attach_piece(body, empty)
         collection.objects.link(body)
 
 
@@ -204,12 +207,11 @@ def show_seen_by(scene: bpy.types.Scene, seen_by: Integer) -> None:
     SeipError
         There is no coverage, or it is of other targets.
     """
-    aspect = _shown_coverage(scene).get(ASPECT)
-    recolour(scene, as_placed(seen_by))
     obj = _shown_coverage(scene)
+    aspect = obj.get(ASPECT) or AS_PLACED  # nothing is compared any longer
+    recolour(scene, as_placed(seen_by))
     obj.data.attributes[SEEN_BY].data.foreach_set("value", seen_by.astype(np.int32))
-    if aspect:
-        colour_coverage(scene, aspect)
+    colour_coverage(scene, aspect)
 
 
 def colour_coverage(scene: bpy.types.Scene, aspect: Aspect) -> None:
@@ -262,6 +264,7 @@ def _write_coverage(collection: bpy.types.Collection, targets: Targets, deployme
     obj = bpy.data.objects.new("Coverage", _coverage_mesh(targets, deployment.seen_by))
     obj[MARK] = True
     _paint(obj, as_placed(deployment.seen_by))
+    obj[ASPECT] = AS_PLACED
     obj["seip_coverage"] = deployment.coverage
     obj["seip_seen_twice"] = deployment.seen_twice
     obj["seip_coverage_weighted"] = deployment.weighted

@@ -11,12 +11,13 @@ from gpu_extras.batch import batch_for_shader
 from ..core.arrays import Float
 from ..core.lidar.model import LidarModel
 from ..core.lidar.rings import BeamRings, beam_rings
+from ..core.pictures.palette import DENSE_BEAMS, PAPER, WIDE_BEAMS, rgb
 from ..core.visibility.ring_resolution import unresolved_from
 from ..scene import contract
 from ..session import session
 from .overlays import redraw
 
-DENSE, WIDE, CONE = (0.30, 0.75, 1.0, 0.9), (1.0, 0.55, 0.10, 0.9), (1.0, 1.0, 1.0, 0.35)
+DENSE, WIDE, CONE = (*rgb(DENSE_BEAMS), 0.9), (*rgb(WIDE_BEAMS), 0.9), (*rgb(PAPER), 0.35)
 """Colours of rings within 2δ of the next, of others, and of the edges of the field of view."""
 WIDTH = 1.5  # pixels
 UPRIGHT = 1e-5  # radians

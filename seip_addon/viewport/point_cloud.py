@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..core.pictures.cloud_colours import STATIC_COLOUR, By, cloud_colours, sensor_colour, strength_ramp
-from ..core.pictures.palette import MAX_INTENSITY, rgb
+from ..core.pictures.cloud_colours import By, cloud_colours, sensor_colour, strength_ramp
+from ..core.pictures.palette import MAX_INTENSITY, STATIC_COLOUR, rgb
 from ..core.scans import Frame, MountedSensor
 from ..overlay import Block, Colour, Entry, Layer, Overlay
 

@@ -1,34 +1,48 @@
-"""Sight lines and shadows of one sensor."""
+"""Sight lines of one sensor, and the road in its range that it does not see."""
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..core.pictures.palette import INK, rgb
+from ..core.arrays import Float
+from ..core.pictures.palette import HIDDEN_COLOUR, MISSED_COLOUR, SIGHT_LINE, rgb
 from ..core.visibility.sight_lines import SightLines
 from ..overlay import Block, Colour, Entry, Layer, Overlay
 from ..scene.write import LIFT
 
 NAME = "sight lines"
-LINE_COLOUR: Colour = (1.0, 0.85, 0.25, 0.30)
-SHADOW_COLOUR: Colour = (*rgb(INK), 0.80)
-ABOVE = LIFT + 0.02  # metres of the shadows over the road: on the coverage, not in it
+LINES: Colour = (*rgb(SIGHT_LINE), 0.30)
+HIDDEN: Colour = (*rgb(HIDDEN_COLOUR), 0.80)
+MISSED: Colour = (*rgb(MISSED_COLOUR), 0.80)
+ABOVE = LIFT + 0.02  # metres of the squares over the road: on the coverage, not in it
 
 
 def sight_overlay(sight: SightLines, label: str) -> Overlay:
     """Return the lines from a sensor to the targets that it sees, and squares on those that it does not."""
     ends = sight.ends + np.array((0.0, 0.0, ABOVE))
     lines = np.stack([np.broadcast_to(sight.eye, ends.shape), ends], axis=1).reshape(-1, 3)
-    squares = sight.shadows + np.array((0.0, 0.0, ABOVE))
-    faces = squares[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
     layers = (
-        Layer("TRIS", faces.astype(np.float32), SHADOW_COLOUR),
-        Layer("LINES", lines.astype(np.float32), LINE_COLOUR),
+        Layer("TRIS", _faces(sight.hidden), HIDDEN),
+        Layer("TRIS", _faces(sight.missed), MISSED),
+        Layer("LINES", lines.astype(np.float32), LINES),
     )
     drawn = "" if len(sight.ends) == sight.seen else f", {len(sight.ends):,} of them drawn"
     block = Block(
         f"{label}: {sight.in_range:,} targets in its range",
         (
-            Entry(f"{sight.seen:,} seen{drawn}", ((*LINE_COLOUR[:3], 1.0),)),
-            Entry(f"{sight.in_range - sight.seen:,} in its shadows", ((*SHADOW_COLOUR[:3], 1.0),)),
+            Entry(f"{sight.seen:,} seen{drawn}", (_opaque(LINES),)),
+            Entry(f"{len(sight.hidden):,} hidden by something", (_opaque(HIDDEN),)),
+            Entry(f"{len(sight.missed):,} in view, but between beams or too faint", (_opaque(MISSED),)),
         ),
     )
     return Overlay(layers, lambda _scene: block, label)
+
+
+def _faces(squares: Float) -> NDArray[np.float32]:
+    """Return the two triangles of each square, (6 m, 3), above the road."""
+    corners = (squares + np.array((0.0, 0.0, ABOVE))).astype(np.float32)
+    faces: NDArray[np.float32] = corners[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    return faces
+
+
+def _opaque(colour: Colour) -> Colour:
+    return (*colour[:3], 1.0)

@@ -44,6 +44,22 @@ def record(scene: bpy.types.Scene) -> dict:
     return json.loads(scene.seip.result.record)
 
 
+def test_the_post_of_a_deleted_sensor_is_not_exported(placed, tmp_path):
+    bodies = {label: empty.children[0].name for label, empty in selection.sensor_empties(placed).items()}
+    move(placed)
+    bpy.ops.seip.evaluate_sensors()
+    placed.seip.result.render = False
+    assert bpy.ops.seip.export_result() == {"FINISHED"}
+    names = {node["name"] for node in gltf_nodes(tmp_path / "out" / "scene.glb")}
+    assert {label for label, name in bodies.items() if name in names} == {"S1", "S2"}
+
+
+def gltf_nodes(path: Path) -> list[dict]:
+    """Return the nodes of a binary glTF: its first chunk, after 12 bytes of header and 8 of its own, is JSON."""
+    content = path.read_bytes()
+    return json.loads(content[20 : 20 + int.from_bytes(content[12:16], "little")])["nodes"]
+
+
 def full_scan(scene: bpy.types.Scene) -> np.ndarray:
     """Return which targets the sensors see as followed sensors do, which go another way through the code."""
     bpy.ops.seip.follow_sensors()

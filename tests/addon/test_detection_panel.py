@@ -16,6 +16,7 @@ import pytest
 
 from seip_addon import preferences
 from seip_addon.background import Background
+from seip_addon.core.progress import Progress
 from seip_addon.core.workflows.detection import DetectingPython
 from seip_addon.operators.detection import SEIP_OT_detect
 from seip_addon.panels import detection as detection_panel
@@ -253,6 +254,7 @@ from headless import runtime
 from seip_addon.core.progress import Progress
 with runtime.progress_bar() as report:
     report(Progress(0, 0, "prepare run-1"))
+    report(Progress(1, 3, "place 4 × type2", counted=False))
     report(Progress(12, 1200, "detect in run-1"))
 """
     outcome = subprocess.run(  # noqa: S603  # our own interpreter and script
@@ -267,4 +269,6 @@ with runtime.progress_bar() as report:
     from seip_addon.core.workflows.detection import _progress  # noqa: PLC0415
 
     found = _progress(outcome.stderr)
-    assert (found.done, found.total, found.what) == (12, 1200, "detect in run-1")
+    assert found == Progress(12, 1200, "detect in run-1")
+    stages = _progress(outcome.stderr.rpartition("detect in run-1")[0])
+    assert stages == Progress(1, 3, "place 4 × type2", counted=False)

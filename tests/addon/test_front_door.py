@@ -18,7 +18,11 @@ from seip_addon import loose_pieces, scene_status
 from seip_addon.panels import front_door
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
+from seip_addon.scene.sensors import placed_sensors
 from seip_addon.scene.views import CLIP_END
+from seip_addon.scene.write import write_result
+from tests.scene_by_hand import make_scene
+from tests.small_junction import make_example
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 
@@ -173,6 +177,31 @@ def test_windows_of_a_deleted_building_go_with_it(scene):
     loose_pieces.remove()
     assert name not in scene.objects
     assert any(obj.name.endswith(" windows") for obj in scene.objects)
+
+
+@pytest.mark.parametrize("copied", [False, True])
+def test_the_post_of_a_deleted_sensor_goes_with_it(scene, copied):
+    example = make_example()
+    scene = make_scene(example.geometry)
+    write_result(scene, example.site, example.deployment)
+    sensor = placed_sensors(scene)["S1"]
+    before = {obj.name for obj in scene.objects}
+    if copied:  # with its body, as Shift+D copies what is selected
+        bpy.context.view_layer.update()
+        with bpy.context.temp_override(selected_objects=[sensor, *sensor.children]):
+            bpy.ops.object.duplicate()
+        bpy.context.view_layer.update()
+        (sensor,) = (obj for obj in scene.objects if obj.name not in before and obj.type == "EMPTY")
+        loose_pieces.remove()
+    else:
+        before -= {sensor.name, *(child.name for child in sensor.children)}
+    assert len(sensor.children) == 1
+    with bpy.context.temp_override(selected_objects=[sensor]):
+        bpy.ops.object.delete()
+    bpy.context.view_layer.update()
+    assert bpy.app.timers.is_registered(loose_pieces.remove)
+    loose_pieces.remove()
+    assert {obj.name for obj in scene.objects} == before
 
 
 @pytest.mark.parametrize("name", ["visibility", "placement", "view", "scan", "dataset", "detection"])

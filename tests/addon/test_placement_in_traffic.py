@@ -40,14 +40,18 @@ def test_panel_and_batch_place_alike_and_what_it_was_chosen_on_stays_with_it(coa
     goal.layer, goal.weights_from_traffic = "height", True
     goal.pose_errors = True  # left from another objective, and not shown for this one
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
-    certificate, purpose = session.state_of(coarse).solution.caption
+    certificate, purpose, band = session.state_of(coarse).solution.caption
+    assert band.startswith("over plausible gains")
+    assert certificate.endswith(
+        "among these candidates to see the points 1.5 m above the road in traffic, on average over 2 instants."
+    )
     assert (certificate[:6], purpose[:17]) == ("Proven", "chosen to see the")
     path = tmp_path / "placed.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
     seip = bpy.context.scene.seip
     panel = parsed_record(seip.result.record)
-    assert any(note.startswith("placing on traffic sees") for note in panel.notes)
+    assert any(note.startswith("this placement sees ") for note in panel.notes)
     seip.traffic.file = str(small_scene.parent / "small_traffic" / "run-1.npz")
     bpy.ops.seip.load_traffic()
     bpy.ops.seip.try_in_traffic()

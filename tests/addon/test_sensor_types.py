@@ -2,6 +2,7 @@
 
 import argparse
 
+from headless.options import read_settings
 from headless.survey import add_options
 
 import bpy
@@ -69,6 +70,14 @@ def test_assumed_poles_are_asked_for_in_the_panel_as_on_the_command_line(survey)
         parser = argparse.ArgumentParser()
         add_options(parser)
         assert parser.parse_args(["-o", "out", *options]).assumed_poles is wanted
+
+
+def test_rules_on_positions_are_allowed_in_the_panel_as_on_the_command_line(survey):
+    survey.allow = {"islands", "cycle-tracks"}
+    parser = argparse.ArgumentParser()
+    add_options(parser)
+    typed = parser.parse_args(["-o", "out", "--allow", "cycle-tracks", "islands"])
+    assert survey.settings().candidates == read_settings(CandidateSettings, typed)
 
 
 def test_the_choice_is_kept_when_a_file_is_reopened(survey, tmp_path):

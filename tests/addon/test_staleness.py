@@ -53,6 +53,24 @@ def forbid() -> None:
     bpy.data.collections["SEIP Poles"].objects[0]["seip_forbidden"] = True
 
 
+def test_a_scene_that_no_longer_counts_in_metres_is_refused_although_it_was_read_before(known):
+    scene = bpy.context.scene
+    scene.unit_settings.system, scene.unit_settings.scale_length = "METRIC", 0.01
+    for operator in (bpy.ops.seip.compute_visibility, bpy.ops.seip.solve_placement):
+        with pytest.raises(RuntimeError, match=r"is 0\.01 m, but is read as one metre: set Unit Scale to 1"):
+            operator()
+    assert not scene.seip.result.record
+    scene.unit_settings.scale_length = 1.0
+    assert bpy.ops.seip.solve_placement() == {"FINISHED"}
+
+
+@pytest.mark.parametrize("name", ["seip_origin", "seip_header_offset", "seip_places"])
+def test_a_property_that_breaks_after_the_scene_was_read_is_refused(known, name):
+    bpy.context.scene[name] = "here"
+    with pytest.raises(RuntimeError, match=name):
+        bpy.ops.seip.solve_placement()
+
+
 @pytest.mark.parametrize("change", [move, reshape, delete, add, modify, hide])
 def test_a_change_is_noticed_at_once_and_read(known, change):
     assert scene_status.stale_survey(bpy.context.scene) == ""

@@ -197,6 +197,6 @@ def test_floating_car_data_are_put_on_the_road(placed, tmp_path):
     fcd.write_text(f"<fcd-export>{''.join(lines)}</fcd-export>", encoding="utf-8")
     placed.seip.traffic.file = str(fcd)
     assert bpy.ops.seip.load_traffic() == {"FINISHED"}
-    assert placed.seip.traffic.loaded.startswith("1 road users, 0 to 5 s\n1 car")
+    assert placed.seip.traffic.loaded.startswith("1 road user, 0 to 5 s\n1 car")
     bpy.ops.seip.scan_frame()
     assert session.scan_of(placed).run.trajectories.source == "run.fcd.xml"

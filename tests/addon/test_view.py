@@ -1,11 +1,15 @@
 """What the viewport shows: colours of the coverage, sight lines, and overlays that are always removed."""
 
+from types import SimpleNamespace
+from unittest.mock import MagicMock
+
 import bpy
 import numpy as np
 import pytest
 from PIL import Image
 
 import seip_addon
+from seip_addon.panels.view import SEIP_PT_view
 from seip_addon.scene import render
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.session import session
@@ -37,18 +41,40 @@ def test_coverage_is_coloured_with_a_legend(placed, aspect):
     assert overlays.handler_count() == 2
 
 
+def test_one_of_the_buttons_of_colours_is_always_pressed(placed):
+    def pressed():
+        layout = MagicMock()
+        panel = SimpleNamespace(layout=layout)
+        context = SimpleNamespace(scene=placed, space_data=SimpleNamespace(shading=SimpleNamespace(type="MATERIAL")))
+        SEIP_PT_view._draw_coverage(panel, context)  # noqa: SLF001  # of the panel, which cannot be made
+        calls = layout.column().row().operator.call_args_list
+        return [call.kwargs["text"] for call in calls if call.kwargs.get("depress") and call.kwargs["text"]]
+
+    assert pressed() == ["Sensors"]
+    for aspect, words in (("seen", "Seen"), ("weights", "Weights"), ("times", "Sensors")):
+        bpy.ops.seip.colour_coverage(aspect=aspect)
+        assert pressed() == [words]
+
+
 def test_sight_lines_are_the_row_of_the_grid(placed):
     held = session.state_of(placed)
     sensor = held.solution.deployment.sensors[1]
     assert bpy.ops.seip.show_sight_lines(sensor=sensor.label) == {"FINISHED"}
     overlay = overlays.find(placed, SIGHT)
-    faces, lines = overlay.layers
+    hidden, missed, lines = overlay.layers
     row = held.survey.grid.visible[sensor.pose]
     assert len(lines.positions) == 2 * row.sum()
     assert np.allclose(lines.positions[::2], sensor.xyz, atol=1e-3)
     assert np.allclose(lines.positions[1::2, :2], held.survey.site.targets.xyz[row, :2], atol=1e-3)
     distance = np.linalg.norm(held.survey.site.targets.xyz - sensor.xyz, axis=1)
-    assert len(faces.positions) == 6 * (~row & (distance <= sensor.model.max_range)).sum()
+    unseen = len(hidden.positions) + len(missed.positions)
+    assert unseen == 6 * (~row & (distance <= sensor.model.max_range)).sum()
+    title, *words = overlay.legend(placed).title, *(entry.words for entry in overlay.legend(placed).entries)
+    assert title.endswith(f"{row.sum() + unseen // 6:,} targets in its range")
+    assert words[1:] == [
+        f"{len(hidden.positions) // 6:,} hidden by something",
+        f"{len(missed.positions) // 6:,} in view, but between beams or too faint",
+    ]
     assert overlay.about == sensor.label
 
 

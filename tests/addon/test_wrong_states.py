@@ -107,12 +107,33 @@ def test_the_panel_says_what_the_record_holds(placed, monkeypatch):
     assert figures["Gap"] == "0.00%"
 
 
-@pytest.mark.parametrize("pose", [None, -1, 10**6])
-def test_a_record_of_a_pose_that_is_not_there_has_its_sentence(placed, pose):
+def test_the_certificate_of_a_placement_for_traffic_is_about_that_and_has_no_tick(placed, monkeypatch):
+    record = json.loads(placed.seip.result.record)
+    note = "chosen to see the road in traffic, on average over 4 instants: objective, bound and gap are of that"
+    record["notes"] = [note, *record["notes"]]
+    placed.seip.result.record = json.dumps(record)
+    monkeypatch.setattr(scene_status, "stale_placement", lambda _: "")
+    icons = {}
+    monkeypatch.setattr(placement_panel, "draw_sentence", lambda _, text, icon="NONE", **__: icons.update({text: icon}))
+    placement_panel.SEIP_PT_placement.draw(SimpleNamespace(layout=MagicMock()), bpy.context)
+    (certificate,) = (text for text in icons if text.startswith("Proven"))
+    assert certificate.endswith("among these candidates to see the road in traffic, on average over 4 instants.")
+    assert icons[certificate] == "INFO"
+
+
+@pytest.mark.parametrize(
+    ("pose", "sentence"),
+    [
+        (None, "another state of the scene or its settings: place again"),
+        (-1, r"sensors\[0\]\.pose is -1, not 0 to"),
+        (10**6, "a sensor has the pose 1000000, and there are 16"),
+    ],
+)
+def test_a_record_of_a_pose_that_is_not_there_has_its_sentence(placed, pose, sentence):
     record = json.loads(placed.seip.result.record)
     record["sensors"][0]["pose"] = pose
     placed.seip.result.record = json.dumps(record)
-    with pytest.raises(RuntimeError, match="another state of the scene or its settings: place again"):
+    with pytest.raises(RuntimeError, match=sentence):
         bpy.ops.seip.rank_candidates()
 
 

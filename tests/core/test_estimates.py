@@ -14,6 +14,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import (
     COUNT,
     SHARE,
+    IntervalEstimate,
     jackknife_reach,
     mean_interval,
     rank_agreements,
@@ -32,6 +33,19 @@ def test_student_quantiles(freedom):
 def test_mean_interval_of_three_seeds_by_hand():
     """Mean 0.7, standard deviation 0.1, t = 4.303: ± 4.303 · 0.1/√3 = 0.248."""
     assert mean_interval([0.6, 0.7, 0.8]) == pytest.approx((0.7 - 0.24841, 0.7 + 0.24841), abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("estimate", "words"),
+    [
+        ((0.0071, -0.001, 0.0152), "0.71 points [-0.10, 1.52] more"),
+        ((-0.0071, -0.0152, 0.001), "0.71 points [-0.10, 1.52] less"),
+        ((-0.0071, -math.inf, math.inf), "0.71 points less [too few data for an interval]"),
+        ((0.0, 0.0, 0.0), "0.00 points [0.00, 0.00] more"),
+    ],
+)
+def test_a_loss_is_called_a_loss(estimate, words):
+    assert IntervalEstimate(*estimate).as_change() == words
 
 
 def test_three_seeds_are_covered_nineteen_times_of_twenty():

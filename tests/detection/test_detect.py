@@ -107,8 +107,9 @@ def test_mistakes_are_named(folder, tmp_path):
     broken.write_bytes(b"no detector")
     with pytest.raises(SeipError, match=r"broken\.pt"):
         detect.main(arguments(folder, "x", detector=broken))
-    with pytest.raises(SeipError, match="must be above 0 s"):
-        detect.main([*arguments(folder, "x"), "--every", "0"])
+    for every in ("0", "-1", "nan", "inf", "1e-9"):
+        with pytest.raises(SeipError, match=rf"--every must be 0\.001 to 86,400 s, not {every}"):
+            detect.main([*arguments(folder, "x"), "--every", every])
     example = make_example()
     make_scene(example.geometry)
     save_blend(tmp_path / "bare.blend")

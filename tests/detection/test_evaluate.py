@@ -112,6 +112,22 @@ def test_an_evaluation_goes_on_and_ends_the_same(run, folder, tmp_path, capsys, 
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
 
 
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--count", "0"], "--count must be 1 to 100,000, not 0"),
+        (["--every", "nan"], "--every must be 0.001 to 86,400 s, not nan"),
+        (["--trainings", "0"], "--trainings must be 1 to 1,000, not 0"),
+        (["--steps", "-5"], "--steps must be 1 to 10,000,000, not -5"),
+        (["--scan-seed", "-1"], "--scan-seed must be at least 0"),
+    ],
+)
+def test_an_option_out_of_its_limits_is_refused_by_its_name(run, tmp_path, options, sentence):
+    with pytest.raises(SeipError, match=sentence):
+        run(tmp_path / "out", *options)
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_run_without_road_users_in_the_region_is_refused_before_training(run, runs, tmp_path):
     elsewhere = Trajectories.load(runs[2])
     moved = replace(elsewhere, position=elsewhere.position + 5000.0, source="of elsewhere")
@@ -145,8 +161,8 @@ def test_runs_beside_a_scene_are_ordered_by_their_numbers(tmp_path):
     [
         ((), (0, 1, 2), "3 runs of traffic are too few"),
         ((), (0, 1, 2, 0), "run-1 and run-1 are nearly the same traffic"),
-        (("--every", "0"), (0, 1, 2, 3), "time between frames"),
-        (("--trainings", "0"), (0, 1, 2, 3), "one training or more"),
+        (("--every", "0"), (0, 1, 2, 3), "--every must be"),
+        (("--trainings", "0"), (0, 1, 2, 3), "--trainings must be 1 to"),
         (("--device", "abacus"), (0, 1, 2, 3), "torch cannot use the device 'abacus'"),
     ],
 )

@@ -50,7 +50,8 @@ def placed(small_scene, tmp_path_factory):
         for name, options in sensors.items():
             place.main([str(small_scene), "-o", str(folder / name), "--count", "2", *COARSE, "--sensor", *options])
     record = json.loads((folder / "alone" / "placement.json").read_text(encoding="utf-8"))
-    for name, change in {"empty": {"sensors": []}, "elsewhere": {"site": record["site"] | {"name": "Away"}}}.items():
+    nothing = {"sensors": [], "price_usd": 0, "coverage": record["coverage"] | {"whole": 0, "seen_twice": 0}}
+    for name, change in {"empty": nothing, "elsewhere": {"site": record["site"] | {"name": "Away"}}}.items():
         (folder / name).mkdir()
         (folder / name / "placement.json").write_text(json.dumps(record | change), encoding="utf-8")
     return folder

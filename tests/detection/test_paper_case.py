@@ -75,7 +75,7 @@ def test_routes_elsewhere_are_one_sentence(run, network):
         (["--trainings", "0"], "ask for one training or more, not 0"),
         (["--steps", "0"], "training must have 1 step or more"),
         (["--runs", "3"], "ask for 4 to 999 runs of traffic, not 3"),
-        (["--every", "0"], "the time between frames must be above 0 s, not 0 s"),
+        (["--every", "0"], r"--every must be 0\.001 to 86,400 s, not 0"),
         (["--device", "abacus"], "abacus"),
     ],
 )

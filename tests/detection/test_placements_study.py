@@ -11,7 +11,6 @@ import pytest
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless.detection.frame_results import FrameResult
-from headless.detection.placements_study.car_returns import CAR_HEIGHT, CAR_REFLECTED, CAR_SPAN, returns_on_cars
 from headless.detection.placements_study.criteria import criteria_of
 from headless.detection.placements_study.drawing import (
     BETWEEN,
@@ -40,6 +39,9 @@ from seip_addon.core.lidar import beam_directions, load_catalogue, return_chance
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.search_limits import DEFAULT_LIMITS
 from seip_addon.core.progress import finish
+from seip_addon.core.returns.bodies import PANELS
+from seip_addon.core.returns.expected_returns import expected_returns
+from seip_addon.core.returns.road_users import cars_at
 from seip_addon.core.scans import MountedSensor, ScanSettings
 from seip_addon.core.scans.static_scene import StaticScene
 from seip_addon.core.site.site import Targets
@@ -143,11 +145,14 @@ def test_more_placements_than_there_are_get_a_sentence(survey):
         finish(draw_placements(survey, replace(SETTINGS, placements=400, count=1), {}))
 
 
+CAR = PANELS["car"]
+
+
 def rectangle(sensor, target):
     """The car as two triangles that face the sensor."""
     offset = target - sensor.xyz
-    across = np.array([-offset[1], offset[0], 0.0]) / np.hypot(*offset[:2]) * CAR_SPAN / 2
-    up = np.array([0.0, 0.0, CAR_HEIGHT])
+    across = np.array([-offset[1], offset[0], 0.0]) / np.hypot(*offset[:2]) * CAR.width / 2
+    up = np.array([0.0, 0.0, CAR.height])
     a, b, c, d = target - across, target + across, target + across + up, target - across + up
     return np.array([(a, b, c), (a, c, d)])
 
@@ -169,8 +174,8 @@ def test_a_cars_returns_are_those_of_a_scan_of_it(turn):
         car = rectangle(sensor, target)
         reach, triangle = make_ray_caster(np.concatenate([static, car])).cast(sensor.xyz, beams, model.max_range)
         on_car = reach[triangle >= len(static)]
-        expected.append(return_chance(model, on_car, np.full(len(on_car), CAR_REFLECTED)).sum())
-    found = returns_on_cars(sensor, make_ray_caster(static), targets)
+        expected.append(return_chance(model, on_car, np.full(len(on_car), CAR.reflected)).sum())
+    found, _ = expected_returns(make_ray_caster(static), sensor.xyz, turn, model, cars_at(targets, 1.0))
     assert expected[2] == 0  # behind the wall
     assert min(expected[:2]) > 20
     np.testing.assert_allclose(found, expected, rtol=0.02, atol=2.0)

@@ -10,6 +10,7 @@ import bpy
 import pytest
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.storage.files import locked_file
 from seip_addon.scene import contract
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -43,6 +44,16 @@ def site(tmp_path, road):
 def opened(path):
     bpy.ops.wm.open_mainfile(filepath=str(path))
     return bpy.context.scene
+
+
+def test_a_file_that_another_run_builds_is_left_to_it(road, tmp_path):
+    output = tmp_path / "site.blend"
+    command = [str(road), "--near", "1100", "2000", "--radius", "30", "-o", str(output)]
+    with locked_file(output), pytest.raises(SeipError, match="another run is writing"):
+        build_scene.main(command)
+    assert not output.exists()
+    build_scene.main(command)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["site.blend", "street.xodr"]
 
 
 @pytest.mark.slow
@@ -85,11 +96,11 @@ def test_the_command_line_goes_before_the_site_file(site, road, tmp_path):
     [
         (["{road}", "-o", "{out}.blend"], "no place is named"),
         (["{road}", "--junction", "7", "-o", "{out}.blend"], "no junction '7'"),
-        (["{road}", "--near", "1100", "2000", "--radius", "-3", "-o", "{out}.blend"], "the radius must be above 0"),
-        (["{road}", "--near", "1100", "2000", "--radius", "nan", "-o", "{out}.blend"], "the radius must be above 0"),
+        (["{road}", "--near", "1100", "2000", "--radius", "-3", "-o", "{out}.blend"], "the radius must be 0.1 to"),
+        (["{road}", "--near", "1100", "2000", "--radius", "nan", "-o", "{out}.blend"], "--radius must be a finite"),
         (["{road}", "--near", "1100", "2000", "--approaches", "50", "-o", "{out}.blend"], "those of a junction"),
         (["{road}", "--near", "1100", "2000", "--level", "9", "-o", "{out}.blend"], "no road '9' at this place"),
-        (["{road}", "--near", "nan", "2000", "-o", "{out}.blend"], "two finite numbers"),
+        (["{road}", "--near", "nan", "2000", "-o", "{out}.blend"], "--near must be a finite number"),
         (["{road}", "--near", "1100", "2000", "-o", "{out}.obj"], r"let it end in \.blend"),
         (["{out}.xodr", "--near", "0", "0", "-o", "{out}.blend"], r"out\.xodr"),
         (["{site}", "--site", "{site}", "-o", "{out}.blend"], "leave the other one"),

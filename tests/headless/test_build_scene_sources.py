@@ -8,8 +8,11 @@ import pytest
 from city_text import CityModel, origin_at
 from dem_files import sampled, write_dem
 from opendrive_text import document, geometry, lane, road, section
+from osm_text import Extract
+from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.opendrive import read_map
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 
@@ -29,6 +32,8 @@ def street(tmp_path):
 @pytest.fixture
 def town(tmp_path):
     model = CityModel((X, Y, 3.0), 25833)
+    contact = {"contactName": "City of Mills", "emailAddress": "mills@example.com"}
+    model.content["metadata"] |= {"title": "Mills in 3D", "referenceDate": "2020-05-01", "pointOfContact": contact}
     return model.add("a", model.gabled(5, 12, 10, 8, 6, 9)).write(tmp_path / "town.city.json")
 
 
@@ -43,8 +48,12 @@ def build(street, tmp_path, *more):
 
 def test_buildings_and_ground_are_in_the_scene(street, town, tmp_path, capsys):
     heights = sampled(lambda x, y: 40 + 0.04 * (x - X) + 0 * y, X - 200, Y + 200, 400)
-    dem = write_dem(tmp_path / "dem.tif", heights, X - 200, Y + 200)
+    dem = write_dem(tmp_path / "dem.tif", heights, X - 200, Y + 200, credit="Surveyors of the State, 2021")
     scene = build(street, tmp_path, "--buildings", town, "--terrain", dem)
+    assert read_scene(scene).geometry.attribution == (
+        "Mills in 3D, City of Mills, 2020-05-01",
+        "Surveyors of the State, 2021",
+    )
     (house,) = [obj for obj in scene.objects if obj.get(contract.SOURCE) == "city model"]
     assert house.name == "Building 1"
     geometry_read = read_scene(scene).geometry
@@ -87,3 +96,19 @@ def test_a_chart_shows_what_boxes_cost(street, tmp_path):
     scene = build(street, tmp_path, "--terrain", survey)
     assert [obj.name for obj in scene.objects if obj.get(contract.SOURCE) == "survey"] == ["Surveyed building 1"]
     assert (tmp_path / "site.boxes.png").stat().st_size > 1000
+
+
+@needs_sumo
+def test_the_map_is_written_where_the_level_must_be_chosen(tmp_path):
+    extract = Extract()
+    for line, more in (((-300, -20), {}), ((-20, 20), {"bridge": "yes"}), ((20, 300), {})):
+        extract.way([(x, 0) for x in line], highway="primary", name="High Road", **more)
+    extract.way([(0, -300), (0, 300)], highway="trunk", name="Trunk Road")
+    path, output = extract.write(tmp_path / "place.osm"), tmp_path / "site.blend"
+    asked = [str(path), "--near-latlon", "52.5, 13.4", "--radius", "60", "-o", str(output)]
+    with pytest.raises(SeipError, match=r"--level 'High Road' or --level 'Trunk Road'; .*site\.xodr is written"):
+        build_scene.main(asked)
+    assert not output.exists()
+    assert {road.name for road in read_map(tmp_path / "site.xodr").roads} >= {"High Road", "Trunk Road"}
+    build_scene.main([*asked, "--level", "High Road"])
+    assert output.exists()

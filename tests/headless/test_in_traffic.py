@@ -55,7 +55,7 @@ def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, option
     said = capsys.readouterr().out
     assert "chosen for the empty road: " in said
     assert "vehicles of one run within 1 m of one of another at the same instant: " in said
-    assert any(note.startswith("placing on traffic sees") and note in said for note in notes)
+    assert any(note.startswith("this placement sees ") and note in said for note in notes)
 
 
 def test_traffic_that_is_of_no_use_is_refused(tmp_path, run):
@@ -71,5 +71,5 @@ def test_traffic_that_is_of_no_use_is_refused(tmp_path, run):
         run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "short.npz", x=5.0, end=1.0))
     with pytest.raises(SeipError, match=r"here.npz and .*again.npz are nearly the same traffic"):
         run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "again.npz", x=0.5))
-    with pytest.raises(SeipError, match="ask for one instant"):
+    with pytest.raises(SeipError, match="--instants must be 1 to 10,000, not 0"):
         run(tmp_path / "out", "--instants", "0")

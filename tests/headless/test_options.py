@@ -2,12 +2,15 @@
 
 import argparse
 import math
+from pathlib import Path
 
-from headless.options import add_objective, add_settings, new_parser, read_objective, read_settings
+from headless.options import add_objective, add_settings, new_parser, read_objective, read_settings, real_number
 from headless.survey import add_options
 
 import pytest
 
+from seip_addon.core.errors import SeipError
+from seip_addon.core.limits import Limits
 from seip_addon.core.placement.objective import Objective
 from seip_addon.core.robustness.risk import Risk
 from seip_addon.core.scans import ScanSettings
@@ -44,6 +47,8 @@ def test_options_left_alone_give_the_defaults(kind):
         (["--yaws", "1.5"], CandidateSettings, None),
         (["--setback", "0.7", "--assumed-poles"], CandidateSettings, {"setback": 0.7, "assumed_poles": True}),
         (["--setback", "near"], CandidateSettings, None),
+        (["--allow", "islands", "private"], CandidateSettings, {"allow": ("islands", "private")}),
+        (["--allow", "gardens"], CandidateSettings, None),
         (["--delta", "0.5"], VisibilitySettings, {"delta": 0.5}),
         (["--grid", "2", "--engine", "bvh"], SurveySettings, {"grid_spacing": 2.0, "engine": "bvh"}),
         (["--engine", "eyes"], SurveySettings, None),
@@ -67,7 +72,7 @@ def test_help_has_a_line_for_each_option_and_names_its_default(monkeypatch):
     assert "  --sensor KEY ...            types to choose from (default: type1 type2 type3)" in lines
     (assumed,) = (line for line in lines if "--assumed-poles" in line)
     assert "default" not in assumed
-    assert len(lines) <= 40
+    assert len(lines) <= 41
 
 
 def test_help_names_the_options_of_a_survey_where_another_command_explains_them(monkeypatch):
@@ -91,3 +96,74 @@ def test_weights_are_the_scene_s_or_one_for_all():
     for typed, weight in wanted.items():
         assert read_objective(parser.parse_args(typed)).central_weight == weight
     assert read_objective(parser.parse_args(["--require", "a", "b"])) == Objective(mandatory=("a", "b"))
+
+
+def parsed(*typed):
+    parser = new_parser("try", "Try options.")
+    parser.add_argument("file", nargs="?", type=Path)
+    parser.add_argument("--length", type=float)
+    parser.add_argument("--many", type=int)
+    parser.add_argument("--share", type=real_number(Limits(0.0, 1.0)))
+    return parser.parse_args(typed)
+
+
+@pytest.mark.parametrize(
+    ("typed", "complaint"),
+    [
+        (["--length", "nan"], "--length must be a finite number, not nan"),
+        (["--length=-inf"], "--length must be a finite number, not -inf"),
+        (["--many", "9" * 40], "--many must be a finite number, not 999"),
+        (["--share", "-0.1"], r"--share must be 0 to 1, not -0\.1"),
+        ([""], "file must not be empty: name a file or folder"),
+        (["a" * 5000], "file is 'aaa.*longer than a path"),
+        (["folder/" + "a" * 300 + ".blend"], "file is 'folder/aaa.*longer than a path"),
+    ],
+)
+def test_every_option_takes_finite_numbers_and_possible_paths(typed, complaint):
+    with pytest.raises(SeipError, match=complaint):
+        parsed(*typed)
+
+
+def test_options_within_their_limits_are_read():
+    options = parsed("scene.blend", "--length", "-2.5", "--many", "3", "--share", "1")
+    assert (options.file, options.length, options.many, options.share) == (Path("scene.blend"), -2.5, 3, 1.0)
+
+
+@pytest.mark.parametrize("text", ["x", "1.5"])
+def test_a_text_that_is_no_number_is_left_to_the_parser(text, capsys):
+    with pytest.raises(SystemExit):
+        parsed("--many", text)
+    assert "invalid int value" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [
+        ["--near", "-31.97", "115.86"],
+        ["--near", "-31.97,115.86"],
+        ["--near", "-31.97, 115.86"],
+        ["--near", "-31.97,", "115.86"],
+        ["--near", "-31.97; 115.86"],
+        ["--near=-31.97,115.86"],
+        ["--near", "-31.97°, 115.86°"],
+    ],
+)
+def test_a_place_is_read_as_web_maps_copy_it(typed):
+    parser = new_parser("build", "Build.")
+    parser.add_argument("source")
+    parser.add_argument("--near", type=float, nargs=2)
+    parser.add_argument("--name")
+    for args in (["map", *typed, "--name", "1,2"], [*typed, "--name", "1,2", "map"]):
+        read = parser.parse_args(args)
+        assert (read.near, read.name, read.source) == ([-31.97, 115.86], "1,2", "map")
+
+
+@pytest.mark.parametrize(
+    "typed", [["--near", "52.5"], ["--near", "52.5,13.4,1"], ["--near", "52.5,east"], ["--near", ","]]
+)
+def test_what_is_no_pair_of_numbers_is_refused(typed, capsys):
+    parser = new_parser("build", "Build.")
+    parser.add_argument("--near", type=float, nargs=2)
+    with pytest.raises(SystemExit):
+        parser.parse_args(typed)
+    assert "error" in capsys.readouterr().err

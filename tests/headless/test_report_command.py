@@ -1,6 +1,7 @@
 """The report command: from a scene that knows where on the Earth it is to a page that can be sent."""
 
 import json
+import re
 import shlex
 
 from headless import place, report
@@ -16,6 +17,7 @@ from seip_addon.core.results.placement_record import comparable, load_placement_
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import open_blend, save_blend
 
+CREDIT = "© OpenStreetMap contributors (ODbL), data of 2024-03-22"
 QUICK = ["--sensor", "type1", "--heights", "3.5", "--grid", "4", "--spacing", "16", "--no-render"]
 RULES = ["--count", "2", "--forbid", "signal pole 1", "--min-distance", "5", "--weighted", "--installed-cost"]
 
@@ -27,6 +29,7 @@ def folder(small_scene, tmp_path_factory):
     open_blend(small_scene)
     scene = bpy.context.scene
     scene[contract.GEO_REFERENCE] = "+proj=utm +zone=32 +datum=WGS84"
+    scene[contract.ATTRIBUTION] = f"{CREDIT}\nSurveyors & Sons"
     scene[contract.HEADER_OFFSET] = [-4_500_000.0, 5_300_000.0, 0.0, 0.0]
     scene[contract.PLACES] = json.dumps([["Mill Lane", "POLYGON ((-36 -7, -7 -7, -7 7, -36 7, -36 -7))"]])
     save_blend(made / "located.blend")
@@ -40,6 +43,27 @@ def test_a_report_is_written_and_named(folder, capsys):
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "Mill Lane" in page
     assert "Prices are of installed sensors" in page
+    price = load_placement_record(folder / "placement.json").price_usd
+    headline = f"2 sensors see [^.]*\\.[^.]*\\.?[^.]*, for \\${price:,.0f} installed\\."
+    assert re.search(headline, page)
+    assert "Installed price, $" in page
+
+
+def test_everything_that_is_shared_names_the_sources(folder):
+    report.main([str(folder), "--effort", "0"])
+    assert load_placement_record(folder / "placement.json").site.attribution == (CREDIT, "Surveyors & Sons")
+    assert json.loads((folder / "placement.geojson").read_text(encoding="utf-8"))["attribution"][0] == CREDIT
+    assert f"{CREDIT}; Surveyors &amp; Sons" in (folder / "report.html").read_text(encoding="utf-8")
+    assert f"<description>{CREDIT}\nSurveyors &amp; Sons" in (folder / "placement.kml").read_text(encoding="utf-8")
+    chunk = (folder / "scene.glb").read_bytes()
+    size = int.from_bytes(chunk[12:16], "little")
+    assert json.loads(chunk[20 : 20 + size])["asset"]["copyright"] == f"{CREDIT}; Surveyors & Sons"
+
+
+@pytest.mark.parametrize("effort", ["-1", "nan", "inf"])
+def test_an_impossible_effort_is_refused(folder, effort):
+    with pytest.raises(SeipError, match=f"--effort must be 0 to 1e\\+09, not {effort}"):
+        report.main([str(folder), "--effort", effort])
 
 
 def test_the_record_and_the_maps_agree(folder):
@@ -66,7 +90,7 @@ def test_the_command_of_a_record_asks_for_the_same_again(folder, tmp_path, monke
     "typed",
     [
         ["--budget", "60000", "--heights", "4:5:0.5", "--tilts", "-5", "0", "10", "--yaws", "12", "--assumed-poles"],
-        ["--coverage", "0.9", "--central-weight", "4", "--require", "sidewalk 3", "signal pole 2", "--effort", "60"],
+        ["--coverage", "0.9", "--central-weight", "4", "--require", "sidewalk 3", "signal pole 2", "--effort", "90"],
         ["--weather", "rain=10", "visibility=200", "wet", "--reflectivity", "asphalt=0.12", "--time-limit", "5"],
         ["--delta", "0.7", "--detection", "0.8", "--grid", "2", "--solver", "cbc", "--engine", "bvh", "--pose-errors"],
         [],

@@ -32,7 +32,7 @@ def test_it_writes_a_result_and_says_what_it_was_chosen_for(tmp_path, capsys, ru
 
 
 def test_errors_that_cannot_be_meant_are_refused(tmp_path, run):
-    with pytest.raises(SeipError, match="error of tilt must be 0 to 57°, not 90°"):
+    with pytest.raises(SeipError, match=r"--tilt-error must be at most 57\.3 degrees, not 90"):
         run(tmp_path, "--tilt-error", "90")
 
 
@@ -47,11 +47,25 @@ def test_one_sensor_cannot_be_lost_of_one(tmp_path, run):
     [
         (("--tilt-error", "-2"), "the error of tilt must be 0 to 57°, not -2°"),  # not of yaw, which follows it
         (("--position-error", "-1"), "the error of position must be 0 to 100 m"),
-        (("--scenarios", "0"), "asked for 0 draws"),
-        (("--draws", "0"), "asked for 0 draws"),
     ],
 )
 def test_a_slip_is_named_before_any_work(tmp_path, option, sentence, run):
+    with pytest.raises(SeipError, match=sentence):
+        run(tmp_path / "out", *option)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "sentence"),
+    [
+        (("--scenarios", "0"), "--scenarios must be 1 to 10,000, not 0"),
+        (("--scenarios", "1000000000"), "--scenarios must be 1 to 10,000, not 1000000000"),
+        (("--draws", "0"), "--draws must be 1 to 100,000, not 0"),
+        (("--tail", "nan"), "--tail must be 0 to 1, not nan"),
+        (("--central-weight", "1e308"), "--central-weight must be 0 to 1,000,000, not 1e308"),
+    ],
+)
+def test_a_number_out_of_its_limits_is_named_by_its_option(tmp_path, option, sentence, run):
     with pytest.raises(SeipError, match=sentence):
         run(tmp_path / "out", *option)
     assert not (tmp_path / "out").exists()

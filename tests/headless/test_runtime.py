@@ -109,6 +109,22 @@ def test_a_log_gets_a_line_every_ten_seconds_at_most(capsys, monkeypatch) -> Non
     assert lines[2:] == ["search [00:36]"]
 
 
+def test_a_log_gives_the_time_left_of_counted_work_alone(capsys, monkeypatch) -> None:
+    clock = iter(range(0, 1000, 20))
+    monkeypatch.setattr(runtime.time, "monotonic", lambda: next(clock))
+    with runtime.progress_bar() as report:
+        report(Progress(0, 0, "search"))
+        report(Progress(20, 40, "cast"))  # 20 of them are from an earlier run
+        report(Progress(30, 40, "cast"))
+        report(Progress(1, 2, "check", counted=False))
+        report(Progress(2, 2, "check", counted=False))
+    search, resumed, cast, *stages = capsys.readouterr().err.splitlines()
+    assert search == "search [00:20]"
+    assert "[00:00<?" in resumed
+    assert "30/40 [00:20<00:20," in cast
+    assert [line.partition("| ")[2] for line in stages] == ["1/2 [01:20]", "2/2 [01:40]"]
+
+
 def test_what_is_logged_goes_to_the_output_and_warnings_say_so(capsys) -> None:
     runtime.LOG.info("read")
     runtime.warn(["the road is bare"])

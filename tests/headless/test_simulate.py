@@ -154,10 +154,24 @@ def test_traffic_that_is_animated_in_the_scene_is_simulated(folder):
         (["--traffic", "no-such.npz"], "no-such.npz"),
         (["--start", "9"], "known from 0 s to 1 s"),
         (["--rate", "50"], "turns 5 times a second"),
-        (["--seed", "-3"], "seed"),
     ],
 )
 def test_each_mistake_has_its_sentence(folder, change, words):
+    with pytest.raises(SeipError, match=words):
+        simulate.main(arguments(folder, "wrong", *change))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (["--seed", "-3"], "--seed must be at least 0, not -3"),
+        (["--rate", "nan"], "--rate must be a finite number of Hz, not nan"),
+        (["--duration", "inf"], "--duration must be a finite number of s, not inf"),
+        (["--dataset", ""], "--dataset must not be empty"),
+        (["--traffic", f"{'a' * 5000}.npz"], "--traffic is 'aaa.* longer than a path"),
+    ],
+)
+def test_an_option_out_of_its_limits_is_refused_by_its_name(folder, change, words):
     with pytest.raises(SeipError, match=words):
         simulate.main(arguments(folder, "wrong", *change))
 
@@ -167,6 +181,26 @@ def test_a_folder_of_another_run_is_left_alone(folder, run):
     with pytest.raises(SeipError, match="another scene, traffic or settings"):
         simulate.main(arguments(folder, "run", "--seed", "1"))
     assert contents(run) == before
+
+
+def test_a_run_is_not_written_into_the_folder_of_a_placement(folder):
+    (folder / "placed").mkdir()
+    (folder / "placed" / "placement.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(SeipError, match="holds a placement, which a run is not written to"):
+        simulate.main(arguments(folder, "placed"))
+    assert [path.name for path in (folder / "placed").iterdir()] == ["placement.json"]
+
+
+def test_traffic_of_another_site_with_the_same_coordinates_is_refused(folder):
+    traffic = make_traffic()
+    traffic.position[:6, 1] += 15.5  # 12 m beside the middle of the road, where another site has its street
+    traffic.save(folder / "other.npz")
+    with pytest.raises(SeipError, match=r"traffic of another site: \d+% of the vehicle positions of .*other\.npz"):
+        simulate.main(arguments(folder, "wrong", "--traffic", str(folder / "other.npz")))
+    traffic = make_traffic(ORIGIN + np.array([0.0, 0.0, 25.0]))
+    traffic.save(folder / "above.npz")
+    with pytest.raises(SeipError, match="traffic of another site: 100%"):
+        simulate.main(arguments(folder, "wrong", "--traffic", str(folder / "above.npz")))
 
 
 def test_traffic_of_another_place_has_its_sentence(folder):
@@ -206,7 +240,7 @@ def test_a_disk_without_room_has_its_sentence(folder):
     assert "make room there" in done.stderr
     assert "Exception ignored" not in done.stderr
     assert "Traceback" not in done.stderr
-    assert list((folder / "full" / "frames").iterdir()) == []
+    assert list((folder / "full").glob("frames/*")) == []
 
 
 def test_two_runs_into_one_folder_have_a_sentence(folder):

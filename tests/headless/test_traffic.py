@@ -44,7 +44,7 @@ def test_floating_car_data_is_put_on_the_road(tmp_path, capsys):
     sources = ["--fcd", str(fcd(tmp_path)), "--routes", str(routes(tmp_path))]
     traffic.main([str(JUNCTION), *sources, "-o", str(output)])
     said = capsys.readouterr().out
-    assert "1 road users (1 car) from 0 to 5.8 s, 30 samples" in said
+    assert "1 road user (1 car) from 0 to 5.8 s, 30 samples" in said
     assert "warning" not in said
     got = Trajectories.load(output)
     np.testing.assert_allclose(got.position[0, :2], [-102.0, -5.25])
@@ -57,7 +57,7 @@ def test_a_span_of_time_is_cut_out_and_missing_sizes_are_said(tmp_path, capsys):
     output = tmp_path / "t.npz"
     traffic.main([str(JUNCTION), "--fcd", str(fcd(tmp_path)), "--begin", "1", "--end", "2", "-o", str(output)])
     assert Trajectories.load(output).span == (1.0, 2.0)
-    assert "warning: missing sizes: 1 of 1 road users" in capsys.readouterr().out
+    assert "warning: missing sizes: 1 of 1 road user is of" in capsys.readouterr().out
 
 
 def test_another_map_leaves_no_file(tmp_path):
@@ -76,7 +76,7 @@ def test_a_missing_file_is_named(tmp_path):
 
 @pytest.mark.parametrize(("option", "value"), [("--duration", "0"), ("--warm-up", "-1"), ("--duration", "nan")])
 def test_senseless_times_are_refused(tmp_path, option, value):
-    with pytest.raises(SeipError, match="--duration must be above 0 s"):
+    with pytest.raises(SeipError, match=r"--duration must be (above 0 s|a finite number)"):
         traffic.main([str(JUNCTION), "--simulate", "x.xodr", option, value, "-o", str(tmp_path / "t.npz")])
 
 

@@ -37,6 +37,26 @@ def way(start, end, direction, lane=0):
     return f'<connection from="{start}" to="{end}" fromLane="{lane}" toLane="0" dir="{direction}"/>'
 
 
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        (edge("a", "n", ROAD, length=-7), r"n\.net\.xml: <lane> 'a_0' has a lane or node of which length is -7, not 0"),
+        (edge("a", "n", ROAD, length="nan"), "length is nan"),
+        (edge("a", "n", ROAD).replace('shape="0,0 120,0"', 'shape="0,0 nan,0"'), "a coordinate is nan"),
+        (edge("a", "n", ROAD).replace('shape="0,0 120,0"', 'shape="0,0 1e300,0"'), r"a coordinate is 1e\+300"),
+        (edge("a", "n", ROAD).replace('shape="0,0 120,0"', 'shape="0,0"'), "not a line of points"),
+        (edge("a", "n", ROAD).replace('index="0"', 'index="-1"'), "has the index -1"),
+        (edge("a", "n", ROAD).replace(' to="n"', ""), "<edge> 'a' has no 'to'"),
+        (edge("a", "n", ROAD) + way("a", "b", "s", lane=4), "<connection> '' begins on lane 4 of an edge with 1"),
+        ('<junction id="n" type="traffic_light" x="inf" y="0"/>', "<junction> 'n' .* a coordinate is inf"),
+        ("", "has no edges"),
+    ],
+)
+def test_a_network_with_impossible_figures_is_refused(tmp_path, text, complaint):
+    with pytest.raises(SeipError, match=complaint):
+        network(tmp_path, text)
+
+
 def network(folder, *elements):
     path = folder / "n.net.xml"
     path.write_text(f"<net>{''.join(elements)}</net>", encoding="utf-8")
@@ -70,6 +90,20 @@ def test_a_network_by_hand(tmp_path):
     assert streets.onward == {"in": [("left", "l"), ("on", "s"), ("right", "r")]}
     assert [arm.id for arm in streets.arms] == ["in"]
     np.testing.assert_array_equal(streets.signalised["j"], [3.0, 4.0])
+
+
+def test_where_people_cross_is_no_way_for_vehicles(tmp_path):
+    """Where a street has no pavement people walk on its lane, which leads to where they cross."""
+    streets = network(
+        tmp_path,
+        edge("in", "j", 'allow=""'),
+        edge("on", "out", ROAD),
+        '<junction id="out" type="dead_end" x="0" y="0"/>',
+        way("in", ":j_w5", "s"),
+        way("in", "on", "s"),
+    )
+    assert streets.onward == {"in": [("on", "s")]}
+    routes(tmp_path, streets, pedestrians=0.0)
 
 
 def test_flow_turns_and_mix_are_as_asked_for(tmp_path):
@@ -254,6 +288,22 @@ def test_the_same_seed_gives_the_same_traffic(tmp_path, run):
     other = simulated(tmp_path / "other", JUNCTION, seed=4)
     assert rows(one.path) == rows(same.path)
     assert rows(one.path) != rows(other.path)
+
+
+@needs_sumo
+@pytest.mark.parametrize("kind", ["tram", "curb", "shared", "walking"])
+def test_no_car_drives_on_lanes_that_are_not_for_cars(tmp_path, kind):
+    """SUMO leaves lanes of kinds that it does not know open to all: cars were sent where people cross."""
+    path = tmp_path / "junction.xodr"
+    pavements = JUNCTION.read_text(encoding="utf-8").split('type="sidewalk"')
+    mixed = [text + f'type="{(kind, "sidewalk")[place % 2]}"' for place, text in enumerate(pavements[:-1])]
+    path.write_text("".join([*mixed, pavements[-1]]), encoding="utf-8")
+    files = simulated(tmp_path / "run", path, duration=5.0)
+    streets = read_network(files.net)
+    plain = read_network(simulated(tmp_path / "plain", JUNCTION, duration=5.0).net)
+    driven = [{name: len(edge.of(DRIVING)) for name, edge in one.edges.items()} for one in (streets, plain)]
+    assert driven[0] == driven[1]
+    assert {edge for ways in streets.onward.values() for edge, _ in ways} <= streets.edges.keys()
 
 
 @needs_sumo

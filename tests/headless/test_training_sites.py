@@ -120,7 +120,7 @@ def test_demand_has_what_is_rare_and_differs_from_run_to_run():
         (["--runs", "0"], "ask for one run of traffic or more on each site, not 0"),
         (["--seed", "-1"], "--seed must be a whole number from 0"),
         (["--duration", "0"], "a run lasts 3 to 3600 s"),
-        (["--duration", "nan"], "a run lasts 3 to 3600 s"),
+        (["--duration", "nan"], "--duration must be a finite number"),
         (["--warm-up", "-1"], "a run lasts 3 to 3600 s"),
         (["--approaches", "5"], "the region follows the streets for 30 to 100 m, not 5"),
     ],

@@ -12,7 +12,7 @@ from headless import benchmark
 from headless.lab.benchmark.approximations import bounding_box, decimated, every_other_channel, thinner
 from headless.lab.benchmark.baselines import BASELINES, can_run
 from headless.lab.benchmark.fresh_process import alone
-from headless.lab.benchmark.growth import repeated
+from headless.lab.benchmark.growth import relaxation_growth, repeated
 from headless.lab.benchmark.measurements import BenchmarkScope
 from headless.lab.benchmark.placement import SolverRun, compare
 from headless.lab.benchmark.report import bars
@@ -27,6 +27,7 @@ import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.placement.reduced_problem import make_instance
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import Mesh
 
@@ -80,6 +81,18 @@ def test_the_figures_hold_every_way(folder):
     assert len(record["bars"]) == 9
     assert record["scans"]["kept embree"]["rays"] == record["scans"]["anew bvh"]["rays"] == 4 * 60_000
     assert all(len(growth["seconds"]) == len(growth["size"]) for growth in record["growth"])
+
+    assert "first linear relaxation" in {growth["what"] for growth in record["growth"]}
+
+
+def test_the_first_relaxation_is_measured_against_the_entries_of_its_program():
+    steps = [(10, 100, 2), (20, 200, 2)]
+    found = relaxation_growth(steps)
+    instances = [make_instance(street_problem(*step[:2], blocks=step[2], count=4))[0] for step in steps]
+    entries = [np.count_nonzero(instance.visible) for instance in instances]
+    assert list(found.size) == entries
+    assert 0 < entries[0] < entries[1]
+    assert all(seconds > 0 for seconds in found.seconds)
 
 
 @pytest.mark.slow

@@ -145,6 +145,17 @@ def test_what_was_forgotten_far_away_changes_nothing_and_is_named() -> None:
     assert "wide" not in warning
 
 
+def test_ground_that_the_builder_laid_out_is_left_out_and_not_named() -> None:
+    """Its verge goes on as far as what stands there: nobody has to move it."""
+    plain = lay_out(geometry(GROUND), SHORT)
+    near, far = np.array([[[-20.0, 8, 0], [20, 8, 0], [20, 9, 0]]]), moved(5e2, 0)
+    laid = lay_out(geometry(GROUND, Mesh("Verge", np.concatenate([near, far]), source="extract")), SHORT)
+    assert laid.warnings == plain.warnings
+    assert len(laid.site.triangles) == len(plain.site.triangles) + 1
+    by_hand = lay_out(geometry(GROUND, Mesh("Verge", np.concatenate([near, far]))), SHORT)
+    assert any("'Verge', lie 4" in warning for warning in by_hand.warnings)
+
+
 def test_what_is_just_within_reach_stays() -> None:
     inside, beyond = (lay_out(geometry(GROUND, Mesh("wall", moved(x, 0))), SHORT) for x in (340.5, 343))
     assert len(inside.site.triangles) == 4

@@ -151,7 +151,7 @@ def test_near_optimal_set_says_when_there_are_more() -> None:
     with patch.object(near_optimal, "MAX_LISTED", 3):
         top = finish(near_optimal_set(problem, best.chosen, 0.5))
     assert not top.complete
-    assert top.message.startswith("more than 3 placements")
+    assert top.message.startswith("at least 3 placements")
     with pytest.raises(SeipError, match="at least 0 and below 1"):
         finish(near_optimal_set(problem, best.chosen, 1.5))
 

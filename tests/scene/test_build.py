@@ -1,5 +1,7 @@
 """The scene that is built keeps the scene contract and says the same as the model."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -14,8 +16,9 @@ from seip_addon.core.streetscape.parts import Part, Role
 from seip_addon.core.streetscape.street_furniture import block, tree
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import new_file
-from seip_addon.scene.build import COLLECTIONS, build_scene, loose_pieces
+from seip_addon.scene.build import COLLECTIONS, build_scene
 from seip_addon.scene.materials import COLOURS
+from seip_addon.scene.pieces import loose_pieces
 from seip_addon.scene.read import read_scene
 
 SQUARE = np.array([[0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0]], dtype=float)
@@ -35,6 +38,7 @@ def model():
         Part("House", slab, (Role.OCCLUDERS,), (20.0, 5.0, 1.0), 0.4),
         Part("Panes", slab, (Role.DRESSING,), (20.5, 5.0, 1.0), 0.4, of="House"),
         Part("Signal pole 1", slab, (Role.POLES,), (11.0, 5.0, 0.0), source=ASSUMED),
+        Part("Driveway", slab, (Role.FORBIDDEN_AREAS,), keep_off="driveways"),
     )
     return SiteModel(
         "A crossing with quite a long name, längs der Straße " * 3,
@@ -164,3 +168,16 @@ def test_windows_are_loose_once_their_building_is_gone_and_not_when_they_are_tak
     panes.parent = house
     bpy.data.objects.remove(house)
     assert loose_pieces(scene.objects) == [panes]
+
+
+def test_what_keeps_new_posts_off_is_read_as_it_was_built(model):
+    geometry = read_scene(built(model)).geometry
+    assert [(area.name, area.rule) for area in geometry.keep_off_areas] == [("Driveway", "driveways")]
+    assert geometry.forbidden_areas == ()
+
+
+def test_assumed_widths_are_read_as_they_were_built(model):
+    parts = tuple(replace(part, width_assumed=part.name == "Road", source="extract") for part in model.parts[:4])
+    scene = built(replace(model, parts=parts))
+    counts = {row.kind: row.assumed for row in read_scene(scene).geometry.sources()}
+    assert counts == {"Road": 1, "Pavement": 0}

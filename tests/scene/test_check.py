@@ -101,6 +101,14 @@ def test_a_unit_scale_that_is_none_of_metres(scene):
         read_scene(scene)
 
 
+@pytest.mark.parametrize("where", [contract.GROUND, contract.POLES])
+def test_a_rule_that_does_not_exist(scene, where):
+    sheet(scene, "strip", where, 3, 3)["seip_keep_off"] = "gardens"
+    severity, obj, text = only(scene)
+    assert (severity, obj) == ("ERROR", "strip")
+    assert "must be one of cycle-tracks" in text
+
+
 @pytest.mark.parametrize("name", ["seip_origin", "seip_header_offset", "seip_places"])
 def test_a_broken_property_of_the_scene(scene, name):
     scene[name] = "here"

@@ -2,6 +2,7 @@
 
 import math
 import struct
+import sys
 
 from headless import build_scene
 
@@ -10,8 +11,9 @@ import numpy as np
 import pytest
 from city_text import origin_at
 
+from seip_addon.core.child_process import exit_status
 from seip_addon.core.errors import SeipError
-from seip_addon.scene import contract
+from seip_addon.scene import contract, imported
 from seip_addon.scene.read import read_scene
 
 X, Y, _ = origin_at(52.5, 13.4)
@@ -105,10 +107,14 @@ FLAT = [(x, 0, 0) for x, _, _ in CORNERS]
     ("box.obj", obj_text(HUGE), (90, 12), "1,000,000 m from its zero"),
     ("box.obj", obj_text(faces=[]), (90, 12), "holds no face"),
     ("box.ply", "ply\nnothing", (90, 12), "box.ply"),
-    ("box.glb", "nothing", (90, 12), "cannot import box.glb"),
+    ("box.ply", "ply\nformat binary_little_endian 1.0\nelement vertex 2147483648\nproperty float x\nend_header\n",
+     (90, 12), "announces 2,147,483,648 rows of 'vertex' and has 0 bytes"),
+    ("box.gltf", '{"asset": {"version": "2.0"}, "buffers": [{"uri": "../../etc/passwd", "byteLength": 9}]}',
+     (90, 12), "which is not in the folder of the model"),
+    ("box.glb", "nothing", (90, 12), "box.glb does not begin as a binary glTF"),
     ("box.dxf", "nothing", (90, 12), "of no kind that is imported"),
     ("box.obj", obj_text(), (90_000, 12), "is no place within 2,000 m of the site"),
-    ("box.obj", obj_text(), (90, float("nan")), "the place of box.obj must be"),
+    ("box.obj", obj_text(), (90, float("nan")), "--mesh-origin must be a finite number"),
     ("box.obj", obj_text(), (90, 2, 3, 4), "the place of box.obj must be"),
     ("box.obj", obj_text(), None, "each --mesh its own --mesh-origin"),
     ("box.obj", None, (90, 12), "no such file"),
@@ -121,3 +127,40 @@ def test_a_faulty_mesh_leaves_no_file(name, text, origin, complaint, tmp_path):
     with pytest.raises(SeipError, match=complaint):
         built(tmp_path, "--mesh", path, *given)
     assert not (tmp_path / "site.blend").exists()
+
+
+@pytest.mark.parametrize(
+    ("status", "complaint"),
+    [(-11, "Blender crashes when it imports box.obj"), (None, "takes more than 300 s to import box.obj")],
+)
+def test_an_import_that_crashes_or_hangs_ends_in_a_sentence(tmp_path, monkeypatch, status, complaint):
+    path = tmp_path / "box.obj"
+    path.write_text(obj_text(), encoding="utf-8")
+    monkeypatch.setattr(imported, "exit_status", lambda *_: status)
+    with pytest.raises(SeipError, match=complaint):
+        built(tmp_path, "--mesh", path, "--mesh-origin", 90, 12)
+    assert not (tmp_path / "site.blend").exists()
+
+
+def test_a_program_that_takes_too_long_is_ended():
+    assert exit_status([sys.executable, "-c", "import time; time.sleep(60)"], 0.2) is None
+    assert exit_status([sys.executable, "-c", "import sys; sys.exit(3)"], 60.0) == 3
+
+
+def test_faces_of_vertices_that_are_not_there_are_left_out(tmp_path):
+    corners = ", ".join(str(corner) for corner in CORNERS)
+    path = tmp_path / "box.usda"
+    path.write_text(
+        f"""#usda 1.0
+(metersPerUnit = 1
+upAxis = "Z")
+def Mesh "box" {{
+    int[] faceVertexCounts = [4, 4, 3]
+    int[] faceVertexIndices = [0, 1, 5, 4, 4, 5, 6, 7, 0, 1, 90000000]
+    point3f[] points = [{corners}]
+}}
+""",
+        encoding="utf-8",
+    )
+    corners = built(tmp_path, "--mesh", path, "--mesh-origin", 90, 12)
+    assert len(np.unique(corners, axis=0)) == 6

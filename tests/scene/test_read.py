@@ -367,11 +367,15 @@ def test_a_missing_library_is_named(scene, tmp_path):
         read_scene(bpy.context.scene)
 
 
-def test_faces_of_vertices_that_are_not_there_are_named(scene):
-    """As in a damaged file: Blender opens it."""
+@pytest.mark.parametrize("damage", ["vertices", "corners"])
+def test_objects_with_damaged_faces_are_named(scene, damage):
+    """As in a damaged file: Blender opens it, and crashes when it cuts the faces into triangles."""
     mesh = sheet(scene, "torn", (contract.OCCLUDERS,), 1, 1, (0, 20, 0)).data
-    mesh.attributes[".corner_vert"].data.foreach_set("value", [0, 1, 2, 99])
-    with pytest.raises(SeipError, match=r"object 'torn' has a vertex .* repair or delete it"):
+    if damage == "vertices":
+        mesh.attributes[".corner_vert"].data.foreach_set("value", [0, 1, 2, 99])
+    else:
+        mesh.polygons.foreach_set("loop_start", [3])
+    with pytest.raises(SeipError, match="object 'torn' has damaged faces: repair or delete it"):
         read_scene(scene)
 
 
@@ -391,3 +395,28 @@ def test_materials_get_the_reflectivity_that_is_asked_for(scene):
     ):
         with pytest.raises(SeipError, match=message):
             set_reflectivity([asked])
+
+
+def test_an_object_may_name_the_rule_that_keeps_new_posts_off_it(scene):
+    for name, where in (
+        ("track", contract.GROUND),
+        ("landing", contract.FORBIDDEN_AREAS),
+        ("house", contract.OCCLUDERS),
+    ):
+        sheet(scene, name, (where,), 2, 3)["seip_keep_off"] = "cycle-tracks" if name == "track" else "landings"
+    sheet(scene, "church", (contract.FORBIDDEN_AREAS,), 1, 1)
+    pole = put(scene, bpy.data.objects.new("mains", None), (contract.POLES,))
+    pole["seip_keep_off"] = "power-poles"
+    geometry = read_scene(scene).geometry
+    found = {(area.name, area.rule): area.polygon.area for area in geometry.keep_off_areas}
+    assert found == {("track", "cycle-tracks"): pytest.approx(24), ("landing", "landings"): pytest.approx(24)}
+    assert [area.name for area in geometry.forbidden_areas] == ["church"]
+    assert [pole.keep_off for pole in geometry.poles] == ["power-poles"]
+    assert [mesh.name for mesh in geometry.ground] == ["track"]
+
+
+@pytest.mark.parametrize("value", ["gardens", 3, ""])
+def test_a_rule_that_does_not_exist_is_refused(scene, value):
+    sheet(scene, "strip", (contract.GROUND,), 2, 3)["seip_keep_off"] = value
+    with pytest.raises(SeipError, match=r"seip_keep_off of object 'strip' is .* must be one of cycle-tracks"):
+        read_scene(scene)

@@ -106,8 +106,8 @@ def _traffic_is_placed_on(window: Window) -> Steps:
     yield from window.picture("in-traffic")
     yield from _press(window, "seip.solve_placement(")
     assert _record()["settings"]["traffic"]["instants"] == 4
-    assert any(note.startswith("placing on traffic sees") for note in _record()["notes"])
-    assert (yield from _says(window, "placing on traffic sees"))
+    assert any(note.startswith("this placement sees ") for note in _record()["notes"])
+    assert (yield from _says(window, "this placement sees "))
 
 
 def _stopped_work_leaves_no_trace(window: Window) -> Steps:

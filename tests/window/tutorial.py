@@ -33,7 +33,8 @@ def _noted(times: Callable[..., str]) -> Callable[..., str]:
 run_button.times_in_words = _noted(run_button.times_in_words)
 
 OUT = Path(sys.argv[sys.argv.index("--") + 1])
-TRAFFIC = Path(bpy.data.filepath).with_name("junction_traffic") / "run-1.npz"
+RUN = "junction_traffic/run-1.npz"
+"""Of the traffic beside the scene."""
 
 
 def scenario(window: Window) -> Steps:
@@ -56,6 +57,8 @@ def _begin(window: Window) -> Steps:
     preferences.own().cache = str(cache)
     copy = OUT / "junction.blend"
     shutil.copy(bpy.data.filepath, copy)
+    (OUT / RUN).parent.mkdir(exist_ok=True)
+    shutil.copy(Path(bpy.data.filepath).parent / RUN, OUT / RUN)
     bpy.ops.wm.open_mainfile(filepath=str(copy))
     yield 1.5
     yield from window.open_sidebar("SEIP")
@@ -152,7 +155,7 @@ def _save_and_reopen(window: Window) -> Steps:
 
 
 def _scan(window: Window) -> Steps:
-    _scene().seip.traffic.file = str(TRAFFIC)  # in place of the file browser
+    _scene().seip.traffic.file = f"//{RUN}"  # in place of the file browser
     yield from window.click("seip.load_traffic(")
     yield from window.until(lambda: session.running is None and "SEIP Traffic" in bpy.data.collections, 60)
     _scene().frame_set(600)

@@ -11,10 +11,11 @@ import numpy as np
 from seip_addon.core.arrays import Float
 from seip_addon.core.placement.deployment import weighted_share
 from seip_addon.core.progress import Progress
+from seip_addon.core.returns.expected_returns import expected_returns
+from seip_addon.core.returns.road_users import RoadUsers, cars_at
 from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.workflows.survey import Survey
 
-from .car_returns import returns_on_cars
 from .occupancy import vehicle_occupancy
 from .precision import ENOUGH_RETURNS, Precisions
 
@@ -73,7 +74,7 @@ def criteria_of(
     """
     targets = survey.site.targets
     seen = [one.deployment.seen_by > 0 for one in placements]
-    returns = yield from _returns(simulator, placements, targets.xyz)
+    returns = yield from _returns(simulator, placements, cars_at(targets.xyz, targets.spacing))
     return (
         Criterion("coverage", "coverage", np.array([one.deployment.coverage for one in placements])),
         *(
@@ -96,7 +97,7 @@ def criteria_of(
 
 
 def _returns(
-    simulator: Simulator, placements: Sequence[SensorConfiguration], targets: Float
+    simulator: Simulator, placements: Sequence[SensorConfiguration], cars: RoadUsers
 ) -> Generator[Progress, None, Float]:
     """Return how many returns a car at each target would have of each placement's sensors, (n, t)."""
     caster = make_ray_caster(simulator.static.triangles, simulator.settings.engine)
@@ -104,11 +105,11 @@ def _returns(
     rows = []
     for done, placement in enumerate(placements):
         yield Progress(done, len(placements), "count a car's returns")
-        row = np.zeros(len(targets))
+        row = np.zeros(len(cars))
         for sensor in placement.sensors:
             key = (sensor.model.key, *sensor.xyz.tolist(), *sensor.orientation.ravel().tolist())
             if key not in known:
-                known[key] = returns_on_cars(sensor, caster, targets)
+                known[key], _ = expected_returns(caster, sensor.xyz, sensor.orientation, sensor.model, cars)
             row += known[key]
         rows.append(row)
     return np.array(rows)

@@ -115,17 +115,17 @@ def draw_placements(
     """
     (sensor,) = survey.models
     site, visible, count = survey.site, survey.grid.visible, settings.count
-    yield Progress(0, 2, f"place {count} × {sensor}")
+    yield Progress(0, 2, f"place {count} × {sensor}", counted=False)
     case = yield from solve_cell(site, survey.models, visible, Cell(sensor, None, count, 1.0), survey.settings.limits)
     problem = placement_problem(site, visible, survey.models, Objective(count=count))
     otherwise: dict[frozenset[int], tuple[str, Placement]] = {}
     for name, weight in weights.items():
-        progress = Progress(1, 2, f"place {count} × {sensor} for {name}")
+        progress = Progress(1, 2, f"place {count} × {sensor} for {name}", counted=False)
         yield progress
         placement = yield from within(progress, solve(replace(problem, weights=weight), survey.settings.limits))
         if set(placement.chosen.tolist()) != set(case.placement.chosen.tolist()):
             otherwise.setdefault(frozenset(placement.chosen.tolist()), (name, placement))
-    yield Progress(1, 2, "draw placements")
+    yield Progress(1, 2, "draw placements", counted=False)
     drawing = _Drawing(
         problem,
         count,
@@ -154,7 +154,7 @@ def draw_placements(
     ]
     evaluated = (optimal, *configurations(RANDOM, random), *configurations(BETWEEN, between), *others)
     kind = (OPTIMAL, *[RANDOM] * len(random), *[BETWEEN] * len(between), *[OTHERWISE] * len(others))
-    yield Progress(2, 2, "placements drawn")
+    yield Progress(2, 2, "placements drawn", counted=False)
     return DrawnPlacements(evaluated, kind, configurations("learnt", learnt))
 
 

@@ -10,19 +10,28 @@ from headless.detection.frame_results import EvaluatedBoxes, FrameResult, Ground
 import numpy as np
 from numpy.typing import NDArray
 
+from seip_addon.core import limits
 from seip_addon.core.storage.array_file import ArrayFile, ArrayRule, ContentError
 
 TABLES = {"truth": GroundTruth, "detected": EvaluatedBoxes}
 TYPES = {"category": "U", "points": "i8", "inside": "b1", "parked": "b1"}  # of columns; of others float64
+LIMITS = {
+    "boxes": limits.LOCAL_COORDINATE,
+    "visibility": limits.ROUNDED_SHARE,
+    "distance": limits.DISTANCE,
+    "score": limits.ROUNDED_SHARE,
+    "density": limits.COUNT,
+    "points": limits.COUNT,
+}
 
 
 def _rules() -> dict[str, ArrayRule]:
-    rules = {"run": ArrayRule("U", ("f",)), "time": ArrayRule("f8", ("f",))}
+    rules = {"run": ArrayRule("U", ("f",)), "time": ArrayRule("f8", ("f",), limits.TIME)}
     for table, kind in TABLES.items():
-        rules[f"{table}.count"] = ArrayRule("i8", ("f",), 0)
+        rules[f"{table}.count"] = ArrayRule("i8", ("f",), limits.COUNT)
         for column in fields(kind):
             shape: tuple[int | str, ...] = (table, 7) if column.name == "boxes" else (table,)
-            rules[f"{table}.{column.name}"] = ArrayRule(TYPES.get(column.name, "f8"), shape)
+            rules[f"{table}.{column.name}"] = ArrayRule(TYPES.get(column.name, "f8"), shape, LIMITS.get(column.name))
     return rules
 
 

@@ -1,6 +1,5 @@
 """What a study of placements found: sentences, tables, record and charts."""
 
-import csv
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
@@ -19,7 +18,8 @@ from headless.detection.case_study import Traffic
 import numpy as np
 
 from seip_addon.core.estimates import IntervalEstimate
-from seip_addon.core.storage.files import save_json, whole_file
+from seip_addon.core.storage.csv_table import save_csv
+from seip_addon.core.storage.files import save_json
 
 from .agreement import (
     Correlation,
@@ -170,10 +170,7 @@ def save_study(
 ) -> None:
     """Write ``placements.csv``, ``placements.json`` and the charts into a folder."""
     rows = [_row(study, number) for number in range(len(study.drawn.evaluated))]
-    with whole_file(folder / "placements.csv") as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    save_csv(folder / "placements.csv", list(rows[0]), [list(row.values()) for row in rows])
     save_json(folder / "placements.json", _record(study, settings, traffic, versions))
     values, coverage = study.precise.values, study.criteria[0].values
     marks = [

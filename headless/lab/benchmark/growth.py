@@ -14,9 +14,12 @@ from headless.lab.benchmark.resource_usage import Expense, peak_memory
 from headless.lab.benchmark.street_visibility import street_problem
 
 import numpy as np
+import pulp
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.lidar import LidarModel
+from seip_addon.core.placement.integer_program import CoverProgram
+from seip_addon.core.placement.reduced_problem import make_instance
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.site import Site
 from seip_addon.core.visibility.chunks import compute_rows, sharing_rays
@@ -149,6 +152,33 @@ def placement_growth(
     """Measure placement in streets of so many positions, targets and blocks."""
     found = [alone(partial(place, *step, seconds)) for step in steps]
     return _growth(f"placement, N = {STREET_SENSORS}", size_of, size, found)
+
+
+def relax(positions: int, targets: int, blocks: int) -> tuple[int, float, float | None]:
+    """Solve the first linear relaxation of the program of a synthetic street grid.
+
+    Returns
+    -------
+    (int, float, float or None)
+        Entries of V that the exact reductions leave, processor seconds, and MB.
+    """
+    instance, _ = make_instance(street_problem(positions, targets, blocks=blocks, count=STREET_SENSORS))
+    program = CoverProgram(instance)
+    program.model.setObjective(program.covered)
+    expense = Expense()
+    solver = pulp.HiGHS(mip=False, msg=False, threads=1)
+    _, memory = peak_memory(lambda: expense.time(lambda: program.model.solve(solver)))
+    return int(np.count_nonzero(instance.visible)), expense.cpu, memory
+
+
+def relaxation_growth(steps: Sequence[tuple[int, int, int]]) -> Growth:
+    """Measure the first linear relaxation in streets of given positions, targets and blocks.
+
+    `integer_program.ROOT_OPERATIONS` is ``OPERATIONS_PER_UNIT`` times the seconds, per squared entry.
+    """
+    found = [alone(partial(relax, *step)) for step in steps]
+    entries = [entries for entries, *_ in found]
+    return _growth("first linear relaxation", "entries of V", entries, [(cpu, memory) for _, cpu, memory in found])
 
 
 def _growth(what: str, size_of: str, size: Sequence[float], found: Sequence[tuple[float, float | None]]) -> Growth:

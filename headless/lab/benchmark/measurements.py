@@ -16,7 +16,14 @@ from headless.coverage_study.cells import COUNTS
 from headless.lab.benchmark.approximations import approximations, with_triangles
 from headless.lab.benchmark.baselines import BASELINES, can_run
 from headless.lab.benchmark.fresh_process import alone
-from headless.lab.benchmark.growth import Growth, Scaled, placement_growth, repeated, visibility_growth
+from headless.lab.benchmark.growth import (
+    Growth,
+    Scaled,
+    placement_growth,
+    relaxation_growth,
+    repeated,
+    visibility_growth,
+)
 from headless.lab.benchmark.placement import SolverRun, compare
 from headless.lab.benchmark.report import Findings
 from headless.lab.benchmark.scans import scan_costs
@@ -256,6 +263,7 @@ def growth(
         ),
         placement_growth("poses", [3 * n for n in posts], [(n, targets, blocks) for n in posts], time_limit),
         placement_growth("targets", points, [(positions, n, blocks) for n in points], time_limit),
+        relaxation_growth([(n, targets, blocks) for n in posts]),
     ]
     for one in found:
         LOG.info(f"{one.what} against {one.size_of}: exponent {one.time_exponent:.2f}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -22,6 +23,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from seip_addon.core import limits
 from seip_addon.core.arrays import Float
 from seip_addon.core.progress import Progress, finish, side_by_side
 from seip_addon.core.scans import Frame, prepare
@@ -32,27 +34,30 @@ from seip_addon.core.traffic.bodies import fitted_body
 
 from .disturbances import Disturbance
 
+_FROM_ZERO = limits.Limits(0.0, math.inf)
+_SCORE = limits.Limits(-math.inf, 1.0)  # of road users; minus infinity where none is found
+
 FILE = ArrayFile(
     "seip.trial",
     3,
     "trial of a detector",
     "delete it, and it is tried again",
     {
-        "detections.score": ArrayRule("f8", ("d",), 0.0, 1.0),
+        "detections.score": ArrayRule("f8", ("d",), limits.SHARE),
         "detections.hit": ArrayRule("b1", ("d",)),
-        "detections.frame": ArrayRule("i8", ("d",), 0),
-        "detections.density": ArrayRule("f8", ("d",), 0.0),
-        "detections.points": ArrayRule("i8", ("d",), 0),
-        "detections.distance": ArrayRule("f8", ("d",), 0.0),
-        "detections.border": ArrayRule("f8", ("d",), 0.0),
-        "wanted.score": ArrayRule("f8", ("t",), most=1.0),
-        "wanted.frame": ArrayRule("i8", ("t",), 0),
+        "detections.frame": ArrayRule("i8", ("d",), limits.COUNT),
+        "detections.density": ArrayRule("f8", ("d",), _FROM_ZERO),
+        "detections.points": ArrayRule("i8", ("d",), limits.COUNT),
+        "detections.distance": ArrayRule("f8", ("d",), _FROM_ZERO),
+        "detections.border": ArrayRule("f8", ("d",), _FROM_ZERO),
+        "wanted.score": ArrayRule("f8", ("t",), _SCORE),
+        "wanted.frame": ArrayRule("i8", ("t",), limits.COUNT),
         "wanted.category": ArrayRule("U", ("t",)),
-        "wanted.points": ArrayRule("i8", ("t",), 0),
-        "wanted.visibility": ArrayRule("f8", ("t",), 0.0, 1.0),
-        "wanted.distance": ArrayRule("f8", ("t",), 0.0),
-        "wanted.border": ArrayRule("f8", ("t",), 0.0),
-        "run": ArrayRule("i8", ("f",), 0),
+        "wanted.points": ArrayRule("i8", ("t",), limits.COUNT),
+        "wanted.visibility": ArrayRule("f8", ("t",), limits.SHARE),
+        "wanted.distance": ArrayRule("f8", ("t",), _FROM_ZERO),
+        "wanted.border": ArrayRule("f8", ("t",), _FROM_ZERO),
+        "run": ArrayRule("i8", ("f",), limits.COUNT),
     },
 )
 

@@ -63,7 +63,7 @@ def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
             f"gives away {100 * study.price(contender):.2f} points of planned coverage; 5 % quantile of "
             f"{contender.evaluated_by.describe_outcome()} {contender.low.describe()} against "
             f"{study.beside(contender).low.describe()} of the nominal optimum: "
-            f"{study.saving(contender).as_points()} more",
+            f"{study.saving(contender).as_change()}",
             f"{settings.draws} draws that nothing was chosen on; half of them "
             f"{'say the same' if study.is_converged(contender) else 'say something else: take more'}",
             f"certificate: within {contender.placement.gap:.2%} of the best objective possible",
@@ -97,7 +97,7 @@ def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
         f"placement for the empty road, to see the {LAYER_NAMES[study.layer]}",
         regime,
         f"placing on traffic holds {study.traffic.seen[study.layer].mean.describe()}, "
-        f"{study.gain(study.layer).as_points()} more",
+        f"{study.gain(study.layer).as_change()}",
         f"chosen on {study.chosen_at} instants; {how}",
         f"placement over instants of traffic; certificate: within {study.traffic.placement.gap:.2%} of the best",
     )

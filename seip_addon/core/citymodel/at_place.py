@@ -10,18 +10,24 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
+from ..counts import counted
 from ..errors import SeipError
 from ..geometry.plan import outline
+from ..limits import ELEVATION, HEIGHT, MAP_COORDINATE, SITE_RADIUS
 from ..opendrive.geo_reference import GeoReference
 from ..opendrive.reference_systems import Transform, reprojection
 from ..progress import Progress
 from ..site.scene_geometry import FROM_CITY_MODEL
-from ..streetscape.description import MAX_HEIGHT, PlacedSolid, SiteDescription, without_covered_buildings
+from ..streetscape.description import PlacedSolid, SiteDescription, without_covered_buildings
 from ..streetscape.map_furniture import facade
 from .cityjson import CityModel, read_city_model
 from .solids import building_solid
 
 BUILDINGS_PER_STEP = 50
+
+_FAULTS = f"without area, wider than {SITE_RADIUS.most:,g} m or not {HEIGHT} high"
+UNUSABLE = (f"building {_FAULTS} is", f"buildings {_FAULTS} are")
+"""Reason to leave out a building, for one and for several."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +89,8 @@ def with_city_model(
         if not (x <= high_x and far_x >= low_x and y <= high_y and far_y >= low_y):
             continue
         solid = building_solid(model, building, facade(len(solids)))
-        if solid is None or top - z > MAX_HEIGHT:
-            left_out["buildings without area, or higher than 1,000 m"] += 1
+        if solid is None or not HEIGHT.allow(top - z) or max(far_x - x, far_y - y) > SITE_RADIUS.most:
+            left_out[UNUSABLE] += 1
             continue
         plan = _plan(solid.vertices, np.array(solid.faces))
         if not plan.intersects(area):
@@ -95,16 +101,16 @@ def with_city_model(
     if not solids:
         raise _elsewhere(asked.path, model, reference, area)
     kept, dropped = without_covered_buildings(description, solids)
-    notes = [f"{number:,} {reason} are left out of {model.name}" for reason, number in left_out.items()]
+    notes = [f"{counted(number, *reason)} left out of {model.name}" for reason, number in left_out.items()]
     if dropped:
-        notes.append(f"{dropped} building{'s' * (dropped > 1)} of the extract gave way to the city model's")
-    return replace(kept, solids=(*kept.solids, *solids)), tuple(notes)
+        notes.append(f"{counted(dropped, 'building')} of the extract gave way to the city model's")
+    return replace(kept, solids=(*kept.solids, *solids)).with_attribution(model.attribution), tuple(notes)
 
 
 def _to_map(model: CityModel, asked: AskedBuildings, reference: GeoReference) -> Transform:
     if asked.origin is not None:
-        if not all(map(math.isfinite, asked.origin)):
-            raise SeipError("the origin of the buildings must be three finite numbers, metres of the map")
+        MAP_COORDINATE.require(asked.origin[:2], "--buildings-origin", "X or Y", "give map coordinates")
+        ELEVATION.require(asked.origin[2], "--buildings-origin", "Z", "give a height above the map's zero")
         shift = np.array(asked.origin[:2])
         return lambda xy: xy + shift
     code = asked.epsg or model.epsg

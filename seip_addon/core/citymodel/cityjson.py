@@ -15,14 +15,20 @@ import numpy as np
 
 from ..arrays import Float, Integer
 from ..errors import SeipError
+from ..limits import ELEVATION, MAP_COORDINATE
 from ..opendrive.reference_systems import epsg_code
+from ..site.sources import one_line
 
 VERSIONS = ("1.1", "2.0")
 HIGHEST_LOD = 2.2
 MAX_BYTES = 300_000_000
 MAX_VERTICES = 3_000_000
-MAX_COORDINATE = 1e8  # metres
 MAX_DEPTH = 20  # of parts of parts
+NO_DETAIL = (
+    "building without surfaces of a level of detail that is read is",
+    "buildings without surfaces of a level of detail that is read are",
+)
+"""Reason to leave out a building, for one and for several."""
 INSIDE = {"InteriorWallSurface", "CeilingSurface", "FloorSurface"}
 """Surfaces within a building, which nobody sees from the street."""
 _SHELL_DEPTH = {"MultiSurface": 0, "CompositeSurface": 0, "Solid": 1, "MultiSolid": 2, "CompositeSolid": 2}
@@ -66,14 +72,17 @@ class CityModel:
     vertices : (n, 3) float64
         In its own system, metres.
     left_out : Counter
-        How many objects were left out, by reason.
+        How many objects were left out, by reason: as of one object, and as of several.
+    attribution : str
+        Title of the model, its point of contact and its date, as far as the metadata state them.
     """
 
     name: str
     epsg: int | None
     vertices: Float
     buildings: tuple[ModelledBuilding, ...]
-    left_out: Counter[str]
+    left_out: Counter[tuple[str, str]]
+    attribution: str = ""
 
 
 def read_city_model(path: Path) -> CityModel:
@@ -91,7 +100,17 @@ def read_city_model(path: Path) -> CityModel:
         raise SeipError(
             f"{path.name} has no building with surfaces of level of detail 1 to {HIGHEST_LOD}: take a model that has"
         )
-    return CityModel(path.name, _code(content), reader.vertices, buildings, reader.left_out)
+    return CityModel(path.name, _code(content), reader.vertices, buildings, reader.left_out, _attribution(content))
+
+
+def _attribution(content: dict[str, Any]) -> str:
+    """Return the metadata that a credit is made of; what is not text is passed over."""
+    metadata = content.get("metadata")
+    metadata = metadata if isinstance(metadata, dict) else {}
+    contact = metadata.get("pointOfContact")
+    contact = contact if isinstance(contact, dict) else {}
+    parts = (metadata.get("title"), contact.get("contactName"), metadata.get("referenceDate"))
+    return ", ".join(one_line(part) for part in parts if isinstance(part, str) and part.strip())
 
 
 def _parsed(path: Path) -> dict[str, Any]:
@@ -137,7 +156,7 @@ class _Reader:
 
     def __init__(self, name: str, content: Mapping[str, Any]) -> None:
         self._name = name
-        self.left_out: Counter[str] = Counter()
+        self.left_out: Counter[tuple[str, str]] = Counter()
         self.vertices = self._vertices(content)
         objects = content.get("CityObjects")
         if not isinstance(objects, dict) or not all(isinstance(one, dict) for one in objects.values()):
@@ -159,7 +178,7 @@ class _Reader:
             if surfaces:
                 yield ModelledBuilding(number, surfaces)
             else:
-                self.left_out["buildings without surfaces of a level of detail that is read"] += 1
+                self.left_out[NO_DETAIL] += 1
         if lost := [number for number in wanted if number not in reached]:
             self._refuse(f"buildings are parts of each other, {lost[0][:60]!r} among them")
 
@@ -177,8 +196,12 @@ class _Reader:
                 placed: Float = places * moves[0] + moves[1]
         except (ValueError, TypeError, AttributeError, OverflowError):
             self._refuse("vertices, and scale and translate of the transform, must be of three numbers each")
-        if not (np.abs(placed) <= MAX_COORDINATE).all():
-            self._refuse(f"a vertex lies beyond {MAX_COORDINATE:,.0f} m, or is no number")
+        for what, limits, values in (
+            ("a coordinate of a vertex", MAP_COORDINATE, placed[:, :2]),
+            ("the height of a vertex", ELEVATION, placed[:, 2]),
+        ):
+            if fault := limits.fault(values):
+                self._refuse(f"{what} {fault}")
         return placed
 
     def _children(self, number: str) -> list[str]:

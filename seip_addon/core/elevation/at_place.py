@@ -11,6 +11,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Boolean, Float, Integer
+from ..counts import counted
 from ..errors import SeipError
 from ..geometry.height_raster import HeightRaster
 from ..geometry.plan import outline
@@ -112,8 +113,10 @@ def with_terrain(
             "--terrain"
         )
     if not is_survey(path):
-        smooth = _of_model(read_geotiff(path), around.reference, around.area).smoothed(SMOOTHING)
-        return replace(description, relief=Relief(smooth, level)), (_heights_note(path, smooth),), ()
+        model = read_geotiff(path)
+        smooth = _of_model(model, around.reference, around.area).smoothed(SMOOTHING)
+        credited = description.with_attribution(model.copyright)
+        return replace(credited, relief=Relief(smooth, level)), (_heights_note(path, smooth),), ()
     points, classes = yield from _survey_points(asked, around)
     smooth = _surveyed_ground(points, classes, around.area, path.name).smoothed(SMOOTHING)
     yield Progress(0, 0, "boxes of the survey")
@@ -126,12 +129,13 @@ def with_terrain(
     notes = [_heights_note(path, smooth)] if is_flat else [f"the map keeps its own heights, not those of {path.name}"]
     if boxes:
         cells = int((raster.kind >= 0).sum())
+        stand = counted(len(boxes), "box stands", "boxes stand")
         notes.append(
-            f"{len(boxes):,} boxes stand for {cells:,} cells of {smooth.step:g} m that {path.name} has above "
-            f"{MIN_ABOVE:g} m: they change {chosen_merging(tried).changed:.2%} of {RAYS:,} random lines of sight"
+            f"{stand} for {counted(cells, 'cell')} of {smooth.step:g} m that {path.name} has above "
+            f"{MIN_ABOVE:g} m: this changes {chosen_merging(tried).changed:.2%} of {RAYS:,} random lines of sight"
         )
     if dropped:
-        notes.append(f"{dropped} building{'s' * (dropped > 1)} of the extract gave way to the survey's")
+        notes.append(f"{counted(dropped, 'building')} of the extract gave way to the survey's")
     relief = Relief(smooth, level) if is_flat else None
     return replace(description, relief=relief, solids=(*description.solids, *added)), tuple(notes), tried
 

@@ -12,11 +12,18 @@ from PIL import Image, UnidentifiedImageError
 from ..arrays import Float
 from ..errors import SeipError
 from ..geometry.height_raster import bilinear
+from ..limits import GROUND, LATITUDE, LONGITUDE, MAP_COORDINATE, Limits
+from ..opendrive.reference_systems import GEOGRAPHIC
+from ..site.sources import one_line
 
 MAX_PIXELS = 150_000_000
-LOWEST, HIGHEST = -500.0, 9000.0  # metres: what lies beyond is no height of the ground
-_SCALE, _TIE_POINT, _TRANSFORMATION, _KEYS, _NO_DATA = 33550, 33922, 34264, 34735, 42113
+MAX_PIXELS_PER_BYTE = 1032  # of compressed files: beyond what DEFLATE reaches with pixels of any type
+SMALL = 1_000_000
+"""Pixels that any file may have, whatever its size."""
+_SCALE, _TIE_POINT, _TRANSFORMATION, _KEYS, _NO_DATA, _COPYRIGHT = 33550, 33922, 34264, 34735, 42113, 33432
 _RASTER_TYPE, _GEOGRAPHIC, _PROJECTED, _LINEAR_UNIT, _VERTICAL_UNIT = 1025, 2048, 3072, 3076, 4099
+PIXEL = Limits(1e-9, 1e5)
+"""Step from a pixel to the next, metres or degrees."""
 _METRE, _NOT_SAID, _OWN = 9001, 0, 32767
 _BROKEN = (OSError, SyntaxError, ValueError, TypeError, KeyError, IndexError, struct.error, EOFError, OverflowError)
 """What Pillow raises for files that are damaged."""
@@ -38,6 +45,8 @@ class GeoTiff:
         From a pixel to the next to the east, and to the next to the south.
     heights : (rows, columns) float64, metres
         From north to south; NaN where there is none.
+    copyright : str
+        Text of the file's Copyright tag, or "".
     """
 
     name: str
@@ -45,6 +54,7 @@ class GeoTiff:
     corner: Float
     step: Float
     heights: Float
+    copyright: str = ""
 
     def at(self, places: Float) -> Float:
         """Return heights (n,) at places (n, 2) of its reference system, metres; NaN beyond its edge."""
@@ -83,6 +93,8 @@ def read_geotiff(path: Path) -> GeoTiff:
             with Image.open(path, formats=["TIFF"]) as picture:
                 if picture.width * picture.height > MAX_PIXELS:
                     raise _too_large(name)
+                if picture.width * picture.height > max(MAX_PIXELS_PER_BYTE * path.stat().st_size, SMALL):
+                    raise SeipError(f"{name} holds far fewer bytes than its size in pixels needs: write it again")
                 tags = {number: picture.tag_v2.get(number) for number in _TAGS}  # type: ignore[attr-defined]
                 bands = len(picture.getbands())
                 values = np.asarray(picture, dtype=np.float64)
@@ -95,7 +107,7 @@ def read_geotiff(path: Path) -> GeoTiff:
     if bands != 1 or values.ndim != 2 or min(values.shape) < 2:
         raise SeipError(f"{name} is a picture and no elevation model: one band of heights is needed")
     try:
-        epsg, corner, step = _placed(tags)
+        epsg, corner, step = _placed(tags, values.shape)
         no_data = tags[_NO_DATA]
         empty = values == float(str(no_data).strip(" \0")) if no_data is not None else np.zeros(values.shape, bool)
     except _BROKEN as error:
@@ -103,16 +115,22 @@ def read_geotiff(path: Path) -> GeoTiff:
             f"{name} {error if isinstance(error, _UnplacedError) else 'has damaged tags'}; {_CONVERT}"
         ) from error
     with np.errstate(invalid="ignore"):
-        values[empty | ~((values >= LOWEST) & (values <= HIGHEST))] = np.nan
+        values[empty | ~((values >= GROUND.least) & (values <= GROUND.most))] = np.nan
     if not np.isfinite(values).any():
-        raise SeipError(f"{name} holds no height between {LOWEST:g} and {HIGHEST:g} m: give heights in metres")
-    return GeoTiff(name, epsg, corner, step, values)
+        raise SeipError(
+            f"{name} holds no height between {GROUND.least:g} and {GROUND.most:g} m: give heights in metres"
+        )
+    return GeoTiff(name, epsg, corner, step, values, one_line(str(tags[_COPYRIGHT] or "")))
 
 
-_TAGS = (_SCALE, _TIE_POINT, _TRANSFORMATION, _KEYS, _NO_DATA)
+_TAGS = (_SCALE, _TIE_POINT, _TRANSFORMATION, _KEYS, _NO_DATA, _COPYRIGHT)
 _CONVERT = (
     "write it anew (gdal_translate -co COMPRESS=DEFLATE -co PREDICTOR=1 in.tif out.tif, or gdalwarp -t_srs EPSG:…)"
 )
+
+
+_PROJECTED_CODES = Limits(1024, 32766)
+"""Codes of EPSG that a key of GeoTIFF may hold."""
 
 
 class _UnplacedError(ValueError):
@@ -126,8 +144,9 @@ def _too_large(name: str) -> SeipError:
     )
 
 
-def _placed(tags: dict[int, Any]) -> tuple[int, Float, Float]:
+def _placed(tags: dict[int, Any], shape: tuple[int, ...]) -> tuple[int, Float, Float]:
     """Return reference system, place of the first pixel and step between pixels."""
+    rows, columns = shape
     if tags[_TRANSFORMATION] is not None:
         matrix = np.array(tags[_TRANSFORMATION], dtype=np.float64).reshape(4, 4)
         if matrix[0, 1] or matrix[1, 0]:
@@ -139,8 +158,8 @@ def _placed(tags: dict[int, Any]) -> tuple[int, Float, Float]:
         corner = np.array([x, y], dtype=np.float64) - step * [column, -row]
     else:
         raise _UnplacedError("has no georeference (ModelTiepoint and ModelPixelScale)")
-    if not (np.isfinite(step).all() and np.isfinite(corner).all() and (step > 0).all()):
-        raise _UnplacedError("has a georeference that is none")
+    if not (MAP_COORDINATE.allow([corner, corner + step * [columns, -rows]]) and PIXEL.allow(step)):
+        raise _UnplacedError("has a georeference that lies nowhere on Earth")
     directory = list(tags[_KEYS] or ())
     keys = {directory[i]: directory[i + 3] for i in range(4, len(directory) - 3, 4) if directory[i + 1] == 0}
     code = keys.get(_PROJECTED, keys.get(_GEOGRAPHIC))
@@ -149,5 +168,11 @@ def _placed(tags: dict[int, Any]) -> tuple[int, Float, Float]:
     for unit in (_LINEAR_UNIT, _VERTICAL_UNIT):
         if keys.get(unit, _NOT_SAID) not in (_NOT_SAID, _METRE):
             raise _UnplacedError("does not count in metres")
+    if not _PROJECTED_CODES.allow(code):
+        raise _UnplacedError("names no reference system by an EPSG code")
+    if (_PROJECTED not in keys or code in GEOGRAPHIC) and not (
+        LONGITUDE.allow(corner[0]) and LATITUDE.allow(corner[1])
+    ):
+        raise _UnplacedError("has a georeference that lies nowhere on Earth")
     is_point = keys.get(_RASTER_TYPE) == 2
     return int(code), corner if is_point else corner + step * [0.5, -0.5], step

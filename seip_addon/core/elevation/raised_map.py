@@ -1,20 +1,32 @@
-"""The map of an extract's streets with the heights of the ground that its scene is laid on."""
+"""The map of an extract's streets with heights of its own: on the ground, on bridges, and in underpasses."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
+from ..arrays import Float
 from ..opendrive import RoadMap
-from ..opendrive.road_map import Road
-from ..streetscape.terrain import Relief
+from ..opendrive.profile import profile
 
-STEP = 10.0  # metres along a road between two heights, as between the rows of its lanes
+Profiles = Mapping[str, tuple[Float, Float]]
+"""For each road, by its id, places (n,) along it, and the heights (n,) there, metres."""
 _PROFILE = re.compile(r"<elevationProfile\s*/>|<elevationProfile>.*?</elevationProfile>", re.DOTALL)
 
 
-def raised_map(text: str, road_map: RoadMap, relief: Relief) -> str:
-    """Return a map whose roads climb with the ground, by straight pieces of `STEP` metres at most.
+def raised_map(road_map: RoadMap, profiles: Profiles) -> RoadMap:
+    """Return a map whose roads have other heights, straight between the places that are given."""
+    records = {
+        number: [(s, (height, slope, 0.0, 0.0)) for s, height, slope in _records(*own)]
+        for number, own in profiles.items()
+    }
+    roads = (replace(road, elevation=profile(records[road.id])) for road in road_map.roads)
+    return replace(road_map, roads=tuple(roads))
+
+
+def raised_text(text: str, road_map: RoadMap, profiles: Profiles) -> str:
+    """Return the text of a map whose roads have other heights.
 
     Parameters
     ----------
@@ -22,19 +34,21 @@ def raised_map(text: str, road_map: RoadMap, relief: Relief) -> str:
         As netconvert writes it: each road with one profile of heights.
     road_map : RoadMap
         The same map as it is read.
+    profiles : Profiles
+        Of all its roads.
     """
-    profiles = (_profile(road, relief) for road in road_map.roads)
-    return _PROFILE.sub(lambda _: next(profiles), text)
+    elements = (
+        "".join(
+            f'<elevation s="{s:.8f}" a="{height:.4f}" b="{slope:.8f}" c="0" d="0"/>'
+            for s, height, slope in _records(*profiles[road.id])
+        )
+        for road in road_map.roads
+    )
+    return _PROFILE.sub(lambda _: f"<elevationProfile>{next(elements)}</elevationProfile>", text)
 
 
-def _profile(road: Road, relief: Relief) -> str:
-    along = np.linspace(0.0, road.length, max(int(np.ceil(road.length / STEP)), 1) + 1)
-    x, y, _ = road.reference_line(along)
-    heights = road.elevation(along) + relief.rise(np.column_stack([x, y]))
-    return f"<elevationProfile>{''.join(_records(along.tolist(), heights.tolist()))}</elevationProfile>"
-
-
-def _records(along: list[float], heights: list[float]) -> Iterator[str]:
-    for place, following, height, end in zip(along[:-1], along[1:], heights[:-1], heights[1:], strict=True):
-        slope = (end - height) / (following - place) if following > place else 0.0
-        yield f'<elevation s="{place:.8f}" a="{height:.4f}" b="{slope:.8f}" c="0" d="0"/>'
+def _records(along: Float, heights: Float) -> Iterator[tuple[float, float, float]]:
+    """Yield place, height and slope of each straight piece."""
+    lengths = np.diff(along)
+    slopes = np.divide(np.diff(heights), lengths, out=np.zeros(len(lengths)), where=lengths > 0)
+    yield from zip(along[:-1].tolist(), heights[:-1].tolist(), slopes.tolist(), strict=True)

@@ -11,6 +11,7 @@ from ..arrays import Boolean, Float, Integer
 MIN_AREA = 1e-9  # square metres in plan below which a triangle stands on edge and covers nothing
 
 _OVERLAY_GRID = 1e-4
+_TWIN_DISTANCE = 1e-9  # metres between corners that are one corner
 
 _BARYCENTRIC_SLACK = 1e-6  # slack in barycentric coordinates, so that no point falls between two triangles
 
@@ -23,9 +24,16 @@ def signed_area(triangles: Float) -> Float:
 
 
 def outline(triangles: Float, grid: float = 1e-3) -> BaseGeometry:
-    """Return the union in plan of triangles (n, 3, 2 or 3), corners rounded to a grid in metres."""
+    """Return the union in plan of triangles (n, 3, 2 or 3), corners rounded to a grid in metres.
+
+    Where rounding makes that fail, corners are rounded to 0.1 mm.
+    """
     lying = triangles[np.abs(signed_area(triangles)) > MIN_AREA, :, :2]
-    return shapely.union_all(shapely.polygons(lying), grid_size=grid)
+    polygons = shapely.polygons(lying)
+    try:
+        return shapely.union_all(polygons, grid_size=grid)
+    except shapely.errors.GEOSException:  # slivers may cross themselves once their corners are rounded
+        return shapely.union_all(polygons, grid_size=_OVERLAY_GRID)
 
 
 def without(area: BaseGeometry, away: BaseGeometry) -> BaseGeometry:
@@ -44,7 +52,18 @@ def united(areas: Iterable[BaseGeometry]) -> BaseGeometry:
 
 def closed(area: BaseGeometry, gap: float) -> BaseGeometry:
     """Return an area in plan with cracks and gaps up to twice ``gap`` metres filled."""
-    return area.buffer(gap, join_style="mitre").buffer(-gap, join_style="mitre")
+    wider = _without_twins(area).buffer(gap, join_style="mitre")
+    return _without_twins(wider).buffer(-gap, join_style="mitre")
+
+
+def _without_twins(area: BaseGeometry) -> BaseGeometry:
+    """Return an area whose corners are apart: unions leave some that differ by rounding.
+
+    Between these edges have no length, or turn back on themselves, and have no mitre.
+    """
+    corners = np.unique(shapely.get_coordinates(area), axis=0)
+    apart = np.unique(np.round(corners / _TWIN_DISTANCE), axis=0)
+    return area if len(apart) == len(corners) else shapely.set_precision(area, _TWIN_DISTANCE)
 
 
 def covered_share(area: BaseGeometry, others: shapely.STRtree) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..limits import ATTENUATION, POSITIVE_SHARE, SHARE, Limits
 
 
 @dataclass(frozen=True)
@@ -38,15 +39,16 @@ class CarlaDropoff:
     zero_intensity: float = 0.4
 
     def __post_init__(self) -> None:
-        checks = {
-            "attenuation must be 0 or more and finite": 0 <= self.attenuation < math.inf,
-            "the general drop-off must lie between 0 and 1": 0 <= self.general <= 1,
-            "the drop-off at zero intensity must lie between 0 and 1": 0 <= self.zero_intensity <= 1,
-            "the drop-off's intensity limit must lie above 0 and up to 1": 0 < self.intensity_limit <= 1,
-        }
-        for sentence, holds in checks.items():
-            if not holds:
-                raise SeipError(sentence)
+        fault = Limits.first_fault(
+            {
+                "the attenuation": (self.attenuation, ATTENUATION),
+                "the general drop-off": (self.general, SHARE),
+                "the drop-off at zero intensity": (self.zero_intensity, SHARE),
+                "the drop-off's intensity limit": (self.intensity_limit, POSITIVE_SHARE),
+            }
+        )
+        if fault:
+            raise SeipError(fault)
 
     def in_air(self, extinction: float) -> CarlaDropoff:
         """Return the law in air that takes so much more light, in 1/m, on each way."""

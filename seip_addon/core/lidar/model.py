@@ -8,8 +8,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .. import limits
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
+from ..limits import Limits
 from .carla_dropoff import CarlaDropoff
 from .range_equation import RangeEquation
 from .rosette import Rosette
@@ -60,6 +62,11 @@ class LidarModel:
         What is added to it for each square metre of r².
     law : RangeEquation or CarlaDropoff
         By which returns are detected.
+    calibration : str
+        Sweep that the law was calibrated on; empty where it is derived from a data sheet.
+    gains : (float, float)
+        Lowest and highest plausible gain: power received, as a multiple of what the law says. Both are 1 for a
+        calibrated law, and for one that counts every return.
     assumed_beams, assumed_law : str
         What of its beams, and of its law, no document says; empty where all is published.
     rosette : Rosette, optional
@@ -83,6 +90,8 @@ class LidarModel:
     range_noise_std: float = 0.03
     range_noise_growth: float = 0.0
     law: DetectionLaw = field(default_factory=CarlaDropoff)
+    calibration: str = ""
+    gains: tuple[float, float] = (1.0, 1.0)
     assumed_beams: str = ""
     assumed_law: str = ""
     rosette: Rosette | None = None
@@ -179,6 +188,22 @@ class LidarModel:
             order = -order % steps if self.all_round else steps - 1 - order
         return order / (steps * self.rotation_rate)
 
+    @property
+    def evidence(self) -> str:
+        """What its law of detection rests on, for people."""
+        if isinstance(self.law, CarlaDropoff):
+            return "every return in range counts (CARLA's model)"
+        if self.calibration:
+            return f"calibrated on {self.calibration}"
+        low, high = self.gains
+        return f"derived from a data sheet; plausible gains {low:g} to {high:g}"
+
+    def amplified(self, gain: float) -> LidarModel:
+        """Return the sensor with a gain: ``gain`` times the power received. A law without power stays."""
+        if gain == 1.0 or isinstance(self.law, CarlaDropoff):
+            return self
+        return replace(self, law=self.law.amplified(gain))
+
     def in_air(self, extinction: float) -> LidarModel:
         """Return the sensor in air that takes so much more light, in 1/m, on each way."""
         return replace(self, law=self.law.in_air(extinction))
@@ -191,23 +216,32 @@ MAX_ROSETTE_RAYS = 2_000_000
 
 
 def _require_valid(model: LidarModel) -> None:
-    right_angle = math.pi / 2
+    fault = Limits.first_fault(
+        {
+            "an elevation": (np.degrees(model.elevations), limits.BEAM_ELEVATION),
+            "an azimuth offset": (np.degrees(model.azimuth_offsets), limits.BEAM_OFFSET),
+            "the horizontal field of view": (math.degrees(model.field_of_view), limits.HORIZONTAL_VIEW),
+            "its range": ((model.min_range, model.max_range), limits.LIDAR_RANGE),
+            "the number of points per second": (model.points_per_second, limits.POINT_RATE),
+            "the rotation rate": (model.rotation_rate, limits.ROTATION_RATE),
+            "a plausible gain": (model.gains, limits.GAIN),
+            "its price": (model.price_range, limits.PRICE),
+            "the range noise": (model.range_noise_std, limits.RANGE_NOISE),
+            "the growth of the range noise": (model.range_noise_growth, limits.NOISE_GROWTH),
+        }
+    )
+    if fault:
+        raise SeipError(f"LiDAR '{model.key}': {fault}")
     low, high = model.price_range
     checks = {
         "it needs at least one channel": model.channels > 0,
-        "elevations must lie between -90 and 90 degrees": bool((np.abs(model.elevations) < right_angle).all()),
         "it needs one azimuth offset per channel": model.azimuth_offsets.shape == model.elevations.shape,
-        "azimuth offsets must lie within two turns": bool((np.abs(model.azimuth_offsets) <= 2 * math.tau).all()),
-        "its horizontal field of view must be above 0 and at most 360 degrees": 0 < model.field_of_view <= math.tau,
-        "its range must be increasing, from 0 m or more to 10 km": 0 <= model.min_range < model.max_range <= 1e4,
-        "points per second must lie between 1 and 1e9": 1 <= model.points_per_second <= 1e9,
-        "the rotation rate must lie between 0.01 and 1000 Hz": 0.01 <= model.rotation_rate <= 1000,
+        "its range must be increasing": model.min_range < model.max_range,
         f"a revolution must have at most {MAX_RAYS:,} rays": (
             model.points_per_second <= MAX_RAYS * model.rotation_rate and model.channels <= MAX_RAYS
         ),
-        "its price range must be positive, finite and not decreasing": 0 < low <= high < math.inf,
-        "the range noise must lie between 0 and 10 m": 0 <= model.range_noise_std <= 10,
-        "the growth of the range noise must lie between 0 and 0.01 per metre": 0 <= model.range_noise_growth <= 0.01,
+        "its plausible gains must not be decreasing": model.gains[0] <= model.gains[1],
+        "its price range must be positive and not decreasing": 0 < low <= high,
     }
     for sentence, holds in checks.items():
         if not holds:

@@ -39,6 +39,7 @@ import numpy as np
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..limits import DETECTION_RANGE, DETECTION_SPREAD, DETECTION_THRESHOLD, EXTINCTION, POSITIVE_SHARE, Limits
 from .carla_dropoff import CarlaDropoff
 
 CEILING = 0.985
@@ -54,7 +55,6 @@ MAKER_PROBABILITY = 0.9
 DROPOFF_REFLECTIVITY = 0.2
 """Of the surfaces, between asphalt and walls, for which `RangeEquation.as_dropoff` is right."""
 
-LEAST_RANGE, MAX_RANGE = 0.1, 1e4  # metres
 LEAST_RATIO = 1.3  # of the ranges at 80 and at 10 %: less of it leaves 1/400 of the light to the air
 
 _TINY = 1e-300
@@ -89,15 +89,16 @@ class RangeEquation:
     extinction: float = 0.0
 
     def __post_init__(self) -> None:
-        checks = {
-            "the threshold of detection must lie between -60 and 20 (ln of 1/m²)": -60 <= self.threshold <= 20,
-            "the spread of detection must lie between 0.05 and 10": 0.05 <= self.spread <= 10,
-            "the ceiling of detection must lie above 0 and up to 1": 0 < self.ceiling <= 1,
-            "the extinction must lie between 0 and 10 per metre": 0 <= self.extinction <= 10,
-        }
-        for sentence, holds in checks.items():
-            if not holds:
-                raise SeipError(sentence)
+        fault = Limits.first_fault(
+            {
+                "the threshold of detection": (self.threshold, DETECTION_THRESHOLD),
+                "the spread of detection": (self.spread, DETECTION_SPREAD),
+                "the ceiling of detection": (self.ceiling, POSITIVE_SHARE),
+                "the extinction": (self.extinction, EXTINCTION),
+            }
+        )
+        if fault:
+            raise SeipError(fault)
 
     @classmethod
     def of_ranges(
@@ -123,10 +124,10 @@ class RangeEquation:
         SeipError
             The range at 80 % is not the longer one, or the probability is not between 0 and the ceiling.
         """
-        if not (at_10 >= LEAST_RANGE and LEAST_RATIO * at_10 <= at_80 <= MAX_RANGE):
+        if not (DETECTION_RANGE.allow((at_10, at_80)) and LEAST_RATIO * at_10 <= at_80):
             raise SeipError(
                 f"the range at 80 % reflectivity ({at_80:g} m) must be {LEAST_RATIO:g} times the one at 10 % "
-                f"({at_10:g} m) or more, and both {LEAST_RANGE:g} to {MAX_RANGE:g} m: check which is which"
+                f"({at_10:g} m) or more, and both {DETECTION_RANGE}: check which is which"
             )
         # p falls by a factor of 8 from one range to the other: what 1/r² leaves of that is extinction
         extinction = max(0.0, (math.log(8.0) - 2.0 * math.log(at_80 / at_10)) / (2.0 * (at_80 - at_10)))
@@ -137,6 +138,10 @@ class RangeEquation:
     def in_air(self, extinction: float) -> RangeEquation:
         """Return the law in air that takes so much more light, in 1/m, on each way."""
         return replace(self, extinction=self.extinction + extinction)
+
+    def amplified(self, gain: float) -> RangeEquation:
+        """Return the law of a sensor that receives ``gain`` times the power."""
+        return replace(self, threshold=self.threshold - math.log(gain))
 
     def losing(self, share: float) -> RangeEquation:
         """Return the law where so large a share of what is detected is lost, less than all."""

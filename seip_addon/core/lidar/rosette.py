@@ -28,12 +28,7 @@ import numpy as np
 
 from ..arrays import Float
 from ..errors import SeipError
-
-MAX_WEDGE = math.radians(45)
-MAX_INDEX = 4.0
-"""Refractive index at most: that of germanium."""
-MAX_RATE = 1000.0
-"""Revolutions of a prism per second at most."""
+from ..limits import PRISM_RATE, PRISM_WEDGE, REFRACTIVE_INDEX, TIME, Limits
 
 
 @dataclass(frozen=True)
@@ -65,13 +60,19 @@ class Rosette:
 
     def __post_init__(self) -> None:
         one, other = self.rates
+        fault = Limits.first_fault(
+            {
+                "the rate of a prism": (np.abs(self.rates), PRISM_RATE),
+                "the wedge angle of a prism": (np.degrees(self.wedges), PRISM_WEDGE),
+                "the refractive index": (self.index, REFRACTIVE_INDEX),
+                "the time at which the rosette begins": (self.begin, TIME),
+            }
+        )
+        if fault:
+            raise SeipError(fault)
         checks = {
-            f"prisms must turn, at most {MAX_RATE:g} times a second": all(0 < abs(r) <= MAX_RATE for r in self.rates),
             "prisms that turn at the same rate draw a circle: their rates must differ": one != other,
             "prisms that turn at opposite rates draw a line: their rates must differ": one != -other,
-            "wedge angles must lie above 0 and up to 45 degrees": all(0 < wedge <= MAX_WEDGE for wedge in self.wedges),
-            f"the refractive index must lie above 1 and up to {MAX_INDEX:g}": 1 < self.index <= MAX_INDEX,
-            "the rosette must begin at a finite time": math.isfinite(self.begin),
         }
         for sentence, holds in checks.items():
             if not holds:

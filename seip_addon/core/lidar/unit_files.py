@@ -23,6 +23,7 @@ from defusedxml.ElementTree import ParseError, fromstring
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..limits import BEAM_ELEVATION, DEGREES, UNIT_BEAMS
 from .model import LidarModel
 
 MAX_BYTES = 4_000_000
@@ -54,14 +55,16 @@ class UnitBeams:
 
     def __post_init__(self) -> None:
         count = len(self.elevations)
-        if not 2 <= count <= 1000 or self.azimuth_offsets.shape != (count,):
+        if not UNIT_BEAMS.allow(count) or self.azimuth_offsets.shape != (count,):
             raise ValueError(
-                f"holds {count} elevations and {len(self.azimuth_offsets)} azimuth offsets, not 2 to 1,000"
+                f"holds {count} elevations and {len(self.azimuth_offsets)} azimuth offsets, not {UNIT_BEAMS}"
             )
-        if not (np.abs(self.elevations) < 90.0).all():
-            raise ValueError("has an elevation that is not between -90 and 90 degrees")
-        if not (np.abs(self.azimuth_offsets) <= 360.0).all():
-            raise ValueError("has an azimuth offset that is not between -360 and 360 degrees")
+        for what, values, limits in (
+            ("elevation", self.elevations, BEAM_ELEVATION),
+            ("azimuth offset", self.azimuth_offsets, DEGREES),
+        ):
+            if fault := limits.fault(values):
+                raise ValueError(f"has an {what} that {fault}")
         beams = np.stack([self.elevations, self.azimuth_offsets], axis=1)
         order = np.lexsort(beams.T)
         same = np.flatnonzero((np.abs(np.diff(beams[order], axis=0)) < _LEAST_APART).all(axis=1))

@@ -6,17 +6,20 @@ import math
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from defusedxml import DefusedXmlException
-from defusedxml.ElementTree import ParseError, parse
+from defusedxml.ElementTree import ParseError, fromstring
 
 from ..errors import SeipError
+from ..limits import MAP_NUMBER
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
-_MAX_NUMBER = 1e9  # metres are below this anywhere on Earth in any projection; nothing computed from it overflows
+
+_MAX_BYTES = 1 << 30  # of a map at most: 1 GiB
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +63,7 @@ class Node:
             raise SeipError(f"{self.place}: <{self.tag}> has no {name!r}; OpenDRIVE asks for it, export the map again")
         return value.strip()
 
-    def number(self, name: str, default: float | None = None, *, most: float = _MAX_NUMBER) -> float:
+    def number(self, name: str, default: float | None = None, *, most: float = MAP_NUMBER.most) -> float:
         """Return an attribute as a number of earthly size; without a default it must be there.
 
         Parameters
@@ -75,7 +78,7 @@ class Node:
             value = float(text)
         except ValueError:
             value = math.nan
-        if not abs(value) <= _MAX_NUMBER:
+        if not MAP_NUMBER.allow(value):
             raise SeipError(f"{self.place}: {name}={text!r} of <{self.tag}> is no sensible number; correct the map")
         if abs(value) > most:
             raise SeipError(
@@ -135,7 +138,11 @@ def read_document(path: str | os.PathLike[str]) -> Node:
     name = os.path.basename(os.fspath(path))  # noqa: PTH119 - works for any path-like, existing or not
     try:
         _refuse_other_formats(path, name)
-        tree = parse(path, forbid_dtd=True, forbid_entities=True, forbid_external=True)
+        if (size := os.stat(path).st_size) > _MAX_BYTES:  # noqa: PTH116 - as above
+            raise SeipError(f"{name} has {size / 1e9:.1f} GB, more than a map of a city; cut the place out of it")
+        content = Path(path).read_bytes()
+        # All at once: given in pieces, expat would read a huge tag again with each piece.
+        root = fromstring(content, forbid_dtd=True, forbid_entities=True, forbid_external=True)
     except FileNotFoundError as error:
         raise SeipError(f"no such file: {path}; check the path of the map") from error
     except OSError as error:
@@ -146,4 +153,4 @@ def read_document(path: str | os.PathLike[str]) -> Node:
         raise SeipError(f"{name} declares a document type or entities, which a map may not; remove them") from error
     except (LookupError, ValueError) as error:
         raise SeipError(f"{name} is in an encoding that cannot be read ({error}); save it as UTF-8") from error
-    return Node(tree.getroot(), name)
+    return Node(root, name)

@@ -11,11 +11,12 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..limits import ELEVATION
 from .road_map import Lane, LaneSection, Road, RoadFrame
 from .sampling import sample
 
 _MIN_TRIANGLE_AREA = 1e-9  # square metres
-_MAX_HEIGHT, _MAX_WIDTH = 10_000.0, 1_000.0  # metres; beyond them a number of the map has slipped
+_MAX_HEIGHT, _MAX_WIDTH = ELEVATION.most, 1_000.0  # metres; beyond them a number of the map has slipped
 
 
 @dataclass(frozen=True, eq=False)

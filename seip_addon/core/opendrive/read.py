@@ -5,11 +5,14 @@ Written after ASAM OpenDRIVE 1.4 to 1.8; attributes that a file leaves out have 
 
 import math
 import os
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from .. import limits
 from ..errors import SeipError
 from .document import Node, read_document
 from .profile import ZERO_PROFILE, Profile, lateral_shape, profile
@@ -22,6 +25,7 @@ from .road_map import (
     ObjectOutline,
     Repeat,
     Road,
+    RoadLink,
     RoadMap,
     RoadObject,
     RoadSignal,
@@ -34,9 +38,12 @@ _OTHER_FORMATS = {
     "OpenSCENARIO": " as OpenSCENARIO does",
     "kml": " as KML does",
 }
-_MAX_ROAD_LENGTH = 1e6  # metres; beyond it a number has slipped
-_MAX_OBJECT_DISTANCE = 5_000.0  # metres that an object reaches, and stands from its road
-_MAX_OBJECT_HEIGHT = 1_000.0  # metres; no building is higher
+ATTRIBUTION = "attribution"
+"""Code of the header's ``<userData>`` whose value is a credit."""
+
+_MAX_ROAD_LENGTH = limits.ROAD_LENGTH.most
+_MAX_OBJECT_DISTANCE = limits.SITE_RADIUS.most  # metres that an object reaches, and stands from its road
+_MAX_OBJECT_HEIGHT = limits.ABOVE_GROUND.most
 _MAX_TURN = 200.0 * math.pi  # radians within one geometry; a hundred turns
 
 
@@ -66,7 +73,18 @@ def read_map(path: str | os.PathLike[str]) -> RoadMap:
         geo_reference=((reference.element.text or "").strip() or None) if reference else None,
         roads=roads,
         junctions=tuple(Junction(node.text("id"), node.text("name", "")) for node in root.children("junction")),
+        attribution=tuple(
+            node.text("value", "")
+            for node in (header.children("userData") if header else ())
+            if node.text("code", "") == ATTRIBUTION and node.text("value", "")
+        ),
     )
+
+
+def with_attribution(text: str, attribution: Iterable[str]) -> str:
+    """Return the text of a map with credits in its header, which `read_map` reads again."""
+    elements = "".join(f"<userData code={quoteattr(ATTRIBUTION)} value={quoteattr(one)}/>" for one in attribution)
+    return text.replace("</header>", f"{elements}</header>", 1)
 
 
 def _road(node: Node) -> Road:
@@ -94,7 +112,16 @@ def _road(node: Node) -> Road:
             _signal(child.within(f"signal {child.text('id', '')}"), node.text("id"))
             for child in node.children("signals", "signal")
         ),
+        predecessor=_link(node, "predecessor"),
+        successor=_link(node, "successor"),
     )
+
+
+def _link(road: Node, end: str) -> RoadLink | None:
+    node = road.child("link", end)
+    if node is None:
+        return None
+    return RoadLink(node.text("elementType", ""), node.text("elementId", ""), node.text("contactPoint", ""))
 
 
 def _reference_line(road: Node) -> ReferenceLine:

@@ -145,6 +145,15 @@ class RoadSignal:
     place: tuple[float, float, float, float] | None
 
 
+@dataclass(frozen=True)
+class RoadLink:
+    """What follows at an end of a road: a ``junction``, or the ``start`` or ``end`` of a ``road``, by its id."""
+
+    kind: str
+    id: str
+    contact: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Road:
     """A road: its reference line in plan, the profiles along it and what stands beside it.
@@ -162,6 +171,8 @@ class Road:
         Height of the surface above the plane that these make.
     sections : tuple of LaneSection
         In order along the road.
+    predecessor, successor : RoadLink or None
+        What follows at its start and at its end.
     """
 
     id: str
@@ -178,6 +189,8 @@ class Road:
     sections: tuple[LaneSection, ...]
     objects: tuple[RoadObject, ...]
     signals: tuple[RoadSignal, ...]
+    predecessor: RoadLink | None = None
+    successor: RoadLink | None = None
 
     @property
     def length(self) -> float:
@@ -260,6 +273,8 @@ class RoadMap:
         In the order of the file.
     junctions : tuple of Junction
         In the order of the file.
+    attribution : tuple of str
+        Credits in the header's ``<userData code="attribution">``.
     """
 
     name: str
@@ -267,6 +282,7 @@ class RoadMap:
     geo_reference: str | None
     roads: tuple[Road, ...]
     junctions: tuple[Junction, ...]
+    attribution: tuple[str, ...] = ()
 
     def junctions_with_roads(self) -> tuple[Junction, ...]:
         """Return the junctions that some road belongs to, in the order of the file: others are no place to work on."""

@@ -19,7 +19,7 @@ from ..streetscape.clearing import CLEARANCE
 from ..streetscape.description import Building
 from ..streetscape.roofs import FLAT, RIDGED, SLOPED, Roof
 from .extract import Relation, Tags, Way
-from .plan_shapes import PlanShapes, polygons
+from .plan_shapes import DRAWN_TWICE, PlanShapes, polygons
 from .quantities import count, metres
 
 STOREY = 3.0  # metres
@@ -110,7 +110,7 @@ def _footprints(shapes: PlanShapes) -> Iterator[_Footprint]:
                 drawn |= {ref for member, ref, role in element.members if member == "way" and role != "inner"}
             same = (kind, area.normalize().wkb)
             if same in known:
-                shapes.dropped["outlines that are drawn twice count once"] += 1
+                shapes.dropped[DRAWN_TWICE] += 1
                 continue
             known.add(same)
             yield _Footprint(area, element.tags, kind == "part")

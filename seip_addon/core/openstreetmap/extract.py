@@ -2,13 +2,16 @@
 
 import itertools
 import math
+import re
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 
+from ..counts import counted
 from ..errors import SeipError
 from ..progress import Progress
+from ..site.sources import one_line
 from ..storage.xml_stream import Attributes, quoted, read_tags
 
 MAX_ELEMENTS = 3_000_000  # nodes, ways and relations that are kept at most: about a city
@@ -25,7 +28,8 @@ _OTHER_FORMATS = {
 """How files begin that are given in place of an extract."""
 MAX_TAG = 255  # characters of a tag's value, as in the database of OpenStreetMap
 MAX_ID = 2**62
-_JOINERS = "\u200c\u200d"  # which writing of Persian and Hindi needs, and emoji
+OPENSTREETMAP = "© OpenStreetMap contributors (ODbL)"
+_DAY = re.compile(r"\d{4}-\d\d-\d\d(?=T|$)")
 _NO_TAGS: Mapping[str, str] = MappingProxyType({})
 
 NEXT_NODE = 3_000.0  # metres beyond a window within which the next node of a street that leaves it is looked for
@@ -77,6 +81,8 @@ class Extract:
         By their ids, in the order of the file.
     notes : tuple of str
         What of the file was left out, and why.
+    attribution : str
+        Credit that the data demand, with their date where the file states one.
     """
 
     name: str
@@ -84,6 +90,7 @@ class Extract:
     ways: dict[int, Way]
     relations: dict[int, Relation]
     notes: tuple[str, ...] = ()
+    attribution: str = ""
 
     def line(self, way: Way) -> list[Node]:
         """Return the nodes of a way that the extract holds: one that was cut off has fewer than the way."""
@@ -101,6 +108,18 @@ class _Collected:
     near: int = 0
     misplaced: int = 0
     root: str = ""
+    holder: str = ""
+    date: str = ""
+    newest: str = ""
+
+    @property
+    def attribution(self) -> str:
+        """The credit of the data: OpenStreetMap's, except where the file names another holder of its rights."""
+        own = self.holder and "openstreetmap" not in self.holder.casefold()
+        credit = f"© {self.holder}" if own else OPENSTREETMAP
+        if self.date:
+            return f"{credit}, data of {self.date}"
+        return f"{credit}, changes up to {self.newest}" if self.newest else credit
 
 
 def read_extract(path: Path, within: Window | None = None) -> Generator[Progress, None, Extract]:
@@ -139,13 +158,15 @@ def read_extract(path: Path, within: Window | None = None) -> Generator[Progress
         )
     notes = []
     if collected.repeated:
-        notes.append(f"{path.name} gives {collected.repeated:,} elements twice: the later one counts")
+        notes.append(f"{path.name} gives {counted(collected.repeated, 'element')} twice: the later one counts")
     if collected.misplaced:
         notes.append(
-            f"{path.name} gives {collected.misplaced:,} nodes no place on Earth below {MAX_LATITUDE:g} degrees of "
-            "latitude: they are left out"
+            f"{path.name} gives {counted(collected.misplaced, 'node')} no place on Earth below {MAX_LATITUDE:g} "
+            "degrees of latitude and is read without"
         )
-    extract = Extract(path.name, collected.nodes, collected.ways, collected.relations, tuple(notes))
+    extract = Extract(
+        path.name, collected.nodes, collected.ways, collected.relations, tuple(notes), collected.attribution
+    )
     return extract if within is None else cropped(extract, within)
 
 
@@ -185,11 +206,17 @@ class _Reader:
         """Take the beginning of an element."""
         if not self._into.root:
             self._into.root = tag
+            self._into.holder = one_line(attributes.get("copyright", "")[:MAX_TAG])
+            self._into.date = _day(attributes.get("timestamp", ""))
+        elif tag == "meta":
+            self._into.date = _day(attributes.get("osm_base", "")) or self._into.date
         if tag in ("node", "way", "relation"):
             self._attributes, self._tags, self._refs, self._members = attributes, {}, [], []
+            if "timestamp" in attributes:
+                self._into.newest = max(self._into.newest, _day(attributes["timestamp"]))
             self._deleted = attributes.get("visible") == "false" or attributes.get("action") == "delete"
         elif tag == "tag":
-            self._tags[attributes.get("k", "")] = _one_line(attributes.get("v", "")[:MAX_TAG])
+            self._tags[attributes.get("k", "")] = one_line(attributes.get("v", "")[:MAX_TAG])
         elif tag == "nd":
             self._refs.append(self._id(attributes, "ref"))
         elif tag == "member":
@@ -257,6 +284,12 @@ class _Reader:
         return south - more <= latitude <= north + more and west - east_more <= longitude <= east + east_more
 
 
+def _day(time: str) -> str:
+    """Return the day of a time stamp (ISO 8601), "" for anything else."""
+    day = _DAY.match(time)
+    return day[0] if day else ""
+
+
 def window(latitude: float, longitude: float, reach: float) -> Window:
     """Return south, west, north and east of a square around a place, degrees; ``reach`` is half its side in metres."""
     north = math.degrees(reach / EARTH_RADIUS)
@@ -301,13 +334,6 @@ def rings(ways: Sequence[Way]) -> tuple[list[list[int]], int]:
         else:
             left += joined
     return found, left
-
-
-def _one_line(text: str) -> str:
-    """Return a text without breaks, and without characters that change how others are shown."""
-    if not text.isprintable():
-        text = "".join(one if one.isprintable() or one in _JOINERS else " " for one in text)
-    return " ".join(text.split())
 
 
 def _refuse_other_formats(path: Path) -> None:

@@ -15,6 +15,19 @@ from .extract import Extract, Node, Relation, Way, rings
 MIN_FOOTPRINT = 0.5  # square metres below which an outline is none
 OUTER_ROLES, INNER_ROLES = {"outer", "outline", "part", ""}, {"inner"}
 
+# what is counted in `PlanShapes.dropped`: one of it, and several
+MENDED = ("outline that crosses itself was mended", "outlines that cross themselves were mended")
+NOT_CLOSED = (
+    "outline that is not closed, or is cut off by the extract, was closed",
+    "outlines that are not closed, or are cut off by the extract, were closed",
+)
+TOO_LITTLE = (
+    "outline of which the extract has too little was left out",
+    "outlines of which the extract has too little were left out",
+)
+PIECES = ("piece of an outline that does not close was left out", "pieces of outlines that do not close were left out")
+DRAWN_TWICE = ("outline that is drawn twice counts once", "outlines that are drawn twice count once")
+
 
 class PlanShapes:
     """Shapes of an extract in map coordinates.
@@ -31,7 +44,7 @@ class PlanShapes:
         self.extract = extract
         self._to_map, self._offset = to_map, offset
         self._known: dict[int, tuple[float, float]] = {}
-        self.dropped: Counter[str] = Counter()
+        self.dropped: Counter[tuple[str, str]] = Counter()
         """What was left out or mended, by reason."""
 
     def point(self, node: Node) -> Float:
@@ -45,6 +58,22 @@ class PlanShapes:
         kept = [point for place, point in enumerate(points) if place == 0 or point != points[place - 1]]
         return np.array(kept).reshape(-1, 2)
 
+    def lines(self, area: BaseGeometry, key: str, values: set[str] | None) -> Iterator[tuple[Way, Float]]:
+        """Yield the ways with a tag that reach into an area, with their lines (n, 2).
+
+        Parameters
+        ----------
+        area : shapely geometry
+            Prepared.
+        values : set of str or None
+            Of the tag; None: any.
+        """
+        for way in self.extract.ways.values():
+            if key in way.tags and (values is None or way.tags[key] in values):
+                line = self.line(way)
+                if len(line) > 1 and area.intersects(shapely.LineString(line)):
+                    yield way, line
+
     def footprint(self, element: Way | Relation) -> BaseGeometry | None:
         """Return the area of a closed way or of a multipolygon relation, None where there is none.
 
@@ -55,7 +84,7 @@ class PlanShapes:
         if area is None or area.is_empty:
             return None
         if not area.is_valid:
-            self.dropped["outlines that cross themselves were mended"] += 1
+            self.dropped[MENDED] += 1
             area = shapely.make_valid(area)
         parts = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon" and part.area >= MIN_FOOTPRINT]
         return shapely.union_all(parts) if parts else None
@@ -63,11 +92,10 @@ class PlanShapes:
     def _of_way(self, way: Way) -> BaseGeometry | None:
         line = self.line(way)
         if way.nodes[:1] != way.nodes[-1:] or len(line) < len(way.nodes):
-            key = "outlines that are not closed, or are cut off by the extract, were closed"
             if len(line) < 3 or not _is_nearly_whole(way, line):
-                self.dropped["outlines of which the extract has too little were left out"] += 1
+                self.dropped[TOO_LITTLE] += 1
                 return None
-            self.dropped[key] += line[0].tolist() != line[-1].tolist()
+            self.dropped[NOT_CLOSED] += line[0].tolist() != line[-1].tolist()
         if len(np.unique(line, axis=0)) < 3:
             return None
         return shapely.Polygon(line)
@@ -87,7 +115,7 @@ class PlanShapes:
             if kind == "way" and role in roles and ref in self.extract.ways
         ]
         found, left = rings(ways)
-        self.dropped["pieces of outlines that do not close were left out"] += left
+        self.dropped[PIECES] += left
         closed = []
         for ring in found:
             line = np.array([self._place(number) for number in ring if number in self.extract.nodes]).reshape(-1, 2)

@@ -3,7 +3,8 @@
 import difflib
 import itertools
 import math
-from collections.abc import Collection, Generator, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,6 +13,8 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
+from ..counts import counted
+from ..elevation.raised_map import raised_map, raised_text
 from ..errors import SeipError
 from ..opendrive import LaneSurface, RoadMap, lane_surfaces, nearest_junctions, read_map
 from ..opendrive.geo_reference import TransverseMercator, projection
@@ -20,18 +23,29 @@ from ..progress import Progress
 from ..site.scene_geometry import FROM_EXTRACT
 from ..streetscape import road_surface
 from ..streetscape.description import DEFAULT_RADIUS, SiteDescription
-from ..streetscape.intersections import intersection, without_plain_joints
+from ..streetscape.intersections import SAME_DIRECTION, TOUCH, intersection, without_plain_joints
+from ..streetscape.levels import UNNAMED_ROAD
+from ..streetscape.named_places import street_names
 from ..streetscape.place import SCENE_MARGIN
 from .extract import EARTH_RADIUS, MAX_LATITUDE, Extract, Node, Way, cropped, read_extract, window
+from .heights import StreetHeights, street_heights
+from .mapped_crossings import guessed_crossings, with_mapped_crossings
 from .netconvert import convert
 from .plan_shapes import PlanShapes
+from .signals import SIGNAL_REACH
 from .street_objects import surroundings
-from .streets import StreetFile, is_street, write_streets
+from .streets import CLASSES, StreetFile, has_lane_count, has_widths, is_street, shown_name, usual_lanes, write_streets
 
 EXTRACT_SUFFIXES = (".osm", ".osm.gz", ".osm.xml")
 STREET_REACH = 450.0  # metres beyond the region within which streets are laid out: traffic comes from there
 MAX_JUNCTION_DISTANCE = 60.0  # metres from a place to the junction that is meant at most
+NAMES = ("name", "name:en", "alt_name", "ref")
+"""Tags that name a street."""
+RANKS = (*(kind for kind in CLASSES if not kind.endswith("_link")), "service", *CLASSES)
+"""Classes of streets, the highest first, and slip roads last."""
 MAX_ROUNDABOUT = 200.0  # metres across which a roundabout is one place at most
+MIN_RAMP = 0.05  # metres by which a ramp moves a street that a note names
+MAX_NAMED = 6  # streets that a note names
 STANDS_AROUND = 20.0  # metres beyond the scene within which what stands there counts
 
 
@@ -75,22 +89,89 @@ def is_extract(path: Path) -> bool:
     return path.name.lower().endswith((*EXTRACT_SUFFIXES, ".pbf"))
 
 
-def site_of_extract(
-    path: Path, place: ExtractPlace, map_path: Path
-) -> Generator[Progress, None, tuple[RoadMap, SiteDescription, tuple[str, ...]]]:
+@dataclass(frozen=True, eq=False)
+class ExtractSite:
+    """The streets of an extract about a place, and what stands there.
+
+    Parameters
+    ----------
+    road_map : RoadMap
+        The streets as netconvert lays them out: flat, unless the extract has heights.
+    map_text : str
+        The same as text.
+    description : SiteDescription
+    notes : tuple of str
+        What was assumed or left out.
+    streets : StreetFile
+    sources : mapping of str to str
+        Of which way each road was made, as `netconvert.convert` returns it.
+    shapes : PlanShapes
+        The extract on the map.
+    lanes : mapping of str to tuple of LaneSurface
+        Of each road of the map.
+    area : shapely geometry
+        What notes tell of: about as far as the region of interest reaches, map coordinates.
+    """
+
+    road_map: RoadMap
+    map_text: str
+    description: SiteDescription
+    notes: tuple[str, ...]
+    streets: StreetFile
+    sources: Mapping[str, str]
+    shapes: PlanShapes
+    lanes: Mapping[str, tuple[LaneSurface, ...]]
+    area: BaseGeometry
+
+    def on_ground(self) -> "ExtractSite":
+        """Return the streets on the ground of the description, on bridges and in underpasses."""
+        relief = self.description.relief
+        ground = None if relief is None else relief.rise
+        heights = street_heights(self.road_map, self.lanes, self.sources, self.streets, self.shapes, ground)
+        raised = replace(self, notes=(*self.notes, *heights.notes, *self._ramp_notes(heights)))
+        if any(along_road.any() for _, along_road in heights.profiles.values()):
+            raised = replace(
+                raised,
+                road_map=raised_map(self.road_map, heights.above_ground),
+                map_text=raised_text(self.map_text, self.road_map, heights.profiles),
+            )
+        if relief is None:
+            return raised
+        relief = replace(relief, bridges=heights.bridges)
+        return replace(raised, description=replace(self.description, relief=relief))
+
+    def _ramp_notes(self, heights: StreetHeights) -> Iterator[str]:
+        """Yield a note on streets in the area that lead up to bridges or down to underpasses, by assumed heights."""
+        names = street_names(self.road_map)
+        moved: dict[str, float] = {}
+        for number, (along, above) in heights.above_ground.items():
+            if number in heights.bridges or not np.abs(above).max() >= MIN_RAMP:
+                continue
+            (road,) = (road for road in self.road_map.roads if road.id == number)
+            places = shapely.points(road.frame(along).origin[:, :2])
+            near = above[shapely.intersects(self.area, places)]
+            if len(near) and np.abs(near).max() >= MIN_RAMP and road.junction_id is None:
+                most = float(near[np.argmax(np.abs(near))])
+                name = names.get(number, UNNAMED_ROAD)
+                moved[name] = max(moved.get(name, 0.0), most, key=abs)
+        if moved:
+            listed = ", ".join(
+                f"{name} by up to {abs(most):.2f} m {'upwards' if most > 0 else 'downwards'}"
+                for name, most in sorted(moved.items(), key=lambda one: (-abs(one[1]), one[0]))[:MAX_NAMED]
+            )
+            yield (
+                f"heights are assumed where streets lead to bridges and underpasses: they move {listed}; junctions "
+                "there may have a hump that the place does not have"
+            )
+
+
+def site_of_extract(path: Path, place: ExtractPlace, map_path: Path) -> Generator[Progress, None, ExtractSite]:
     """Lay out the streets of an extract about a place, and describe what stands there.
 
     Parameters
     ----------
     map_path : Path
         Where the map of the streets is written (.xodr); its folder takes a file in between.
-
-    Returns
-    -------
-    road_map : RoadMap
-    description : SiteDescription
-    notes : tuple of str
-        What was assumed or left out.
 
     Raises
     ------
@@ -114,13 +195,16 @@ def site_of_extract(
     )
     try:
         if streets.streets == 0:
-            raise _no_street(extract, near)
-        yield from convert(streets, streets_path, map_path)
+            raise _no_street(extract, near, place.reach + STREET_REACH)
+        sources = yield from convert(streets, streets_path, map_path)
     finally:
         streets_path.unlink(missing_ok=True)
     road_map = read_map(map_path)
     shapes, middle = _shapes(extract, road_map, near)
-    lanes = without_plain_joints([lane for road in road_map.roads for lane in lane_surfaces(road)])
+    surfaces = {road.id: lane_surfaces(road) for road in road_map.roads}
+    map_text = map_path.read_text(encoding="utf-8")
+    road_map, map_text = with_mapped_crossings(road_map, map_text, surfaces, streets, shapes)
+    lanes = without_plain_joints(list(itertools.chain(*surfaces.values())))
     junction = nearest_junctions(road_map, lanes, float(middle[0]), float(middle[1]), 1)
     if (not junction or junction[0][1] > MAX_JUNCTION_DISTANCE) and place.radius is None:
         raise SeipError(
@@ -133,10 +217,16 @@ def site_of_extract(
     carriageway = _carriageway(lanes, middle, reach)
     area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
     beside = surroundings(shapes, area, carriageway)
-    names = _street_names(road_map, lanes, junction[0][0].id, together) if junction else ()
+    names = [_spelt(extract, name) for name in place.streets]
+    if junction and not names:
+        meeting = _street_names(road_map, lanes, junction[0][0].id, together)
+        ranked = sorted(meeting, key=_ranks(streets.ways.values()).__getitem__)
+        names = _crossing_pair(ranked, _headings(road_map, lanes, together))
+    seen = shapely.Point(middle).buffer(place.radius or _reach(lanes, together, middle) + place.along)
+    near_streets = [way for way in streets.ways.values() if seen.intersects(_path(shapes, way))]
     description = replace(
         beside,
-        name=STREETS.join(names[:2]) or path.name.partition(".")[0],
+        name=STREETS.join(names) or f"Junction at {near[0]:.5f}, {near[1]:.5f}",
         near=None if place.radius is None else (float(middle[0]), float(middle[1])),
         junction=junction[0][0].id if place.radius is None else None,
         radius=place.radius,
@@ -144,9 +234,75 @@ def site_of_extract(
         from_centre_lines=True,
         roundabouts=roundabouts,
         map_source=FROM_EXTRACT,
+        widths_assumed=_assumed_widths(near_streets),
+        attribution=(extract.attribution,),
     )
-    dropped = [f"{number} {reason}" for reason, number in shapes.dropped.items() if number]
-    return road_map, description, (*place_notes, *extract.notes, *streets.notes, *dropped)
+    dropped = [counted(number, *reason) for reason, number in shapes.dropped.items() if number]
+    lone = [extract.nodes[number] for number in streets.lone_signals]
+    lone = [node for node in lone if seen.intersects(shapely.Point(shapes.point(node)))]
+    assumed = _assumed_lanes(near_streets)
+    return ExtractSite(
+        road_map,
+        map_text,
+        description,
+        (
+            *place_notes,
+            *extract.notes,
+            *streets.notes,
+            *assumed,
+            *_assumed_crossings(guessed_crossings(road_map, seen)),
+            *dropped,
+            *_lone_signals(lone),
+        ),
+        streets,
+        sources,
+        shapes,
+        surfaces,
+        seen,
+    )
+
+
+def _lone_signals(nodes: Sequence[Node]) -> Iterator[str]:
+    """Yield a note on traffic signals that have no post."""
+    if nodes:
+        places = " and ".join(f"{node.latitude:.5f}, {node.longitude:.5f}" for node in nodes[:3])
+        yield (
+            f"traffic signals that belong to no junction within {SIGNAL_REACH:g} m have no post: {len(nodes)}, "
+            f"at {places}{' and elsewhere' if len(nodes) > 3 else ''}; describe a signal_pole where one stands"
+        )
+
+
+def _path(shapes: PlanShapes, way: Way) -> BaseGeometry:
+    """Return the line of a way, map coordinates; an empty one where the extract has less than two of its nodes."""
+    line = shapes.line(way)
+    return shapely.LineString(line if len(line) > 1 else None)
+
+
+def _assumed_widths(ways: Iterable[Way]) -> frozenset[str]:
+    """Return the groups of lanes whose widths the extract does not give for some streets: always those of pavements."""
+    known = all(has_widths(way.tags) for way in ways if "highway" in way.tags)
+    return frozenset({"sidewalk", "biking"}) if known else frozenset({"sidewalk", "biking", "driving"})
+
+
+def _assumed_lanes(ways: Iterable[Way]) -> Iterator[str]:
+    """Yield notes on streets whose number of lanes the extract does not give."""
+    streets: dict[int, list[str]] = {}
+    for way in ways:
+        if "highway" in way.tags and not has_lane_count(way.tags):
+            name = {**way.tags, **shown_name(way.tags)}.get("name", "streets without a name")
+            streets.setdefault(usual_lanes(way.tags), []).append(name)
+    for lanes, names in sorted(streets.items()):
+        known = list(dict.fromkeys(sorted(names, key=lambda name: (name == "streets without a name", name))))
+        listed = ", ".join(known[:MAX_NAMED]) + (f" and {len(known) - MAX_NAMED} more" * (len(known) > MAX_NAMED))
+        each = "one lane is" if lanes == 1 else f"{lanes} lanes are"
+        yield f"{each} assumed in each direction of streets without a number of lanes in the extract: {listed}"
+
+
+def _assumed_crossings(number: int) -> Iterator[str]:
+    """Yield a note on crossings that the extract does not map."""
+    if number:
+        are = counted(number, "crossing of pedestrians at junctions is", "crossings of pedestrians at junctions are")
+        yield f"{are} assumed: the extract maps none there"
 
 
 def _check(place: ExtractPlace) -> None:
@@ -186,7 +342,8 @@ def surroundings_of_map(
     found = surroundings(shapes, area, _carriageway(lanes, middle, reach))
     if not found.has_objects:
         raise SeipError(f"{path.name} has nothing that stands at the place: take the extract of the map's own place")
-    dropped = [f"{number} {reason}" for reason, number in shapes.dropped.items() if number]
+    dropped = [counted(number, *reason) for reason, number in shapes.dropped.items() if number]
+    found = replace(found, attribution=(extract.attribution,))
     return description.with_objects_of(found), (*extract.notes, *dropped)
 
 
@@ -250,6 +407,52 @@ def _street_names(
     return tuple(dict.fromkeys(name for number in numbers for name in meeting.get(number, ())))
 
 
+def _ranks(ways: Iterable[Way]) -> defaultdict[str, int]:
+    """Return the rank of each street by its name: that of its highest class, slip roads last."""
+    ranks: defaultdict[str, int] = defaultdict(lambda: len(RANKS))
+    for way in ways:
+        name = {**way.tags, **shown_name(way.tags)}.get("name", "")
+        kind = way.tags.get("highway", "")
+        ranks[name] = min(ranks[name], RANKS.index(kind) if kind in RANKS else len(RANKS))
+    return ranks
+
+
+def _headings(
+    road_map: RoadMap, lanes: Sequence[LaneSurface], junctions: Collection[str]
+) -> defaultdict[str, list[float]]:
+    """Return the directions, radians, of each street that meets junctions, by its name."""
+    area = shapely.union_all([lane.polygon for lane in lanes if lane.junction_id in junctions])
+    names = {road.id: road.name for road in road_map.roads}
+    headings: defaultdict[str, list[float]] = defaultdict(list)
+    for lane in lanes:
+        if lane.junction_id is None and area.distance(lane.polygon) < TOUCH:
+            x, y = (lane.left[-1] - lane.left[0])[:2].tolist()
+            headings[names[lane.road_id]].append(math.atan2(y, x))
+    return headings
+
+
+def _crossing_pair(names: Sequence[str], headings: Mapping[str, Sequence[float]]) -> list[str]:
+    """Return the first of names, and the first of the others whose street does not go on from that one's."""
+
+    def crosses(name: str) -> bool:
+        pairs = itertools.product(headings.get(names[0], ()), headings.get(name, ()))
+        return any(abs(math.remainder(one - other, math.pi)) > SAME_DIRECTION for one, other in pairs)
+
+    others = sorted(names[1:], key=lambda name: not crosses(name))
+    return [*names[:1], *others[:1]]
+
+
+def _spelt(extract: Extract, name: str) -> str:
+    """Return the name of a street, in whatever letters it was asked for, as the extract spells it."""
+    wanted = name.strip().casefold()
+    for way in _streets_called(extract, name):
+        shown = {**way.tags, **shown_name(way.tags)}
+        for key in NAMES:
+            if way.tags.get(key, "").casefold() == wanted:
+                return shown.get(key, "") or name
+    return name.strip()
+
+
 def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[tuple[float, float], tuple[str, ...]]:
     """Return latitude and longitude of where streets meet, and a note where they meet in several places.
 
@@ -294,8 +497,7 @@ def _streets_called(extract: Extract, name: str) -> list[Way]:
     return [
         way
         for way in extract.ways.values()
-        if is_street(way.tags, service=True)
-        and wanted in {way.tags.get(key, "").casefold() for key in ("name", "name:en", "alt_name", "ref")}
+        if is_street(way.tags, service=True) and wanted in {way.tags.get(key, "").casefold() for key in NAMES}
     ]
 
 
@@ -305,11 +507,8 @@ def _alike(extract: Extract, name: str) -> str:
     return f"the closest: {', '.join(close)}" if close else "its streets have no names"
 
 
-def _no_street(extract: Extract, near: tuple[float, float]) -> SeipError:
-    nodes = extract.nodes.values()
-    south, north = (f(node.latitude for node in nodes) for f in (min, max))
-    west, east = (f(node.longitude for node in nodes) for f in (min, max))
+def _no_street(extract: Extract, near: tuple[float, float], reach: float) -> SeipError:
     return SeipError(
-        f"{extract.name} has no street near {near[0]:.5f}, {near[1]:.5f}: it holds {south:.4f} to {north:.4f} degrees "
-        f"of latitude and {west:.4f} to {east:.4f} of longitude"
+        f"{extract.name} has no street within {reach:,.0f} m of {near[0]:.5f}, {near[1]:.5f}: give a place on one of "
+        "its streets, latitude before longitude, or --service-roads where driveways or aisles are streets too"
     )

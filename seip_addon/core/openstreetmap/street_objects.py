@@ -1,17 +1,20 @@
 """What stands beside the streets of an extract: trees, lamps, posts, walls, shelters; and ways that are no road."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
+from ..site.post_rules import RuleName
 from ..site.scene_geometry import ASSUMED, FROM_EXTRACT
 from ..streetscape.description import Poles, SideWay, SiteDescription, Slab, Trees, Wall
 from ..streetscape.map_furniture import CROWN_SHARE, LIGHT_ARM, LIGHT_HEIGHT, TREE_HEIGHT
 from .buildings import buildings, passages
-from .extract import Node, Tags, Way
+from .extract import Node, Tags
+from .keep_off import keep_off_areas
 from .plan_shapes import PlanShapes, polygons, spaced
 from .quantities import metres
 
@@ -37,18 +40,21 @@ POST_KINDS = {
     ("man_made", "mast"): 10.0,
 }
 """Heights (metres) that are assumed for posts, by key and value."""
+POWER_POLES = {"power", "utility_pole"}
+"""Keys and values of posts that carry lines, and belong to who runs these."""
 SIGNAL_HEIGHT, SIGNAL_ARM = 6.0, 0.0
 SHELTER_SIZE, SHELTER_HEIGHT, SHELTER_ROOF = (4.0, 1.5), 2.5, 0.15  # metres: length and depth, height, and roof
-WAY_WIDTHS = {
-    "footway": (2.0, "pavement", "Footways"),
-    "path": (1.8, "pavement", "Footways"),
-    "steps": (2.0, "pavement", "Footways"),
-    "pedestrian": (4.0, "pavement", "Footways"),
-    "cycleway": (2.0, "asphalt cycle", "Cycle tracks"),
-    "service": (3.5, "asphalt shoulder", "Driveways"),
-    "track": (3.0, "asphalt shoulder", "Driveways"),
+FOOTWAYS = "Footways"
+WAY_WIDTHS: dict[str, tuple[float, str, str, RuleName | None]] = {
+    "footway": (2.0, "pavement", FOOTWAYS, None),
+    "path": (1.8, "pavement", FOOTWAYS, None),
+    "steps": (2.0, "pavement", FOOTWAYS, None),
+    "pedestrian": (4.0, "pavement", FOOTWAYS, None),
+    "cycleway": (2.0, "asphalt cycle", "Cycle tracks", "cycle-tracks"),
+    "service": (3.5, "asphalt shoulder", "Driveways", "driveways"),
+    "track": (3.0, "asphalt shoulder", "Driveways", "driveways"),
 }
-"""Width (metres), material and name of ways that are no road."""
+"""Width (metres), material and name of ways that are not roads, and the rule that keeps new posts off them."""
 
 
 def surroundings(shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeometry) -> SiteDescription:
@@ -68,15 +74,17 @@ def surroundings(shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeomet
         for node in shapes.extract.nodes.values()
         if node.tags and area.intersects(shapely.Point(place := shapes.point(node)))
     ]
+    walls, ways = tuple(_barriers(shapes, area)), tuple(_side_ways(shapes, area))
     return SiteDescription(
         buildings=tuple(buildings(shapes, area, passages(shapes, carriageway))),
         trees=(*_single_trees(nodes), *_tree_rows(shapes, area)),
-        walls=tuple(_barriers(shapes, area)),
+        walls=walls,
         street_lights=tuple(_lamps(nodes)),
         signal_poles=tuple(_signals(nodes, carriageway)),
         posts=tuple(_posts(nodes)),
+        keep_off_areas=tuple(keep_off_areas(shapes, area, carriageway, ways, walls)),
         slabs=(*_shelters(shapes, nodes, area, carriageway), *_thick_barriers(shapes, area)),
-        ways=tuple(_side_ways(shapes, area)),
+        ways=ways,
     )
 
 
@@ -101,7 +109,7 @@ def _trees(places: Float, tags: Tags, source: str) -> Trees:
 
 
 def _tree_rows(shapes: PlanShapes, area: BaseGeometry) -> Iterator[Trees]:
-    for way, line in _lines(shapes, area, "natural", {"tree_row"}):
+    for way, line in shapes.lines(area, "natural", {"tree_row"}):
         places = spaced(line, TREE_SPACING)
         near = places[shapely.intersects_xy(area, places)]
         if len(near):
@@ -126,14 +134,16 @@ def _signals(nodes: list[tuple[Node, Float]], carriageway: BaseGeometry) -> Iter
 def _posts(nodes: list[tuple[Node, Float]]) -> Iterator[Poles]:
     for node, place in nodes:
         for (key, value), usual in POST_KINDS.items():
-            if node.tags.get(key) == value:
+            if node.tags.get(key) == value and node.tags.get("highway") != "street_lamp":
                 height, assumed = _height(node.tags, usual, MAX_POST)
-                yield Poles(place[None], height, 0.0, None, FROM_EXTRACT, assumed)
+                post = Poles(place[None], height, 0.0, None, FROM_EXTRACT, assumed)
+                carries_lines = not POWER_POLES.isdisjoint((key, value))
+                yield replace(post, name="Power pole", keep_off="power-poles") if carries_lines else post
                 break
 
 
 def _barriers(shapes: PlanShapes, area: BaseGeometry) -> Iterator[Wall]:
-    for way, line in _lines(shapes, area, "barrier", set(BARRIERS)):
+    for way, line in shapes.lines(area, "barrier", set(BARRIERS)):
         if way.tags.get("area") == "yes" and way.is_closed:
             continue
         kind = way.tags["barrier"]
@@ -208,25 +218,18 @@ def _back_wall(outline: shapely.Polygon, carriageway: BaseGeometry) -> shapely.P
 
 
 def _side_ways(shapes: PlanShapes, area: BaseGeometry) -> Iterator[SideWay]:
-    for way, line in _lines(shapes, area, "highway", set(WAY_WIDTHS)):
+    for way, line in shapes.lines(area, "highway", set(WAY_WIDTHS)):
         tags = way.tags
         if tags.get("tunnel", "no") != "no" or tags.get("indoor", "no") != "no":
             continue
         if tags.get("layer", "0") != "0" or tags.get("bridge", "no") != "no" or tags.get("footway") == "crossing":
             continue
-        usual, material, name = WAY_WIDTHS[tags["highway"]]
+        usual, material, name, rule = WAY_WIDTHS[tags["highway"]]
         if tags.get("area") == "yes":
             outline = shapes.footprint(way)
             if outline is not None:
-                yield SideWay(outline, material, name)
+                yield SideWay(outline, material, name, rule)
             continue
         width = metres(tags.get("width"), MAX_BARRIER) or usual
-        yield SideWay(shapely.LineString(line).buffer(width / 2), material, name)
-
-
-def _lines(shapes: PlanShapes, area: BaseGeometry, key: str, values: set[str]) -> Iterator[tuple[Way, Float]]:
-    for way in shapes.extract.ways.values():
-        if way.tags.get(key) in values:
-            line = shapes.line(way)
-            if len(line) > 1 and area.intersects(shapely.LineString(line)):
-                yield way, line
+        along = line if name == FOOTWAYS else None
+        yield SideWay(shapely.LineString(line).buffer(width / 2), material, name, rule, along, width)

@@ -12,9 +12,11 @@ import numpy as np
 import shapely
 
 from ..arrays import Float
+from .bridges import Structures, structures
 from .extract import Extract, Node, Tags, Way
 from .handedness import drives_on_the_left
 from .quantities import count, metres
+from .signals import Signals, matched_signals
 
 CLASSES = (
     *("motorway", "trunk", "primary", "secondary", "tertiary"),
@@ -22,12 +24,16 @@ CLASSES = (
     *("unclassified", "residential", "living_street", "road", "busway"),
 )
 """Values of ``highway`` that are streets; ``service`` (driveways, aisles, alleys) is one where it is asked for."""
+TRACKS = {"tram", "light_rail"}
+"""Values of ``railway`` whose tracks may lie in a street."""
 PAVED_CLASSES = {"primary", "secondary", "tertiary", "unclassified", "residential", "living_street", "road"}
 """Streets that have a pavement on both sides where the map says nothing of pavements."""
+WIDE_CLASSES = {"motorway", "trunk"}
+"""Streets whose one-way carriageways usually have two lanes."""
 ONE_WAY = {"yes", "true", "1", "-1", "reverse"}
 COPIED = (
-    *("highway", "railway", "name", "oneway", "junction", "lanes", "lanes:forward", "lanes:backward", "maxspeed"),
-    *("turn:lanes", "turn:lanes:forward", "turn:lanes:backward", "bridge", "layer", "access", "area"),
+    *("highway", "railway", "name", "oneway", "junction", "maxspeed"),
+    *("turn:lanes", "turn:lanes:forward", "turn:lanes:backward", "access", "area"),
 )
 """Tags of a street that netconvert reads as they are."""
 MAX_LANES, MAX_STREET_WIDTH = 12, 60.0
@@ -58,6 +64,12 @@ class StreetFile:
         Nodes of each roundabout: where streets meet it is a junction of its own.
     slip_ends : tuple of int
         Nodes where a slip lane leaves or joins a street, apart from other nodes where streets meet.
+    ways : mapping of int to Way
+        The streets, by the ids that they are written with.
+    structures : Structures
+        Streets on bridges and in underpasses.
+    lone_signals : tuple of int
+        Nodes of traffic signals that no junction follows.
     notes : tuple of str
         What was assumed.
     """
@@ -67,14 +79,17 @@ class StreetFile:
     left_hand: bool
     roundabouts: tuple[frozenset[int], ...]
     slip_ends: tuple[int, ...]
+    ways: Mapping[int, Way]
+    structures: Structures
+    lone_signals: tuple[int, ...]
     notes: tuple[str, ...]
 
 
 def is_street(tags: Tags, *, service: bool = False) -> bool:
-    """Return whether a way is a street on the surface, or a tram's track; driveways only with ``service``."""
+    """Return whether a way is a street on the surface, or a track of trams or light rail; driveways on request."""
     if tags.get("area") == "yes" or tags.get("tunnel", "no") not in ("no", "building_passage"):
         return False
-    if tags.get("railway") == "tram":
+    if tags.get("railway") in TRACKS:
         return True
     highway = tags.get("highway")
     return highway in CLASSES or (service and highway == "service")
@@ -108,16 +123,21 @@ def write_streets(
     heights = [elevation(extract.nodes[number]) for number in used]
     elevated = bool(used) and sum(height is not None for height in heights) >= MIN_ELEVATED * len(used)
     medians = _Medians(extract, [way for _, way in pieces])
+    places = dict(zip(extract.nodes, _in_metres(extract, list(extract.nodes.values())), strict=True))
+    signals = matched_signals(extract, [way for _, way in pieces], places)
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<osm version="0.6">']
     for number, height in zip(used, heights, strict=True):
-        lines += _node(number, extract.nodes[number], height if elevated else None)
+        lines += _node(number, extract.nodes[number], height if elevated else None, signals)
     for number, way in pieces:
         lines += _way(number, way.nodes, _tags(way, medians, left_hand=left_hand))
     lines += _restrictions(extract, {number for number, _ in pieces})
     path.write_text(os.linesep.join([*lines, "</osm>", ""]), encoding="utf-8")
     roundabouts = _joined(way.nodes for _, way in pieces if is_roundabout(way.tags))
     slip_ends = tuple(_slip_ends(extract, [way for _, way in pieces]))
-    return StreetFile(len(pieces), elevated, left_hand, roundabouts, slip_ends, tuple(notes))
+    crossed = structures(extract, pieces, places)
+    return StreetFile(
+        len(pieces), elevated, left_hand, roundabouts, slip_ends, dict(pieces), crossed, signals.unmatched, tuple(notes)
+    )
 
 
 def _slip_ends(extract: Extract, ways: Sequence[Way]) -> Iterator[int]:
@@ -197,10 +217,14 @@ def _runs(inside: list[bool]) -> Iterator[tuple[int, int]]:
             start = None
 
 
-def _node(number: int, node: Node, height: float | None) -> list[str]:
+def _node(number: int, node: Node, height: float | None, signals: Signals) -> list[str]:
     longitude = math.remainder(node.longitude, 360.0)
     place = f'<node id="{number}" lat="{node.latitude:.9f}" lon="{longitude:.9f}"'
     tags = {key: node.tags[key] for key in ("highway", "crossing", "railway") if key in node.tags}
+    if number in signals.moved:
+        tags = {key: value for key, value in tags.items() if key != "highway"}
+    if number in signals.junctions:
+        tags["highway"] = "traffic_signals"
     if height is not None:
         tags["ele"] = f"{height:.3f}"
     return [f"{place}/>"] if not tags else [f"{place}>", *_tag_lines(tags), "</node>"]
@@ -229,14 +253,9 @@ def _tags(way: Way, medians: "_Medians", *, left_hand: bool) -> dict[str, str]:
     """Return the tags of a street that netconvert is to read: lanes, widths, pavements and cycle lanes explicit."""
     given = way.tags
     tags = {key: given[key] for key in COPIED if key in given} | shown_name(given)
-    if given.get("railway") == "tram" and "highway" not in given:
+    if given.get("railway") in TRACKS and "highway" not in given:
         return tags
-    if given.get("tunnel") == "building_passage":
-        tags.pop("layer", None)
-    elif given.get("bridge", "no") != "no":
-        tags.setdefault("layer", "1")
-    if tags.get("lanes") is not None and not (count(tags["lanes"], MAX_LANES) or 0) >= 1:
-        del tags["lanes"]
+    tags |= _lane_tags(given)
     near, far = ("left", "right") if left_hand else ("right", "left")
     cycle = {"right": _cycle_lane(given, near), "left": _cycle_lane(given, far)}
     walked = dict(zip(("left", "right"), _sidewalks(way, medians, left_hand=left_hand), strict=True))
@@ -248,6 +267,13 @@ def _tags(way: Way, medians: "_Medians", *, left_hand: bool) -> dict[str, str]:
         for side in ("right", "left")
     }
     return tags | _widths(given, beside)
+
+
+def _lane_tags(tags: Tags) -> dict[str, str]:
+    """Return the number of lanes in the tags that netconvert reads: its own defaults by class of street differ."""
+    lanes = lane_counts(tags)
+    own = {} if is_one_way(tags) else {f"lanes:{way}": str(number) for way, number in lanes.items()}
+    return {"lanes": str(sum(lanes.values()))} | own
 
 
 def _cycle_lane(tags: Tags, side: str) -> str | None:
@@ -280,17 +306,47 @@ def _widths(tags: Tags, beside: Mapping[str, list[float]]) -> dict[str, str]:
 
 
 def lane_counts(tags: Tags) -> dict[str, int]:
-    """Return how many lanes a street has in each direction: ``forward`` and, where it is none of one way, ``backward``.
+    """Return the number of lanes of a street in each direction: ``forward`` and, for two-way streets, ``backward``.
 
-    What is not said is as netconvert assumes it.
+    Without a number a direction has `usual_lanes`. One lane of a two-way street serves both directions: the street is
+    laid out with one lane each.
     """
-    whole = count(tags.get("lanes"), MAX_LANES)
+    whole = int(count(tags.get("lanes"), MAX_LANES) or 0)
     if is_one_way(tags):
-        return {"forward": int(whole or 1)}
-    own = {way: count(tags.get(f"lanes:{way}"), MAX_LANES) for way in ("forward", "backward")}
-    total = max(int(whole or (sum(number or 1 for number in own.values()))), 2)
-    backward = int(own["backward"] or (total - own["forward"] if own["forward"] else total // 2))
-    return {"forward": max(total - backward, 1), "backward": max(backward, 1)}
+        return {"forward": whole or _listed_lanes(tags, "") or usual_lanes(tags)}
+    own = {
+        way: int(count(tags.get(f"lanes:{way}"), MAX_LANES) or 0) or _listed_lanes(tags, f":{way}")
+        for way in ("forward", "backward")
+    }
+    total = max(whole, sum(number or 1 for number in own.values()))
+    backward = own["backward"] or (total - own["forward"] if own["forward"] else total // 2)
+    return {"forward": total - backward, "backward": backward}
+
+
+def usual_lanes(tags: Tags) -> int:
+    """Return the number of lanes that each direction of a street has where the map does not say it."""
+    return 2 if is_one_way(tags) and tags.get("highway") in WIDE_CLASSES else 1
+
+
+def has_lane_count(tags: Tags) -> bool:
+    """Return whether the map gives the number of lanes of a street."""
+    ways = ("",) if is_one_way(tags) else (":forward", ":backward")
+    whole = count(tags.get("lanes"), MAX_LANES) or 0
+    return whole >= 1 or all(
+        (count(tags.get(f"lanes{way}"), MAX_LANES) or 0) >= 1 or _listed_lanes(tags, way) > 0 for way in ways
+    )
+
+
+def has_widths(tags: Tags) -> bool:
+    """Return whether the map gives the width of a street's lanes."""
+    return all(_lane_widths(tags, way, number) for way, number in lane_counts(tags).items())
+
+
+def _listed_lanes(tags: Tags, way: str) -> int:
+    """Return the number of lanes that ``turn:lanes`` of a direction lists, 0 where there is no list."""
+    listed = tags.get(f"turn:lanes{way}", "")
+    number = listed.count("|") + 1
+    return number if listed and number <= MAX_LANES else 0
 
 
 def _lane_widths(tags: Tags, way: str, lanes: int) -> list[float]:

@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 
 from ..arrays import Float
 from ..scans.frame import STATIC_INSTANCE, Frame
-from .palette import INTENSITY_COLOURS, MAX_INTENSITY, SENSOR_COLOURS, rgb
+from .palette import INTENSITY_COLOURS, MAX_INTENSITY, SENSOR_COLOURS, STATIC_COLOUR, rgb
 
 By = Literal["sensor", "intensity", "instance"]
 
-STATIC_COLOUR = "#7d8790"  # of points on what stands still, where road users have colours
 GOLDEN_RATIO = 0.618033988749895  # of the colour circle, from a road user to the next: neighbours differ most
 
 

@@ -1,19 +1,17 @@
 """Colours of targets in the viewport: coverage, weight, comparison."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
 from ..arrays import Float, Integer
-from .palette import SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS
+from ..placement.deployment import Deployment
+from ..placement.returns_summary import FEW_RETURNS
+from .palette import RETURNS_COLOURS, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, WEIGHT_COLOURS
 
 Aspect = Literal["seen", "times", "weights"]
-
-THRICE_WORDS = ("not seen", "seen by one sensor", "seen by two", "seen by three or more")
-THRICE_COLOURS = (*SEEN_COLOURS, "#123f66")
-WEIGHT_COLOURS = ("#fff3d6", "#fdd07e", "#f0984a", "#c9592f", "#7f2d1f")
-"""From the lightest weight to the heaviest; lightness alone tells them apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +39,20 @@ class Colouring:
         return share
 
 
+RETURNS_CLASSES = (1.0, FEW_RETURNS, 20.0)
+"""Returns from a pedestrian at which the classes of a plan change."""
+
+
+def of_placement(deployment: Deployment) -> Colouring:
+    """Colour targets by what a placement was chosen for: returns from a pedestrian, or how many sensors see them."""
+    returns = deployment.pedestrian_returns
+    if returns is None:
+        return as_placed(deployment.seen_by)
+    ends = [f"{limit:g}" for limit in RETURNS_CLASSES]
+    words = (f"below {ends[0]}", *(f"{low} to {high}" for low, high in pairwise(ends)), f"{ends[-1]} or more")
+    return Colouring(words, RETURNS_COLOURS, np.searchsorted(RETURNS_CLASSES, returns, side="right"))
+
+
 def as_placed(seen_by: Integer) -> Colouring:
     """Colour targets as pictures of a placement do."""
     return Colouring(SEEN_WORDS, SEEN_COLOURS, np.minimum(seen_by, SEEN_TWICE))
@@ -60,7 +72,7 @@ def colouring(aspect: Aspect, seen_by: Integer, weight: Float) -> Colouring:
     if aspect == "seen":
         return Colouring(("not seen", "seen"), (SEEN_COLOURS[0], SEEN_COLOURS[-1]), np.minimum(seen_by, 1))
     if aspect == "times":
-        return Colouring(THRICE_WORDS, THRICE_COLOURS, np.minimum(seen_by, len(THRICE_WORDS) - 1))
+        return as_placed(seen_by)
     return _by_weight(weight)
 
 

@@ -2,7 +2,7 @@
 
 import io
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from ..arrays import Boolean, Float
-from ..placement.deployment import Deployment
+from ..counts import counted
+from ..placement.deployment import Deployment, price_text
 from ..site.site import Site
 from ..storage.files import whole_file
 from .callouts import place_callouts
@@ -22,6 +23,7 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "h", "X")
 SENSOR_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 11.0, "mfc": INK, "mec": PAPER, "mew": 1.6}
 HIDDEN_MARK: dict[str, Any] = {"mfc": "none", "mec": INK, "mew": 2.0}
 MARK_RADIUS, LABEL_SIZE, LABEL_PADDING = 8.0, 8.5, 0.35  # points, points, share of the size
+ATTRIBUTION_ORDER = 100  # drawing order of credits: over everything
 MAX_LABELLED = 40  # more sensors than these get no labels on the picture
 
 
@@ -98,18 +100,33 @@ def draw_title(figure: Figure, site: Site, deployment: Deployment, left: float) 
     width, height = figure.get_size_inches()
     style = {"x": left / width, "ha": "left", "va": "top", "parse_math": False}
     figure.text(y=1 - 0.20 / height, s=site.name, size=17, weight="bold", color=INK, **style)
-    figure.text(y=1 - 0.55 / height, s=summary(deployment), size=11, color=SOFT_INK, **style)
+    line = figure.text(y=1 - 0.55 / height, s=summary(deployment), size=11, color=SOFT_INK, **style)
+    share = line.get_window_extent().width / (figure.dpi * (width - 2 * left))
+    line.set_fontsize(11 / max(1.0, share))  # so that it ends on the page
+
+
+def draw_attribution(axes: Axes, attribution: Sequence[str]) -> None:
+    """Write the credits of a map's sources at its lower right corner, over what is drawn there."""
+    if not attribution:
+        return
+    paper: dict[str, Any] = {"boxstyle": "square,pad=0.25", "facecolor": PAPER, "alpha": 0.85, "edgecolor": "none"}
+    style: dict[str, Any] = {"ha": "right", "va": "bottom", "size": 7, "color": INK, "bbox": paper, "parse_math": False}
+    axes.text(0.995, 0.005, "\n".join(attribution), transform=axes.transAxes, zorder=ATTRIBUTION_ORDER, **style)
 
 
 def summary(deployment: Deployment) -> str:
     """Return the result in one line."""
-    one = len(deployment.sensors) == 1
-    sensors = "1 sensor sees" if one else f"{len(deployment.sensors)} sensors see"
-    parts = [f"{sensors} {percent(deployment.coverage)} of the road"]
-    if deployment.central is not None:
-        parts.append(f"{percent(deployment.central)} of its weighted part")
-    parts.append(f"{percent(deployment.seen_twice)} seen twice")
-    parts.append(f"price ${deployment.price:,.0f}")
+    sensors = counted(len(deployment.sensors), "sensor sees", "sensors see")
+    band = deployment.gain_band
+    between = f" ({percent(band.low)} to {percent(band.high)})" if band is not None and band.sheets else ""
+    parts = [f"{sensors} {percent(deployment.coverage)} of the road{between}"]
+    if deployment.returns is not None:
+        parts.insert(0, deployment.returns.describe())
+    else:
+        if deployment.central is not None:
+            parts.append(f"{percent(deployment.central)} of its weighted part")
+        parts.append(f"{percent(deployment.seen_twice)} seen twice")
+    parts.append(f"price {price_text(deployment.price, installed=deployment.installed)}")
     return "  ·  ".join(parts)
 
 

@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 from ..arrays import Boolean, Float
 from ..placement.deployment import Deployment
 from ..site.site import Site
-from .drawing import draw_sensors, draw_title, percent, save_png
+from .drawing import draw_attribution, draw_sensors, draw_title, percent, save_png
 from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
 
 DPI = 160
@@ -60,6 +60,7 @@ def save_labelled_view(
     view.set(xlim=(0.0, width), ylim=(0.0, height))
     size = np.array((width, height))
     draw_sensors(view, deployment, sight.sensors * size, sight.targets * size, zorder=2, hidden=sight.hidden)
+    draw_attribution(view, site.attribution)
     draw_title(figure, site, deployment, MARGIN)
     _draw_legend(figure, deployment, any_hidden=bool(sight.hidden.any()))
     save_png(path, figure)

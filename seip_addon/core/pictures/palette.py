@@ -1,4 +1,8 @@
-"""Colours shared by pictures and the scene; distinct for colour-blind readers and in greyscale."""
+"""All colours that mean something, in pictures, in the viewport and in files: coverage, sensors and areas share no hue.
+
+Coverage is orange and blue, which colour-blind people tell apart, sensors are yellow, green and pink, and areas are red
+and violet. Within a group colours differ in lightness as well, so that they remain distinct in greyscale.
+"""
 
 INK = "#1d2b36"
 SOFT_INK = "#5d6b76"
@@ -8,9 +12,40 @@ SEEN_TWICE = 2
 SEEN_COLOURS = ("#e8823c", "#8cc4e2", "#2c72a8")
 """Of targets that no sensor, one sensor, two sensors or more see; lightness differs as well as hue."""
 SEEN_WORDS = ("not seen", "seen by one sensor", "seen by two or more")
+RETURNS_COLOURS = (SEEN_COLOURS[0], "#f6c9a8", *SEEN_COLOURS[1:])
+"""Of places by the returns that a pedestrian has there, from fewest to most; the first two are too few to be found."""
+COMPARED_COLOURS = ("#8a8f94", "#cfd6db", SEEN_COLOURS[2], SEEN_COLOURS[0])
+"""Of targets seen in neither of two placements, in both, gained and lost."""
+DENSE_BEAMS, WIDE_BEAMS = "#4dbfff", "#ff8c1a"
+"""Of beams on the road that leave no gap to the next, and of those that do: such road may go unseen."""
+HIDDEN_COLOUR, MISSED_COLOUR = INK, "#a3abb2"
+"""Of road that something hides from a sensor, and of road in its view that no beam of it returns from."""
+COVERAGE_COLOURS = (
+    *SEEN_COLOURS,
+    RETURNS_COLOURS[1],
+    *COMPARED_COLOURS,
+    DENSE_BEAMS,
+    WIDE_BEAMS,
+    HIDDEN_COLOUR,
+    MISSED_COLOUR,
+)
 
-SENSOR_COLOURS = ("#56b4e9", "#e69f00", "#3cc99b", "#f07ac0", "#f0e442", "#d55e00", "#8f9bff", "#cfd8dc")
-"""Told apart by colour-blind people, on a dark ground (after Okabe and Ito 2008)."""
+SENSOR_COLOURS = ("#f0e442", "#12b886", "#f783c5", "#a8e05f", "#d6358c", "#7ff0d8", "#1f9d8a", "#cfd8dc")
+"""Of the points of each sensor, on a dark ground; neighbours differ in lightness too."""
+SENSOR_BODY, SIGHT_LINE = "#f2c230", "#ffd940"
+POLE_COLOUR, ASSUMED_POLE_COLOUR = "#f2c94c", "#8a7400"
+"""Of where a sensor may be mounted."""
+ALL_SENSOR_COLOURS = (*SENSOR_COLOURS, SENSOR_BODY, SIGHT_LINE, POLE_COLOUR, ASSUMED_POLE_COLOUR)
+
+WEIGHTED, FORBIDDEN, MANDATORY = "#7b3fa0", "#a3333d", "#4b3fb0"
+REGION_VEIL, WEIGHTED_VEIL, FORBIDDEN_VEIL, MANDATORY_VEIL = "#d9d2ee", "#c04df0", "#f0304f", "#6f5dff"
+"""Of areas in the viewport, where three quarters of what is below shine through."""
+WEIGHT_COLOURS = ("#f1e6f7", "#d7b8e8", "#b584d3", "#8a4fb3", "#4f2374")
+"""From the lightest weight to the heaviest, in the hue of weighted areas; lightness alone tells them apart."""
+AREA_VEILS = (REGION_VEIL, WEIGHTED_VEIL, FORBIDDEN_VEIL, MANDATORY_VEIL)
+AREA_COLOURS = (WEIGHTED, FORBIDDEN, MANDATORY, *AREA_VEILS, *WEIGHT_COLOURS)
+
+STATIC_COLOUR = "#7d8790"  # of points on what stands still, where road users have colours
 INTENSITY_COLOURS = ("#27408b", "#1fa187", "#fde725", "#ffffff")
 """From no intensity to `MAX_INTENSITY`, evenly spaced along its square root."""
 MAX_INTENSITY = 0.6  # intensity from which on returns have the last colour; below, colours go by its square root

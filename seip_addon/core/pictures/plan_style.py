@@ -4,20 +4,19 @@ from typing import Any
 
 from matplotlib.colors import LinearSegmentedColormap
 
-from .palette import INK, PAPER
+from .palette import ASSUMED_POLE_COLOUR, INK, PAPER, POLE_COLOUR
 
 Style = dict[str, Any]
 
 HEIGHT_CMAP = LinearSegmentedColormap.from_list("heights", ("#d2d0c4", "#8b9285", "#4b5350"))
-WEIGHTED, FORBIDDEN, MANDATORY = "#6a3d9a", "#a3333d", "#2f6b3a"
 SIDEWALK_MARK: Style = {"linestyle": "none", "marker": "o", "markersize": 2.6, "mfc": PAPER, "mec": INK, "mew": 0.5}
 ASSUMED_MARK: Style = {
     "linestyle": "none",
     "marker": "D",
     "markersize": 3.8,
     "mfc": PAPER,
-    "mec": "#a3333d",
+    "mec": ASSUMED_POLE_COLOUR,
     "mew": 0.9,
 }
 ASSUMED_HEIGHT: Style = {"facecolor": "none", "edgecolor": "#c9cdc4", "hatch": "\\\\\\", "linewidth": 0.4}
-POLE_MARK: Style = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc": "#f2c94c", "mec": INK, "mew": 0.6}
+POLE_MARK: Style = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc": POLE_COLOUR, "mec": INK, "mew": 0.6}

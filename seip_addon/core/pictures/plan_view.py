@@ -21,18 +21,16 @@ from ..placement.deployment import Deployment
 from ..site.scene_geometry import ASSUMED, Mesh, SceneGeometry
 from ..site.site import Site
 from ..site.target_squares import target_squares
-from .drawing import add_axes, draw_polygons, draw_sensors, draw_title, save_png
-from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SOFT_INK
-from .plan_legend import LEGEND_WIDTH, PlanLegend
+from .coverage_colours import of_placement
+from .drawing import add_axes, draw_attribution, draw_polygons, draw_sensors, draw_title, save_png
+from .palette import FORBIDDEN, INK, MANDATORY, PAPER, SOFT_INK, WEIGHTED
+from .plan_legend import PlanLegend
 from .plan_style import (
     ASSUMED_HEIGHT,
     ASSUMED_MARK,
-    FORBIDDEN,
     HEIGHT_CMAP,
-    MANDATORY,
     POLE_MARK,
     SIDEWALK_MARK,
-    WEIGHTED,
     Style,
 )
 
@@ -42,6 +40,8 @@ ARROW_LENGTH, WEDGE_LENGTH = 0.34, 0.5  # inches
 MIN_MAP_WIDTH, MAX_MAP_WIDTH = 9.6, 15.0  # inches
 MIN_MAP_HEIGHT, MAX_MAP_HEIGHT = 6.6, 10.5  # inches
 MARGIN_SHARE = 0.06  # of the region's size, shown around it
+ROOMS = (1.0, 1.03, 1.06, 1.1, 1.15, 1.2, 1.3, 1.4)  # by which more is shown until no corner's writing hides the region
+Window = tuple[float, float, float, float]
 
 LAND, PAVEMENT, ROAD, KERB = "#eaece6", "#d9d5cc", "#b9bcc0", "#8f949a"
 MAX_GAP = 0.06  # metres
@@ -69,8 +69,10 @@ def save_plan_view(
 def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment, notes: Sequence[str] = ()) -> Figure:
     """Return the plan as a figure."""
     map_width, map_height = _map_size(site.region)
-    window = _window(site.region, map_height / map_width)
-    figure = Figure((map_width + LEGEND_WIDTH + 3 * MARGIN, map_height + HEAD + MARGIN), dpi=DPI, facecolor=PAPER)
+    window = _window(site.region, map_width, map_height)
+    trial = PlanLegend(Figure().add_axes((0.0, 0.0, 1.0, 1.0)), map_height)
+    trial.draw(geometry, site, deployment, Normalize(0.0, 1.0), notes)  # its width decides the page's
+    figure = Figure((map_width + trial.width + 3 * MARGIN, map_height + HEAD + MARGIN), dpi=DPI, facecolor=PAPER)
     FigureCanvasAgg(figure)  # measures text
     plan = add_axes(figure, MARGIN, MARGIN, map_width, map_height)
     plan.spines[:].set(color=SOFT_INK, linewidth=0.8)
@@ -88,8 +90,9 @@ def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment, notes
     _draw_headings(plan, deployment, inch)
     draw_scale(plan, inch)
     _draw_north(plan, inch)
+    draw_attribution(plan, site.attribution)
     draw_title(figure, site, deployment, MARGIN)
-    panel = add_axes(figure, map_width + 2 * MARGIN, MARGIN, LEGEND_WIDTH, map_height)
+    panel = add_axes(figure, map_width + 2 * MARGIN, MARGIN, trial.width, map_height)
     PlanLegend(panel, map_height).draw(geometry, site, deployment, norm, notes)
     return figure
 
@@ -101,11 +104,26 @@ def _map_size(region: BaseGeometry) -> tuple[float, float]:
     return min(max(map_height * width / height, MIN_MAP_WIDTH), MAX_MAP_WIDTH), map_height
 
 
-def _window(region: BaseGeometry, shape: float) -> tuple[float, float, float, float]:
-    """Return the part of the plane to show: the region with some room, and ``shape`` times as high as wide."""
+def _window(region: BaseGeometry, map_width: float, map_height: float) -> Window:
+    """Return the part of the plane to show: the region with some room, on a map of so many inches.
+
+    There is more room where scale or north arrow would hide some of the region.
+    """
     x, y, width, height = _bounds(region)
+    shape = map_height / map_width
     width, height = max(width, height / shape), max(height, width * shape)
-    return x - width / 2, y - height / 2, x + width / 2, y + height / 2
+    windows = [
+        (x - room * width / 2, y - room * height / 2, x + room * width / 2, y + room * height / 2) for room in ROOMS
+    ]
+    return next((one for one in windows if not region.intersects(_papers(one, map_width))), windows[0])
+
+
+def _papers(window: Window, map_width: float) -> BaseGeometry:
+    """Return where scale and north arrow lie on a map of a width in inches."""
+    left, bottom, right, top = window
+    inch = (right - left) / map_width
+    scale, north = _scale_paper(left, bottom, inch), _north_paper(right, top, inch)
+    return shapely.union_all([shapely.box(x, y, x + width, y + height) for x, y, width, height in (scale, north)])
 
 
 def _bounds(region: BaseGeometry) -> tuple[float, float, float, float]:
@@ -129,7 +147,8 @@ def _footprint(mesh: Mesh, shown: BaseGeometry) -> BaseGeometry:
 
 
 def _draw_targets(plan: Axes, site: Site, deployment: Deployment) -> None:
-    colours = np.array(SEEN_COLOURS)[np.minimum(deployment.seen_by, SEEN_TWICE)]
+    shown = of_placement(deployment)
+    colours = np.array(shown.colours)[shown.of]
     squares = target_squares(site.targets)[:, :, :2]
     draw_polygons(plan, squares, facecolors=colours, edgecolors="none", antialiaseds=False, zorder=TARGET)
 
@@ -212,15 +231,30 @@ def _draw_headings(plan: Axes, deployment: Deployment, inch: float) -> None:
 
 def draw_scale(plan: Axes, inch: float) -> None:
     """Draw a bar of a round length, at most two inches of so many metres."""
-    decade = 10.0 ** math.floor(math.log10(2 * inch))
-    length = max(step * decade for step in (1, 2, 5) if step * decade <= 2 * inch)
+    length = _scale_length(inch)
     left, bottom = plan.get_xlim()[0] + 0.25 * inch, plan.get_ylim()[0] + 0.25 * inch
-    _draw_paper(plan, left - 0.13 * inch, bottom - 0.12 * inch, length + 0.45 * inch, 0.52 * inch)
+    _draw_paper(plan, *_scale_paper(plan.get_xlim()[0], plan.get_ylim()[0], inch))
     for part in range(4):
         style: Style = {"facecolor": INK if part % 2 == 0 else PAPER, "edgecolor": INK, "linewidth": 0.7}
         plan.add_patch(Rectangle((left + part * length / 4, bottom), length / 4, 0.08 * inch, zorder=TEXT, **style))
     for at, words in ((0.0, "0"), (length / 2, f"{length / 2:g}"), (length, f"{length:g} m")):
         plan.text(left + at, bottom + 0.13 * inch, words, ha="center", va="bottom", size=8, color=INK, zorder=TEXT)
+
+
+def _scale_length(inch: float) -> float:
+    """Return the largest round length, in metres, of at most two inches of so many metres."""
+    decade = 10.0 ** math.floor(math.log10(2 * inch))
+    return max(step * decade for step in (1, 2, 5) if step * decade <= 2 * inch)
+
+
+def _scale_paper(left: float, bottom: float, inch: float) -> tuple[float, float, float, float]:
+    """Return left, bottom, width and height of what the scale is drawn on, in the map's lower left corner."""
+    return left + 0.12 * inch, bottom + 0.13 * inch, _scale_length(inch) + 0.45 * inch, 0.52 * inch
+
+
+def _north_paper(right: float, top: float, inch: float) -> tuple[float, float, float, float]:
+    """Return left, bottom, width and height of what the north arrow is drawn on, in the map's upper right corner."""
+    return right - 0.62 * inch, top - 0.92 * inch, 0.48 * inch, 0.8 * inch
 
 
 def _draw_paper(plan: Axes, left: float, bottom: float, width: float, height: float) -> None:
@@ -232,7 +266,7 @@ def _draw_north(plan: Axes, inch: float) -> None:
     """Draw an arrow along +y, which is north in map coordinates."""
     right, top = plan.get_xlim()[1], plan.get_ylim()[1]
     x, y = right - 0.38 * inch, top - 0.82 * inch
-    _draw_paper(plan, x - 0.24 * inch, y - 0.1 * inch, 0.48 * inch, 0.8 * inch)
+    _draw_paper(plan, *_north_paper(right, top, inch))
     arrow = np.array([(0.0, 0.42), (0.12, 0.0), (0.0, 0.09), (-0.12, 0.0)]) * inch + (x, y)
     plan.fill(arrow[:, 0], arrow[:, 1], facecolor=INK, edgecolor="none", zorder=TEXT)
     plan.text(x, y + 0.46 * inch, "N", ha="center", va="bottom", size=9, weight="bold", color=INK, zorder=TEXT)

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
+from ..counts import counted
 from ..scans.frame import Frame, Labels
 from ..scans.sensor import MountedSensor
 from .cloud_colours import sensor_colour
-from .drawing import LABEL_SIZE, SENSOR_MARK, add_axes, draw_polygons, save_png
-from .palette import INK, INTENSITY_COLOURS, MAX_INTENSITY, PAPER, SOFT_INK
+from .drawing import LABEL_SIZE, SENSOR_MARK, add_axes, draw_attribution, draw_polygons, save_png
+from .palette import INK, INTENSITY_COLOURS, MAX_INTENSITY, PAPER, SEEN_COLOURS, SOFT_INK
 from .plan_style import Style
 from .plan_view import draw_area, draw_scale
 
@@ -26,11 +27,15 @@ MARGIN_SHARE = 0.04  # of the region's size, shown around it
 PIXELS = 1100  # of a cloud's picture, along a side
 BACKGROUND_COLOUR = "#101820"
 INTENSITY_CMAP = LinearSegmentedColormap.from_list("strength", INTENSITY_COLOURS)
-SEEN_COLOUR, UNSEEN_COLOUR = "#ffffff", "#ff5a4f"
+SEEN_COLOUR, UNSEEN_COLOUR = PAPER, SEEN_COLOURS[0]
 
 
 def save_scan_view(
-    path: str | os.PathLike[str], frame: Frame, region: BaseGeometry, sensors: Sequence[MountedSensor]
+    path: str | os.PathLike[str],
+    frame: Frame,
+    region: BaseGeometry,
+    sensors: Sequence[MountedSensor],
+    attribution: Sequence[str] = (),
 ) -> None:
     """Draw a frame twice, its points coloured by sensor and by intensity, with the boxes of its road users, as PNG.
 
@@ -40,8 +45,12 @@ def save_scan_view(
         Region of interest in plan; the picture shows this and a little around it.
     sensors : sequence of MountedSensor
         In the order of the frame's numbers.
+    attribution : sequence of str
+        Credits that the sources of the scene demand.
     """
-    save_png(path, draw_scan(frame, region, sensors))
+    figure = draw_scan(frame, region, sensors)
+    draw_attribution(figure.axes[-1], attribution)
+    save_png(path, figure)
 
 
 def draw_scan(frame: Frame, region: BaseGeometry, sensors: Sequence[MountedSensor]) -> Figure:
@@ -102,8 +111,8 @@ def _write_around(figure: Figure, frame: Frame, sensors: Sequence[MountedSensor]
     width, height = figure.get_size_inches()
     style = {"x": MARGIN / width, "ha": "left", "va": "top"}
     unseen = int((frame.labels.points.sum(axis=1) == 0).sum())
-    users = f"{len(frame.labels)} road users, {unseen} without a return"
-    counts = f"{len(frame):,} points of {len(sensors)} sensors  ·  {users}"
+    users = f"{counted(len(frame.labels), 'road user')}, {unseen} without a return"
+    counts = f"{counted(len(frame), 'point')} of {counted(len(sensors), 'sensor')}  ·  {users}"
     figure.text(y=1 - 0.20 / height, s=f"Scan at {frame.time:.2f} s", size=17, weight="bold", color=INK, **style)
     figure.text(y=1 - 0.58 / height, s=counts, size=11, color=SOFT_INK, **style)
     shown = range(len(sensors))

@@ -23,6 +23,7 @@ import numpy as np
 
 from ..arrays import Float, Integer
 from ..progress import Progress
+from .constraints import Constrained
 from .reduced_problem import Instance
 from .search_limits import Clock
 
@@ -90,7 +91,7 @@ class Bound:
     selection: Selection
 
 
-def select(instance: Instance, score: Float, near: float = 0.0) -> Selection:
+def select(instance: Constrained, score: Float, near: float = 0.0) -> Selection:
     """Choose the candidates of largest scores, one per clique, within the number and the budget.
 
     The budget is relaxed; its multiplier minimises the bound, by bisection, or is the best of a few near the one given.
@@ -247,7 +248,7 @@ def lagrangian_bound(
                 break
             keep, instance = keep[within], instance.of(within)
             descent.restart(bound_from(instance, best.targets, best.groups, layers, exact=False))
-        yield Progress(iteration, iterations, "bounding what any placement can cover")
+        yield Progress(0, 0, "bounding what any placement can cover")  # it mostly ends long before the limit
         clock.spend(2 * instance.visible.size)
         current = descent.current
         picked = current.selection.picked
@@ -304,7 +305,7 @@ def can_reach(instance: Instance, bound: Bound, goal: float) -> Integer:
     return np.flatnonzero(forced >= goal - instance.margin)
 
 
-def _select(instance: Instance, score: Float, multiplier: float) -> Selection:
+def _select(instance: Constrained, score: Float, multiplier: float) -> Selection:
     net = score - multiplier * instance.price if multiplier else score
     best_first = np.lexsort((-net, instance.clique))
     clique = instance.clique[best_first]

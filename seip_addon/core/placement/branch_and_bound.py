@@ -34,7 +34,7 @@ from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
 from .bounds import Bound, lagrangian_bound, select
 from .problem import TIE_TOLERANCE
-from .reduced_problem import MAX_EXACT_DOUBLE, Instance, Numbers
+from .reduced_problem import MAX_EXACT_DOUBLE, WHOLE_SLACK, Instance, Numbers
 from .search_limits import Clock
 
 MIN_SENSORS = 3  # with so many sensors to come, or more, a node is bounded by Lagrangian relaxation as well
@@ -48,7 +48,7 @@ Elsewhere branching itself tightens the bound, and sooner.
 TRIALS, MAX_KEPT_SHARE = 4, 0.5
 """... and, after so many trials with as many sensors to come, where it leaves no more than such a share of them."""
 
-FIRST_STEPS, LATER_STEPS = 300, 100  # of the multipliers of the first node, and of later ones from their parent's
+FIRST_STEPS, LATER_STEPS = 300, 30  # of the multipliers of the first node, and of later ones from their parent's
 MAX_ENTRIES = 30_000_000  # entries of V that the search keeps as numbers at most: 240 MB, or twice that
 OPERATIONS_PER_FETCH = 8  # multiplications that take as long as fetching an entry of V
 
@@ -100,7 +100,7 @@ def merit(instance: Instance, chosen: Integer) -> tuple[int, float, float, list[
     return (
         len(chosen),
         relative_price(instance, math.fsum(instance.price[chosen])),
-        -(doubly if instance.step == 1 else round(doubly / instance.step)),
+        -(doubly if instance.step == 1 else round(doubly / instance.slack)),
         chosen.tolist(),
     )
 
@@ -140,6 +140,7 @@ class Search:
         self._clock = Clock(math.inf)
         self._matrix = instance.matrix
         self._by_target = np.ascontiguousarray(self._matrix.T)
+        self._seen_by = np.ascontiguousarray(instance.visible.T)
         self._weight = instance.weight.astype(self._matrix.dtype)
         self._overlap = (self._matrix * self._weight) @ self._by_target if instance.cover.top == 1 else None
         self._excluded = instance.conflict | np.eye(len(instance), dtype=bool)
@@ -275,7 +276,7 @@ class Search:
         if self._left(node) == 0:
             return
         for candidate, gain in zip(node.followers[:children].tolist(), node.gains[:children].tolist(), strict=True):
-            if node.value + gain < self._wanted(node):
+            if self.satisfied or node.value + gain < self._wanted(node):
                 return
             self.offer(np.array((*node.chosen, candidate)))
 
@@ -285,10 +286,10 @@ class Search:
         spent = math.fsum(instance.price[list(node.chosen)])
         return replace(
             instance,
-            visible=instance.visible[np.ix_(followers, targets)],
+            visible=self._seen_by[targets][:, followers].T,  # rows of targets are copied faster
             weight=instance.weight[targets],
             price=instance.price[followers],
-            conflict=instance.conflict[np.ix_(followers, followers)],
+            conflict=np.broadcast_to(np.False_, (len(followers), len(followers))),  # bounds know the cliques alone
             clique=instance.clique[followers],
             mandatory=np.zeros((0, len(followers)), bool),
             original=instance.original[followers],
@@ -387,7 +388,9 @@ class Search:
 
 
 class BestPlacements(Search):
-    """Lists the placements of largest coverage among those that cover at least a goal: a better one clears the list.
+    """Lists the placements of largest coverage among those that cover at least a goal.
+
+    Each one that covers more raises the goal, and those that fall short of it by then leave the list.
 
     Parameters
     ----------
@@ -408,7 +411,7 @@ class BestPlacements(Search):
     def __init__(self, instance: Instance, goal: float, most: int, bound: float) -> None:
         super().__init__(instance, goal)
         self.overflowed = False
-        self._listed: dict[bytes, Integer] = {}
+        self._listed: dict[bytes, tuple[float, Integer]] = {}
         self._most = most
         self._bound = bound
         self._value = -math.inf
@@ -416,25 +419,28 @@ class BestPlacements(Search):
     @property
     def found(self) -> list[Integer]:
         """Sorted candidates of the placements that cover most, in the order in which they were met."""
-        return list(self._listed.values())
+        return [placement for _, placement in self._listed.values()]
 
     def _take(self, placement: Integer) -> float:
         instance, value = self.instance, self.instance.value(placement)
         if value < self.goal or not instance.feasible(placement):
             return self.goal
-        if value > self._value + instance.slack:
-            self._listed, self.overflowed, self._value = {}, False, value
-            self.goal = value - instance.slack
+        # with more sensors only those are wanted that cover more: weights are whole numbers
+        more = value + 1 - WHOLE_SLACK
+        if value > self._value:
+            self.overflowed &= value <= self._value + instance.slack
+            self._value, self.goal = value, value - instance.slack
+            self._listed = {key: tie for key, tie in self._listed.items() if tie[0] >= self.goal}
         if placement.tobytes() in self._listed:
-            return value + instance.step - instance.slack
+            return more
         if len(self._listed) < self._most:
-            self._listed[placement.tobytes()] = placement
+            self._listed[placement.tobytes()] = value, placement
         else:
             # one more than can be listed: from here on only a better one is of interest
             self.overflowed = True
-            self.goal = self._value + instance.step - instance.slack
-        self.satisfied = self.overflowed and self._bound < self._value + instance.step - instance.slack
-        return value + instance.step - instance.slack
+            self.goal = max(self.goal, more)
+        self.satisfied = self.overflowed and self._bound < more
+        return more
 
 
 class FirstInOrder(Search):
@@ -477,7 +483,7 @@ class FirstInOrder(Search):
         below_two = instance.gains(instance.weight * (twice < 2))
         reach = float(instance.weight @ twice) + float(_largest(below_two[followers], left).sum())
         doubly = reach - self.goal + self._rounding
-        return (doubly if instance.step == 1 else doubly / instance.step + 1) < -self._key[2]
+        return (doubly if instance.step == 1 else doubly / instance.slack + 1) < -self._key[2]
 
 
 def _within_reach(node: _Node, left: int, goal: float) -> tuple[_Node, int]:

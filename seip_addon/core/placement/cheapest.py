@@ -19,6 +19,7 @@ from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 from .solver import prove, scale_notes, solve_within
 from .tie_breaking import fewest
 
+SAME_PRICE = "among equally cheap placements "  # how the note begins that bounds what another one may cover
 MIN_TIE_BREAKING_LIMIT = 1.0  # seconds, or units of work, that choosing among equally cheap placements may always take
 
 
@@ -59,7 +60,7 @@ def cheapest_for_coverage(
         bound = 0.0 if proven else -math.inf
     finishing = clock.part(clock.elapsed, MIN_TIE_BREAKING_LIMIT)  # no longer than it took to find the price
     best = yield from solve_within(_no_dearer(problem, instance, cheapest), solver, finishing)
-    reached = best.covered * factor >= goal - instance.margin
+    reached = best.covered * factor >= goal - instance.slack
     chosen = best.chosen if reached else instance.original[cheapest]
     return _record(problem, chosen, bound, best, clock)
 
@@ -138,10 +139,13 @@ def _record(problem: PlacementProblem, chosen: Integer, bound: float, best: Plac
     notes = [*scale_notes(problem)]
     if not optimal:
         notes.append(
-            "the time was too short to prove this placement the cheapest: the gap says how much dearer it may be"
+            "the time was too short to prove this placement the cheapest: the gap is the share of its price that "
+            "another one may save"
         )
     if best.status != "optimal":
-        notes.append("among equally cheap placements another one may cover more")
+        more = max(0.0, best.bound - problem.covered(chosen)) / math.fsum(problem.weights)
+        points = math.ceil(more * 1000 - 1e-9) / 10
+        notes.append(f"{SAME_PRICE}another one may cover up to {points:.1f} percentage points more")
     return assess(
         problem,
         chosen,

@@ -87,10 +87,10 @@ def decomposition_bound(
         parts_seeing[part.targets] += 1
     start = _bound(instance, parts, instance.weight / np.maximum(parts_seeing, 1))
     descent = SubgradientDescent(start, instance.total)
-    for iteration in range(MAX_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         if descent.best.value < goal - instance.margin or descent.step < MIN_STEP or clock.elapsed > end:
             break
-        yield Progress(iteration, MAX_ITERATIONS, "bounding by parts of the candidates")
+        yield Progress(0, 0, "bounding by parts of the candidates")
         clock.spend(6 * sum(part.matrix.size for part in parts))
         multipliers, seen = descent.current.multipliers, descent.current.seen
         change = descent.move(np.where(multipliers < instance.weight, seen - 1.0, np.maximum(seen - 1.0, 0.0)), goal)

@@ -2,13 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Annotated
 
 import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 from ..geometry.orientation import describe_turn, orientation
 from ..lidar import LidarModel
+from ..limits import SHARE
 from ..site.site import Candidates, Site
+from .returns_summary import ReturnsSummary
+
+BAND, UNRANKED = "over plausible gains", "not ranked"
+"""How the messages of a `GainBand` begin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +86,56 @@ class Sensor:
         return describe_turn(self.tilt, None if self.model.all_round else self.yaw)
 
 
+@dataclass(frozen=True)
+class TypeBand:
+    """Coverage of a placement if all of its sensors were of one type, at that type's plausible gains."""
+
+    sensor: str
+    low: Annotated[float, SHARE]
+    high: Annotated[float, SHARE]
+
+
+@dataclass(frozen=True)
+class GainBand:
+    """Coverage of a placement over the plausible gains of its sensors.
+
+    Parameters
+    ----------
+    low, high : float
+        Share of the targets that is seen at the lowest and at the highest gains.
+    sheets : tuple of str
+        Sensor types of the placement whose law of detection comes from a data sheet, by catalogue key.
+    types : tuple of TypeBand
+        For each type that there was to choose from; empty where there was only one.
+    """
+
+    low: Annotated[float, SHARE]
+    high: Annotated[float, SHARE]
+    sheets: tuple[str, ...]
+    types: tuple[TypeBand, ...] = ()
+
+    @property
+    def unranked(self) -> tuple[tuple[TypeBand, TypeBand], ...]:
+        """Pairs of types whose bands overlap, so that neither is better by what is known of them."""
+        pairs = combinations(self.types, 2)
+        return tuple((one, other) for one, other in pairs if one.low <= other.high and other.low <= one.high)
+
+    def messages(self) -> tuple[str, ...]:
+        """Describe the band, and name the types that it does not rank."""
+        messages = []
+        if self.sheets:
+            sheets = ", ".join(self.sheets)
+            messages.append(
+                f"{BAND} coverage is {self.low:.1%} to {self.high:.1%}: detection by {sheets} is derived from data "
+                "sheets, not calibrated on a sweep"
+            )
+        types = dict.fromkeys(one for pair in self.unranked for one in pair)
+        if types:
+            bands = ", ".join(f"{one.sensor} {one.low:.0%} to {one.high:.0%}" for one in types)
+            messages.append(f"{UNRANKED}, as their bands overlap where the sensors are mounted: {bands}")
+        return tuple(messages)
+
+
 @dataclass(frozen=True, eq=False)
 class Deployment:
     """The chosen sensors and what they see together.
@@ -100,6 +157,12 @@ class Deployment:
     price : float, dollars
     rows : (k, t) bool
         What each of them sees.
+    gain_band : GainBand, optional
+        Coverage over the plausible gains, where some type is not calibrated on a sweep.
+    returns : ReturnsSummary, optional
+        Returns from road users, where the sensors were chosen for them.
+    pedestrian_returns : (t,) float64, optional
+        Expected returns from a pedestrian near each target, likewise.
     """
 
     sensors: tuple[Sensor, ...]
@@ -110,6 +173,19 @@ class Deployment:
     weighted: float
     price: float
     rows: Boolean
+    gain_band: GainBand | None = None
+    returns: ReturnsSummary | None = None
+    pedestrian_returns: Float | None = None
+
+    @property
+    def installed(self) -> bool:
+        """Whether its price counts posts, mounting, power and backhaul."""
+        return any(sensor.installation is not None for sensor in self.sensors)
+
+
+def price_text(price: float, *, installed: bool) -> str:
+    """Return a price in whole dollars, with the word that it is of installed sensors where it is."""
+    return f"${price:,.0f}{' installed' if installed else ''}"
 
 
 def pose_prices(candidates: Candidates, models: Mapping[str, LidarModel]) -> Float:

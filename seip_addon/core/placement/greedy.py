@@ -1,4 +1,4 @@
-"""Greedy selection with its certificate, and swap local search."""
+"""Greedy selection with its certificate, and local search by swaps."""
 
 import math
 from collections.abc import Generator, Iterable, Iterator
@@ -8,15 +8,11 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
 from .bounds import select
+from .constraints import Constrained
 from .problem import TIE_TOLERANCE
 from .reduced_problem import Instance
-from .search_limits import Clock
 
 GREEDY_STARTS = 8  # candidates to begin a greedy choice with, before swaps
-TABU_STEPS_PER_CANDIDATE = 2  # swaps of a tabu search for each candidate
-
-ADDED_TENURE, DROPPED_TENURE = 4, 12
-"""A candidate added stays for fewer steps than the first; one dropped stays out for one to two times the second."""
 
 
 def greedy(instance: Instance, start: Integer, *, per_price: bool = False, enough: float = math.inf) -> Integer:
@@ -102,48 +98,6 @@ def swap_search(instance: Instance, chosen: Integer) -> Generator[Progress, None
         chosen = np.sort(np.append(np.delete(chosen, gone), new))
 
 
-def tabu_search(
-    instance: Instance, chosen: Integer, clock: Clock, seconds: float
-) -> Generator[Progress, None, Integer]:
-    """Make the best swap again and again, even for the worse, and return the best choice met (Glover 1989).
-
-    Who went cannot come back for a while, and who came cannot go, unless that leads to a choice better than any before.
-    """
-    best, end = chosen, clock.elapsed + seconds
-    covered = most = instance.value(chosen)
-    locked = np.zeros(len(instance), np.int64)
-    random = np.random.default_rng(0)
-    columns = np.ascontiguousarray(instance.matrix.T)
-    rests, seen = np.zeros((0, len(instance.weight))), np.zeros((0, len(instance)))
-    steps = TABU_STEPS_PER_CANDIDATE * len(instance)
-    for step in range(steps):
-        if len(chosen) == 0 or clock.elapsed > end or most == instance.total:
-            break
-        yield Progress(step, steps, "searching swaps")
-        clock.spend(2 * columns.size)
-        before, rests = rests, _rests(instance, chosen)
-        if len(rests) == len(before):
-            changed = np.flatnonzero((rests != before).any(axis=0))
-            seen += (rests - before)[:, changed].astype(columns.dtype) @ columns[changed]
-        else:
-            seen = instance.gains(rests.T).T
-        gain = _allowed_gains(instance, chosen, seen)
-        tabu = (locked > step) | (locked[chosen, None] > step)
-        gain[tabu & (covered + gain <= most + instance.slack)] = -np.inf
-        if not np.isfinite(gain).any():
-            continue
-        gone, came = np.unravel_index(int(np.argmax(gain)), gain.shape)
-        locked[came] = step + random.integers(1, ADDED_TENURE)
-        locked[chosen[gone]] = step + random.integers(DROPPED_TENURE, 2 * DROPPED_TENURE)
-        chosen = np.where(np.arange(len(chosen)) == gone, came, chosen)
-        if len(chosen) < instance.count:
-            chosen = greedy(instance, chosen)
-        covered = instance.value(chosen)
-        if covered > most:
-            best, most = np.sort(chosen), covered
-    return best
-
-
 def drop_redundant(instance: Instance, chosen: Integer, goal: float) -> Integer:
     """Take away sensors, the dearest first, that neither the coverage to reach nor a mandatory group needs."""
     for candidate in chosen[np.argsort(-instance.price[chosen], kind="stable")]:
@@ -158,7 +112,7 @@ def drop_weakest(instance: Instance, chosen: Integer) -> Integer:
     return max((chosen[chosen != candidate] for candidate in chosen), key=instance.value)
 
 
-def addable(instance: Instance, chosen: Integer) -> Boolean:
+def addable(instance: Constrained, chosen: Integer) -> Boolean:
     """Return which candidates can join the chosen ones within all constraints, (c,) bool."""
     if len(chosen) >= instance.count:
         return np.zeros(len(instance), bool)

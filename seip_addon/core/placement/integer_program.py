@@ -29,8 +29,12 @@ Expression = Any  # of PuLP, which has no types
 TOTAL_WEIGHT = 1e4  # total weight in a program: far above the solvers' absolute tolerances of 1e-6
 TOLERANCE = 2e-6  # share of all weight that a solver's tolerance of 1e-6 on every variable may add up to, doubled
 SOLVERS = ("highs", "cbc", "gurobi")  # what `solver_name` knows beside ``auto``
+MAX_ENTRIES = 1_000_000  # entries of V up to which a program is built: PuLP takes 0.5 kB for each
+MAX_REJECTED = 100  # choices in a row that a solver's tolerance admits and exact arithmetic does not, before giving up
 MIN_SECONDS = 0.01  # seconds that a solver is given where none are left
 OPERATIONS_PER_ENTRY = 1e4  # multiplications per entry of a program that count as the work of one branch of a solver
+CALL_OPERATIONS = 1e8  # multiplications that take as long as handing the smallest program to a solver
+ROOT_OPERATIONS = 5.0  # multiplications per squared entry that count as the work of the first linear relaxation
 UNLIMITED_SECONDS = 1e7  # seconds that solvers are given where there is no limit: not all of them take infinity
 
 
@@ -130,6 +134,11 @@ class CoverProgram:
         instance = self.instance
         self.require(self._at_least(self.covered, goal), lambda c: instance.value(c) >= goal - instance.slack)
 
+    def require_better(self, than: float) -> None:
+        """Require a covered weight that is larger than ``than`` by at least the instance's step."""
+        instance, goal = self.instance, than + self.instance.step
+        self.require(self._at_least(self.covered, goal), lambda c: instance.value(c) >= goal)
+
     def require_double_coverage(self, goal: float) -> None:
         """Require a doubly covered weight, but for the instance's slack."""
         instance = self.instance
@@ -153,7 +162,7 @@ class CoverProgram:
         self.model.setObjective(objective)
         ends = clock.elapsed + share * clock.left
         size = np.count_nonzero(self.instance.visible) + len(self.x)
-        while True:
+        for _ in range(MAX_REJECTED):
             left = max(ends - clock.elapsed, MIN_SECONDS)
             seconds = max(clock.seconds_left, MIN_SECONDS) if clock.counts_work else left
             nodes = math.ceil(left * OPERATIONS_PER_UNIT / (size * OPERATIONS_PER_ENTRY)) if clock.counts_work else None
@@ -161,13 +170,15 @@ class CoverProgram:
                 lambda stop, limits=(seconds, nodes): self._solve(solver, limits, stop),  # type: ignore[misc]
                 f"solving an integer program of {len(self.x)} candidates",
             )
-            clock.spend((outcome.nodes + 1) * size * OPERATIONS_PER_ENTRY)
+            branching = outcome.nodes * size * OPERATIONS_PER_ENTRY
+            clock.spend(CALL_OPERATIONS + root_operations(self.instance) + branching)
             chosen = outcome.chosen
             if chosen is None or all(check(chosen) for check in self._checks):
                 return outcome
             # solvers have tolerances of their own: forbid exactly what fails in exact arithmetic
             others = np.setdiff1d(np.arange(len(self.x)), chosen)
             self.model += self.number_among(chosen) - self.number_among(others) <= len(chosen) - 1
+        return replace(outcome, chosen=None, finished=False)
 
     def maximise_coverage(self, solver: str, clock: Clock, share: float = 1.0) -> Generator[Progress, None, Outcome]:
         """Solve for the largest covered weight within the limits; the outcome's bound is not scaled."""
@@ -200,6 +211,24 @@ class CoverProgram:
     @cached_property
     def _seen(self) -> list[Any]:
         return [self.number_among(np.flatnonzero(column)) for column in self.instance.visible.T]
+
+
+def root_operations(instance: Instance) -> float:
+    """Return the work of the first linear relaxation of an instance's program, in multiplications.
+
+    The benchmark measures it against the entries of V (`headless.benchmark`, under “Growth”).
+    """
+    return ROOT_OPERATIONS * float(np.count_nonzero(instance.visible)) ** 2
+
+
+def is_affordable(instance: Instance, clock: Clock, share: float = 1.0) -> bool:
+    """Return whether an instance's program fits into memory, and its first relaxation into what is left of limits.
+
+    A solver cannot be stopped by counted work within a relaxation, and PuLP takes long to build a large program.
+    """
+    if clock.left <= 0 or np.count_nonzero(instance.visible) > MAX_ENTRIES:
+        return False
+    return root_operations(instance) <= share * clock.left * OPERATIONS_PER_UNIT
 
 
 def reaching(instance: Instance, goal: float) -> CoverProgram:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Float, Integer
+from ..counts import counted
 from ..errors import SeipError
 from ..progress import Progress
 from .branch_and_bound import Search, is_worthwhile
@@ -55,12 +56,15 @@ class NearOptimalSet:
         near = f"within {self.share:.0%} of the best"
         if self.complete and len(self) == 1:
             return f"no other placement covers {near}"
-        many = f"{len(self):,}" if self.complete else f"more than {len(self):,}"
+        if len(self) == 1:
+            return f"whether other placements cover {near} is not known"
+        least = "" if self.complete else "at least "
         fewest, sensors = int(np.flatnonzero(self.in_common)[0]), len(self.in_common) - 1
-        alike = (
-            f"some share {fewest or 'none'} of {sensors} with it" if fewest < sensors else "all where the best has its"
-        )
-        return f"{many} placements cover {near}; they use {self.positions} positions, {alike}"
+        own = counted(sensors, "position")
+        shared = f"all share its {own}"
+        if fewest < sensors:
+            shared = f"some share only {fewest} of its {own}" if fewest else f"some share none of its {own}"
+        return f"{least}{len(self):,} placements cover {near}; they use {self.positions:,} positions, {shared}"
 
 
 def near_optimal_set(

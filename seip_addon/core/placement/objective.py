@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SeipError
-from ..lidar import LidarModel
+from ..lidar import CarlaDropoff, LidarModel
+from ..limits import CHOSEN_WEIGHT, DISTANCE, PRICE
 from ..progress import Progress
 from ..settings import setting
 from ..site.site import Candidates, Site
 from . import Placement, PlacementProblem, cheapest_for_coverage, solve, solve_greedy
-from .deployment import Deployment, deploy, pose_prices
+from .deployment import BAND, UNRANKED, Deployment, deploy, pose_prices
 from .search_limits import DEFAULT_LIMITS, SolverLimits
 
 DEFAULT_COUNT = 4  # sensors to place where neither a number nor a budget nor a coverage is asked for: the study's four
@@ -43,32 +44,54 @@ class Objective:
         Least distance between two sensors.
     forbidden, mandatory : tuple of str
         Names of positions that must not, and that must, carry a sensor.
+    criterion : {"auto", "road", "returns"}
+        What is to be large: the road seen, or the returns from road users; see `criterion_of`.
+    shares : (float, float, float)
+        Importance of cars, cyclists and pedestrians for the returns, in proportion.
     """
 
     count: int | None = setting(
         None, f"largest number of sensors ({DEFAULT_COUNT} if no objective is given)", minimum=1, metavar="N"
     )
-    budget: float | None = setting(None, "largest total price", unit="USD", minimum=0.0, metavar="USD")
+    budget: float | None = setting(
+        None, "largest total price", unit="USD", minimum=0.0, maximum=PRICE.most, metavar="USD"
+    )
     coverage: float | None = setting(
         None, "reach this share (0 to 1) at the least price", minimum=0.0, maximum=1.0, metavar="SHARE"
     )
     central_weight: float | Literal["scene"] | None = setting(
-        None, "one weight for all weighted regions", minimum=0.0, metavar="W"
+        None, "one weight for all weighted regions", minimum=0.0, maximum=CHOSEN_WEIGHT.most, metavar="W"
     )
     min_distance: float = setting(0.0, "least distance between two sensors", unit="m", minimum=0.0, metavar="M")
     forbidden: tuple[str, ...] = setting((), "positions without sensor", option="forbid", metavar="POSITION")
     mandatory: tuple[str, ...] = setting((), "positions with a sensor", option="require", metavar="POSITION")
+    criterion: Literal["auto", "road", "returns"] = setting(
+        "auto", "optimise the road seen or the returns from road users (auto: returns, if sensors have a range law)"
+    )
+    shares: tuple[float, float, float] = setting(
+        (1.0, 1.0, 1.0),
+        "importance of cars, cyclists and pedestrians for returns (1 1 1)",
+        minimum=0.0,
+        maximum=CHOSEN_WEIGHT.most,
+        metavar="W",
+    )
 
     def __post_init__(self) -> None:
-        for name in ("budget", "min_distance"):
+        for name, limits in (("budget", PRICE), ("min_distance", DISTANCE)):
             value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value >= 0):
-                raise SeipError(f"the {name.replace('_', ' ')} must be a finite number of at least 0, not {value}")
+            if value is not None and not limits.allow(value):
+                raise SeipError(f"the {name.replace('_', ' ')} must be {limits}, not {value}")
         if self.coverage is not None and not 0 < self.coverage <= 1:
             raise SeipError(f"the coverage to reach must be a share above 0 and at most 1, not {self.coverage:g}")
         weight = self.central_weight
-        if isinstance(weight, float | int) and not (math.isfinite(weight) and weight > 0):
-            raise SeipError(f"the central weight must be a positive number, not {weight}")
+        if isinstance(weight, float | int) and not CHOSEN_WEIGHT.allow(weight):
+            raise SeipError(f"the central weight must be {CHOSEN_WEIGHT}, not {weight}")
+        if self.coverage is not None and self.criterion == "returns":
+            raise SeipError("a coverage to reach is a share of the road: leave out the criterion returns")
+        if not all(CHOSEN_WEIGHT.allow(share) or share == 0 for share in self.shares) or not any(self.shares):
+            raise SeipError(
+                f"the shares of cars, cyclists and pedestrians must be {CHOSEN_WEIGHT} or 0, one of them above 0"
+            )
         both = sorted(set(self.forbidden) & set(self.mandatory))
         if both:
             raise SeipError(f"position {both[0]!r} is both forbidden and mandatory: take it out of one of the two")
@@ -82,6 +105,18 @@ class Objective:
     def cheapest(self) -> bool:
         """Whether the least price for a coverage is asked for."""
         return self.coverage is not None
+
+
+def criterion_of(objective: Objective, models: Mapping[str, LidarModel]) -> Literal["road", "returns"]:
+    """Return the criterion of an objective for the sensor types to choose from.
+
+    Coverage of the road predicts detection where every return counts, as for the sensors of the SEIP paper. Sensors of
+    a range law detect vehicles several times as far as asphalt: there the returns from road users do.
+    """
+    if objective.criterion != "auto":
+        return objective.criterion
+    range_laws = any(not isinstance(model.law, CarlaDropoff) for model in models.values())
+    return "returns" if range_laws and not objective.cheapest else "road"
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,40 +139,75 @@ class Solution:
     @property
     def certificate(self) -> str:
         """The certificate as a message: proven optimal, or within which gap."""
-        return certificate(self.placement.status, self.placement.gap, cheapest=self.objective.cheapest)
+        status, gap, notes = self.placement.status, self.placement.gap, self.placement.notes
+        return certificate(status, gap, cheapest=self.objective.cheapest, notes=notes)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Notes on the placement, those on the plausible gains of its sensors last."""
+        band = self.deployment.gain_band
+        return tuple(dict.fromkeys((*self.placement.notes, *(band.messages() if band else ()))))
 
     @property
     def caption(self) -> tuple[str, ...]:
-        """What a picture says of it: the certificate, and what was optimised where that is not nominal coverage."""
-        return (self.certificate, *(note for note in self.placement.notes if note.startswith(CHOSEN_FOR)))
+        """What a picture says of it: certificate, plausible gains, and the objective if not nominal coverage."""
+        return (self.certificate, *(note for note in self.notes if note.startswith((CHOSEN_FOR, BAND, UNRANKED))))
 
 
-def certificate(status: str, gap: float | None, *, cheapest: bool) -> str:
-    """Return a placement's certificate as a message: proven optimal, or within which gap.
+def certificate(status: str, gap: float | None, *, cheapest: bool, notes: Sequence[str] = ()) -> str:
+    """Return a placement's certificate as a message: what is proven optimal, or within which gap.
 
     Parameters
     ----------
     gap : float or None
         Between bound and objective, as a share of the objective; None or infinite where nothing bounds it.
+    notes : sequence of str
+        Those of the placement: one may say that something other than nominal coverage was optimised.
     """
     if status == MOVED:
         return MOVED_MESSAGE
-    best = "cheapest" if cheapest else "best"
+    best, among = "cheapest" if cheapest else "best", f"among these candidates{purpose(notes)}."
     if status == "optimal":
-        return f"Proven: the {best} placement that there is among these candidates."
+        return f"Proven: the {best} placement that there is {among}"
     share = "an unknown share" if gap is None or not math.isfinite(gap) else f"{gap:.2%}"
-    return f"Within {share} of the {best} placement possible among these candidates."
+    return f"Within {share} of the {best} placement possible {among}"
+
+
+def purpose(notes: Sequence[str]) -> str:
+    """Return what a placement was optimised for, from its notes, after a space; empty for nominal coverage."""
+    chosen_for = next((note.removeprefix(CHOSEN_FOR) for note in notes if note.startswith(CHOSEN_FOR)), "")
+    return chosen_for and f" {chosen_for.partition(':')[0]}"
 
 
 def target_weights(site: Site, objective: Objective) -> NDArray[np.float64]:
     """Weight of each target under an objective, (t,) float64."""
+    return weights_in_regions(objective, site.targets.weight, site.targets.central)
+
+
+def weights_in_regions(
+    objective: Objective, weight: NDArray[np.float64], central: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return the weights of points under an objective, (n,) float64.
+
+    Parameters
+    ----------
+    weight : (n,) float64
+        The scene's own weights.
+    central : (n,) bool
+        Whether a point lies in some weighted region.
+
+    Raises
+    ------
+    SeipError
+        The objective is weighted, and no point lies in a weighted region.
+    """
     if objective.central_weight is None:
-        return np.ones(len(site.targets))
-    if not site.targets.central.any():
+        return np.ones(len(weight))
+    if not central.any():
         raise SeipError("the weighted problem needs a weighted region: draw one in SEIP Weighted Regions")
     if objective.central_weight == "scene":
-        return site.targets.weight
-    return np.where(site.targets.central, objective.central_weight, 1.0)
+        return weight
+    return np.where(central, objective.central_weight, 1.0)
 
 
 def placement_problem(

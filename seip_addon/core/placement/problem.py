@@ -8,7 +8,7 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer, Text
 from ..errors import SeipError
 
-TIE_TOLERANCE = 1e-9  # placements are equal that differ by less than this share of all weight, or of the price
+TIE_TOLERANCE = 1e-9  # share of all weight, or of the price, below which differences count as rounding
 
 
 @dataclass(frozen=True, eq=False)

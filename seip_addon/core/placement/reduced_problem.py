@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
+from .constraints import Constrained
 from .multi_cover import COVERAGE, MultiCover
 from .problem import TIE_TOLERANCE, PlacementProblem, canonical_order
 
@@ -24,6 +25,8 @@ INCOMMENSURABLE_TOTAL = 2**50
 
 MICROMETRE = 1e-6  # metres to which positions are rounded: posts may be too close by less than this
 WHOLE_SLACK = 0.25  # whole weights differ by one or not at all
+BOUND_ROUNDING = 1e-11  # share of all weight by which rounding may move a sum in double precision, with room to spare
+MAX_BINARY_PARTS = 1024  # binary fractions up to this are taken as the unit of weights: halves, quarters, ...
 DENOMINATORS = range(1, 13)  # a common unit of all weights is sought among these parts of the smallest one
 
 
@@ -31,7 +34,7 @@ Numbers = NDArray[np.floating[Any]]
 
 
 @dataclass(frozen=True, eq=False)
-class Instance:
+class Instance(Constrained):
     """A reduced maximal covering instance: c candidates in canonical order, t merged targets, g mandatory groups.
 
     Parameters
@@ -41,9 +44,10 @@ class Instance:
     weight : (t,) float64
         Weights of the merged targets: whole numbers, so that sums are exact and ties are ties on every machine.
     step : float
-        Smallest difference between two covered weights that counts.
+        A placement is proven optimal where none covers more by this: one unit of weight, or half of ``slack``.
     slack : float
-        Covered weights that differ by no more count as equal: less than one where weights have a common unit.
+        Covered weights that differ by no more are equal. Weights with a common unit are compared exactly (``slack`` is
+        less than one unit); without one, this is `TIE_TOLERANCE` of the weight that the candidates together see.
     margin : float
         Rounding error that the bound of a relaxation may have.
     price : (c,) float64
@@ -77,13 +81,17 @@ class Instance:
     budget: float
     cover: MultiCover = COVERAGE
 
-    def __len__(self) -> int:
-        return len(self.visible)
-
     @cached_property
     def matrix(self) -> Numbers:
         """``visible`` as numbers, in the smallest precision in which products with increments are exact."""
         return self.visible.astype(np.float32 if self.total < MAX_EXACT_SINGLE else np.float64)
+
+    @cached_property
+    def seen_by(self) -> tuple[Integer, Integer]:
+        """Candidates that see each target: where those of each begin (t + 1,), and all of them in a row (n,) int64."""
+        target, candidate = np.nonzero(self.visible.T)
+        number = np.bincount(target, minlength=len(self.weight))
+        return np.concatenate(([0], np.cumsum(number))), candidate
 
     @cached_property
     def total(self) -> float:
@@ -93,6 +101,10 @@ class Instance:
     def attainable(self, goal: float) -> float:
         """Return the smallest covered weight of at least ``goal`` that a placement can have at all."""
         return math.ceil(goal - self.slack) if self.step == 1 else goal
+
+    def as_good(self, value: float) -> float:
+        """Return the smallest covered weight that is equal to ``value``, ties included."""
+        return self.attainable(value - self.slack)
 
     def attained(self, bound: float) -> float:
         """Return the largest covered weight up to ``bound`` that a placement can have at all."""
@@ -135,19 +147,6 @@ class Instance:
         """Return the weight that two or more of the chosen candidates cover."""
         return float(self.weight[self.visible[chosen].sum(axis=0) > 1].sum())
 
-    def affordable(self, price: Float | float) -> Boolean | bool:
-        """Return whether a total price is within the budget, but for rounding."""
-        return price <= self.budget * (1 + TIE_TOLERANCE)
-
-    def feasible(self, chosen: Integer) -> bool:
-        """Return whether the chosen candidates meet every constraint."""
-        return bool(
-            len(chosen) <= self.count
-            and self.affordable(math.fsum(self.price[chosen]))
-            and not self.conflict[np.ix_(chosen, chosen)].any()
-            and self.mandatory[:, chosen].any(axis=1).all()
-        )
-
     def part(self, keep: Integer) -> Instance:
         """Return the same instance with only the candidates ``keep``, targets merged anew."""
         visible, weight = merge_targets(self.visible[keep], self.weight)
@@ -184,18 +183,18 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
         )
     unit, whole = common_unit(problem.weights[seen])
     visible, weight = merge_targets(problem.visible[order][:, seen], np.rint(problem.weights[seen] / unit))
-    margin = TIE_TOLERANCE * float(weight.sum())
-    slack = min(margin, WHOLE_SLACK) if whole else margin
-    conflict = _conflicts(problem.positions[order], problem.xyz[order], problem.min_distance)
+    total = float(weight.sum())
+    slack = min(TIE_TOLERANCE * total, WHOLE_SLACK) if whole else TIE_TOLERANCE * total
+    conflict = conflicts(problem.positions[order], problem.xyz[order], problem.min_distance)
     instance = Instance(
         visible=visible,
         weight=weight,
-        step=1.0 if whole else 2 * slack,
+        step=1.0 if whole else slack / 2,
         slack=slack,
-        margin=margin,
+        margin=BOUND_ROUNDING * total,
         price=problem.prices[order],
         conflict=conflict,
-        clique=_cliques(conflict),
+        clique=cliques(conflict),
         mandatory=problem.mandatory_groups[:, order],
         original=order,
         count=problem.most_sensors,
@@ -207,9 +206,9 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
 def common_unit(weights: Float) -> tuple[float, bool]:
     """Return a unit in which all weights are whole numbers, and whether it is theirs or only a fine grain.
 
-    It is theirs where all weights are whole numbers whose sum is exact in
-    double precision, or where rounding all weights to its multiples moves no
-    sum of them by more than `TIE_TOLERANCE` and a single unit counts for more than that.
+    It is theirs where all weights are whole numbers, or binary fractions, whose sum is exact in double precision, or
+    where rounding all weights to its multiples moves no sum of them by more than `TIE_TOLERANCE` and a single unit
+    counts for more than that.
 
     Parameters
     ----------
@@ -217,10 +216,11 @@ def common_unit(weights: Float) -> tuple[float, bool]:
         Positive.
     """
     total = math.fsum(weights)
-    if total <= MAX_EXACT_DOUBLE and (weights == np.rint(weights)).all():
-        return float(np.gcd.reduce(weights.astype(np.int64))), True
-    for parts in DENOMINATORS:
-        unit = float(weights.min()) / parts
+    parts = max(weight.as_integer_ratio()[1] for weight in np.unique(weights).tolist())  # each a power of two
+    if parts <= MAX_BINARY_PARTS and total * parts <= MAX_EXACT_DOUBLE:
+        return float(np.gcd.reduce((weights * parts).astype(np.int64))) / parts, True
+    for share in DENOMINATORS:
+        unit = float(weights.min()) / share
         rounding = math.fsum(np.abs(weights - np.rint(weights / unit) * unit))
         if unit > 4 * TIE_TOLERANCE * total and rounding <= TIE_TOLERANCE / 2 * total:
             return unit, True
@@ -251,7 +251,8 @@ def merge_targets(visible: Boolean, weight: Float) -> tuple[Boolean, Float]:
     return visible[:, first], np.bincount(group, weight).astype(np.float64)
 
 
-def _conflicts(positions: Integer, xyz: Float, min_distance: float) -> Boolean:
+def conflicts(positions: Integer, xyz: Float, min_distance: float) -> Boolean:
+    """Return the pairs of candidates at one position, or closer in plan than the minimum distance, (c, c) bool."""
     conflict: Boolean = positions[:, None] == positions[None, :]
     if min_distance > 0:
         for index, xy in enumerate(xyz[:, :2]):
@@ -260,7 +261,7 @@ def _conflicts(positions: Integer, xyz: Float, min_distance: float) -> Boolean:
     return conflict
 
 
-def _cliques(conflict: Boolean) -> Integer:
+def cliques(conflict: Boolean) -> Integer:
     """Part the candidates into sets that all exclude each other, grown greedily in order, (c,) int64."""
     clique = np.full(len(conflict), -1)
     for first in range(len(conflict)):

@@ -10,31 +10,47 @@ from ..errors import SeipError
 
 OPERATIONS_PER_UNIT = 1e10  # multiplications that make a unit of work: about a second of one processor core
 OVERHEAD_OPERATIONS = 3e6  # multiplications that take as long as what goes on around each counted step
+DEFAULT_EFFORT = 60.0  # units of work for an answer where nothing else limits it
 MIN_PART = 0.01  # seconds, or units of work, of a part of a limit where nothing is left
 
 
 @dataclass(frozen=True)
 class SolverLimits:
-    """Solver of integer programs, and how long a placement is searched.
+    """Solver of integer programs, and the limits of a search for a placement.
+
+    At a limit, the best placement found is returned with its bound and gap.
 
     Parameters
     ----------
     solver : str
         ``highs``, ``cbc`` or ``gurobi``.
-    time_limit : float, seconds
-        After it the best placement found is returned with its bound and gap.
-    effort : float, units of work
-        Alike, but counted: the same on every machine, about a second of one processor core each. Where it ends the
-        search before the time does, the same inputs give the same result again.
+    time_limit : float, seconds, optional
+        Limit of wall time. What is found and proven then depends on the machine and on what else runs on it.
+    effort : float, units of work, optional
+        Limit of counted work, about a second of one processor core for each unit. The same inputs give the same
+        result on every machine. Default: `DEFAULT_EFFORT`, or no limit where there is a time limit.
     """
 
     solver: str = "highs"
-    time_limit: float = 60.0
-    effort: float = math.inf
+    time_limit: float | None = None
+    effort: float | None = None
+
+    @property
+    def work(self) -> float:
+        """Limit of counted work, infinite where only time is limited."""
+        if self.effort is not None:
+            return self.effort
+        return DEFAULT_EFFORT if self.time_limit is None else math.inf
 
     def clock(self) -> Clock:
-        """Return a clock that starts now."""
-        return Clock(self.time_limit, self.effort)
+        """Return a clock that starts now.
+
+        Raises
+        ------
+        SeipError
+            A limit is not a positive number.
+        """
+        return Clock(math.inf if self.time_limit is None else self.time_limit, self.work)
 
 
 DEFAULT_LIMITS = SolverLimits()

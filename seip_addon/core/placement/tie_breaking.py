@@ -15,7 +15,7 @@ from ..progress import Progress
 from .bounds import lagrangian_bound
 from .branch_and_bound import BestPlacements, FirstInOrder, is_worthwhile, merit
 from .greedy import drop_redundant, drop_weakest, swap_search
-from .integer_program import Expression, reaching
+from .integer_program import Expression, is_affordable, reaching
 from .reduced_problem import Instance
 from .search_limits import Clock
 
@@ -25,7 +25,7 @@ BLOCK_SIZE = 10  # candidates whose order is settled by one program: powers of t
 
 
 def canonical_optimum(
-    instance: Instance, chosen: Integer, ties: tuple[Integer, ...] | None, solver: str, clock: Clock
+    instance: Instance, chosen: Integer, goal: float, ties: tuple[Integer, ...] | None, solver: str, clock: Clock
 ) -> Generator[Progress, None, tuple[Integer, bool]]:
     """Return the canonical one of the placements that cover as much as an optimal one.
 
@@ -33,6 +33,8 @@ def canonical_optimum(
     ----------
     chosen : (k,) int64
         An optimal placement.
+    goal : float
+        No placement covers more; what falls short of it by the instance's slack at most is equally good.
     ties : tuple of (k,) int64, optional
         All optimal placements, but for those with idle sensors, where they are known.
 
@@ -45,12 +47,11 @@ def canonical_optimum(
     """
     if ties is not None:
         return min(ties, key=lambda choice: merit(instance, choice)), True
-    goal = instance.value(chosen)
-    chosen, settled = yield from fewest(instance, chosen, goal, solver, clock)
+    chosen, settled = yield from fewest(instance, drop_redundant(instance, chosen, goal), goal, solver, clock)
     if not settled:
         return chosen, False
     same_number = replace(instance, count=len(chosen))
-    keep, _ = yield from lagrangian_bound(same_number, goal, clock)
+    keep, _ = yield from lagrangian_bound(same_number, same_number.as_good(goal), clock)
     keep = np.union1d(keep, chosen)
     yield Progress(0, 0, f"breaking ties among {len(keep)} candidates")
     part, within = same_number.part(keep), np.searchsorted(keep, chosen)
@@ -59,6 +60,8 @@ def canonical_optimum(
         finished = yield from search.run(clock, clock.left)
         candidates = [within] if search.best is None else [within, search.best]
         return keep[min(candidates, key=lambda choice: merit(part, choice))], finished
+    if not is_affordable(part, clock):
+        return chosen, False
     equal, all_found = yield from _all_equal(part, within, goal, solver, clock)
     best = min(equal, key=lambda choice: merit(part, choice))
     if all_found or len(equal) < MAX_LISTED_TIES:
@@ -77,7 +80,7 @@ def fewest(
         if fewer.feasible(improved) and fewer.value(improved) >= goal - instance.slack:
             chosen = drop_redundant(fewer, improved, goal)
             continue
-        keep, bound = yield from lagrangian_bound(fewer, goal, clock)
+        keep, bound = yield from lagrangian_bound(fewer, fewer.as_good(goal), clock)
         if bound.value < goal - instance.slack or len(keep) == 0:
             break
         yield Progress(0, 0, f"looking for fewer than {len(chosen)} sensors among {len(keep)} candidates")
@@ -89,7 +92,10 @@ def fewest(
                 continue
             if finished:
                 break
-        outcome = yield from reaching(fewer.part(keep), goal).maximise_coverage(solver, clock)
+        part = fewer.part(keep)
+        if not is_affordable(part, clock):
+            return chosen, False
+        outcome = yield from reaching(part, goal).maximise_coverage(solver, clock)
         if outcome.chosen is None:
             return chosen, outcome.finished
         chosen = drop_redundant(fewer, keep[outcome.chosen], goal)

@@ -14,6 +14,23 @@ from ..site.targets import Targets
 
 DIRECTIONS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
 ARMS = DIRECTIONS[::2]
+MIN_DISTANCE = 0.5  # metres from a centre from which on there is a direction from it
+
+
+@dataclass(frozen=True, eq=False)
+class Centre:
+    """A point from which distances and directions are counted.
+
+    Parameters
+    ----------
+    name : str
+        What it is the centre of, in words.
+    xy : (2,) float64, metres
+        Local.
+    """
+
+    name: str
+    xy: Float
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +88,7 @@ def seen_places(targets: Targets, seen_by: Integer, areas: Sequence[Area]) -> li
     """Return what is seen of each named area; where no street is named, of the road towards each side as well."""
     parts = [(f"{area.name} (weighted)" if area.kind == WEIGHTED else area.name, area.within) for area in areas]
     if not any(area.kind == PLACE for area in areas):
-        parts += _arms(targets)
+        parts += _arms(targets, centres(targets, areas))
     return [
         SeenPlace(
             name,
@@ -84,28 +101,47 @@ def seen_places(targets: Targets, seen_by: Integer, areas: Sequence[Area]) -> li
     ]
 
 
-def _arms(targets: Targets) -> Iterator[tuple[str, Boolean]]:
-    """Yield the targets on each side of the middle, those in weighted regions left out where there are any."""
-    angle, _ = _from_middle(targets, targets.xyz)
+def centres(targets: Targets, areas: Sequence[Area]) -> list[Centre]:
+    """Return the points from which places on the road are counted: the centres of the weighted regions.
+
+    The weighted region of a site that was built is its junction. Without a weighted region the centre is that of the
+    road to be seen, the mean of its squares.
+    """
+    weighted = [area for area in areas if area.kind == WEIGHTED and area.within.any()]
+    return [Centre(area.name, targets.xyz[area.within, :2].mean(axis=0)) for area in weighted] or [
+        Centre("the road", targets.xyz[:, :2].mean(axis=0))
+    ]
+
+
+def _arms(targets: Targets, origins: Sequence[Centre]) -> Iterator[tuple[str, Boolean]]:
+    """Yield the targets on each side of the nearest centre, without those in weighted regions."""
+    nearest, angle, _ = _from_nearest(origins, targets.xyz)
     quarter = np.round(angle / (math.pi / 2)).astype(np.int64) % 4
-    for number, name in enumerate(ARMS):
-        yield f"Road to the {name} of the middle", (quarter == number) & ~targets.central
+    for origin, centre in enumerate(origins):
+        for number, name in enumerate(ARMS):
+            within = (nearest == origin) & (quarter == number) & ~targets.central
+            yield f"Road {name} of the centre of {centre.name}", within
 
 
-def _from_middle(targets: Targets, points: Float) -> tuple[Float, Float]:
-    """Return direction (radians) and distance (metres) of points (n, 3) from the middle of all targets."""
-    low, high = targets.xyz[:, :2].min(axis=0), targets.xyz[:, :2].max(axis=0)
-    x, y = (points[:, :2] - (low + high) / 2).T
-    return np.arctan2(y, x), np.hypot(x, y)
+def _from_nearest(origins: Sequence[Centre], points: Float) -> tuple[Integer, Float, Float]:
+    """Return index of, direction from (radians) and distance from (metres) the centre nearest to each point (n, 3)."""
+    offsets = points[:, None, :2] - np.array([centre.xy for centre in origins])
+    distances = np.hypot(*np.moveaxis(offsets, 2, 0))
+    nearest = distances.argmin(axis=1)
+    rows = np.arange(len(points))
+    x, y = offsets[rows, nearest].T
+    return nearest, np.arctan2(y, x), distances[rows, nearest]
 
 
 def _where(own: Integer, middle: Float, targets: Targets, areas: Sequence[Area]) -> str:
-    """Say where a blind spot is: in the area that holds most of it, and in which direction from the middle."""
-    angle, distance = _from_middle(targets, middle[None])
-    direction = DIRECTIONS[round(float(angle[0]) / (math.pi / 4)) % 8]
-    words = f"{distance[0]:.0f} m {direction} of the middle"
-    held = [(int(area.within[own].sum()), area.name) for area in areas]
-    most, name = max(held, key=lambda one: one[0], default=(0, ""))
+    """Return where a blind spot is: the area that holds most of it, and distance and direction from a centre."""
+    origins = centres(targets, areas)
+    (nearest,), (angle,), (distance,) = _from_nearest(origins, middle[None])
+    direction = DIRECTIONS[round(float(angle) / (math.pi / 4)) % 8]
+    away = f"{distance:.0f} m {direction} of" if distance >= MIN_DISTANCE else "at"
+    words = f"{away} the centre of {origins[nearest].name}"
+    shares = [(int(area.within[own].sum()), area.name) for area in areas]
+    most, name = max(shares, key=lambda one: one[0], default=(0, ""))
     return f"{name}, {words}" if 2 * most >= len(own) else words
 
 

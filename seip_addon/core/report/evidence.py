@@ -86,6 +86,9 @@ def load_evidence(folder: Path) -> Evidence:
     key = record.inputs.get("visibility")
     if site.key != key or len(site.seen) != len(record.sensors):
         raise SeipError(f"{folder} holds files of different placements: place the sensors again")
+    counts = record.counts
+    if (counts.targets, counts.poses) != (len(site.targets), len(site.problem.prices)):
+        raise SeipError(f"placement.json and site.npz in {folder} contradict each other: place the sensors again")
     names = [*PICTURES]
     names += ROBUST_PICTURES if "robustness" in record.settings else ()
     names += TRAFFIC_PICTURES if "traffic" in record.settings else ()

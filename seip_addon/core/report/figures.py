@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from ..pictures.drawing import MAX_LABELLED, as_png, draw_callouts
+from ..pictures.drawing import MAX_LABELLED, as_png, draw_attribution, draw_callouts
 from ..pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
 from ..pictures.plan_style import Style
 from .blind_spots import BlindSpot
@@ -50,6 +50,7 @@ def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
     if 0 < len(sensors) <= MAX_LABELLED:
         draw_callouts(axes, sensors, [sensor.id for sensor in evidence.sensors], targets.xyz[:, :2], 3.0)
     axes.plot(*sensors.T, linestyle="none", marker="^", markersize=10, mfc=INK, mec=PAPER, mew=1.2, zorder=4.0)
+    draw_attribution(axes, evidence.record.site.attribution)
     for number, spot in enumerate(spots, start=1):
         circle: Style = {"boxstyle": "circle,pad=0.25", "facecolor": PAPER, "edgecolor": INK, "linewidth": 1.2}
         style = {"ha": "center", "va": "center", "size": 9, "weight": "bold", "color": INK, "zorder": 5.0}
@@ -57,13 +58,15 @@ def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
     return as_png(figure)
 
 
-def front_chart(points: Sequence[FrontPoint], placed: tuple[float, float]) -> bytes:
+def front_chart(points: Sequence[FrontPoint], placed: tuple[float, float], *, installed: bool = False) -> bytes:
     """Return coverage against price as PNG.
 
     Parameters
     ----------
     placed : (float, float)
         Price (dollars) and covered share of the weight of the placement.
+    installed : bool
+        Whether prices count posts, mounting, power and backhaul.
     """
     figure = Figure(CHART_SIZE, dpi=DPI, facecolor=PAPER, layout="constrained")
     FigureCanvasAgg(figure)
@@ -77,7 +80,7 @@ def front_chart(points: Sequence[FrontPoint], placed: tuple[float, float]) -> by
         axes.annotate(str(point.count), (x, y), xytext=(8, -13), textcoords="offset points", size=9)
     ring: Style = {"markersize": 15, "mfc": "none", "mec": INK, "mew": 1.6, "linestyle": "none"}
     axes.plot(placed[0] / 1000, 100 * placed[1], marker="o", label="this placement", **ring)
-    axes.set(xlabel="price, thousand US dollars", ylabel="coverage, %")
+    axes.set(xlabel=f"{'installed ' * installed}price, thousand US dollars", ylabel="coverage, %")
     axes.margins(0.1, 0.15)
     axes.grid(visible=True, color="#d8dde1", linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)

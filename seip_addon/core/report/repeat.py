@@ -8,13 +8,14 @@ from dataclasses import asdict
 from typing import Any
 
 from ..placement.objective import Objective
+from ..placement.search_limits import DEFAULT_EFFORT
 from ..results.placement_record import PlacementRecord
 from ..settings import settings_of
 from ..site.candidates import CandidateSettings
 from ..site.installed_cost import load_installed_cost
 from ..visibility.settings import VisibilitySettings
 
-DEFAULT_GRID, DEFAULT_TIME = 1.0, 60.0  # metres, seconds: of `SurveySettings`
+DEFAULT_GRID = 1.0  # metres, of `SurveySettings`
 
 
 def repeating_command(record: PlacementRecord) -> str:
@@ -51,9 +52,9 @@ def _of_survey(settings: Mapping[str, Any]) -> Iterator[str]:
     for name in ("engine", "solver"):
         if settings.get(name, "auto") != "auto":
             yield from (f"--{name}", str(settings[name]))
-    if settings.get("time_limit_s", DEFAULT_TIME) != DEFAULT_TIME:
+    if "time_limit_s" in settings:
         yield from ("--time-limit", f"{settings['time_limit_s']:.12g}")
-    if "effort" in settings:
+    if settings.get("effort", DEFAULT_EFFORT) != DEFAULT_EFFORT:
         yield from ("--effort", f"{settings['effort']:.12g}")
     for name in ("catalogue", "reflectivity"):
         if settings.get(name):

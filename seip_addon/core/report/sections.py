@@ -9,19 +9,24 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..arrays import Float
+from ..counts import counted
 from ..pictures.drawing import percent
-from ..placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE
+from ..placement.cheapest import SAME_PRICE
+from ..placement.deployment import BAND, UNRANKED
+from ..placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE, Objective, certificate, purpose
 from ..results.located import LOCATED_FILES
-from ..results.placement_record import RecordedObjective, RecordedSensor, relevant_warnings
+from ..results.placement_record import RecordedObjective, relevant_warnings
 from ..site.sources import source_table
-from .blind_spots import BlindSpot, blind_spots, seen_places
+from .blind_spots import BlindSpot, blind_spots, centres, seen_places
 from .blocks import Block, Bullets, Code, Paragraph, Picture, Report, Section, Table
 from .evidence import ROBUST_PICTURES, TRAFFIC_PICTURES, Evidence
 from .figures import blind_spot_map, front_chart
-from .losses import FrontPoint, failures
+from .losses import FrontPoint, equal_prices, failures
 from .repeat import repeating_command
 
 MOST_SPOTS = 8
+MIN_DIFFERENCE = 1e-6  # share of the road by which two coverages differ at least; records have nine digits
+Row = tuple[str, ...]
 POSE_ERRORS = "with errors of"
 """How the note begins that says what pose errors cost."""
 CAPTIONS = {
@@ -48,7 +53,7 @@ def make_report(evidence: Evidence, points: Sequence[FrontPoint]) -> Report:
         Section("The sensors", tuple(_sensors(evidence))),
         Section("What they see", tuple(_coverage(evidence))),
         Section("Blind spots", tuple(_blind_spots(evidence))),
-        Section("How good this answer is", tuple(_certificate(evidence))),
+        Section("How good this answer is", tuple(_certificate(evidence, points))),
         Section("What can go wrong", tuple(_losses(evidence))),
         Section("Fewer or more sensors", tuple(_front(evidence, points))),
         Section("What to know before trusting the figures", tuple(_warnings(evidence))),
@@ -56,26 +61,36 @@ def make_report(evidence: Evidence, points: Sequence[FrontPoint]) -> Report:
     )
     coverage = record.coverage
     central = "" if coverage.central is None else f", {percent(coverage.central)} of its weighted part"
+    band = coverage.gain_band
+    between = f" ({percent(band.low)} to {percent(band.high)} {BAND})" if band is not None and band.sheets else ""
+    returns = "" if record.returns is None else f"{_sentence(record.returns.describe())} "
     summary = (
-        f"{_count(len(record.sensors), 'sensor')} {'sees' if len(record.sensors) == 1 else 'see'} "
-        f"{percent(coverage.whole)} of the road{central}, for {_dollars(record.price_usd)}."
+        f"{returns}{counted(len(record.sensors), 'sensor sees', 'sensors see')} "
+        f"{percent(coverage.whole)} of the road{between}{central}, for {record.price_text}."
     )
     return Report(record.site.name, summary, record.times.created, sections)
 
 
 def certificate_sentence(evidence: Evidence) -> str:
-    """Say how good the placement provably is, against every other choice among the same places."""
-    found, places = evidence.record.objective, evidence.record.counts.positions
+    """Return how good the placement provably is, against every other choice among the same positions."""
+    record = evidence.record
+    found, places = record.objective, record.counts.positions
     if found.status == MOVED:
         return MOVED_MESSAGE
-    if any(note.startswith(CHOSEN_FOR) for note in evidence.record.notes):
-        return found.certificate
-    choice = f"choice among the {places:,} places where a sensor may hang that keeps to the same rules"
+    if any(note.startswith(CHOSEN_FOR) for note in record.notes):
+        return certificate(found.status, found.gap, cheapest=found.cheapest, notes=record.notes)
+    choice = f"choice{_limits(record.asked.goal, 'of')} among the {places:,} positions, under the same rules,"
     if found.bound is None:
         return f"Another {choice} may be better; how much better is not known."
     better = _cheaper(found) if found.cheapest else _more_coverage(evidence)
     proven = "this is proven" if found.status == "optimal" else "this much is proven, and no more was found out"
     return f"No other {choice} {better}: {proven}."
+
+
+def _limits(goal: Objective, joint: str) -> str:
+    """Return the limits on a placement, its number of sensors after a word and its price, as the end of a sentence."""
+    count = "" if goal.count is None else f" {joint} at most {counted(goal.count, 'sensor')}"
+    return count if goal.budget is None else f"{count} for at most {_dollars(goal.budget)}"
 
 
 def _cheaper(found: RecordedObjective) -> str:
@@ -96,9 +111,8 @@ def _more_coverage(evidence: Evidence) -> str:
 def _question(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
     goal, counts = record.asked.goal, record.counts
-    limits = [] if goal.count is None else [f"at most {_count(goal.count, 'sensor')}"]
-    limits += [] if goal.budget is None else [f"at most {_dollars(goal.budget)}"]
-    with_limits = f", with {' and '.join(limits)}" if limits else ""
+    limits = _limits(goal, "with")
+    with_limits = f",{limits}" if limits else ""
     types = ", ".join(record.asked.candidates.sensors)
     if goal.coverage is not None:
         yield Paragraph(
@@ -106,7 +120,8 @@ def _question(evidence: Evidence) -> Iterator[Block]:
             "they hang?"
         )
     else:
-        yield Paragraph(f"Where must sensors hang to see as much as possible of the road{with_limits}?")
+        what = "see as much as possible of the road" if record.returns is None else "have most returns from road users"
+        yield Paragraph(f"Where must sensors hang to {what}{with_limits}?")
     rules = [
         f"Sensor types to choose from: {types}.",
         (
@@ -126,23 +141,35 @@ def _question(evidence: Evidence) -> Iterator[Block]:
 
 def _site(evidence: Evidence) -> Iterator[Block]:
     record, targets = evidence.record, evidence.site.targets
-    x, y, z = record.site.origin_m
     yield Paragraph(
-        f"The region of interest is {len(targets) * evidence.cell:,.0f} m² of road, looked at in "
-        f"{len(targets):,} squares of {targets.spacing:g} m. Map coordinates are metres; the scene has its origin at "
-        f"map ({x:,.2f}, {y:,.2f}, {z:,.2f})."
+        f"The region of interest is evaluated in {len(targets):,} squares of {targets.spacing:g} m, "
+        f"{len(targets) * evidence.cell:,.0f} m² of road together. {_origin(evidence)}"
     )
     if record.site.sources:
         heading, *rows = source_table(record.site.sources)
         yield Paragraph("Where the objects of the scene come from, and for how many place or height is assumed:")
         yield Table(heading, tuple(rows), frozenset({2, 3, 4}))
+    if record.site.attribution:
+        yield Paragraph(f"Data: {'; '.join(record.site.attribution)}.")
     obstacle = evidence.geo_reference.obstacle
     if obstacle:
         yield Paragraph(f"There are no latitudes and longitudes: {obstacle}.")
     else:
-        yield Paragraph(f"Latitudes and longitudes are on WGS 84, by the map's projection “{_projection(evidence)}”.")
+        yield Paragraph(
+            f"Eastings and northings are coordinates of the map's projection, “{_projection(evidence)}”; latitudes and "
+            "longitudes are on WGS 84."
+        )
     if "view.png" in evidence.pictures:
         yield Picture(evidence.pictures["view.png"], "The site with the sensors and what they see.")
+
+
+def _origin(evidence: Evidence) -> str:
+    origin = np.array(evidence.record.site.origin_m)
+    if evidence.geo_reference.obstacle:
+        x, y, z = origin
+        return f"The scene's origin is at ({x:,.2f}, {y:,.2f}, {z:,.2f}) in map coordinates, metres."
+    easting, northing, height = evidence.geo_reference.projected(origin)
+    return f"The scene's origin is at easting {easting:,.2f} m, northing {northing:,.2f} m, height {height:,.2f} m."
 
 
 def _projection(evidence: Evidence) -> str:
@@ -152,8 +179,8 @@ def _projection(evidence: Evidence) -> str:
 
 def _sensors(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
-    installed = any(sensor.installation_usd is not None for sensor in record.sensors)
-    head = ("", "Type", "Place", "Height, m", "Tilt, °", "Direction, °", "Price, $")
+    price = "Installed price, $" if record.installed else "Price, $"
+    head = ("", "Type", "Place", "Height, m", "Tilt, °", "Direction, °", price)
     rows = [
         (
             sensor.id,
@@ -170,10 +197,10 @@ def _sensors(evidence: Evidence) -> Iterator[Block]:
     ]
     yield Table(head, tuple(rows), frozenset({3, 4, 5, 6}))
     yield Paragraph(
-        f"Together {_dollars(record.price_usd)}. Height is that of the optical centre above the ground; tilt is how "
+        f"Together {record.price_text}. Height is that of the optical centre above the ground; tilt is how "
         "far the sensor's front looks down, direction where it points, counter-clockwise from the map's x axis."
     )
-    if installed:
+    if record.installed:
         total = sum(sensor.installation_usd or 0.0 for sensor in record.sensors)
         yield Paragraph(
             f"Prices are of installed sensors: {_dollars(total)} of them is for posts, mounting, power and backhaul, "
@@ -181,23 +208,43 @@ def _sensors(evidence: Evidence) -> Iterator[Block]:
         )
     else:
         yield Paragraph("Prices are of the sensors alone: posts, mounting, power and backhaul are not counted.")
-    yield _coordinates(record.sensors)
+    types = {sensor.sensor_name: sensor.evidence for sensor in record.sensors if sensor.evidence}
+    if types:
+        yield Paragraph("What the detection of each type rests on:")
+        yield Bullets(tuple(f"{name}: {rests_on}." for name, rests_on in types.items()))
+    yield _coordinates(evidence)
     if not evidence.geo_reference.obstacle:
-        yield Paragraph("Altitude is the height of the optical centre above the map's zero.")
+        yield Paragraph("Height in this table is that of the optical centre above the map's zero.")
 
 
-def _coordinates(sensors: Sequence[RecordedSensor]) -> Table:
-    """Return the table of where the optical centres are."""
-    rows = [(sensor.id, *(f"{value:.3f}" for value in sensor.map_m), *_degrees(sensor)) for sensor in sensors]
-    head = ("", "Map x, m", "Map y, m", "Map z, m", "Latitude, °", "Longitude, °", "Altitude, m")
-    return Table(head[: max(map(len, rows), default=1)], tuple(rows), frozenset(range(1, 7)))
+def _coordinates(evidence: Evidence) -> Table:
+    """Return the table of the sensors' optical centres."""
+    head, rows = _located(evidence, np.array([sensor.map_m for sensor in evidence.sensors]), 3, 8)
+    named = tuple((sensor.id, *row) for sensor, row in zip(evidence.sensors, rows, strict=True))
+    return Table(("", *head), named, frozenset(range(1, 1 + len(head))))
 
 
-def _degrees(sensor: RecordedSensor) -> tuple[str, ...]:
-    """Return latitude, longitude and altitude of a sensor; nothing where they are not known."""
-    if sensor.latitude_deg is None or sensor.longitude_deg is None or sensor.altitude_m is None:
-        return ()
-    return f"{sensor.latitude_deg:.8f}", f"{sensor.longitude_deg:.8f}", f"{sensor.altitude_m:.2f}"
+def _located(evidence: Evidence, points: Float, metres: int, degrees: int) -> tuple[Row, list[Row]]:
+    """Return heads and cells of a table of positions.
+
+    Positions are projected and geographic coordinates where the map's projection is known, otherwise map coordinates.
+
+    Parameters
+    ----------
+    points : (n, 3) float64, metres
+        Map coordinates.
+    metres, degrees : int
+        Decimals of each.
+    """
+    points = points.reshape(-1, 3)
+    places = evidence.geo_reference.geographic(points)
+    if places is None:
+        return ("Map x, m", "Map y, m", "Map z, m"), [tuple(f"{value:.{metres}f}" for value in row) for row in points]
+    rows = [
+        (*(f"{value:.{metres}f}" for value in projected), f"{latitude:.{degrees}f}", f"{longitude:.{degrees}f}")
+        for projected, (longitude, latitude, _) in zip(evidence.geo_reference.projected(points), places, strict=True)
+    ]
+    return ("Easting, m", "Northing, m", "Height, m", "Latitude, °", "Longitude, °"), rows
 
 
 def _coverage(evidence: Evidence) -> Iterator[Block]:
@@ -206,6 +253,7 @@ def _coverage(evidence: Evidence) -> Iterator[Block]:
     lines = [
         f"{percent(coverage.whole)} of the road is seen by a sensor, {percent(coverage.seen_twice)} by two or more."
     ]
+    lines += [_sentence(note) for note in record.notes if note.startswith((BAND, UNRANKED))]
     if coverage.central is not None:
         lines.append(f"{percent(coverage.central)} of the weighted regions is seen.")
     yield Bullets(tuple(lines))
@@ -233,41 +281,74 @@ def _blind_spots(evidence: Evidence) -> Iterator[Block]:
     area = sum(spot.area for spot in spots)
     shown = spots[:MOST_SPOTS]
     largest = "" if len(shown) == len(spots) else f" The {len(shown)} largest are listed."
-    parts = _count(len(spots), "connected part")
-    yield Paragraph(f"{area:,.0f} m² of road is not seen, in {parts}.{largest}")
+    parts = counted(len(spots), "connected part")
+    yield Paragraph(f"{area:,.0f} m² of road is not seen, in {parts}.{largest} {_counted_from(evidence)}")
     yield Picture(
         blind_spot_map(evidence, shown),
         "Orange is not seen, light blue seen by one sensor, dark blue by two or more; triangles are sensors, numbers "
-        "the blind spots of the table. North, or the map's y axis, is up.",
+        "the blind spots of the table. The map's y axis points up.",
     )
     middles = np.array([spot.middle for spot in shown]) + np.array(evidence.record.site.origin_m)
     yield _spot_table(evidence, shown, middles)
 
 
+def _counted_from(evidence: Evidence) -> str:
+    """Return the sentence that defines distances and directions of blind spots."""
+    origins = centres(evidence.site.targets, evidence.site.areas)
+    names = [f"“{centre.name}”" for centre in origins]
+    if not evidence.site.targets.central.any():
+        origin = "the centre of the road, the mean of all its squares"
+    elif len(names) == 1:
+        origin = f"the centre of the weighted region {names[0]}"
+    else:
+        origin = f"the nearest centre of a weighted region ({', '.join(names)})"
+    return f"Distances and directions are counted from {origin}; north is the direction of the map's y axis."
+
+
 def _spot_table(evidence: Evidence, spots: Sequence[BlindSpot], middles: Float) -> Table:
-    places = evidence.geo_reference.geographic(middles)
-    rows = []
-    for number, (spot, middle) in enumerate(zip(spots, middles, strict=True)):
-        located = () if places is None else tuple(f"{places[number, axis]:.6f}" for axis in (1, 0))
-        plan = tuple(f"{value:.1f}" for value in middle[:2])
-        rows.append((str(number + 1), f"{spot.area:,.0f}", spot.where, *plan, *located))
-    head = ("", "Area, m²", "Where", "Map x, m", "Map y, m", "Latitude, °", "Longitude, °")
-    return Table(head[: len(rows[0])], tuple(rows), frozenset({1, 3, 4, 5, 6}))
+    head, rows = _located(evidence, middles, 1, 6)
+    cells = tuple(
+        (str(number), f"{spot.area:,.0f}", spot.where, *row)
+        for number, (spot, row) in enumerate(zip(spots, rows, strict=True), start=1)
+    )
+    return Table(("", "Area, m²", "Where", *head), cells, frozenset({1, *range(3, 3 + len(head))}))
 
 
-def _certificate(evidence: Evidence) -> Iterator[Block]:
+def _certificate(evidence: Evidence, points: Sequence[FrontPoint]) -> Iterator[Block]:
     record = evidence.record
     yield Paragraph(certificate_sentence(evidence))
-    elsewhere = (POSE_ERRORS, CHOSEN_FOR, *LOCATED_FILES)
+    same_price = _same_price(evidence, points)
+    elsewhere = (POSE_ERRORS, CHOSEN_FOR, BAND, UNRANKED, *LOCATED_FILES, *([SAME_PRICE] if same_price else []))
     notes = [_sentence(note) for note in record.notes if not note.startswith(elsewhere)]
+    notes += [same_price] if same_price else []
     if record.greedy is not None:
         lost = record.greedy.gap_to_placement
         notes.append(
             "Choosing one sensor after the other, each the best at the time, gives "
-            f"{f'{lost:.2%} less' if lost > 0 else 'no less'}."
+            f"{f'{lost:.2%}' if lost > 0 else 'no'} {'less' if record.returns is None else 'fewer returns'}."
         )
     notes.append("“Proven” is said of the model: of this scene, these sensors and this rule of what counts as seen.")
     yield Bullets(tuple(notes))
+
+
+def _same_price(evidence: Evidence, points: Sequence[FrontPoint]) -> str:
+    """Return what is proven of the coverage of the cheapest placement, from the table of numbers of sensors, or ""."""
+    record, problem = evidence.record, evidence.site.problem
+    own = [point for point in points if point.count == len(record.sensors)]
+    if not record.objective.cheapest or record.objective.status == MOVED or not own or not equal_prices(problem):
+        return ""
+    choice = f"choice of {counted(len(record.sensors), 'sensor')}, at the same price,"
+    more = own[0].coverage - _weighted_share(evidence)
+    if more > MIN_DIFFERENCE:
+        return f"Another {choice} covers {_points(more)} more: see “Fewer or more sensors”."
+    missed = own[0].missed
+    return f"No other {choice} covers more{f' than {_points(missed)} more' if missed else ': this is proven'}."
+
+
+def _weighted_share(evidence: Evidence) -> float:
+    """Return the share of the road that is seen, counted by its weights."""
+    weights = evidence.site.problem.weights
+    return math.fsum(weights[evidence.seen]) / math.fsum(weights)
 
 
 def _losses(evidence: Evidence) -> Iterator[Block]:
@@ -308,15 +389,21 @@ def _front(evidence: Evidence, points: Sequence[FrontPoint]) -> Iterator[Block]:
         )
         yield Paragraph(f"Other numbers of sensors were not looked at: {why}.")
         return
-    weights = evidence.site.problem.weights
-    share = math.fsum(weights[evidence.seen]) / math.fsum(weights)
-    weighted = " Coverage counts the road by its weights here." if float(np.ptp(weights)) > 0 else ""
+    record = evidence.record
+    weighted = " Coverage counts the road by its weights here." if np.ptp(evidence.site.problem.weights) > 0 else ""
+    budget = record.asked.goal.budget
+    limit = "" if budget is None else f" The budget of {_dollars(budget)} does not limit the choices of this table."
     yield Paragraph(
-        "The choice of one sensor, of two, and so on, that sees most under the same rules, whatever it costs: a search "
-        f"with a budget may find more for the money. Each was searched for a limited time only.{weighted}"
+        f"For each number of sensors, the choice that covers most under the same rules, whatever its "
+        f"price.{limit}{weighted} The last column states what is proven of the coverage of all other choices of at "
+        "most that number. Searches for other numbers start from this placement and are limited."
     )
+    goal = purpose(record.notes)
+    if goal:
+        yield Paragraph(f"This placement was chosen{goal}, and not to cover most: the table does not rank it.")
+    price = "Installed price, $" if record.installed else "Price, $"
     yield Picture(
-        front_chart(points, (evidence.record.price_usd, share)),
+        front_chart(points, (record.price_usd, _weighted_share(evidence)), installed=record.installed),
         "Coverage against price by number of sensors; a line above a point reaches to what could not be ruled out.",
     )
     rows = tuple(
@@ -324,11 +411,11 @@ def _front(evidence: Evidence, points: Sequence[FrontPoint]) -> Iterator[Block]:
             str(point.count),
             f"{point.price:,.0f}",
             percent(point.coverage),
-            "proven the best" if point.missed == 0 else f"at most {_points(point.missed)} more",
+            "none covers more" if point.missed == 0 else f"at most {_points(point.missed)} more",
         )
         for point in points
     )
-    yield Table(("Sensors", "Price, $", "Coverage", "Another choice"), rows, frozenset({0, 1, 2}))
+    yield Table(("Sensors", price, "Coverage", "Other choices"), rows, frozenset({0, 1, 2}))
 
 
 def _warnings(evidence: Evidence) -> Iterator[Block]:
@@ -362,10 +449,6 @@ def _sentence(text: str) -> str:
     first = text.split(maxsplit=1)[0] if text.strip() else ""
     begun = text[:1].upper() + text[1:] if first.isalpha() else text
     return begun if begun.endswith((".", "!", "?")) else f"{begun}."
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number:,} {what}{'s' * (number != 1)}"
 
 
 def _dollars(amount: float) -> str:

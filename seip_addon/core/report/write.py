@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Generator
 from pathlib import Path
 
+from ..errors import SeipError
+from ..limits import EFFORT as EFFORT_LIMITS
 from ..progress import Progress
 from ..storage.files import whole_file
 from .evidence import load_evidence
@@ -35,6 +37,8 @@ def write_report(folder: Path, effort: float = EFFORT) -> Generator[Progress, No
     SeipError
         The folder holds no result, or a damaged one, or cannot be written.
     """
+    if not EFFORT_LIMITS.allow(effort):
+        raise SeipError(f"the effort must be {EFFORT_LIMITS} units of counted work, not {effort:g}")
     yield Progress(0, 0, "reading the result")
     evidence = load_evidence(folder)
     points = yield from front(evidence, effort)

@@ -1,6 +1,5 @@
 """``candidates.csv``: every candidate pose with what it sees, for a spreadsheet."""
 
-import csv
 import os
 from collections.abc import Mapping
 
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 from ..lidar import LidarModel
 from ..placement.deployment import Deployment, Sensor, sensor_at, weighted_share
 from ..site.site import Site
-from ..storage.files import whole_file
+from ..storage.csv_table import save_csv
 from .headings import degrees, tilt_degrees
 
 COLUMNS = (
@@ -39,19 +38,18 @@ def save_candidate_table(
     seen = visible.sum(axis=1)
     weighted = np.array([weighted_share(row, site.targets.weight) for row in visible])
     rank = _ranks(weighted, seen)
-    with whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for pose in range(len(site.candidates)):
-            sensor = sensor_at(site, models, label.get(pose, ""), pose)
-            source = str(site.candidates.pole_source[site.candidates.position_of[pose]])
-            share = seen[pose] / len(site.targets)
-            worth = (seen[pose], f"{share:.6f}", f"{weighted[pose]:.6f}", rank[pose])
-            writer.writerow((pose, *_place(sensor, site, source), *worth, sensor.label))
-        for sensor in deployment.sensors:
-            if sensor.pose is None:
-                worth = (round(sensor.alone * len(site.targets)), f"{sensor.alone:.6f}", "", "")
-                writer.writerow(("", *_place(sensor, site, ""), *worth, sensor.label))
+    rows: list[tuple[object, ...]] = []
+    for pose in range(len(site.candidates)):
+        sensor = sensor_at(site, models, label.get(pose, ""), pose)
+        source = str(site.candidates.pole_source[site.candidates.position_of[pose]])
+        share = seen[pose] / len(site.targets)
+        worth = (seen[pose], f"{share:.6f}", f"{weighted[pose]:.6f}", rank[pose])
+        rows.append((pose, *_place(sensor, site, source), *worth, sensor.label))
+    for sensor in deployment.sensors:
+        if sensor.pose is None:
+            worth = (round(sensor.alone * len(site.targets)), f"{sensor.alone:.6f}", "", "")
+            rows.append(("", *_place(sensor, site, ""), *worth, sensor.label))
+    save_csv(path, COLUMNS, rows)
 
 
 def _place(sensor: Sensor, site: Site, source: str) -> tuple[object, ...]:

@@ -10,11 +10,10 @@ import numpy as np
 from ..arrays import Integer
 from ..errors import SeipError
 from ..pictures.coverage_colours import Colouring
+from ..pictures.palette import COMPARED_COLOURS
 
 NEITHER, BOTH, GAINED, LOST = range(4)
 COMPARED_WORDS = ("seen in neither", "seen in both", "gained", "lost")
-COMPARED_COLOURS = ("#8a8f94", "#cfd6db", "#1f6fb4", "#e0662f")
-"""What stays as it is is grey; gains are blue and losses orange, of other lightness each."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,10 @@ def save_geojson(path: str | os.PathLike[str], placed: Located) -> None:
     Positions are longitude and latitude, degrees on WGS 84; those of sensors have the height above the map's zero,
     metres, as their third number.
     """
-    head = json.dumps({"type": "FeatureCollection", "name": placed.site.name}, ensure_ascii=False)[:-1]
+    about: dict[str, object] = {"type": "FeatureCollection", "name": placed.site.name}
+    if placed.site.attribution:
+        about["attribution"] = placed.site.attribution
+    head = json.dumps(about, ensure_ascii=False)[:-1]
     lines = (json.dumps(one, ensure_ascii=False, allow_nan=False, separators=(",", ":")) for one in _features(placed))
     with whole_file(path) as temporary:
         temporary.write_text(f'{head}, "features": [\n' + ",\n".join(lines) + "\n]}\n", encoding="utf-8")

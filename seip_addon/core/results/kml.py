@@ -9,8 +9,7 @@ from xml.etree import ElementTree as ET
 
 import shapely
 
-from ..pictures.palette import SEEN_COLOURS
-from ..pictures.plan_style import WEIGHTED
+from ..pictures.palette import SEEN_COLOURS, WEIGHTED
 from ..placement.deployment import Sensor
 from ..storage.files import whole_file
 from .headings import degrees, tilt_degrees
@@ -35,6 +34,8 @@ def save_kml(path: str | os.PathLike[str], placed: Located) -> None:
     root = ET.Element("kml", {"xmlns": NAMESPACE})
     document = ET.SubElement(root, "Document")
     _text(document, "name", placed.site.name)
+    if placed.site.attribution:
+        _text(document, "description", "\n".join(placed.site.attribution))
     for name, look in STYLES.items():
         _style(document, name, *look)
     sensors = _folder(document, "Sensors")

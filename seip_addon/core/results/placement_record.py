@@ -7,29 +7,42 @@ import os
 import platform
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from functools import cached_property, lru_cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
+from .. import limits
 from ..arrays import Float
 from ..errors import SeipError
 from ..geometry.orientation import orientation
 from ..opendrive.geo_reference import GeoReference
 from ..placement import Placement
-from ..placement.deployment import Sensor
-from ..placement.objective import Objective, Solution, certificate
+from ..placement.deployment import GainBand, Sensor, TypeBand, price_text
+from ..placement.objective import Objective, Solution
+from ..placement.returns_summary import ReturnsSummary, share_reached
 from ..site.site import Site
 from ..site.sources import SourceCount
 from ..storage.files import save_json
 from ..storage.json_dataclass import from_json
 from .headings import degrees, tilt_degrees
+from .record_check import check_consistency
 
-Point = tuple[float, float, float]
+Coordinate = Annotated[float, limits.LOCAL_COORDINATE]
+MapCoordinate = Annotated[float, limits.MAP_COORDINATE]
+Point = tuple[Coordinate, Coordinate, Coordinate]
+MapPoint = tuple[MapCoordinate, MapCoordinate, MapCoordinate]
+Height = Annotated[float, limits.ABOVE_GROUND]
+Degrees = Annotated[float, limits.DEGREES]
+Dollars = Annotated[float, limits.PRICE]
+Share = Annotated[float, limits.SHARE]
+Total = Annotated[float, limits.TOTAL_WEIGHT]
+Count = Annotated[int, limits.COUNT]
+Seconds = Annotated[float, limits.DURATION]
 
 SCHEMA = "seip-placement/2"
 LIBRARIES = ("numpy", "shapely", "pulp", "highspy")
@@ -76,26 +89,29 @@ class RecordedGeoReference:
     """What the scene's map says of where on the Earth it is: see `GeoReference`."""
 
     projection: str
-    header_offset_m: Point
-    header_heading_deg: float
+    header_offset_m: MapPoint
+    header_heading_deg: Degrees
 
 
 @dataclass(frozen=True)
 class RecordedSite:
     """A scene, the map coordinates of its local origin, and what its map says of where that is.
 
-    Records of earlier versions hold no ``geo_reference`` and no ``sources``.
+    Records of earlier versions hold no ``geo_reference``, ``sources`` and ``attribution``.
 
     Parameters
     ----------
     sources : tuple of SourceCount
         Where the scene's surfaces come from.
+    attribution : tuple of str
+        Credits that these sources demand.
     """
 
     name: str
-    origin_m: Point
+    origin_m: MapPoint
     geo_reference: RecordedGeoReference | None = None
     sources: tuple[SourceCount, ...] = ()
+    attribution: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -112,30 +128,37 @@ class RecordedSensor:
         Of a sensor that a hand has put elsewhere, and of no other.
     latitude_deg, longitude_deg, altitude_m : float, optional
         On WGS 84, and the height above the map's zero; None where the map's projection is not known.
+    easting_m, northing_m : float, optional
+        Coordinates of the map's projection: map coordinates and the offset of the map's header. None likewise.
+    evidence : str
+        What its type's law of detection rests on; records of earlier versions lack it.
     installation_usd : float, optional
         Of the price, what it takes to install the sensor; None where prices are those of sensors alone.
     """
 
     id: str
-    pose: int | None
+    pose: Count | None
     sensor: str
     sensor_name: str
     position: str
     on_pole: bool
     local_m: Point
-    map_m: Point
-    height_m: float
-    yaw_deg: float
-    tilt_deg: float
-    price_usd: float
-    coverage_alone: float
-    coverage_added: float
-    coverage_marginal: float
-    roll_deg: float | None = None
-    latitude_deg: float | None = None
-    longitude_deg: float | None = None
-    altitude_m: float | None = None
-    installation_usd: float | None = None
+    map_m: MapPoint
+    height_m: Height
+    yaw_deg: Degrees
+    tilt_deg: Degrees
+    price_usd: Dollars
+    coverage_alone: Share
+    coverage_added: Share
+    coverage_marginal: Share
+    roll_deg: Degrees | None = None
+    latitude_deg: Annotated[float, limits.LATITUDE] | None = None
+    longitude_deg: Annotated[float, limits.LONGITUDE] | None = None
+    altitude_m: MapCoordinate | None = None
+    easting_m: MapCoordinate | None = None
+    northing_m: MapCoordinate | None = None
+    evidence: str = ""
+    installation_usd: Dollars | None = None
 
     @property
     def orientation(self) -> Float:
@@ -146,12 +169,16 @@ class RecordedSensor:
 
 @dataclass(frozen=True)
 class RecordedCoverage:
-    """Shares of the targets, or of their weight, that are seen; ``central`` is None without weighted regions."""
+    """Shares of the targets, or of their weight, that are seen.
 
-    whole: float
-    central: float | None
-    weighted: float
-    seen_twice: float
+    ``central`` is None without weighted regions, ``gain_band`` where all sensors are calibrated on sweeps.
+    """
+
+    whole: Share
+    central: Share | None
+    weighted: Share
+    seen_twice: Share
+    gain_band: GainBand | None = None
 
 
 @dataclass(frozen=True)
@@ -159,10 +186,10 @@ class RecordedObjective:
     """What was optimised, in covered weight or dollars, and what is proven of it; None where nothing bounds it."""
 
     kind: Literal["vanilla", "weighted"]
-    sought: Literal["most coverage", "least price"]
-    value: float
-    bound: float | None
-    gap: float | None
+    sought: Literal["most coverage", "most returns", "least price"]
+    value: Total
+    bound: Total | None
+    gap: Annotated[float, limits.RELATIVE_GAP] | None
     status: str
     solver: str
 
@@ -171,20 +198,15 @@ class RecordedObjective:
         """Whether the least price was sought."""
         return self.sought == "least price"
 
-    @property
-    def certificate(self) -> str:
-        """How good the placement provably is, as a sentence."""
-        return certificate(self.status, self.gap, cheapest=self.cheapest)
-
 
 @dataclass(frozen=True)
 class RecordedGreedy:
     """The greedy answer to the same question, and the share of the objective that it loses."""
 
-    value: float
-    bound: float | None
-    gap_to_placement: float
-    poses: tuple[int, ...]
+    value: Total
+    bound: Total | None
+    gap_to_placement: Annotated[float, limits.SIGNED_SHARE]
+    poses: tuple[Count, ...]
     notes: tuple[str, ...]
 
 
@@ -192,12 +214,12 @@ class RecordedGreedy:
 class RecordedCounts:
     """How many targets, positions and poses there were, and how many candidates were dropped, by reason."""
 
-    targets: int
-    targets_central: int
-    positions: int
-    positions_on_poles: int
-    poses: int
-    dropped: Mapping[str, int]
+    targets: Count
+    targets_central: Count
+    positions: Count
+    positions_on_poles: Count
+    poses: Count
+    dropped: Mapping[str, Count]
 
 
 @dataclass(frozen=True)
@@ -205,7 +227,7 @@ class RecordedTimes:
     """When a placement was made (ISO 8601), and how many seconds each step took."""
 
     created: str
-    durations_s: Mapping[str, float]
+    durations_s: Mapping[str, Seconds]
 
 
 @dataclass(frozen=True)
@@ -236,27 +258,40 @@ class PlacementRecord:
         All that could have been set, by name; `asked` is the part that this program reads again.
     inputs : mapping of str to str
         Digests of what went in.
+    returns : ReturnsSummary, optional
+        Returns from road users, where the placement was chosen for them.
     """
 
     site: RecordedSite
     sensors: tuple[RecordedSensor, ...]
-    price_usd: float
+    price_usd: Dollars
     coverage: RecordedCoverage
     objective: RecordedObjective
     greedy: RecordedGreedy | None
     counts: RecordedCounts
     settings: Mapping[str, object]
-    seeds: Mapping[str, int]
+    seeds: Mapping[str, Annotated[int, limits.SEED]]
     inputs: Mapping[str, str]
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
     versions: Mapping[str, str]
     times: RecordedTimes
+    returns: ReturnsSummary | None = None
 
     @cached_property
     def asked(self) -> Asked:
         """What was asked for."""
         return from_json(Asked, self.settings, "settings")
+
+    @property
+    def installed(self) -> bool:
+        """Whether its prices count posts, mounting, power and backhaul."""
+        return any(sensor.installation_usd is not None for sensor in self.sensors)
+
+    @property
+    def price_text(self) -> str:
+        """The price in dollars, as text."""
+        return price_text(self.price_usd, installed=self.installed)
 
     def as_json(self) -> dict[str, Any]:
         """Return the value of ``placement.json``, its keys in order."""
@@ -289,7 +324,9 @@ def placement_record(
     """
     deployment, placement, greedy = solution.deployment, solution.placement, solution.greedy
     return PlacementRecord(
-        site=RecordedSite(site.name, _metres(site.origin), _geo_reference(site.geo_reference), site.sources),
+        site=RecordedSite(
+            site.name, _metres(site.origin), _geo_reference(site.geo_reference), site.sources, site.attribution
+        ),
         sensors=tuple(_sensor(sensor, site) for sensor in deployment.sensors),
         price_usd=_rounded(deployment.price, 2),
         coverage=RecordedCoverage(
@@ -297,17 +334,18 @@ def placement_record(
             central=None if deployment.central is None else _share(deployment.central),
             weighted=_share(deployment.weighted),
             seen_twice=_share(deployment.seen_twice),
+            gain_band=deployment.gain_band and _rounded_band(deployment.gain_band),
         ),
         objective=RecordedObjective(
-            kind="weighted" if solution.objective.weighted else "vanilla",
-            sought="least price" if solution.objective.cheapest else "most coverage",
+            kind=_kind(solution),
+            sought=_sought(solution),
             value=_significant(placement.objective),
             bound=_found(placement.bound),
             gap=_found(placement.gap),
             status=placement.status,
             solver=placement.solver,
         ),
-        greedy=None if greedy is None else _greedy(greedy, placement),
+        greedy=None if greedy is None else _greedy(greedy, placement, of_returns=deployment.returns is not None),
         counts=_counts(site),
         settings=dict(settings),
         seeds={},  # visibility and placement draw no random numbers
@@ -319,6 +357,7 @@ def placement_record(
             provenance.created.isoformat(timespec="seconds"),
             {step: _rounded(seconds, 3) for step, seconds in provenance.durations.items()},
         ),
+        returns=deployment.returns and _rounded_returns(deployment.returns),
     )
 
 
@@ -369,6 +408,7 @@ def _read(text: bytes, where: str) -> PlacementRecord:
         if schema == SCHEMA:
             record = from_json(PlacementRecord, content)
             _ = record.asked, record.text().encode()  # refused if these cannot be read or written again
+            check_consistency(record)
             return record
     except (SeipError, ValueError, RecursionError) as error:
         raise SeipError(f"{where} is damaged or no placement: {error}; place the sensors again") from error
@@ -386,7 +426,7 @@ def _without_absent(items: list[tuple[str, Any]]) -> dict[str, Any]:
     return {name: value for name, value in items if name not in _LEFT_OUT or value is not None}
 
 
-_LEFT_OUT = {"roll_deg", "installation_usd"}  # of a sensor, where it has none
+_LEFT_OUT = {"roll_deg", "installation_usd", "returns"}  # where there are none
 
 
 def _geo_reference(known: GeoReference) -> RecordedGeoReference | None:
@@ -400,6 +440,8 @@ def _geo_reference(known: GeoReference) -> RecordedGeoReference | None:
 def _sensor(sensor: Sensor, site: Site) -> RecordedSensor:
     place = site.geographic(sensor.xyz[None])
     longitude, latitude, altitude = (None, None, None) if place is None else place[0]
+    map_xyz = sensor.xyz + site.origin
+    easting, northing = (None, None) if place is None else site.geo_reference.projected(map_xyz[None])[0, :2]
     return RecordedSensor(
         id=sensor.label,
         pose=sensor.pose,
@@ -408,7 +450,7 @@ def _sensor(sensor: Sensor, site: Site) -> RecordedSensor:
         position=sensor.position_name,
         on_pole=sensor.on_pole,
         local_m=_metres(sensor.xyz),
-        map_m=_metres(sensor.xyz + site.origin),
+        map_m=_metres(map_xyz),
         height_m=_rounded(sensor.height, 6),
         yaw_deg=degrees(sensor.yaw),
         tilt_deg=tilt_degrees(sensor.tilt),
@@ -420,17 +462,41 @@ def _sensor(sensor: Sensor, site: Site) -> RecordedSensor:
         latitude_deg=None if latitude is None else _rounded(latitude, 8),
         longitude_deg=None if longitude is None else _rounded(longitude, 8),
         altitude_m=None if altitude is None else _rounded(altitude, 6),
+        easting_m=None if easting is None else _rounded(easting, 3),
+        northing_m=None if northing is None else _rounded(northing, 3),
+        evidence=sensor.model.evidence,
         installation_usd=None if sensor.installation is None else _rounded(sensor.installation, 2),
     )
 
 
-def _greedy(greedy: Placement, placement: Placement) -> RecordedGreedy:
-    lost = placement.objective - greedy.objective
+def _rounded_band(band: GainBand) -> GainBand:
+    types = tuple(TypeBand(one.sensor, _share(one.low), _share(one.high)) for one in band.types)
+    return replace(band, low=_share(band.low), high=_share(band.high), types=types)
+
+
+def _kind(solution: Solution) -> Literal["vanilla", "weighted"]:
+    return "weighted" if solution.objective.weighted else "vanilla"
+
+
+def _sought(solution: Solution) -> Literal["most coverage", "most returns", "least price"]:
+    if solution.objective.cheapest:
+        return "least price"
+    return "most coverage" if solution.deployment.returns is None else "most returns"
+
+
+def _rounded_returns(returns: ReturnsSummary) -> ReturnsSummary:
+    """Round to what single precision holds."""
+    crossings = tuple(replace(one, least=_rounded(one.least, 3)) for one in returns.crossings)
+    of_each = {name: _rounded(number, 3) for name, number in returns.of_each.items()}
+    return ReturnsSummary(_rounded(returns.typical, 3), of_each, crossings)
+
+
+def _greedy(greedy: Placement, placement: Placement, *, of_returns: bool) -> RecordedGreedy:
     return RecordedGreedy(
         value=_significant(greedy.objective),
         # The better of the two bounds: once the optimum is proven, it no longer hangs on a platform's rounding.
         bound=_found(min(greedy.bound, placement.bound)),
-        gap_to_placement=_share(lost / placement.objective) if placement.objective > 0.0 else 0.0,
+        gap_to_placement=_share(1.0 - share_reached(greedy.objective, placement.objective, of_returns=of_returns)),
         poses=tuple(int(pose) for pose in greedy.chosen),
         notes=greedy.notes,
     )

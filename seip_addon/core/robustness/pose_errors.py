@@ -22,6 +22,7 @@ import numpy as np
 from ..arrays import Boolean, Float
 from ..errors import SeipError
 from ..geometry.orientation import orientations
+from ..limits import DRAWS
 from ..settings import setting
 from ..site.obstruction import inside_any
 from ..site.scene_geometry import Mesh
@@ -112,9 +113,9 @@ class PoseDraws:
 
 
 def require_draws(draws: int) -> None:
-    """Raise SeipError where the number of draws is below one."""
-    if draws < 1:
-        raise SeipError(f"asked for {draws} draws or scenarios of pose errors; ask for at least 1")
+    """Raise SeipError where the number of draws is below one, or more than memory holds."""
+    if not DRAWS.allow(draws):
+        raise SeipError(f"asked for {draws} draws or scenarios of pose errors; ask for {DRAWS}")
 
 
 def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseDraws:

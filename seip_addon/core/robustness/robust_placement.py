@@ -38,7 +38,7 @@ from ..placement.branch_and_bound import FIRST_STEPS
 from ..placement.feasibility import starting_choice
 from ..placement.greedy import swap_search
 from ..placement.problem import TIE_TOLERANCE, assess, relative_gap
-from ..placement.reduced_problem import Instance, common_unit, make_instance, merge_targets
+from ..placement.reduced_problem import WHOLE_SLACK, Instance, common_unit, make_instance, merge_targets
 from ..placement.search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 from ..placement.solver import solve_within
 from ..progress import Progress, within
@@ -95,10 +95,23 @@ def solve_robust(
     solver, clock = limits.solver, limits.clock()
     if foreseen is None and risk.seen_by == 1:
         foreseen = yield from foresee(problem, different, solver, clock.part(SCENARIO_SHARE * clock.left))
-    placement = yield from _searched(problem, different, risk, solver, clock.part(math.inf, MIN_SECONDS))
+    slack = equal_within(problem, risk, len(different))
+    placement = yield from _searched(problem, different, risk, slack, solver, clock.part(math.inf, MIN_SECONDS))
     if foreseen is not None and risk.seen_by == 1:  # coverage by one look bounds that by two as well, but far above
-        placement = _with_foresight(problem, different, risk, placement, foreseen)
+        placement = _with_foresight(problem, different, risk, slack, placement, foreseen)
     return replace(placement, seconds=clock.seconds)
+
+
+def equal_within(problem: PlacementProblem, risk: Risk, scenarios: int) -> float:
+    """Return by how much two values of T may differ and still be equal, as `placement.solve` compares coverage.
+
+    Where the weights have a common unit, T is a multiple of a share of it, and different multiples differ. Elsewhere
+    values are equal that differ by less than `TIE_TOLERANCE` of all weight.
+    """
+    tolerance = TIE_TOLERANCE * math.fsum(problem.weights)
+    unit, whole = common_unit(problem.weights[problem.weights > 0])
+    parts = risk.counted(scenarios) * (problem.most_sensors if risk.failure == "mean" else 1)
+    return min(tolerance, WHOLE_SLACK * unit / parts) if whole else tolerance
 
 
 def foresee(
@@ -114,7 +127,7 @@ def foresee(
     scenarios = _without_copies(scenarios)
     found = []
     for scenario in range(len(scenarios)):
-        here = Progress(scenario, len(scenarios), "solving each scenario by itself")
+        here = Progress(scenario, len(scenarios), "solving each scenario by itself", counted=False)
         yield here
         alone = replace(problem, visible=scenarios.seen(scenario))
         # what the quick ones leave goes to those that follow
@@ -127,6 +140,7 @@ def _with_foresight(
     problem: PlacementProblem,
     scenarios: ScenarioVisibility,
     risk: Risk,
+    slack: float,
     placement: Placement,
     foreseen: Sequence[Placement],
 ) -> Placement:
@@ -134,10 +148,10 @@ def _with_foresight(
     value, chosen = placement.objective, placement.chosen
     for other in foreseen:
         reached = risk.of(outcomes_of(problem, scenarios, risk, other.chosen))
-        if reached > value * (1 + TIE_TOLERANCE) and placement.status != "optimal":
+        if reached > value + slack and placement.status != "optimal":
             value, chosen = reached, other.chosen
     bound = max(min(placement.bound, risk.of(np.array([other.bound for other in foreseen]))), value)
-    optimal = placement.status == "optimal" or bound <= value * (1 + TIE_TOLERANCE)
+    optimal = placement.status == "optimal" or bound <= value + slack
     return assess(
         problem,
         chosen,
@@ -188,15 +202,15 @@ def _stacked(problem: PlacementProblem, scenarios: ScenarioVisibility, share: Fl
 
 
 def _searched(
-    problem: PlacementProblem, scenarios: ScenarioVisibility, risk: Risk, solver: str, clock: Clock
+    problem: PlacementProblem, scenarios: ScenarioVisibility, risk: Risk, slack: float, solver: str, clock: Clock
 ) -> Generator[Progress, None, Placement]:
     """Find scenarios' weights with a small bound, then the best placement by branch and bound."""
     yield Progress(0, 0, "reducing the scenarios' targets")
     whole, _ = make_instance(_stacked(problem, scenarios, np.ones(len(scenarios))))
-    game = FictitiousPlay(problem, scenarios, risk, whole)
+    game = FictitiousPlay(problem, scenarios, risk, whole, clock)
     start = yield from starting_choice(problem, whole, solver)
-    chosen, share = yield from game.play(start, clock)
-    instance, unit, slack = game.instance(share), game.unit(share), TIE_TOLERANCE * math.fsum(problem.weights)
+    chosen, share = yield from game.play(start)
+    instance, unit = game.instance(share), game.unit(share)
     goal = (game.evaluate(chosen) - slack) * unit
     root = yield from lagrangian_bound(instance, goal, clock, iterations=FIRST_STEPS)
     search = BestUnderRisk(instance, unit, game.evaluate, chosen, slack, root)
@@ -220,10 +234,14 @@ class FictitiousPlay:
     ----------
     whole : Instance
         Of all scenarios: candidates that can matter, with their constraints.
+    clock : Clock
+        Limits of the search, which evaluations count against.
     """
 
-    def __init__(self, problem: PlacementProblem, scenarios: ScenarioVisibility, risk: Risk, whole: Instance) -> None:
-        self._scenarios, self._risk, self._whole = scenarios, risk, whole
+    def __init__(
+        self, problem: PlacementProblem, scenarios: ScenarioVisibility, risk: Risk, whole: Instance, clock: Clock
+    ) -> None:
+        self._scenarios, self._risk, self._whole, self._clock = scenarios, risk, whole, clock
         self._weight = problem.weights
         self._used = problem.weights > 0
         self._unit, _ = common_unit(problem.weights[self._used])
@@ -232,6 +250,7 @@ class FictitiousPlay:
 
     def evaluate(self, chosen: Integer) -> float:
         """Return T of candidates of the whole instance."""
+        self._clock.spend(8.0 * self._scenarios.packed[:, 0].size * len(chosen))
         seen = self._scenarios.seen_by_each(self._whole.original[chosen])
         return self._risk.of(self._risk.outcomes(seen, self._weight, self._sensors))
 
@@ -248,23 +267,23 @@ class FictitiousPlay:
         """Return by what T is to be multiplied to be compared with F."""
         return float(share.sum()) * self._cover.unit / self._unit
 
-    def play(self, start: Integer, clock: Clock) -> Generator[Progress, None, tuple[Integer, Integer]]:
+    def play(self, start: Integer) -> Generator[Progress, None, tuple[Integer, Integer]]:
         """Return the best placement met, and how often each scenario was among the worst, (K,) int64."""
         even = np.ones(len(self._scenarios), dtype=np.int64)
         instance = self.instance(even)
         chosen = yield from swap_search(instance, start)
         if not self._cover.concave:
-            chosen = yield from swap_search_from_pairs(instance, start, chosen, clock)
+            chosen = yield from swap_search_from_pairs(instance, start, chosen, self._clock)
             chosen = yield from swap_search_by_risk(instance, self.evaluate, chosen)
         best, value = chosen, self.evaluate(chosen)
         if self._risk.counted(len(even)) == len(even):
             return best, even
         share = np.zeros_like(even)
-        for played in range(ROUNDS):
-            if clock.left < 0:
+        for _ in range(ROUNDS):
+            if self._clock.left < 0:
                 break
-            yield Progress(played, ROUNDS, "weighing the scenarios")
-            clock.spend(2 * self._scenarios.packed.size * 8)
+            yield Progress(0, 0, "weighing the scenarios")
+            self._clock.spend(2 * self._scenarios.packed.size * 8)
             seen = self._scenarios.seen_by_each(self._whole.original[chosen])
             share[self._risk.worst(self._risk.outcomes(seen, self._weight, self._sensors))] += 1
             chosen = yield from swap_search(self.instance(share), chosen)

@@ -109,8 +109,8 @@ class BestUnderRisk(Search):
     ----------
     best : (k,) int64
     value : float
-        T of the best placement so far. Of equally good ones it is the one with fewest sensors, then the cheapest,
-        then the first in the order of candidates.
+        T of the best placement so far. Of equally good ones, which are those within ``slack`` of the largest T, it is
+        the one with fewest sensors, then the cheapest, then the first in the order of candidates.
     """
 
     def __init__(
@@ -125,6 +125,7 @@ class BestUnderRisk(Search):
         super().__init__(instance, 0.0, root=root)
         self._unit, self._evaluate, self._slack = unit, evaluate, slack
         self._highest = root[1].value
+        self._front: list[tuple[float, tuple[int, float, list[int]], Integer]] = []
         self._keep(np.sort(chosen), evaluate(chosen))
 
     @property
@@ -134,16 +135,19 @@ class BestUnderRisk(Search):
 
     def _take(self, placement: Integer) -> float:
         if self.instance.feasible(placement):
-            value = self._evaluate(placement)
-            if value > self.value + self._slack or (
-                value >= self.value - self._slack and self._rank(placement) < self._rank(self.best)
-            ):
-                self._keep(placement, value)
+            self._keep(placement, self._evaluate(placement))
         return self.goal
 
     def _keep(self, placement: Integer, value: float) -> None:
-        self.best, self.value = placement, value
-        self.goal = (value - self._slack) * self._unit
+        """Keep the placements of which none other has both a larger T and a better rank; the best is among them."""
+        rank = self._rank(placement)
+        if any(kept >= value and better <= rank for kept, better, _ in self._front):
+            return
+        front = [one for one in self._front if one[0] > value or one[1] < rank]
+        least = max([value, *(kept for kept, _, _ in front)]) - self._slack
+        self._front = [one for one in [*front, (value, rank, placement)] if one[0] >= least]
+        self.value, _, self.best = min(self._front, key=lambda one: one[1])
+        self.goal = least * self._unit
 
     def _rank(self, chosen: Integer) -> tuple[int, float, list[int]]:
         return len(chosen), round(math.fsum(self.instance.price[chosen]), 6), chosen.tolist()

@@ -6,7 +6,9 @@ from dataclasses import asdict, astuple, dataclass, field, replace
 import numpy as np
 
 from ..arrays import Float
+from ..errors import SeipError
 from ..estimates import IntervalEstimate, mean_of, quantile_gain, quantile_of
+from ..limits import DRAWS, SCENARIOS
 from ..placement import Placement, PlacementProblem, SolverLimits, solve
 from ..placement.search_limits import DEFAULT_LIMITS
 from ..progress import Progress, within
@@ -42,12 +44,13 @@ class RobustnessSettings:
 
     risk: Risk = field(default_factory=Risk)
     errors: PoseErrors = field(default_factory=PoseErrors)
-    scenarios: int = setting(20, "draws to choose on", minimum=1)
-    draws: int = setting(500, "unseen draws to evaluate on", minimum=1)
-    seed: int = setting(0, "of the scenarios; unseen draws have the next")
+    scenarios: int = setting(20, "draws to choose on", minimum=1, maximum=int(SCENARIOS.most))
+    draws: int = setting(500, "unseen draws to evaluate on", minimum=1, maximum=int(DRAWS.most))
+    seed: int = setting(0, "of the scenarios; unseen draws have the next", minimum=0)
 
     def __post_init__(self) -> None:
-        require_draws(self.scenarios)
+        if not SCENARIOS.allow(self.scenarios):
+            raise SeipError(f"asked for {self.scenarios} draws or scenarios of pose errors; ask for {SCENARIOS}")
         require_draws(self.draws)
 
     def as_record(self) -> dict[str, object]:
@@ -158,7 +161,7 @@ def robust_study(
     ways = dict.fromkeys(risk.alone for risk in risks)  # in the order of the risks, each once
     entries = [("the poses as planned", nominal, way) for way in ways]
     for number, risk in enumerate(risks):
-        here = Progress(number, len(risks), f"placing for {risk.describe()}")
+        here = Progress(number, len(risks), f"placing for {risk.describe()}", counted=False)
         yield here
         steps = solve_robust(problem, spread, risk, limits, foreseen)
         found: Placement = yield from within(here, steps)

@@ -8,33 +8,29 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import limits
 from ..arrays import Boolean, Float, Integer, Text
 from ..storage.array_file import ArrayFile, ArrayRule, ContentError
 from ..traffic.trajectories import CATEGORIES
 
-_MAX_COORDINATE = 1e7
-"""Metres from the local origin within which all points and boxes lie."""
-
-_ROUNDED_ONE = 1.0 + 1e-5  # 1, as float32 may round it
-
 _POINTS = {
-    "points": ArrayRule("f4", ("n", 3), -_MAX_COORDINATE, _MAX_COORDINATE),
-    "sensor": ArrayRule("i2", ("n",), 0),
-    "delay": ArrayRule("f4", ("n",), -1e3, 1e3),
-    "intensity": ArrayRule("f4", ("n",), 0.0, _ROUNDED_ONE),
-    "instance": ArrayRule("i4", ("n",), -1),
+    "points": ArrayRule("f4", ("n", 3), limits.LOCAL_COORDINATE),
+    "sensor": ArrayRule("i2", ("n",), limits.COUNT),
+    "delay": ArrayRule("f4", ("n",), limits.DELAY),
+    "intensity": ArrayRule("f4", ("n",), limits.ROUNDED_SHARE),
+    "instance": ArrayRule("i4", ("n",), limits.INDEX),
     "foreground": ArrayRule("b1", ("n",)),
 }
 _LABELS = {
-    "labels.user": ArrayRule("i8", ("k",), 0),
+    "labels.user": ArrayRule("i8", ("k",), limits.COUNT),
     "labels.category": ArrayRule("U", ("k",)),
-    "labels.centre": ArrayRule("f8", ("k", 3), -_MAX_COORDINATE, _MAX_COORDINATE),
-    "labels.size": ArrayRule("f8", ("k", 3), 0.0, 1e3),
-    "labels.yaw": ArrayRule("f8", ("k",), -4.0, 4.0),
-    "labels.pitch": ArrayRule("f8", ("k",), -2.0, 2.0),
-    "labels.speed": ArrayRule("f8", ("k",), -1e6, 1e6),
-    "labels.points": ArrayRule("i8", ("k", "s"), 0),
-    "labels.visibility": ArrayRule("f8", ("k",), 0.0, _ROUNDED_ONE),
+    "labels.centre": ArrayRule("f8", ("k", 3), limits.LOCAL_COORDINATE),
+    "labels.size": ArrayRule("f8", ("k", 3), limits.ROAD_USER_SIZE),
+    "labels.yaw": ArrayRule("f8", ("k",), limits.YAW),
+    "labels.pitch": ArrayRule("f8", ("k",), limits.PITCH),
+    "labels.speed": ArrayRule("f8", ("k",), limits.APPARENT_SPEED),
+    "labels.points": ArrayRule("i8", ("k", "s"), limits.COUNT),
+    "labels.visibility": ArrayRule("f8", ("k",), limits.ROUNDED_SHARE),
     "labels.inside": ArrayRule("b1", ("k",)),
 }
 FILE = ArrayFile("seip.frame", 3, "frame of scans", "simulate it again", _POINTS | _LABELS, compressed=False)
@@ -152,3 +148,10 @@ class Frame:
             raise ContentError("points lie on road users without a label")
         if len(self) and int(self.sensor.max()) >= labels.points.shape[1]:
             raise ContentError("points are from sensors that the labels do not count")
+        hits = self.instance != STATIC_INSTANCE
+        counted = np.zeros_like(labels.points)
+        np.add.at(counted, (np.searchsorted(labels.user, self.instance[hits]), self.sensor[hits]), 1)
+        if len(labels) and (counted != labels.points).any():
+            raise ContentError("the labels count other points than there are")
+        if fault := limits.TIME.fault(self.time):
+            raise ContentError(f"its time {fault}")

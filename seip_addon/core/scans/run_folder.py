@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import limits
 from ..arrays import Float
 from ..errors import SeipError
 from ..lidar import LidarModel
@@ -26,6 +27,7 @@ from .static_scene import StaticScene
 
 SCHEMA = "seip-run/1"
 MANIFEST, FRAMES = "manifest.json", "frames"
+PLACEMENT = "placement.json"  # by which a folder is one of a placement
 
 Record = dict[str, Any]
 
@@ -142,6 +144,7 @@ def write_run(folder: Path, run: Run, simulation: Simulation) -> Generator[Progr
 
 def check_run_folder(folder: Path, run: Run) -> None:
     """Raise SeipError where a folder holds something other than frames of this run."""
+    check_no_placement(folder)
     if (folder / MANIFEST).exists():
         if load_manifest(folder)["key"] != run.key:
             raise SeipError(
@@ -151,6 +154,12 @@ def check_run_folder(folder: Path, run: Run) -> None:
         raise SeipError(
             f"{folder} holds frames without a {MANIFEST} that says whose: delete them, or name another folder"
         )
+
+
+def check_no_placement(folder: Path) -> None:
+    """Raise SeipError where a folder holds a placement, whose files those of a run would mix with."""
+    if (folder / PLACEMENT).exists():
+        raise SeipError(f"{folder} holds a placement, which a run is not written to: name another folder")
 
 
 def load_manifest(folder: Path) -> Record:
@@ -183,10 +192,19 @@ def _is_whole(record: Record) -> bool:
     texts = [record["key"], record["trajectories"]["source"], *(sensor["sensor"] for sensor in record["sensors"])]
     texts += [frame["sha256"] for frame in record["frames"]]
     names = [frame["name"] for frame in record["frames"]]
+    frames = record["frames"]
+    times = np.array([frame["time_s"] for frame in frames], dtype=np.float64)
+    counts = [frame[what] for frame in frames for what in ("points", "road_users")]
+    road_users = record["trajectories"]["road_users"]
     return (
         isinstance(record["complete"], bool)
         and sensors.shape == (len(sensors), 3)
-        and bool(np.isfinite(sensors).all())
+        and limits.LOCAL_COORDINATE.allow(sensors)
+        and limits.TIME.allow(times)
+        and bool((np.diff(times) > 0.0).all())
+        and all(type(count) is int for count in (*counts, road_users))
+        and limits.COUNT.allow(np.array([*counts, road_users], dtype=np.float64))
+        and all(frame["road_users"] <= road_users for frame in frames)
         and all(isinstance(text, str) for text in texts)
         and names == [f"{number:06d}" for number in range(len(names))]
         and bool(names) >= record["complete"]
@@ -209,6 +227,9 @@ def load_frames(folder: Path) -> Iterator[tuple[str, Frame]]:
         frame = Frame.load(path)
         if content_hash(frame) != entry["sha256"]:
             raise SeipError(f"{path} is a frame of another run: delete {folder} and simulate again")
+        sensors = frame.labels.points.shape[1]
+        if entry != _frame_record(int(entry["name"]), frame) or sensors not in {0, len(record["sensors"])}:
+            raise SeipError(f"{folder / MANIFEST} contradicts {path.name}: delete {folder} and simulate again")
         yield entry["name"], frame
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..arrays import Float, Integer
 from ..errors import SeipError
 from ..lidar import measured_returns
+from ..limits import FRAMES
 from ..progress import Progress
 from ..settings import setting
 from ..traffic import Snapshot, Trajectories
@@ -254,7 +255,10 @@ def frame_times(
     duration = end - start if duration is None else duration
     if not (begin <= start <= end and 0 <= duration <= end - start + _TIME_TOLERANCE):
         raise SeipError(f"the traffic is known from {begin:g} s to {end:g} s: choose start and duration within that")
-    return start + np.arange(math.floor(duration * rate + _TIME_TOLERANCE) + 1) / rate
+    count = math.floor(duration * rate + _TIME_TOLERANCE) + 1
+    if not FRAMES.allow(count):
+        raise SeipError(f"{duration:g} s at {rate:g} Hz are {count:,} frames, and a run has {FRAMES}: ask for less")
+    return start + np.arange(count) / rate
 
 
 FOREGROUND_SIGMAS, FOREGROUND_MARGIN = 3.0, 0.05

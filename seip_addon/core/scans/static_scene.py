@@ -28,12 +28,15 @@ class StaticScene:
         Region of interest in plan.
     warnings : tuple of str
         What was left out of it.
+    attribution : tuple of str
+        Credits that the sources of the scene demand.
     """
 
     triangles: Float
     reflectivity: Float
     region: BaseGeometry
     warnings: tuple[str, ...] = ()
+    attribution: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Have GEOS index the region before threads share it: it does so with the second point, without a lock."""
@@ -59,4 +62,4 @@ def static_scene(geometry: SceneGeometry, sensors: Sequence[MountedSensor] = ())
         places = shapely.MultiPoint([sensor.xyz[:2] for sensor in sensors])
         geometry, warnings = without_far_objects(geometry, places, max(s.model.max_range for s in sensors))
     surfaces = ordered_surfaces((*geometry.roads, *geometry.ground, *geometry.occluders))
-    return StaticScene(*surfaces, geometry.region, warnings)
+    return StaticScene(*surfaces, geometry.region, warnings, geometry.attribution)

@@ -11,12 +11,14 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Boolean, Float, Integer, Text
+from ..counts import counted
 from ..errors import SeipError
 from ..geometry.orientation import orientation
 from ..geometry.plan import outline, surface_height
 from ..settings import setting
 from .obstruction import inside_any, post_blocked
 from .pavement_sampling import spread
+from .post_rules import RULES, RuleName, check_allowed, excluded_posts
 from .scene_geometry import ASSUMED, NamedArea, Pole, SceneGeometry, joined
 
 _MAX_ABOVE_POLE = 0.5
@@ -25,7 +27,7 @@ _MAX_ABOVE_POLE = 0.5
 MAX_SENSOR_HEIGHT = 100.0
 """Metres above the ground; a larger height is taken for a typing error."""
 
-ASSUMED_POLES = "assumed poles"
+ASSUMED_POLES = "on an assumed pole"
 """Reason for which assumed poles are dropped."""
 
 MAX_TILT = 90.0
@@ -61,6 +63,8 @@ class CandidateSettings:
         How far from an existing pole's axis the sensor hangs, towards the region.
     assumed_poles : bool
         Whether poles that are assumed, and stand in no map, may carry sensors.
+    allow : tuple of str
+        Names of the rules of `post_rules.RULES` that do not apply: by default all do.
     """
 
     sensors: tuple[str, ...] = setting(
@@ -104,6 +108,7 @@ class CandidateSettings:
         default=False,
         help="let poles carry sensors that are assumed, since the map has none for its traffic lights",
     )
+    allow: tuple[RuleName, ...] = setting((), f"also use: {' '.join(RULES)}", metavar="RULE")
 
     def __post_init__(self) -> None:
         if not self.sensors:
@@ -116,6 +121,7 @@ class CandidateSettings:
                     f"a mounting height must be a positive number of metres up to {MAX_SENSOR_HEIGHT:g}, not {height}"
                 )
         self._check_tilts()
+        check_allowed(self.allow)
         if not 1 <= self.yaws <= MAX_YAWS:
             raise SeipError(f"there must be 1 to {MAX_YAWS} yaws, not {self.yaws}")
         if not 0.1 <= self.spacing <= 1000:
@@ -288,7 +294,7 @@ def generate_candidates(geometry: SceneGeometry, settings: CandidateSettings) ->
     blocked = np.zeros(len(xyz), dtype=bool)
     post = ~on_pole[position_of] & ~inside
     blocked[post] = post_blocked(foot[position_of[post]], height[post], settings.clearance, geometry.occluders)
-    dropped["higher than their pole"] = int(too_high.sum())
+    dropped["higher than the pole"] = int(too_high.sum())
     dropped["inside an object"] = int(inside.sum())
     dropped["too close to a wall or object"] = int(blocked.sum())
     kept = ~too_high & ~inside & ~blocked
@@ -351,10 +357,17 @@ def _free_poles(geometry: SceneGeometry, settings: CandidateSettings, dropped: d
     for pole in geometry.poles:
         if pole.mandatory and pole not in free:
             raise SeipError(f"mandatory pole {pole.name!r} stands in a forbidden area: take one of the two back")
-    dropped["forbidden poles"] = len(geometry.poles) - len(free)
+    dropped["on a forbidden pole"] = len(geometry.poles) - len(free)
     usable = [pole for pole in free if settings.assumed_poles or pole.mandatory or pole.source != ASSUMED]
     dropped[ASSUMED_POLES] = len(free) - len(usable)
-    return usable
+    allowed = []
+    for pole in usable:
+        if pole.keep_off is None or pole.keep_off in settings.allow or pole.mandatory:
+            allowed.append(pole)
+        else:
+            reason = RULES[pole.keep_off].reason
+            dropped[reason] = dropped.get(reason, 0) + 1
+    return allowed
 
 
 def _pavement_feet(
@@ -374,6 +387,11 @@ def _pavement_feet(
     allowed = ~shapely.intersects_xy(forbidden, plan[:, 0], plan[:, 1])
     dropped["in a forbidden area"] = int((~allowed).sum())
     plan = plan[allowed]
+    left = np.ones(len(plan), dtype=bool)
+    for rule, hit in excluded_posts(plan, geometry.keep_off_areas, road, settings.allow).items():
+        dropped[RULES[rule].reason] = dropped.get(RULES[rule].reason, 0) + int(hit.sum())
+        left &= ~hit
+    plan = plan[left]
     height = surface_height(plan, joined((*geometry.ground, *geometry.roads)))
     supported = np.isfinite(height)
     dropped["over no ground"] = int((~supported).sum())
@@ -423,10 +441,11 @@ def assumed_pole_warnings(geometry: SceneGeometry, candidates: Candidates) -> tu
     assumed = sum(pole.source == ASSUMED for pole in geometry.poles)
     if not assumed:
         return ()
-    poles = f"{assumed} poles are" if assumed > 1 else "1 pole is"
+    poles = counted(assumed, "pole is", "poles are")
     if (candidates.pole_source == ASSUMED).any():
         return (f"{poles} assumed, not from the map, and may carry sensors: make sure that they exist",)
-    return (f"{poles} assumed, not from the map, and carry no sensors: ask for assumed poles to use them",)
+    carry = "carries" if assumed == 1 else "carry"
+    return (f"{poles} assumed, not from the map, and {carry} no sensors: ask for assumed poles to use them",)
 
 
 def _union(areas: Sequence[NamedArea]) -> BaseGeometry:
@@ -438,4 +457,7 @@ def _union(areas: Sequence[NamedArea]) -> BaseGeometry:
 def _none_left(dropped: dict[str, int]) -> str:
     reasons = ", ".join(f"{count} {reason}" for reason, count in dropped.items() if count)
     cure = "enlarge SEIP Candidate Areas, add SEIP Poles, or ask for less set-back and clearance"
+    rules = [name for name, rule in RULES.items() if dropped.get(rule.reason)]
+    if rules:
+        cure += f", or allow {' '.join(rules)}"
     return f"no candidate is left ({reasons}): {cure}" if reasons else f"no candidate: {cure}"

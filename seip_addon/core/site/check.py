@@ -12,6 +12,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
+from ..counts import counted
 from ..errors import SeipError
 from ..geometry.plan import heights_over, outline, signed_area, surface_height
 from ..progress import Progress
@@ -152,14 +153,14 @@ def check_site(
     """
     plans: dict[str, BaseGeometry] = {}
     for number, role in enumerate(("region", "roads", "candidate_areas")):
-        yield Progress(number, STAGES, "outlines")
+        yield Progress(number, STAGES, "outlines", counted=False)
         plans[role] = outline(np.concatenate([np.empty((0, 3, 3)), *_triangles(contents, role)]))
-    yield Progress(3, STAGES, "problems")
+    yield Progress(3, STAGES, "problems", counted=False)
     problems = [*contents.problems, *_problems(contents, plans)]
-    yield Progress(4, STAGES, "road")
+    yield Progress(4, STAGES, "road", counted=False)
     problems += _road_problems(contents, plans)
     counts = _counts(contents, plans)
-    yield Progress(5, STAGES, "candidates")
+    yield Progress(5, STAGES, "candidates", counted=False)
     if contents.geometry is not None:
         try:
             site, warnings = lay_out(contents.geometry)
@@ -170,7 +171,7 @@ def check_site(
             problems += [Problem("WARNING", text) for text in warnings]
     elif not any(problem.severity == "ERROR" for problem in problems):
         problems.append(Problem("ERROR", contents.complaint, _named_in(contents.complaint, contents)))
-    yield Progress(STAGES, STAGES, "candidates")
+    yield Progress(STAGES, STAGES, "candidates", counted=False)
     return SiteCheck(counts, _in_order(problems))
 
 
@@ -204,8 +205,8 @@ def _counts(contents: SceneContents, plans: dict[str, BaseGeometry]) -> dict[str
         surfaces = _of(contents, role)
         if surfaces or role in {"region", "roads"}:
             faces = sum(len(surface.triangles) for surface in surfaces)
-            counts[title] = f"{_number(len(surfaces), 'object')}, {_number(faces, 'triangle')}"
-    counts["Poles"] = _number(len(contents.poles), "pole")
+            counts[title] = f"{counted(len(surfaces), 'object')}, {counted(faces, 'triangle')}"
+    counts["Poles"] = counted(len(contents.poles), "pole")
     for mark in ("forbidden", "mandatory"):
         marked = sum(getattr(pole, mark) for pole in contents.poles)
         counts["Poles"] += f", {marked} {mark}" * (marked > 0)
@@ -227,10 +228,6 @@ def _site_counts(site: Site) -> dict[str, str]:
         "Poses": f"{len(poses):,}",
     }
     return counts | {f"Dropped, {reason}": f"{count:,}" for reason, count in poses.dropped.items()}
-
-
-def _number(count: int, what: str) -> str:
-    return f"{count:,} {what}{'s' * (count != 1)}"
 
 
 def _problems(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterator[Problem]:
@@ -273,7 +270,7 @@ def _far(contents: SceneContents) -> Iterator[Problem]:
         reach, name = max(far)
         yield Problem(
             "WARNING",
-            f"{name!r} and {_number(len(far) - 1, 'other object')} lie up to {reach / 1000:,.0f} km from the origin, "
+            f"{name!r} and {counted(len(far) - 1, 'other object')} lie up to {reach / 1000:,.0f} km from the origin, "
             f"where Blender rounds places to {1000 * np.spacing(np.float32(reach)):.0f} mm: move all to the origin and "
             "put the map's coordinates of it into the scene's property seip_origin.",
             name,
@@ -336,6 +333,7 @@ def _pole_problems(contents: SceneContents, region: BaseGeometry) -> Iterator[Pr
             for pole, away in zip(poles, distance, strict=True)
             if away > MAX_POLE_DISTANCE
         ],
+        f"pole stands more than {MAX_POLE_DISTANCE:g} m from the region: take it out of the poles",
         f"poles stand more than {MAX_POLE_DISTANCE:g} m from the region: take them out of the poles",
     )
     under = np.concatenate([np.empty((0, 3, 3)), *_triangles(contents, "roads"), *_triangles(contents, "ground")])
@@ -349,6 +347,7 @@ def _pole_problems(contents: SceneContents, region: BaseGeometry) -> Iterator[Pr
             for pole, high in zip(poles, above, strict=True)
             if abs(high) > MAX_FOOT_OFFSET
         ],
+        f"pole has its foot more than {MAX_FOOT_OFFSET:g} m above or below the ground: move it or its origin",
         f"poles have their foot more than {MAX_FOOT_OFFSET:g} m above or below the ground: move them or their origins",
     )
     nearest = shapely.STRtree(shapely.points(feet[:, :2])).query(
@@ -360,6 +359,7 @@ def _pole_problems(contents: SceneContents, region: BaseGeometry) -> Iterator[Pr
             for a, b in nearest.T
             if a < b
         ],
+        "pole stands where another one stands: take one of the two out",
         "poles stand where another one stands: take one of each two out",
     )
 
@@ -368,12 +368,12 @@ def _level(high: float) -> str:
     return f"{abs(high):.1f} m {'above' if high > 0 else 'below'}"
 
 
-def _named(culprits: list[tuple[str, str]], together: str) -> Iterator[Problem]:
-    """Name a few culprits one by one, and the others together."""
+def _named(culprits: list[tuple[str, str]], one: str, several: str) -> Iterator[Problem]:
+    """Name a few culprits one by one, and the others together: as one object, or as several."""
     yield from (Problem("WARNING", text, name) for name, text in culprits[:MAX_NAMED])
     rest = culprits[MAX_NAMED:]
     if rest:
-        yield Problem("WARNING", f"{len(rest):,} more {together}.", rest[0][0])
+        yield Problem("WARNING", f"{counted(len(rest), f'more {one}', f'more {several}')}.", rest[0][0])
 
 
 def _duplicates(contents: SceneContents) -> Iterator[Problem]:
@@ -422,7 +422,7 @@ def _holes(contents: SceneContents, road: BaseGeometry, region: BaseGeometry) ->
         largest = max(holes, key=lambda hole: float(hole.area))
         yield Problem(
             "WARNING",
-            f"The road has {_number(len(holes), 'hole')} of up to {largest.area:.2g} m², as at {_place(largest)}: "
+            f"The road has {counted(len(holes), 'hole')} of up to {largest.area:.2g} m², as at {_place(largest)}: "
             "there are no targets in them; close them where faces are missing.",
             _nearest_road(contents, largest),
         )
@@ -439,7 +439,7 @@ def _steps(contents: SceneContents, places: Float, spacing: float) -> Iterator[P
         point = shapely.Point(places[first[worst], :2])
         yield Problem(
             "WARNING",
-            f"The road has steps or slopes over {MAX_ROAD_STEP:.0%} at {_number(len(steep), 'place')}, up to "
+            f"The road has steps or slopes over {MAX_ROAD_STEP:.0%} at {counted(len(steep), 'place')}, up to "
             f"{rise[worst]:.2g} m at {_place(point)}: targets there lie on no road, unless it is a bridge's edge.",
             _nearest_road(contents, point),
         )
@@ -454,7 +454,7 @@ def _layers(contents: SceneContents, places: Float, triangles: Float) -> Iterato
         yield Problem(
             "WARNING",
             f"Road lies {LAYER_DISTANCES[0]:g} to {LAYER_DISTANCES[1]:g} m above other road at "
-            f"{_number(len(hidden), 'place')}, as at {_place(at)}: targets lie on the upper one; take out what is "
+            f"{counted(len(hidden), 'place')}, as at {_place(at)}: targets lie on the upper one; take out what is "
             "no road.",
             _nearest_road(contents, at),
         )

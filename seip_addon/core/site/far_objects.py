@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Boolean, Float
+from ..counts import counted
 from .scene_geometry import Mesh, SceneGeometry
 
 _RANGE_SLACK = 1.0
@@ -39,30 +40,34 @@ def without_far_objects(
     geometry : SceneGeometry
         The same object where nothing is left out.
     warnings : tuple of str
-        One sentence that names what was left out, or none.
+        One sentence that names what was left out, or none: ground that the builder laid out, and that goes on beyond
+        the range, belongs there.
     """
     if math.isinf(reach):
         return geometry, ()
     middle = around.convex_hull
     roles = {name: getattr(geometry, name) for name in ("roads", "ground", "occluders")}
     kept = {name: [_near(mesh, middle, reach) for mesh in meshes] for name, meshes in roles.items()}
-    far = [
-        (mesh.name, mesh.triangles[~near])
-        for name, meshes in roles.items()
-        for mesh, near in zip(meshes, kept[name], strict=True)
-        if not near.all()
-    ]
-    if not far:
+    if all(near.all() for each in kept.values() for near in each):
         return geometry, ()
     left: dict[str, Any] = {
         name: tuple(_part(mesh, near) for mesh, near in zip(meshes, kept[name], strict=True) if near.any())
         for name, meshes in roles.items()
     }
+    far = [
+        (mesh.name, mesh.triangles[~near])
+        for name, meshes in roles.items()
+        for mesh, near in zip(meshes, kept[name], strict=True)
+        if not near.all() and not (mesh.source and near.any())
+    ]
+    if not far:
+        return replace(geometry, **left), ()
     distances = [float(shapely.distance(middle, _plan_boxes(triangles)).max()) for _, triangles in far]
     farthest = int(np.argmax(distances))
     count = sum(len(triangles) for _, triangles in far)
+    triangles = f"{counted(count, 'triangle')} of {counted(len(far), 'object')} {'lies' if count == 1 else 'lie'}"
     sentence = (
-        f"{count:,} triangles of {len(far)} objects lie beyond every sensor's range of {reach:,.0f} m and are left "
+        f"{triangles} beyond every sensor's range of {reach:,.0f} m and {'is' if count == 1 else 'are'} left "
         f"out; the farthest, of {far[farthest][0]!r}, lie {distances[farthest]:,.0f} m away: "
         "where they do not belong there, move them or take them away"
     )

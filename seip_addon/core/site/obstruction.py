@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Boolean, Float
 from ..geometry.winding_number import enclosed
@@ -18,16 +19,31 @@ _MIN_OBSTACLE_HEIGHT, _MIN_OBSTACLE_WIDTH = 1.0, 0.5
 """Metres of height and of width up to which an object hides next to nothing from a sensor on a post."""
 
 NO_OBSTACLES_MESSAGE = (
-    "nothing in this scene can hide anything: it has no building, tree or wall, so that coverage says where the rings "
-    "of the sensors fall, not what they can see; describe or model what stands there"
+    "nothing in this scene can hide anything: no building, tree or wall stands between sensors and road, so that "
+    "coverage says where the rings of the sensors fall, not what they can see; describe or model what stands there"
 )
 
 
-def bareness_warnings(geometry: SceneGeometry) -> tuple[str, ...]:
-    """Return a warning where no occluder but poles is large enough to hide anything."""
+def bareness_warnings(geometry: SceneGeometry, places: Float | None = None) -> tuple[str, ...]:
+    """Return a warning where no occluder but poles is large enough, and in the right place, to hide anything.
+
+    Parameters
+    ----------
+    places : (n, 2) float64, metres, optional
+        Positions of sensors and targets in plan: only what stands between them counts.
+    """
     poles = {pole.name for pole in geometry.poles}
-    others = (mesh.triangles.reshape(-1, 3) for mesh in geometry.occluders if mesh.name not in poles)
-    return () if any(map(can_hide, others)) else (NO_OBSTACLES_MESSAGE,)
+    others = [mesh.triangles for mesh in geometry.occluders if mesh.name not in poles]
+    if places is not None:
+        area = shapely.multipoints(places).convex_hull
+        others = [triangles for triangles in others if _reaches_into(triangles, area)]
+    hides = any(can_hide(triangles.reshape(-1, 3)) for triangles in others)
+    return () if hides else (NO_OBSTACLES_MESSAGE,)
+
+
+def _reaches_into(triangles: Float, area: BaseGeometry) -> bool:
+    """Return whether a triangle (n, 3, 3) of an object lies in an area in plan, at least in part."""
+    return bool(shapely.intersects(area, shapely.convex_hull(shapely.multipoints(triangles[:, :, :2]))).any())
 
 
 def can_hide(corners: Float) -> bool:

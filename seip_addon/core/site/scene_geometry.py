@@ -11,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..opendrive.geo_reference import GeoReference
+from .post_rules import KeepOffArea, RuleName
 from .sources import SourceCount, count_sources
 
 DEFAULT_WEIGHT = 2.0
@@ -39,8 +40,8 @@ class Mesh:
         Share of the light (0 to 1) that each triangle scatters back; `DEFAULT_REFLECTIVITY` where not given.
     source : str
         Who says that it is there, as of a `Pole`.
-    height_assumed : bool
-        Whether that source does not give its height.
+    height_assumed, width_assumed : bool
+        Whether that source does not give its height, or its width, as of lanes.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Mesh:
     reflectivity: Float | None = None
     source: str = ""
     height_assumed: bool = False
+    width_assumed: bool = False
 
 
 def joined(meshes: Sequence[Mesh]) -> Float:
@@ -88,6 +90,8 @@ class Pole:
         No sensor may hang here; at least one sensor must.
     source : str
         `FROM_MAP`, `DESCRIBED`, `ASSUMED` or `FROM_EXTRACT`; empty where the user put it into the scene.
+    keep_off : str or None
+        Rule that keeps sensors off the pole, unless it is allowed; None where none does.
     """
 
     name: str
@@ -96,15 +100,25 @@ class Pole:
     forbidden: bool = False
     mandatory: bool = False
     source: str = ""
+    keep_off: RuleName | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class NamedArea:
-    """A named area in plan, local site axes in metres; ``weight`` counts for weighted regions alone."""
+    """A named area in plan, local site axes in metres.
+
+    Parameters
+    ----------
+    weight : float
+        Weight of the targets in a weighted region.
+    crossing : bool
+        Whether a place of the map is a pedestrian crossing.
+    """
 
     name: str
     polygon: BaseGeometry
     weight: float = 1.0
+    crossing: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,10 +146,14 @@ class SceneGeometry:
         Where a new post may stand, in plan.
     poles : tuple of Pole
         Existing posts that can carry a sensor.
+    keep_off_areas : tuple of KeepOffArea
+        Where rules keep new posts off, in plan.
     geo_reference : GeoReference
         Where on the Earth the scene's map is.
     places : tuple of NamedArea
         Streets and crossings of the map, in plan: results name them, and nothing else depends on them.
+    attribution : tuple of str
+        Credits that the sources of the scene demand; results carry them.
     """
 
     name: str
@@ -151,11 +169,13 @@ class SceneGeometry:
     poles: tuple[Pole, ...] = ()
     geo_reference: GeoReference = field(default_factory=GeoReference)
     places: tuple[NamedArea, ...] = ()
+    attribution: tuple[str, ...] = ()
+    keep_off_areas: tuple[KeepOffArea, ...] = ()
 
     def sources(self) -> tuple[SourceCount, ...]:
         """Count the surfaces of which the scene says where they come from, by kind and source."""
         return count_sources(
-            (mesh.name, mesh.source, mesh.height_assumed or mesh.source == ASSUMED)
+            (mesh.name, mesh.source, mesh.height_assumed or mesh.width_assumed or mesh.source == ASSUMED)
             for mesh in (*self.roads, *self.ground, *self.occluders)
             if mesh.source
         )

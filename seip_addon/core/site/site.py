@@ -43,6 +43,8 @@ class Site:
         Where on the Earth the scene's map is.
     sources : tuple of SourceCount
         Where the scene's surfaces come from.
+    attribution : tuple of str
+        Credits that these sources demand.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Site:
     reflectivity: Float
     geo_reference: GeoReference = field(default_factory=GeoReference)
     sources: tuple[SourceCount, ...] = ()
+    attribution: tuple[str, ...] = ()
 
     def geographic(self, points: Float) -> Float | None:
         """Return longitude, latitude (degrees, WGS 84) and height above the map's zero of local points, all (n, 3).
@@ -108,4 +111,5 @@ def make_site(
         reflectivity=reflectivity,
         geo_reference=geometry.geo_reference,
         sources=geometry.sources(),
+        attribution=geometry.attribution,
     )

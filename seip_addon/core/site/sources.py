@@ -4,8 +4,14 @@ import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Annotated
+
+from ..limits import COUNT
 
 _NUMBER = re.compile(r"[ ._]*\d+( of the [a-z ]+)?$")
+
+
+_JOINERS = "\u200c\u200d"  # which writing of Persian and Hindi needs, and emoji
 
 
 @dataclass(frozen=True)
@@ -19,13 +25,20 @@ class SourceCount:
     source : str
         As in `scene_geometry.Pole`.
     count, assumed : int
-        How many there are, and how many of these are assumed to be there, or to be as high as they are.
+        How many there are, and how many of these are assumed to be there, or to be as high or as wide as they are.
     """
 
     kind: str
     source: str
-    count: int
-    assumed: int
+    count: Annotated[int, COUNT]
+    assumed: Annotated[int, COUNT]
+
+
+def one_line(text: str) -> str:
+    """Return a text of a file without line breaks, and without characters that change how others are shown."""
+    if not text.isprintable():
+        text = "".join(one if one.isprintable() or one in _JOINERS else " " for one in text)
+    return " ".join(text.split())
 
 
 def count_sources(objects: Iterable[tuple[str, str, bool]]) -> tuple[SourceCount, ...]:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SeipError
+from ..limits import Limits
 from .files import digest, whole_file
 
 MAX_BYTES = 1 << 32  # bytes of all arrays of a file together at most: 4 GiB
@@ -50,28 +51,23 @@ class ArrayRule:
         NumPy's name of its type; ``U`` is text of any length up to `MAX_TEXT_LENGTH`.
     shape : tuple of int and str
         Length of each axis; a text is a variable that has one value across all arrays of a file.
-    least, most : float
-        Allowed range, inclusive.
-    nan : bool
-        Whether NaN is allowed as well.
+    limits : Limits, optional
+        Allowed range of the values. Arrays of floating-point numbers always have one.
     """
 
     dtype: str
     shape: tuple[int | str, ...]
-    least: float = -math.inf
-    most: float = math.inf
-    nan: bool = False
+    limits: Limits | None = None
+
+    def __post_init__(self) -> None:
+        if self.limits is None and self.dtype.startswith("f"):
+            raise ValueError("an array of floating-point numbers needs limits")
 
     def check(self, name: str, array: NDArray[Any]) -> None:
-        """Raise `ContentError` where values lie outside the range."""
-        if array.dtype.kind not in "fiu":
-            return
-        within = (array >= self.least) & (array <= self.most)
-        if self.nan:
-            within |= np.isnan(array)
-        if not within.all():
-            worst = array[~within].flat[0]
-            raise ContentError(f"{name} has the value {worst:g}, not {self.least:g} to {self.most:g}")
+        """Raise `ContentError` where values lie outside the limits."""
+        if self.limits is not None and not self.limits.allow(array):
+            worst = array[~self.limits.each(array)].flat[0]
+            raise ContentError(f"{name} has the value {worst:g}, not {self.limits}")
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,11 @@ import reprlib
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
-from functools import cache
+from functools import cache, partial
 from types import NoneType, UnionType
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from ..limits import Limits
 
 Value = TypeVar("Value")
 
@@ -26,7 +28,8 @@ def from_json(kind: type[Value], content: object, where: str = "") -> Value:
     """Return the dataclass that a JSON value holds: its keys are the names of the fields.
 
     Fields are ``str``, ``bool``, ``int``, ``float`` (whole numbers stay as they are), ``object`` (anything), literals,
-    dataclasses, and tuples, mappings by name and unions of these. Keys without a field are passed over.
+    dataclasses, and tuples, mappings by name and unions of these. A type that is annotated with `Limits` holds values
+    within them: ``Annotated[float, PRICE]``. Keys without a field are passed over.
 
     Parameters
     ----------
@@ -36,7 +39,7 @@ def from_json(kind: type[Value], content: object, where: str = "") -> Value:
     Raises
     ------
     ValueError
-        A field without a default is missing, or a value is not of its field's type or no finite number.
+        A field without a default is missing, or a value is not of its field's type, not finite, or beyond its limits.
     """
     read: Value = _read(kind, content, where)
     return read
@@ -48,6 +51,8 @@ def _read(kind: Any, value: Any, where: str) -> Any:  # noqa: ANN401 -- types an
         read = value
     elif is_dataclass(kind):
         read = _object(kind, _plain(dict, value, where), where)
+    elif get_origin(kind) is Annotated:
+        read = _limited(parts, value, where)
     elif get_origin(kind) in {Union, UnionType}:
         read = _first_of(parts, value, where)
     elif get_origin(kind) is tuple:
@@ -55,12 +60,24 @@ def _read(kind: Any, value: Any, where: str) -> Any:  # noqa: ANN401 -- types an
     elif get_origin(kind) is Mapping:
         read = {name: _read(parts[1], part, _at(where, name)) for name, part in _plain(dict, value, where).items()}
     elif get_origin(kind) is Literal:
-        if value not in parts:
-            raise ValueError(f"{where} must be {' or '.join(map(repr, parts))}, not {reprlib.repr(value)}")
-        read = value
+        read = _one_of(parts, value, where)
     else:
         read = _plain(kind, value, where)
     return read
+
+
+def _limited(parts: tuple[Any, ...], value: object, where: str) -> Any:  # noqa: ANN401 -- as above
+    read = _read(parts[0], value, where)
+    for limits in parts[1:]:
+        if isinstance(limits, Limits) and (fault := limits.fault(read)):
+            raise ValueError(f"{where} {fault}")
+    return read
+
+
+def _one_of(literals: tuple[Any, ...], value: object, where: str) -> object:
+    if value not in literals:
+        raise ValueError(f"{where} must be {' or '.join(map(repr, literals))}, not {reprlib.repr(value)}")
+    return value
 
 
 def _object(kind: Any, content: dict[str, Any], where: str) -> Any:  # noqa: ANN401 -- as above
@@ -103,4 +120,4 @@ def _at(where: str, name: str) -> str:
     return f"{where}.{name}" if where else name
 
 
-_hints: Callable[[type], dict[str, Any]] = cache(get_type_hints)
+_hints: Callable[[type], dict[str, Any]] = cache(partial(get_type_hints, include_extras=True))

@@ -1,13 +1,13 @@
 """TOML files of users, checked against the keys that their tables may have."""
 
 import difflib
-import math
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeGuard
 
 from ..errors import SeipError
+from ..limits import MAP_NUMBER, Limits
 
 Reader = Callable[[Any], Any]  # from a value to what it stands for; its `ValueError` says what it must be instead
 REQUIRED = object()  # the default of a key that must be there
@@ -74,18 +74,14 @@ def text(value: object) -> str:
     return value
 
 
-def number(*, above: float = -math.inf, least: float = -math.inf, most: float = math.inf) -> Reader:
-    """Return a reader of numbers above or from a limit on, of an amount of at most ``most``."""
+def number(limits: Limits) -> Reader:
+    """Return a reader of numbers within limits."""
 
     def read(value: object) -> float:
         if not is_number(value):
-            raise ValueError("must be a number below 1e9")
-        if abs(value) > most:
-            raise ValueError(f"must be at most {most:g}, not {value:g}")
-        if not (value > above and value >= least):
-            raise ValueError(
-                f"must be {'above' if above >= least else 'at least'} {max(above, least):g}, not {value:g}"
-            )
+            raise ValueError(f"must be a number from {limits}")
+        if not limits.least <= value <= limits.most:
+            raise ValueError(f"must be {limits}, not {value:g}")
         return float(value)
 
     return read
@@ -93,4 +89,6 @@ def number(*, above: float = -math.inf, least: float = -math.inf, most: float = 
 
 def is_number(value: object) -> TypeGuard[float]:
     """Whether a value is a finite number of earthly size; whole numbers of any length are valid TOML."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e9
+    return (
+        isinstance(value, (int, float)) and not isinstance(value, bool) and MAP_NUMBER.least < value < MAP_NUMBER.most
+    )

@@ -17,7 +17,35 @@ Attributes = dict[str, str]
 SUMO_CURE = "let SUMO finish writing it"
 _MAX_QUOTED = 60  # characters of a file that a message repeats
 _CHUNK = 1 << 20
+_MAX_TOKEN = 8 << 20  # bytes of one tag, comment or text: expat reads an unfinished one again with each chunk
+_MAX_RATIO = 200  # of unpacked to packed bytes; DEFLATE reaches 1,032 on content that says nothing
+_ALWAYS_UNPACKED = 1 << 30  # bytes that any file may unpack to: standing traffic repeats itself as well
 _GZIP = b"\x1f\x8b"
+
+
+class _Unpacked(gzip.GzipFile):
+    """Content of a gzip file up to a number of bytes."""
+
+    def __init__(self, file: BinaryIO, most: int, name: str) -> None:
+        super().__init__(fileobj=file)
+        self._left, self._file_name = most, name
+
+    def read(self, size: int | None = -1) -> bytes:
+        """Return up to some bytes, refusing a file that unpacks to far more than it holds."""
+        return self._counted(super().read(size))
+
+    def read1(self, size: int = -1) -> bytes:
+        """Return what is at hand, as `read` does."""
+        return self._counted(super().read1(size))
+
+    def _counted(self, content: bytes) -> bytes:
+        self._left -= len(content)
+        if self._left < 0:
+            raise SeipError(
+                f"{self._file_name} unpacks to more than {_MAX_RATIO} times its size, which no map or simulation does: "
+                "take another file"
+            )
+        return content
 
 
 @contextmanager
@@ -41,7 +69,8 @@ def opened(path: str | os.PathLike[str]) -> Iterator[tuple[BinaryIO, Callable[[]
             size = os.fstat(file.fileno()).st_size
             packed = file.read(2) == _GZIP
             file.seek(0)
-            stream = cast(BinaryIO, gzip.GzipFile(fileobj=file) if packed else file)
+            most = max(_MAX_RATIO * size, _ALWAYS_UNPACKED)
+            stream = cast(BinaryIO, _Unpacked(file, most, name) if packed else file)
             yield stream, lambda: Progress(min(file.tell(), size), size, f"reading {name}")
     except FileNotFoundError as error:
         raise SeipError(f"no such file: {path}; check its path") from error
@@ -87,10 +116,21 @@ def read_tags(
     parser.StartDoctypeDeclHandler = refuse
     parser.StartElementHandler = take
     parser.EndElementHandler = leave
+    # Newer expat defers unfinished tags until its buffer has doubled. Its byte index then lags far behind what it was
+    # given, and `_MAX_TOKEN` would reject files of ordinary tags.
+    if hasattr(parser, "SetReparseDeferralEnabled"):
+        parser.SetReparseDeferralEnabled(False)  # noqa: FBT003  # takes no name
+    taken = 0
     with opened(path) as (stream, progress):
         try:
             while chunk := stream.read(_CHUNK):
                 parser.Parse(chunk, False)  # noqa: FBT003  # takes no name
+                taken += len(chunk)
+                if taken - max(parser.CurrentByteIndex, 0) > _MAX_TOKEN:
+                    raise SeipError(
+                        f"{name} holds a tag or text of more than {_MAX_TOKEN >> 20} MiB, which no map or simulation "
+                        f"writes; {cure}"
+                    )
                 yield progress()
             parser.Parse(b"", True)  # noqa: FBT003  # takes no name
         except expat.ExpatError as error:

@@ -30,20 +30,25 @@ class _End:
 
 @dataclass(frozen=True, eq=False)
 class _ApproachRoad:
-    """A road by its driving lanes: the range of s, its two ends, and whether an approach goes along it."""
+    """A road by its driving lanes: range of s, ends, turn between them (radians), whether an approach goes along it."""
 
     start: float
     stop: float
     ends: tuple[_End, _End]
+    turn: float
     leads_on: bool
 
 
 def approach_lanes(
-    surfaces: Sequence[LaneSurface], junctions: Collection[str], distance: float
+    surfaces: Sequence[LaneSurface],
+    junctions: Collection[str],
+    distance: float,
+    names: Mapping[str, str] | None = None,
 ) -> tuple[LaneSurface, ...]:
     """Return the driving lanes of junctions that are one place, and of their approaches up to a distance.
 
-    An approach goes on over the roads that join on to it, and straight on through other junctions.
+    An approach goes on over the roads that join on to it, and straight on through other junctions: into each road there
+    that turns little, or with names only into the one that the street goes on in.
 
     Parameters
     ----------
@@ -53,6 +58,8 @@ def approach_lanes(
         Their ids.
     distance : float, metres
         Along the roads, from where the junction ends.
+    names : mapping of str to str, optional
+        Of the streets, by the ids of their roads.
 
     Returns
     -------
@@ -65,7 +72,9 @@ def approach_lanes(
     if not inside:
         return ()
     streets = {road: _street(lanes) for road, lanes in roads.items()}
-    away = _distances(streets, inside, distance)
+    joints = _joints(streets)
+    closed = frozenset[Key]() if names is None else _side_ways(roads, streets, joints, names)
+    away = _distances(streets, joints, inside, closed, distance)
     return tuple(
         piece
         for road, street in streets.items()
@@ -80,7 +89,7 @@ def _street(lanes: Sequence[LaneSurface]) -> _ApproachRoad:
     first = _end([(lane, 0) for lane in lanes if lane.s[0] == start])
     last = _end([(lane, -1) for lane in lanes if lane.s[-1] == stop])
     turn = math.acos(float(np.clip(first.along @ last.along, -1.0, 1.0)))
-    return _ApproachRoad(start, stop, (first, last), lanes[0].junction_id is None or turn < MAX_STRAIGHT_TURN)
+    return _ApproachRoad(start, stop, (first, last), turn, lanes[0].junction_id is None or turn < MAX_STRAIGHT_TURN)
 
 
 def _end(rows: Sequence[tuple[LaneSurface, int]]) -> _End:
@@ -105,10 +114,46 @@ def _joints(streets: Mapping[str, _ApproachRoad]) -> dict[Key, list[Key]]:
     return joints
 
 
-def _distances(streets: Mapping[str, _ApproachRoad], inside: set[str], most: float) -> dict[Key, float]:
+def _side_ways(
+    roads: Mapping[str, Sequence[LaneSurface]],
+    streets: Mapping[str, _ApproachRoad],
+    joints: Mapping[Key, Sequence[Key]],
+    names: Mapping[str, str],
+) -> frozenset[Key]:
+    """Return the ends of roads in junctions at which a street does not go on: another road there does.
+
+    It goes on in the road of its own name, and of several in the one that turns least.
+    """
+    ways: dict[Key, list[tuple[tuple[bool, float], frozenset[str], Key]]] = {}
+    for road, street in streets.items():
+        if roads[road][0].junction_id is not None and street.leads_on:
+            for which in (0, 1):
+                leads_to = frozenset(other for other, _ in joints[road, 1 - which] if _is_street(roads[other]))
+                for key in joints[road, which]:
+                    if _is_street(roads[key[0]]) and leads_to:
+                        own = names.get(key[0], "")
+                        other_name = not own or all(names.get(other) != own for other in leads_to)
+                        ways.setdefault(key, []).append(((other_name, street.turn), leads_to, (road, which)))
+    closed: set[Key] = set()
+    for found in ways.values():
+        _, best, _ = min(found, key=lambda way: way[0])
+        closed.update(key for _, leads_to, key in found if leads_to.isdisjoint(best))
+    return frozenset(closed)
+
+
+def _is_street(lanes: Sequence[LaneSurface]) -> bool:
+    return lanes[0].junction_id is None
+
+
+def _distances(
+    streets: Mapping[str, _ApproachRoad],
+    joints: Mapping[Key, Sequence[Key]],
+    inside: set[str],
+    closed: Collection[Key],
+    most: float,
+) -> dict[Key, float]:
     """Return how far each end of a road is from a junction, metres along the roads; infinity beyond ``most``."""
     away = {(road, which): math.inf for road in streets for which in (0, 1)}
-    joints = _joints(streets)
     waiting = [(0.0, (road, which)) for road in inside for which in (0, 1)]
     away.update({key: 0.0 for _, key in waiting})
     while waiting:
@@ -116,7 +161,7 @@ def _distances(streets: Mapping[str, _ApproachRoad], inside: set[str], most: flo
         road, which = key
         if travelled > away[key]:
             continue
-        steps = [(travelled, other) for other in joints[key]]
+        steps = [(travelled, other) for other in joints[key] if other not in closed]
         if road not in inside and streets[road].leads_on:
             steps.append((travelled + streets[road].stop - streets[road].start, (road, 1 - which)))
         for total, other in steps:

@@ -16,10 +16,12 @@ from .description import Building, Poles, SiteDescription, Slab, Trees, Wall
 CLEARANCE = 4.5  # metres above the road from which on something may hang over it
 NEAR_EDGE = 3.0  # metres inside the carriageway up to which trees and posts are moved to its edge
 SETBACK = 0.2  # metres that they then stand from it
+MAX_IN_LANE = 0.5  # metres inside the carriageway up to which a post is taken to stand at its edge
 MIN_OVERLAP, MIN_REST = 0.1, 2.0  # square metres on the carriageway that do not count, and of what is left that does
 
 _CLIPPED = "buildings cut off at the edge of the carriageway, on to which they reached"
 _MOVED = f"trees and posts moved to the edge of the carriageway, up to {NEAR_EDGE:g} m inside which they stood"
+_IN_LANE = f"posts that carry no sensor, since the map has them in a lane, more than {MAX_IN_LANE:g} m from its edge"
 _DROPPED = "trees and posts left out, since they stood in the middle of the carriageway"
 _CUT = "walls, fences and shelters cut off at the edge of the carriageway, which they crossed"
 
@@ -38,25 +40,41 @@ def clear(
         On the level that is studied, and lines across it where the road goes on; map coordinates.
     """
     shapely.prepare(carriageway)
+    lanes = carriageway.buffer(-MAX_IN_LANE)
     edge = without(shapely.boundary(carriageway), mouths.buffer(SETBACK))
     counted = Counter[str]()
 
     def beside(rows: Sequence[Row]) -> tuple[Row, ...]:
         return tuple(_beside(row, carriageway, edge, counted) for row in rows)
 
+    def posts(rows: Sequence[Poles]) -> tuple[Poles, ...]:
+        return beside(tuple(_split_at_lanes(rows, lanes, counted)))
+
     cleared = replace(
         description,
         buildings=tuple(_clipped(description.buildings, carriageway, counted, _CLIPPED)),
         trees=beside(description.trees),
         walls=tuple(_cut(description.walls, carriageway, counted)),
-        street_lights=beside(description.street_lights),
-        signal_poles=beside(description.signal_poles),
+        street_lights=posts(description.street_lights),
+        signal_poles=posts(description.signal_poles),
         slabs=tuple(_clipped(description.slabs, carriageway, counted, _CUT)),
-        posts=beside(description.posts),
+        posts=posts(description.posts),
     )
     return cleared, tuple(
-        f"{reason}: {counted[reason]}" for reason in (_CLIPPED, _CUT, _MOVED, _DROPPED) if counted[reason]
+        f"{reason}: {counted[reason]}" for reason in (_CLIPPED, _CUT, _MOVED, _IN_LANE, _DROPPED) if counted[reason]
     )
+
+
+def _split_at_lanes(rows: Sequence[Poles], lanes: BaseGeometry, counted: Counter[str]) -> Iterator[Poles]:
+    """Yield posts; those in a lane come as rows that carry no sensors, since where they stand is not known."""
+    for row in rows:
+        inside = shapely.intersects_xy(lanes, row.positions)
+        if row.source == DESCRIBED or not inside.any():
+            yield row
+            continue
+        counted[_IN_LANE] += int(inside.sum())
+        yield replace(row, positions=row.positions[inside], carries=False)
+        yield replace(row, positions=row.positions[~inside])
 
 
 def _beside(row: Row, carriageway: BaseGeometry, edge: BaseGeometry, counted: Counter[str]) -> Row:

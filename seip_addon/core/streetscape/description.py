@@ -16,9 +16,11 @@ from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.validation import explain_validity
 
+from .. import limits
 from ..arrays import Float
 from ..errors import SeipError
 from ..geometry.plan import covered_share
+from ..site.post_rules import KeepOffArea, RuleName
 from ..site.scene_geometry import DEFAULT_WEIGHT, DESCRIBED, FROM_EXTRACT, FROM_MAP
 from ..storage.toml_table import Key, Reader, is_number, number, parse_toml, read_table, text
 from .roofs import FLAT, Roof
@@ -28,9 +30,8 @@ from .terrain import Relief
 DEFAULT_RADIUS = 80.0
 DESCRIPTION_SUFFIX = ".toml"
 
-MAX_SIZE = 100_000.0  # metres (or degrees, or a weight) that nothing described may exceed
-MAX_HEIGHT = 1_000.0  # metres that nothing described is high
-MAX_RADIUS = 5_000.0  # metres from the middle of the place to the end of its region at most
+MAX_SIZE, MAX_HEIGHT, MAX_RADIUS = limits.SIZE.most, limits.HEIGHT.most, limits.SITE_RADIUS.most  # metres
+MIN_AREA = 1e-4  # square metres below which an outline encloses nothing
 MAX_COVERED = 0.5  # share of a building's outline from which on another source's building stands for it
 MAX_ROW_LENGTH = 10_000  # limit on the trees or lights of a row
 
@@ -116,6 +117,12 @@ class Poles:
         Where the arm points, counter-clockwise from map x (east). None: to the nearest carriageway.
     source, height_assumed
         As of a `Building`.
+    name : str
+        Kind of the posts, for those that are neither street lights nor signals.
+    keep_off : str or None
+        Rule that keeps sensors off the posts, unless it is allowed.
+    carries : bool
+        Whether the posts may carry sensors at all.
     """
 
     positions: Float
@@ -124,6 +131,9 @@ class Poles:
     heading: float | None
     source: str = DESCRIBED
     height_assumed: bool = False
+    name: str = "Post"
+    keep_off: RuleName | None = None
+    carries: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,11 +179,27 @@ class PlacedSolid:
 
 @dataclass(frozen=True, eq=False)
 class SideWay:
-    """A footway, cycle track or driveway that is no part of the road: its area in plan and material."""
+    """A footway, cycle track or driveway that is no part of the road.
+
+    Parameters
+    ----------
+    area : shapely geometry
+        In plan, map coordinates.
+    material, name : str
+    keep_off : str or None
+        Rule that keeps new posts off it.
+    line : (n, 2) float64, metres, or None
+        Middle line of a footway, which may run beside a pavement of the street and stand for the same; None for others.
+    width : float, metres
+        Width of the footway along that line.
+    """
 
     area: BaseGeometry
     material: str
     name: str
+    keep_off: RuleName | None = None
+    line: Float | None = None
+    width: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,13 +222,15 @@ class SiteDescription:
     region : shapely geometry or None
         Instead of both: the driving surface within this area.
     level : tuple of str
-        Ids of roads that lie on the level to study, where roads lie above each other.
+        Names of streets, or ids of roads, on the level to study, where roads lie above each other.
     weighted_regions, buildings, trees, walls, street_lights, signal_poles, forbidden_areas, mandatory_areas : tuple
         What the file lists.
     slabs, posts, ways : tuple
         What an extract adds: plates, plain posts, and ways beside the road.
     solids : tuple of PlacedSolid
         What a city model or a survey adds; where these are buildings the map's own give way to them.
+    keep_off_areas : tuple of KeepOffArea
+        Where rules keep new posts off, map coordinates.
     relief : Relief or None
         Ground that the map, which is flat, is laid on.
     from_centre_lines : bool
@@ -212,6 +240,10 @@ class SiteDescription:
         Ids of junctions that are one roundabout each, in a map made of middle lines.
     map_source : str
         Who says where the roads are.
+    widths_assumed : frozenset of str
+        Groups of lanes (`road_surface.GROUPS`) of which the map has some whose width nobody gives.
+    attribution : tuple of str
+        Credits that the sources of the site demand.
     """
 
     name: str = ""
@@ -234,10 +266,13 @@ class SiteDescription:
     posts: tuple[Poles, ...] = ()
     ways: tuple[SideWay, ...] = ()
     solids: tuple[PlacedSolid, ...] = ()
+    keep_off_areas: tuple[KeepOffArea, ...] = ()
     relief: Relief | None = None
     from_centre_lines: bool = False
     roundabouts: tuple[frozenset[str], ...] = ()
     map_source: str = FROM_MAP
+    widths_assumed: frozenset[str] = frozenset()
+    attribution: tuple[str, ...] = ()
 
     @property
     def has_objects(self) -> bool:
@@ -258,7 +293,13 @@ class SiteDescription:
             posts=(*self.posts, *other.posts),
             ways=(*self.ways, *other.ways),
             solids=(*self.solids, *other.solids),
+            attribution=tuple(dict.fromkeys((*self.attribution, *other.attribution))),
+            keep_off_areas=(*self.keep_off_areas, *other.keep_off_areas),
         )
+
+    def with_attribution(self, credit: str) -> "SiteDescription":
+        """Return this description with one more credit, if it is not empty."""
+        return replace(self, attribution=(*self.attribution, credit)) if credit else self
 
     @property
     def along(self) -> float | None:
@@ -350,8 +391,8 @@ def describe_place(
         along = None if junction is None else described.approaches
         described = replace(described, near=near, junction=junction, region=None, approaches=along)
     for name, length in (("radius", radius), ("length of the approaches", approaches)):
-        if length is not None and not 0 < length <= MAX_RADIUS:
-            raise SeipError(f"the {name} must be above 0 m and at most {MAX_RADIUS:g} m, not {length:g}")
+        if length is not None and not limits.SITE_RADIUS.allow(length):
+            raise SeipError(f"the {name} must be {limits.SITE_RADIUS}, not {length:g}")
     if radius is not None or approaches is not None:
         described = replace(described, radius=radius, approaches=approaches, region=None)
     if described.approaches is not None and described.junction is None:
@@ -412,7 +453,7 @@ def _outline(value: object) -> Polygon:
     if not isinstance(value, list) or len(value) < 3 or not all(map(_is_point, value)):
         raise ValueError("must be a list of at least three points [[x, y], [x, y], [x, y]]")
     polygon = Polygon(value)
-    if not polygon.is_valid or polygon.area == 0.0:
+    if not polygon.is_valid or polygon.area < MIN_AREA:
         reason = explain_validity(polygon) if not polygon.is_valid else "no area"
         raise ValueError(f"must be the outline of an area that does not cross itself ({reason})")
     if polygon.length > MAX_SIZE:
@@ -462,12 +503,12 @@ def _positions(row: Mapping[str, Any]) -> Float:
     return positions
 
 
-_SIZE = number(above=0.0, most=MAX_SIZE)
-_HEIGHT = number(above=0.0, most=MAX_HEIGHT)
-_EXTENT = Key(number(above=0.0, most=MAX_RADIUS), None)
+_SIZE = number(limits.SIZE)
+_HEIGHT = number(limits.HEIGHT)
+_EXTENT = Key(number(limits.SITE_RADIUS), None)
 _ROW = {"position": Key(_point, None), "from": Key(_point, None), "to": Key(_point, None), "spacing": Key(_SIZE, None)}
-_POLE = _ROW | {"heading": Key(number(most=MAX_SIZE), None)}
-_ARM = number(least=0.0, most=MAX_SIZE)
+_POLE = _ROW | {"heading": Key(number(limits.DEGREES), None)}
+_ARM = number(limits.DISTANCE)
 _AREA = {"name": Key(text, "Area"), "polygon": Key(_outline)}
 
 _PLACE = {
@@ -479,6 +520,7 @@ _PLACE = {
     "approaches": _EXTENT,
     "region": Key(_region, None),
     "level": Key(_texts, ()),
+    "attribution": Key(_texts, ()),
 }
 """Keys of the file itself."""
 
@@ -487,14 +529,14 @@ _LISTED: Mapping[str, tuple[Callable[..., Any], Mapping[str, Key]]] = {
         _weighted_region,
         {
             "name": Key(text, None),
-            "weight": Key(_SIZE, DEFAULT_WEIGHT),
+            "weight": Key(number(limits.CHOSEN_WEIGHT), DEFAULT_WEIGHT),
             "polygon": Key(_outline, None),
             "junction": Key(text, None),
         },
     ),
     "building": (
         Building,
-        {"outline": Key(_outline), "height": Key(_HEIGHT), "base": Key(number(most=MAX_HEIGHT), 0.0)},
+        {"outline": Key(_outline), "height": Key(_HEIGHT), "base": Key(number(limits.ABOVE_GROUND), 0.0)},
     ),
     "tree": (_trees, _ROW | {"height": Key(_HEIGHT, 8.0), "crown_diameter": Key(_SIZE, None)}),
     "wall": (Wall, {"line": Key(_line), "height": Key(_HEIGHT, 2.0), "thickness": Key(_SIZE, 0.25)}),

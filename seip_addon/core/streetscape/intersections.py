@@ -17,6 +17,7 @@ from ..arrays import Float
 from ..geometry.plan import closed, united
 from ..opendrive import LaneSurface, junction_area
 
+FOOTPATHS = {"sidewalk", "walking", "none"}
 MIN_ARMS = 3  # arms of a junction; where fewer meet, a street goes on
 ARM_GAP = 2.0  # metres between two ends of roads of one arm at most
 SAME_DIRECTION = math.radians(40.0)  # roads whose ends differ by less lead the same way
@@ -28,11 +29,15 @@ MAX_INTERSECTION = 45.0  # metres from the junction in the middle to the farthes
 
 
 def without_plain_joints(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, ...]:
-    """Return lanes of which those are in no junction that lie where no more than two arms meet."""
+    """Return lanes of which those are in no junction that lie where no more than two arms meet.
+
+    A pavement that is a road of its own, as netconvert makes of one on the left of a one-way street, is no arm.
+    """
     areas = _areas(surfaces)
+    streets = {lane.road_id for lane in surfaces if lane.lane_type not in FOOTPATHS}
     ends, outwards, roads = [], [], []
     for lane in surfaces:
-        if lane.junction_id is None:
+        if lane.junction_id is None and lane.road_id in streets:
             for row, next_row in ((0, 1), (-1, -2)):
                 roads.append((lane.road_id if lane.lane_type == "driving" else None, row))
                 ends.append(shapely.LineString([lane.left[row, :2], lane.right[row, :2]]))
@@ -105,6 +110,9 @@ def with_other_carriageways(
 ) -> BaseGeometry:
     """Return the area of lanes, and of what lies beside them of the same streets: the other carriageway of each.
 
+    A street with both directions beside each other is no carriageway of another one, and a street with a name of its
+    own that runs along them is no link between them.
+
     Parameters
     ----------
     lanes : sequence of LaneSurface
@@ -121,20 +129,54 @@ def with_other_carriageways(
         if names.get(lane.road_id) and lane.junction_id is None and np.ptp(middle, axis=0).max() > 0:
             band = shapely.LineString(middle).buffer(MAX_MEDIAN, cap_style="flat")
             bands.setdefault(names[lane.road_id], []).append((band, _heading(lane)))
+    two_way = _two_way_roads(surfaces)
     sides = {name: closed(united(band for band, _ in own), JUNCTION_REACH) for name, own in bands.items()}
     others = [
         shapely.make_valid(lane.polygon).intersection(sides[names[lane.road_id]])
         for lane in surfaces
-        if any(
+        if lane.road_id not in two_way
+        and any(
             abs(math.remainder(_heading(lane) - heading, math.pi)) < PARALLEL and band.intersects(lane.polygon)
             for band, heading in bands.get(names.get(lane.road_id, ""), ())
         )
     ]
     streets = united([area, *others])
+    headings = [heading for own in bands.values() for _, heading in own]
     links = [
-        lane.polygon for lane in surfaces if names.get(lane.road_id) not in bands and _leads_between(lane, streets)
+        lane.polygon
+        for lane in surfaces
+        if names.get(lane.road_id) not in bands
+        and not (names.get(lane.road_id) and _runs_along(lane, headings))
+        and _leads_between(lane, streets)
     ]
     return united([streets, united(links).intersection(united(sides.values()))])
+
+
+def _two_way_roads(surfaces: Sequence[LaneSurface]) -> frozenset[str]:
+    """Return the ids of roads, each of one direction, whose inner edge is that of a road of the other direction."""
+    innermost: dict[str, LaneSurface] = {}
+    for lane in surfaces:
+        found = innermost.get(lane.road_id)
+        if lane.junction_id is None and (found is None or abs(lane.lane_id) < abs(found.lane_id)):
+            innermost[lane.road_id] = lane
+    edges = [shapely.LineString((lane.right if lane.lane_id > 0 else lane.left)[:, :2]) for lane in innermost.values()]
+    roads = list(innermost)
+    middles = [edge.interpolate(0.5, normalized=True) for edge in edges]
+    one, other = shapely.STRtree(edges).query(middles, predicate="dwithin", distance=TOUCH)
+    return frozenset(
+        roads[a]
+        for a, b in zip(one.tolist(), other.tolist(), strict=True)
+        if a != b
+        and abs(math.remainder(_heading(innermost[roads[a]]) - _heading(innermost[roads[b]]), math.tau)) > math.pi / 2
+    )
+
+
+def _runs_along(lane: LaneSurface, headings: Iterable[float]) -> bool:
+    """Return whether a lane is longer than the way across a median, and as good as parallel to some heading."""
+    length = float(np.hypot(*(lane.left[-1] - lane.left[0])[:2]))
+    own = _heading(lane)
+    alike = any(abs(math.remainder(own - heading, math.pi)) < SAME_DIRECTION for heading in headings)
+    return length > MAX_MEDIAN and alike
 
 
 def box_along(area: BaseGeometry, lanes: Iterable[LaneSurface]) -> BaseGeometry:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import shapely
@@ -20,6 +20,7 @@ MIN_HEIGHT = 0.2  # outlines lower than this (metres) hide nothing that matters
 POLE_HEIGHT, POLE_THICKNESS = 3.0, 0.08
 """Posts from this height and thickness up (metres) can carry a sensor: a traffic sign's of 5 to 6 cm cannot."""
 
+LANDING_DEPTH = 2.0  # metres from the kerb that the ground in front of a crossing is deep
 TREE_HEIGHT, CROWN_SHARE = 8.0, 0.6
 MIN_CROWN_SHARE = 0.15  # a tree that is more slender than this is given by its trunk: its crown follows from its height
 LIGHT_HEIGHT, LIGHT_ARM = 8.0, 1.5
@@ -75,6 +76,27 @@ def object_parts(objects: Iterable[PlacedObject], carriageway: BaseGeometry) -> 
         For the arms of street lights.
     """
     return tuple(part for number, placed in enumerate(objects) for part in _object(placed, number, carriageway))
+
+
+def landings(objects: Iterable[PlacedObject]) -> Iterator[BaseGeometry]:
+    """Yield the crossings of a map with the ground at their ends, in local axes.
+
+    Each is its rectangle, extended along both axes: what lies at its sides is carriageway.
+    """
+    for placed in objects:
+        if placed.kind == "crosswalk":
+            rings = [ring.base for ring in placed.outlines] or [footprint(placed) + placed.position]
+            for ring in rings:
+                corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(shapely.MultiPoint(ring[:, :2])))
+                if len(corners) == 5:
+                    yield from (_extended(corners[:4], side) for side in (corners[1:3], corners[2:4]))
+
+
+def _extended(corners: Float, side: Float) -> BaseGeometry:
+    """Return a rectangle (4, 2) that goes on by the depth of a landing at both ends of its side (2, 2)."""
+    along = side[1] - side[0]
+    by = LANDING_DEPTH * along / (np.hypot(*along) or 1.0)
+    return shapely.MultiPoint(np.concatenate([corners + by, corners - by])).convex_hull
 
 
 def local_objects(objects: Iterable[PlacedObject], origin: Float) -> tuple[PlacedObject, ...]:

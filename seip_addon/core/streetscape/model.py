@@ -3,22 +3,27 @@
 from collections import Counter
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
+from ..counts import counted
 from ..errors import SeipError
-from ..geometry.plan import covered_share, outline, signed_area, without
-from ..opendrive import LaneSurface, PlacedObject, RoadMap, lane_surfaces, placed_objects, placed_signals
+from ..geometry.plan import covered_share, outline, signed_area, united, without
+from ..opendrive import LaneSurface, PlacedObject, Road, RoadMap, lane_surfaces, placed_objects, placed_signals
 from ..progress import Progress
 from ..site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
+from ..site.post_rules import RULES
 from ..site.scene_geometry import ASSUMED, DESCRIBED, NamedArea
 from ..site.sources import SourceCount, count_sources
 from . import road_surface, street_furniture
-from .clearing import clear
+from .clearing import MAX_IN_LANE, clear
 from .description import MAX_COVERED, Building, PlacedSolid, Poles, SiteDescription, Slab, Trees, Wall
+from .folds import without_folds
+from .footways import without_doubles
 from .geographic_position import in_metres
 from .intersections import without_plain_joints
 from .levels import MIN_LEVEL_HEIGHT, Levels
@@ -31,22 +36,26 @@ from .map_furniture import (
     facade,
     footprint,
     is_trunk,
+    landings,
     local_objects,
     object_parts,
     pole_part,
     tree_part,
 )
-from .named_places import named_places
+from .named_places import named_places, street_names
 from .object_kinds import Kind, kind_of
 from .parts import Part, Role
 from .place import SCENE_MARGIN, Place, shifted
-from .road_surface import Roadside
+from .road_checks import road_warnings
+from .road_surface import Roadside, SurfaceLayers, without_crumbs
 from .roofs import house
 from .signal_posts import signal_parts, split_posts
+from .tapers import with_tapers
 from .terrain import Relief, Terrain, cut
 
 STAGES = 6  # pieces of work that a model is made in once the map's lanes are known
 ROADS_PER_STEP = 20
+MIN_HOLE = 0.01  # square metres: smaller holes of a carriageway are rounding
 CANDIDATE_MARGIN = 15.0  # how far outside the region of interest (metres) a new post may stand
 VERGE_STRIP = (0.8, 2.3)  # where new posts may stand beside a road without pavements: metres from the carriageway
 VERGE_BELOW = 0.03
@@ -55,6 +64,7 @@ MAX_GROUND_DISTANCE = 300.0  # how far from the extent (metres) it goes on at mo
 VERGE_SPACING = 12.0
 KERB_STEP, RELIEF_SPACING = 2.5, 6.0  # metres: as ground on which nothing is farther off than some centimetres needs
 OVERLAY_SPACING = 4.0  # as the surface of junctions: coarser veils would rise through the coverage on curved roads
+UNNAMED_STREET = "Unnamed street"
 AREA_OVERLAYS = {
     Role.REGION: (0.03, "region veil"),
     Role.WEIGHTED_REGIONS: (0.04, "weighted veil"),
@@ -63,6 +73,7 @@ AREA_OVERLAYS = {
     Role.CANDIDATE_AREAS: (0.03, "candidate veil"),
 }
 """Height above the ground (metres) and material of areas that are not there to be seen."""
+OVERLAY_STEP = 0.001  # metres of height between areas of one role that may overlap
 
 SURFACES = {
     "driving": ("Driving lanes", "asphalt", Role.ROADS),
@@ -74,6 +85,10 @@ SURFACES = {
     "median": ("Medians", "median", Role.GROUND),
 }
 """Name, material and role of the surface of each group of lanes but the pavements."""
+PART_NAMES = {group: (name,) for group, (name, _, _) in SURFACES.items()} | {
+    "sidewalk": ("Pavements", "Pavements beyond", "Kerbs")
+}
+"""Names of the parts that are as wide as the lanes of a group."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +111,8 @@ class SiteModel:
         Reasons to distrust results of the scene, one sentence each.
     places : tuple of NamedArea
         Streets and crossings of the map in the region, local axes.
+    attribution : tuple of str
+        Credits that the sources of the site demand.
     """
 
     name: str
@@ -107,11 +124,12 @@ class SiteModel:
     notes: tuple[str, ...]
     warnings: tuple[str, ...] = ()
     places: tuple[NamedArea, ...] = ()
+    attribution: tuple[str, ...] = ()
 
     def sources(self) -> tuple[SourceCount, ...]:
         """Count what is there by kind and source; what is there to be looked at alone does not count."""
         return count_sources(
-            (part.name, part.source, part.height_assumed or part.source == ASSUMED)
+            (part.name, part.source, part.height_assumed or part.width_assumed or part.source == ASSUMED)
             for part in self.parts
             if part.source and set(part.roles) != {Role.DRESSING}
         )
@@ -128,6 +146,12 @@ class _Surroundings:
     roadside: Roadside
     terrain: Terrain
     relief: Relief | None
+
+    @cached_property
+    def lane_interiors(self) -> BaseGeometry:
+        """Driving lanes without a strip along their edges, in which a post is taken to stand beside the road."""
+        driving = road_surface.lane_outline(road_surface.in_groups(self.lanes, ["driving"]))
+        return driving.buffer(-MAX_IN_LANE)
 
 
 def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Progress, None, SiteModel]:
@@ -153,8 +177,14 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         raise SeipError(f"map {road_map.name!r} has no lane with an area; give its lanes widths, or take another map")
     description, place_notes = in_metres(description, road_map, surfaces)
     if description.from_centre_lines:
-        surfaces = without_plain_joints(surfaces)
-    stages = (Progress(done, STAGES, "streets") for done in range(STAGES + 1))
+        jointless = without_plain_joints(surfaces)
+        joints = {
+            lane.road_id: lane.junction_id
+            for lane, kept in zip(surfaces, jointless, strict=True)
+            if lane.junction_id is not None and kept.junction_id is None
+        }
+        surfaces = without_folds(with_tapers(jointless, joints))
+    stages = (Progress(done, STAGES, "streets", counted=False) for done in range(STAGES + 1))
     yield next(stages)
     place = Place(road_map, surfaces, description)
     levels = place.levels()
@@ -162,7 +192,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     region = place.region()
     origin = _origin(place, description.relief)
     yield next(stages)
-    street = _surroundings(place.surfaces, origin, shifted(region, -origin), description.relief)
+    street = _surroundings(place.surfaces, origin, shifted(region, -origin), description)
     yield next(stages)
     on_map = (shifted(area, origin) for area in (street.roadside.carriageway, street.roadside.mouths))
     description, clear_notes = clear(description, *on_map)
@@ -177,37 +207,50 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     ]
     placed, covered_notes = _without_covered(placed, description, origin)
     others, lights = split_posts(placed, local_signals, street.roadside)
-    signals = signal_parts(lights, street.roadside, street.terrain)
-    objects = [_on_level(part, street) for part in object_parts(others, street.roadside.carriageway)]
-    other_levels, below = _other_level_parts(levels.others, street)
+    signals = [_checked_pole(part, street) for part in signal_parts(lights, street.roadside, street.terrain)]
+    objects = [_checked_pole(part, street) for part in object_parts(others, street.roadside.carriageway)]
+    other_lanes = _strips(levels.others, street.origin, street.extent, street.relief)
+    other_levels, below = _other_level_parts(other_lanes, street)
     furniture = [*objects, *signals, *_described_parts(description, street)]
-    beside = _side_way_parts(description, street, below)
     yield next(stages)
-    pavement, notes = _pavement_parts(street, below, off_lanes=description.from_centre_lines)
+    layers = SurfaceLayers(street.lanes, street.extent, fill=description.from_centre_lines)
+    carriageway = _surface_parts(street, layers, fill=description.from_centre_lines)
     yield next(stages)
-    carriageway = _surface_parts(street, fill=description.from_centre_lines)
+    pavement, notes = _pavement_parts(street, layers, below, off_lanes=description.from_centre_lines)
+    beside, side_notes = _side_way_parts(description, street, layers, below)
     yield next(stages)
     weighted = place.weighted_areas()
     parts = [
         *carriageway,
         *pavement,
         *beside,
-        _verge_part(street, furniture, below),
+        _verge_part(
+            street,
+            furniture,
+            [*carriageway, *pavement, *beside],
+            below,
+            from_centre_lines=description.from_centre_lines,
+        ),
         *other_levels,
         _marking_part(street, stop_lines=bool(signals or description.signal_poles)),
         *furniture,
         _area_part("Region of interest", street.region, Role.REGION, street),
         *_weighted_parts(weighted, street, described=bool(description.weighted_regions)),
         *_area_parts(description, street),
+        *_keep_off_parts(description, placed, street),
     ]
     occluders = [part for part in (*furniture, *other_levels) if Role.OCCLUDERS in part.roles]
+    names = street_names(road_map)
+    seen = _sight_area(region, origin, parts)
+    bare = () if any(_hides(part, seen) for part in occluders) else (NO_OBSTACLES_MESSAGE,)
+    warnings = road_warnings(road_map, (*street.lanes, *other_lanes), names, origin)
     yield next(stages)
     return SiteModel(
         name=description.name or road_map.name,
         origin=origin,
         geo_reference=road_map.geo_reference,
         header_offset=road_map.header_offset,
-        parts=tuple(_with_source(part, description.map_source) for part in parts if part.solid.faces),
+        parts=tuple(_with_source(part, description) for part in parts if part.solid.faces),
         region=street.region,
         notes=(
             *place_notes,
@@ -215,11 +258,42 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
             *_level_notes(levels),
             *clear_notes,
             *notes,
+            *side_notes,
             *_furniture_notes(placed, signals),
         ),
-        warnings=() if any(can_hide(part.solid.vertices) for part in occluders) else (NO_OBSTACLES_MESSAGE,),
-        places=named_places(street.lanes, {road.id: road.name for road in road_map.roads}, placed, street.region),
+        warnings=(*bare, *warnings),
+        places=named_places(
+            street.lanes,
+            names,
+            placed,
+            street.region,
+            unnamed=UNNAMED_STREET if description.from_centre_lines else "",
+            rings=_ring_roads(road_map, description.roundabouts),
+        ),
+        attribution=tuple(dict.fromkeys((*road_map.attribution, *description.attribution))),
     )
+
+
+def _ring_roads(road_map: RoadMap, roundabouts: Sequence[frozenset[str]]) -> frozenset[str]:
+    """Return the ids of the roads that lead from one junction of a roundabout to another one of it."""
+
+    def is_ring(road: Road) -> bool:
+        ends = {link.id for link in (road.predecessor, road.successor) if link is not None and link.kind == "junction"}
+        return len(ends) == 2 and any(ends <= one for one in roundabouts)
+
+    return frozenset(road.id for road in road_map.roads if road.junction_id is None and is_ring(road))
+
+
+def _sight_area(region: BaseGeometry, origin: Float, parts: Sequence[Part]) -> BaseGeometry:
+    """Return the area in plan, local axes, that lies between places for sensors and the region of interest."""
+    posts = [part.foot[:2] for part in parts if Role.POLES in part.roles]
+    return shapely.union_all([shifted(region, -origin).buffer(CANDIDATE_MARGIN), shapely.MultiPoint(posts)]).convex_hull
+
+
+def _hides(part: Part, area: BaseGeometry) -> bool:
+    """Return whether a part is large enough to hide something in an area, and reaches into it."""
+    plan = shapely.MultiPoint(part.solid.vertices[:, :2] + part.foot[:2]).convex_hull
+    return can_hide(part.solid.vertices) and bool(area.intersects(plan))
 
 
 def _without_covered(
@@ -232,7 +306,7 @@ def _without_covered(
     tree = shapely.STRtree(modelled)
     kept = tuple(one for one in placed if kind_of(one) is not Kind.BUILDING or not _is_covered(one, tree))
     count = len(placed) - len(kept)
-    note = f"{count} building{'s' * (count > 1)} of the map gave way to the city model's or the survey's"
+    note = f"{counted(count, 'building')} of the map gave way to the city model's or the survey's"
     return kept, (note,) if count else ()
 
 
@@ -243,21 +317,23 @@ def _is_covered(placed: PlacedObject, modelled: shapely.STRtree) -> bool:
     return covered_share(area, modelled) > MAX_COVERED
 
 
-def _with_source(part: Part, source: str) -> Part:
+def _with_source(part: Part, description: SiteDescription) -> Part:
     """Return a part of which somebody says that it is there; what only means an area needs nobody."""
-    is_there = not AREA_OVERLAYS.keys() >= set(part.roles)
-    return replace(part, source=source) if is_there and not part.source else part
+    if part.source or AREA_OVERLAYS.keys() >= set(part.roles):
+        return part
+    assumed = any(part.name in PART_NAMES.get(group, ()) for group in description.widths_assumed)
+    return replace(part, source=description.map_source, width_assumed=assumed)
 
 
 def _furniture_notes(placed: Sequence[PlacedObject], signals: Sequence[Part]) -> Iterator[str]:
     """Return notes on posts and tree crowns that are assumed, since the map does not give them."""
     assumed = sum(part.source == ASSUMED for part in signals)
     if assumed:
-        posts = f"{assumed} posts of traffic lights are" if assumed > 1 else "1 post of traffic lights is"
+        posts = counted(assumed, "post of traffic lights is", "posts of traffic lights are")
         yield f"{posts} assumed, since the map has none there: no sensor hangs there unless assumed poles are asked for"
     trunks = sum(map(is_trunk, placed))
     if trunks:
-        trees = f"{trunks} tree{'s' * (trunks > 1)}"
+        trees = counted(trunks, "tree")
         yield f"the map gives {trees} the width of a trunk: the crown is taken as {CROWN_SHARE:g} times the height"
 
 
@@ -273,14 +349,17 @@ def _all_lanes(road_map: RoadMap) -> Generator[Progress, None, tuple[LaneSurface
 
 def _level_notes(levels: Levels) -> Iterator[str]:
     roads = levels.other_roads()
+    told = set()  # the carriageways of one street cross another one each, which is one crossing to a person
     for crossing in levels.crossings:
-        away = crossing.above if crossing.above in roads else crossing.below
-        yield f"{crossing}: road {away} is on another level, in the way but not studied"
+        streets = (crossing.called(crossing.above), crossing.called(crossing.below), crossing.above in roads)
+        if streets not in told:
+            told.add(streets)
+            away = "upper" if crossing.above in roads else "lower"
+            yield f"{crossing}: the {away} one is on another level, in the way but not studied"
 
 
-def _other_level_parts(others: Sequence[LaneSurface], street: _Surroundings) -> tuple[list[Part], BaseGeometry]:
-    """Return the roads of other levels, above and below, and the area in plan of those below."""
-    lanes = _strips(others, street.origin, street.extent, street.relief)
+def _other_level_parts(lanes: Sequence[LaneSurface], street: _Surroundings) -> tuple[list[Part], BaseGeometry]:
+    """Return the roads of other levels, above and below, and the area in plan of those below; lanes in local axes."""
     if not lanes:
         return [], shapely.Polygon()
     triangles = np.concatenate([lane.triangles for lane in lanes])
@@ -290,15 +369,34 @@ def _other_level_parts(others: Sequence[LaneSurface], street: _Surroundings) -> 
         Part("Roads above", _solid(triangles[above], "asphalt"), (Role.OCCLUDERS,)),
         Part("Roads below", _solid(triangles[~above], "asphalt"), (Role.GROUND,)),
     ]
-    return parts, outline(triangles[~above], road_surface.SNAP_GRID)
+    below = outline(triangles[~above], road_surface.SNAP_GRID)
+    walls = _retaining_walls(below, Terrain(triangles[~above]), street)
+    return [*parts, Part("Retaining walls", _solid(walls, "wall"), (Role.DRESSING,))], below
 
 
-def _on_level(part: Part, street: _Surroundings) -> Part:
-    """Return a part of the map; a pole that stands on another level carries no sensor."""
+def _retaining_walls(below: BaseGeometry, roads: Terrain, street: _Surroundings) -> Float:
+    """Return (n, 3, 3) upright triangles that close the gap between roads below and the ground beside them."""
+    if below.is_empty:
+        return np.empty((0, 3, 3))
+    sides = shapely.boundary(below).intersection(street.extent.buffer(-road_surface.MAX_STEP / 2))
+    quads = [np.empty((0, 4, 3))]
+    for line in shapely.get_parts(shapely.segmentize(sides, KERB_STEP)):
+        plan = shapely.get_coordinates(line)
+        low = np.column_stack([plan, roads.height(plan)])
+        high = np.column_stack([plan, np.maximum(street.terrain.height(plan), low[:, 2])])
+        quads.append(np.stack([low[:-1], low[1:], high[1:], high[:-1]], axis=1))
+    faces = np.concatenate(quads)
+    return np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
+
+
+def _checked_pole(part: Part, street: _Surroundings) -> Part:
+    """Return a part of the map; a pole on another level, or in a lane, carries no sensor."""
+    if Role.POLES not in part.roles:
+        return part
     x, y, z = part.foot
-    if Role.POLES in part.roles and abs(z - float(street.terrain.height(np.array([[x, y]]))[0])) > MIN_LEVEL_HEIGHT:
-        return replace(part, roles=(Role.OCCLUDERS,), source="")
-    return part
+    away = abs(z - float(street.terrain.height(np.array([[x, y]]))[0])) > MIN_LEVEL_HEIGHT
+    in_lane = shapely.intersects_xy(street.lane_interiors, x, y)
+    return replace(part, roles=(Role.OCCLUDERS,), source="") if away or in_lane else part
 
 
 def _origin(place: Place, relief: Relief | None) -> Float:
@@ -331,23 +429,43 @@ def _strips(
     surfaces: Sequence[LaneSurface], origin: Float, area: BaseGeometry, relief: Relief | None
 ) -> tuple[LaneSurface, ...]:
     """Return the lanes near an area in local axes, on the ground that the map is laid on."""
-    lanes = road_surface.local_strips(surfaces, origin * [1, 1, relief is None], area)
     if relief is None:
-        return lanes
+        return road_surface.local_strips(surfaces, origin, area)
+    surfaces = [_bridged(lane, relief) if lane.road_id in relief.bridges else lane for lane in surfaces]
+    lanes = road_surface.local_strips(surfaces, origin * [1, 1, 0], area)
     shift, height = origin * [1, 1, 0], origin * [0, 0, 1]
 
     def risen(edge: Float) -> Float:
         moved: Float = _risen_place(edge + shift, relief) - shift - height
         return moved
 
-    return tuple(replace(lane, left=risen(lane.left), right=risen(lane.right)) for lane in lanes)
+    def lowered(edge: Float) -> Float:
+        moved: Float = edge - height
+        return moved
+
+    raised = ((lane, lowered if lane.road_id in relief.bridges else risen) for lane in lanes)
+    return tuple(replace(lane, left=move(lane.left), right=move(lane.right)) for lane, move in raised)
+
+
+def _bridged(lane: LaneSurface, relief: Relief) -> LaneSurface:
+    """Return a lane of a bridge, map coordinates, on the ground at its ends and straight in between."""
+
+    def risen(edge: Float) -> Float:
+        ends = relief.rise(edge[[0, -1], :2])
+        along = np.interp(lane.s, lane.s[[0, -1]], ends)
+        moved: Float = edge + along[:, None] * [0, 0, 1]
+        return moved
+
+    return replace(lane, left=risen(lane.left), right=risen(lane.right))
 
 
 def _surroundings(
-    surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry, relief: Relief | None
+    surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry, description: SiteDescription
 ) -> _Surroundings:
-    extent = region.convex_hull.buffer(SCENE_MARGIN, quad_segs=16)
+    extent, relief = region.convex_hull.buffer(SCENE_MARGIN, quad_segs=16), description.relief
     lanes = _strips(surfaces, origin, extent, relief)
+    if description.from_centre_lines:
+        lanes = road_surface.without_loose_ends(lanes, region, extent)
     triangles = np.concatenate([lane.triangles for lane in lanes])
     roadside = road_surface.roadside(lanes)
     shapely.prepare(roadside.carriageway)
@@ -355,35 +473,49 @@ def _surroundings(
     return _Surroundings(origin, lanes, region, extent, roadside, Terrain(triangles, beyond), relief)
 
 
-def _surface_parts(street: _Surroundings, *, fill: bool) -> list[Part]:
-    """Return the surfaces of lanes by group; with ``fill`` the driving lanes have no small holes."""
+def _surface_parts(street: _Surroundings, layers: SurfaceLayers, *, fill: bool) -> list[Part]:
+    """Return the surfaces of lanes by group; the driving lanes have no small holes."""
     groups = {road_surface.group(lane) for lane in street.lanes}
-    parts = []
-    for group, (name, material, role) in SURFACES.items():
-        if group in groups:
-            triangles = road_surface.group_triangles(street.lanes, group, street.extent, fill=fill)
-            if fill and group == "driving":
-                holes = road_surface.small_holes(street.roadside.carriageway).intersection(street.extent)
-                triangles = np.concatenate([triangles, street.terrain.drape(holes, spacing=OVERLAY_SPACING)])
-            parts.append(Part(name, street_furniture.from_faces(triangles, material), (role,)))
-    return parts
+    laid = {group: layers.lay_group(group) for group in SURFACES if group in groups}
+    if "driving" in laid:
+        whole = road_surface.without_gaps(street.roadside, street.lanes, fill=fill).intersection(street.extent)
+        gaps = without_crumbs(without(whole, layers.area), least=MIN_HOLE)
+        level = Terrain(np.concatenate(list(laid.values())))  # not that of pavements, which are a kerb higher
+        filling = layers.lay(level.drape(gaps, spacing=OVERLAY_SPACING), gaps)
+        laid["driving"] = np.concatenate([laid["driving"], filling])
+    return [
+        Part(
+            name,
+            _solid(laid[group], material),
+            (role,),
+            keep_off="cycle-tracks" if group == "biking" else None,
+        )
+        for group, (name, material, role) in SURFACES.items()
+        if group in laid
+    ]
 
 
 def _pavement_parts(
-    street: _Surroundings, below: BaseGeometry, *, off_lanes: bool
+    street: _Surroundings, layers: SurfaceLayers, below: BaseGeometry, *, off_lanes: bool
 ) -> tuple[list[Part], tuple[str, ...]]:
     """Return pavements near the region (where posts may stand), those beyond, their kerbs, verges, and notes.
 
     With ``off_lanes`` they give way to the carriageway where both lie on each other.
     """
-    own = road_surface.group_triangles(street.lanes, "sidewalk", street.extent)
+    own = layers.lay_group("sidewalk")
     if off_lanes:
         own = cut(own, street.roadside.carriageway)
     if len(own) == 0:
         verge = _verge_strip(street, street.roadside.sides(), below)
         return [verge], ("the map has no pavements: new posts may stand on a strip of verge",)
     corners = road_surface.corner_pavements(own, street.lanes, street.roadside.carriageway)
+    corners = layers.lay(corners, outline(corners, road_surface.SNAP_GRID))
     triangles = np.concatenate([own, corners])
+    if off_lanes:
+        notches = road_surface.notch_pavements(triangles, street.roadside.carriageway)
+        notches = layers.lay(notches, outline(notches, road_surface.SNAP_GRID))
+        triangles = np.concatenate([triangles, notches])
+        triangles = cut(triangles, road_surface.slivers(triangles))
     plan = shapely.polygons(triangles[:, :, :2])
     near = shapely.distance(street.region, plan) <= CANDIDATE_MARGIN
     kerbs = road_surface.kerb_faces(triangles, None if street.relief is None else KERB_STEP)
@@ -404,7 +536,8 @@ def _pavement_parts(
     if verge.solid.faces:
         parts.append(verge)
         length = bare.intersection(street.region.buffer(CANDIDATE_MARGIN)).length
-        notes.append(f"{length:,.0f} m of roadside have no pavement: new posts may stand on a strip of verge there")
+        if length >= 1.0:
+            notes.append(f"{length:,.0f} m of roadside have no pavement: new posts may stand on a strip of verge there")
     return parts, tuple(notes)
 
 
@@ -420,25 +553,52 @@ def _verge_strip(street: _Surroundings, sides: BaseGeometry, below: BaseGeometry
     return _area_part("Verge strip", near, Role.CANDIDATE_AREAS, street)
 
 
-def _verge_part(street: _Surroundings, furniture: Sequence[Part], below: BaseGeometry) -> Part:
-    """Return the ground beside all lanes and under all furniture, a little below the lanes and under their seams."""
+def _verge_part(
+    street: _Surroundings,
+    furniture: Sequence[Part],
+    surfaces: Sequence[Part],
+    below: BaseGeometry,
+    *,
+    from_centre_lines: bool,
+) -> Part:
+    """Return the ground beside all lanes and under all furniture, a little below the lanes and under their seams.
+
+    Parameters
+    ----------
+    surfaces : sequence of Part
+        What else is laid on the ground.
+    """
     corners = [part.solid.vertices[:, :2] + part.foot[:2] for part in furniture]
     built_up = shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *corners])))
     gardens = built_up.buffer(GROUND_MARGIN).intersection(street.extent.buffer(MAX_GROUND_DISTANCE))
     ground = street.extent if built_up.is_empty else street.extent.union(gardens).convex_hull
     covered = road_surface.lane_outline(street.lanes).intersection(street.extent)
     lanes = covered.buffer(-road_surface.MAX_SEAM, join_style="mitre").union(below)
+    laid = united([_plan(part) for part in surfaces if {Role.ROADS, Role.GROUND} & set(part.roles)])
+    if from_centre_lines:  # strips of pavement that were too narrow are ground
+        bare = without(covered, laid.buffer(road_surface.MAX_SEAM)).buffer(2 * road_surface.MAX_SEAM)
+        lanes = without(lanes, bare)
+    others = without(laid, covered).buffer(-road_surface.MAX_SEAM)
+    lanes = lanes if others.is_empty else lanes.union(others)
     beside = road_surface.without_crumbs(without(ground, lanes))
     spacing = VERGE_SPACING if street.relief is None else RELIEF_SPACING
     triangles = street.terrain.drape(beside, spacing=spacing, above=-VERGE_BELOW)
     return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
 
 
+def _plan(part: Part) -> BaseGeometry:
+    """Return the area in plan of a part of triangles that stands at the origin."""
+    return outline(
+        part.solid.vertices[np.array(part.solid.faces, dtype=np.int64).reshape(-1, 3)], road_surface.SNAP_GRID
+    )
+
+
 def _marking_part(street: _Surroundings, *, stop_lines: bool) -> Part:
-    quads = road_surface.markings(street.lanes)
+    quads = road_surface.markings(street.lanes, street.extent)
     if stop_lines:
-        quads = np.concatenate([quads, road_surface.stop_lines(street.lanes)])
-    quads = quads[shapely.contains_xy(street.extent, quads[:, :, :2].mean(axis=1))]
+        lines = road_surface.stop_lines(street.lanes)
+        lines = lines[shapely.contains_xy(street.extent, lines[:, :, :2].mean(axis=1))]
+        quads = np.concatenate([quads, lines])
     return Part("Lane markings", _solid(quads, "marking"), (Role.DRESSING,))
 
 
@@ -462,6 +622,23 @@ def _area_parts(description: SiteDescription, street: _Surroundings) -> list[Par
         for areas, role in kinds
         for area in areas
     ]
+
+
+def _keep_off_parts(
+    description: SiteDescription, placed: Sequence[PlacedObject], street: _Surroundings
+) -> Iterator[Part]:
+    """Yield the areas that rules keep new posts off, as far as new posts might stand there.
+
+    A map that was not made of middle lines has its crossings where they are; netconvert's are guessed.
+    """
+    areas = [(one.rule, shifted(one.polygon, -street.origin)) for one in description.keep_off_areas]
+    if not description.from_centre_lines:
+        areas += [("landings", landing) for landing in landings(placed)]
+    near = without(street.region.buffer(CANDIDATE_MARGIN), street.roadside.carriageway)
+    for number, (rule, about) in enumerate(RULES.items()):
+        area = without_crumbs(united(area for name, area in areas if name == rule).intersection(near))
+        part = _area_part(f"No new posts: {about.title.lower()}", area, Role.FORBIDDEN_AREAS, street, step=number)
+        yield replace(part, keep_off=rule)
 
 
 def _described_parts(description: SiteDescription, street: _Surroundings) -> list[Part]:
@@ -518,28 +695,42 @@ def _solid_parts(description: SiteDescription, street: _Surroundings, buildings:
 
 
 def _told(part: Part, item: Building | Wall | Slab | Trees | Poles) -> Part:
-    """Return a part with who says so."""
-    return replace(part, source=item.source, height_assumed=item.height_assumed)
+    """Return a part with its source, and a post with what it may carry."""
+    told = replace(part, source=item.source, height_assumed=item.height_assumed)
+    if isinstance(item, Poles):
+        return replace(told, keep_off=item.keep_off, roles=told.roles if item.carries else (Role.OCCLUDERS,))
+    return told
 
 
-def _side_way_parts(description: SiteDescription, street: _Surroundings, below: BaseGeometry) -> Iterator[Part]:
-    """Yield ways beside the road, by kind, where no lane, building or other road lies."""
+def _side_way_parts(
+    description: SiteDescription, street: _Surroundings, layers: SurfaceLayers, below: BaseGeometry
+) -> tuple[list[Part], tuple[str, ...]]:
+    """Return ways beside the road, by kind, where no lane, building or other road lies, and notes."""
     lanes = road_surface.lane_outline(street.lanes)
     standing: list[Building | PlacedSolid] = [*description.buildings, *description.solids]
     houses = shapely.union_all([shifted(one.outline, -street.origin) for one in standing])
-    taken = shapely.union_all([lanes, street.roadside.filled, houses, below]).buffer(road_surface.MAX_SEAM)
+    covered = [lanes, street.roadside.filled, layers.area, houses, below]
+    taken = shapely.union_all(covered).buffer(road_surface.MAX_SEAM)
+    pavement = road_surface.lane_outline(road_surface.in_groups(street.lanes, ["sidewalk"]))
+    shapely.prepare(pavement)
+    parts, doubled = [], 0.0
     for name, material in sorted({(way.name, way.material) for way in description.ways}):
-        areas = [
-            shifted(way.area, -street.origin)
-            for way in description.ways
-            if (way.name, way.material) == (name, material)
-        ]
+        areas = []
+        for way in description.ways:
+            if (way.name, way.material) == (name, material):
+                area = shifted(way.area, -street.origin)
+                if way.line is not None and not pavement.is_empty and area.intersects(street.extent):
+                    area, length = without_doubles(way.line - street.origin[:2], way.width, pavement)
+                    doubled += length
+                areas.append(area)
         area = without(shapely.union_all(areas).intersection(street.extent), taken)
         taken = taken.union(area)
         triangles = street.terrain.drape(
             road_surface.without_crumbs(area), spacing=VERGE_SPACING, above=-VERGE_BELOW / 2
         )
-        yield Part(name, _solid(triangles, material), (Role.GROUND,))
+        parts.append(Part(name, _solid(triangles, material), (Role.GROUND,)))
+    note = f"{doubled:,.0f} m of footways beside a pavement of the street are left out: they are the same pavement"
+    return parts, (note,) if doubled else ()
 
 
 def _pole_parts(description: SiteDescription, street: _Surroundings) -> Iterator[Part]:
@@ -552,9 +743,9 @@ def _pole_parts(description: SiteDescription, street: _Surroundings) -> Iterator
         whose = "the site file" if row.source == DESCRIBED else f"the {row.source}"
         yield _told(pole_part(f"Signal pole {number} of {whose}", shape, foot, heading, row.source), row)
     for number, (foot, heading, row) in enumerate(_pole_places(description.posts, street), start=1):
-        pole = pole_part(f"Post {number}", street_furniture.post(row.height, POST_RADIUS), foot, heading, row.source)
-        role = Role.POLES if row.height >= POLE_HEIGHT else Role.OCCLUDERS
-        yield _told(replace(pole, roles=(role,)), row)
+        shape = street_furniture.post(row.height, POST_RADIUS)
+        pole = _told(pole_part(f"{row.name} {number}", shape, foot, heading, row.source), row)
+        yield pole if row.height >= POLE_HEIGHT else replace(pole, roles=(Role.OCCLUDERS,))
 
 
 def _pole_places(rows: Sequence[Poles], street: _Surroundings) -> Iterator[tuple[Float, float, Poles]]:
@@ -570,11 +761,11 @@ def _on_ground(plan: Float, street: _Surroundings) -> Float:
 
 
 def _area_part(
-    name: str, area: BaseGeometry, role: Role, street: _Surroundings, *, weight: float | None = None
+    name: str, area: BaseGeometry, role: Role, street: _Surroundings, *, weight: float | None = None, step: int = 0
 ) -> Part:
-    """Return an area in plan as an overlay on the ground."""
+    """Return an area in plan as an overlay on the ground; areas of one role that overlap have steps of their own."""
     above, material = AREA_OVERLAYS[role]
-    triangles = street.terrain.drape(area, spacing=OVERLAY_SPACING, above=above)
+    triangles = street.terrain.drape(area, spacing=OVERLAY_SPACING, above=above + step * OVERLAY_STEP)
     return Part(name, _solid(triangles, material), (role,), weight=weight)
 
 

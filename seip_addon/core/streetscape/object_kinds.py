@@ -50,6 +50,9 @@ SIGNAL_WORDS = {"signal", "signals", "traffic", "trafficlight", "light", "ampel"
 """Words in the name of a post that carries traffic lights."""
 SIGN_WORDS = {"sign", "signs", "schild", "verkehrszeichen", "speed"}
 
+MIN_HEIGHT = 0.01
+"""Metres below which a height is none that the map states."""
+
 MIN_POST_HEIGHT, MAX_POST_THICKNESS, MIN_POST_SLENDERNESS = 2.0, 0.6, 6.0
 """A post is at least so high, at most so thick (metres), and at least so many times as high as thick."""
 
@@ -117,7 +120,8 @@ def post_of(placed: PlacedObject) -> Post | None:
 
 def height_of(placed: PlacedObject) -> float:
     """Return the height of an object, metres, its outlines counted; zero where the map does not say."""
-    return max([placed.height, *(float(outline.height.max()) for outline in placed.outlines)])
+    height = max([placed.height, *(float(outline.height.max()) for outline in placed.outlines)])
+    return height if height >= MIN_HEIGHT else 0.0
 
 
 def size_of(placed: PlacedObject) -> float:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from ..site.post_rules import RuleName
 from .street_furniture import Solid
 
 
@@ -40,6 +41,10 @@ class Part:
         Who says that it stands there, as in `scene_geometry.Pole`; empty for what only means an area.
     height_assumed : bool
         Whether that source does not give its height.
+    width_assumed : bool
+        Whether that source does not give its width, as of lanes.
+    keep_off : str or None
+        Rule that keeps new posts off the part, or sensors off the pole, unless it is allowed.
     of : str
         Name of the part, an earlier one, that takes this along where it is moved or deleted; empty where none does.
     """
@@ -52,4 +57,6 @@ class Part:
     weight: float | None = None
     source: str = ""
     height_assumed: bool = False
+    width_assumed: bool = False
+    keep_off: RuleName | None = None
     of: str = ""

@@ -19,6 +19,7 @@ from .description import DEFAULT_RADIUS, SiteDescription
 from .geographic_position import looks_like_degrees
 from .intersections import JUNCTION_REACH, box_along, filled, intersection, with_other_carriageways
 from .levels import Levels, split_levels
+from .named_places import street_names
 
 MIN_SHARE_OF_JUNCTION = 0.5  # of a junction's area that a region holds from which on it holds all of it
 SCENE_MARGIN = 40.0  # metres that the scene extends beyond the region of interest, for occluders at its edge
@@ -64,9 +65,8 @@ class Place:
             return shapely.Point(self.centre).buffer(self.description.radius or DEFAULT_RADIUS, quad_segs=32)
         lanes = self._approach_lanes()
         if self.description.from_centre_lines:
-            names = {road.id: road.name for road in self.road_map.roads}
             driving = road_surface.in_groups(self.surfaces, ["driving"])
-            return with_other_carriageways(lanes, driving, names).convex_hull
+            return with_other_carriageways(lanes, driving, self._names).convex_hull
         return shapely.union_all([shapely.make_valid(lane.polygon) for lane in lanes]).convex_hull
 
     def levels(self) -> Levels:
@@ -79,7 +79,7 @@ class Place:
             away = shapely.distance([lane.polygon for lane in driving], shapely.Point(self.centre))
             least = max(away.min(initial=np.inf), MAX_ROAD_DISTANCE)
             anchors = {lane.road_id for lane, distance in zip(driving, away, strict=True) if distance <= least}
-        return split_levels(self.surfaces, around, anchors, self.description.level)
+        return split_levels(self.surfaces, around, anchors, self.description.level, street_names(self.road_map))
 
     def region(self) -> BaseGeometry:
         """Return the region of interest."""
@@ -89,7 +89,7 @@ class Place:
         driving = road_surface.in_groups(lanes, ["driving"])
         near = road_surface.local_strips(driving, shift, within) if driving else ()
         if near:
-            outline = road_surface.lane_outline(near)
+            outline = road_surface.without_small_holes(road_surface.lane_outline(near))
             if self.description.from_centre_lines:
                 outline = self._whole_streets(near, shift)
             region = road_surface.without_crumbs(outline.intersection(within))
@@ -102,8 +102,7 @@ class Place:
         around = self.within.convex_hull.buffer(SCENE_MARGIN)
         driving = road_surface.in_groups(self.surfaces, ["driving"])
         nearby = road_surface.local_strips(driving, shift, shifted(around, -shift))
-        names = {road.id: road.name for road in self.road_map.roads}
-        area = with_other_carriageways(lanes, nearby, names)
+        area = with_other_carriageways(lanes, nearby, self._names)
         numbers = sorted({lane.junction_id for lane in nearby if lane.junction_id is not None})
         junctions = [filled([lane for lane in nearby if lane.junction_id == number]) for number in numbers]
         inside = [one for one in junctions if one.intersection(area).area > MIN_SHARE_OF_JUNCTION * one.area]
@@ -141,7 +140,7 @@ class Place:
             nearest = nearest_junctions(self.road_map, self.surfaces, float(self.centre[0]), float(self.centre[1]), 1)
             if nearest and nearest[0][1] <= JUNCTION_REACH:
                 junctions = self._one_place(nearest[0][0])
-                return approach_lanes(self.surfaces, junctions, description.radius or DEFAULT_RADIUS)
+                return approach_lanes(self.surfaces, junctions, description.radius or DEFAULT_RADIUS, self._names)
         return self.surfaces
 
     @cached_property
@@ -162,7 +161,13 @@ class Place:
         return find_junction(self.road_map, self.surfaces, id_or_name)
 
     def _approach_lanes(self) -> tuple[LaneSurface, ...]:
-        return approach_lanes(self.surfaces, self._junctions, self.description.along or 0.0)
+        names = self._names if self.description.from_centre_lines else None
+        return approach_lanes(self.surfaces, self._junctions, self.description.along or 0.0, names)
+
+    @cached_property
+    def _names(self) -> dict[str, str]:
+        """Names of the streets, by the ids of their roads."""
+        return {road.id: road.name for road in self.road_map.roads}
 
     def _driving_area(self, junction: Junction) -> BaseGeometry:
         driving = road_surface.in_groups(self.surfaces, ["driving"])

@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
 from ..arrays import Float, Integer
-from ..geometry.plan import closed, outline, without
+from ..geometry.plan import closed, outline, signed_area, united, without
 from ..opendrive import LaneSurface
 from .intersections import filled
 from .terrain import Terrain, cut
@@ -31,22 +31,31 @@ GROUPS = {
 """Group of each OpenDRIVE lane type (ASAM OpenDRIVE 1.8, table of e_laneType); ``none`` has no surface."""
 
 CARRIAGEWAY = ("driving", "shoulder", "parking", "biking", "track")
+NOT_DRIVEN = ("border", "sidewalk", "median")
 MAX_STEP = 10.0
 CORNER_NOTCH = 3.0  # notches up to twice this (metres) at the corners of a junction are pavement
 MAX_CORNER, MAX_ENDS = 40.0, 20.0
 """A corner is no longer than this along the carriageway, and along the pavements at its two ends (metres)."""
+SMALL_NOTCH, MIN_NOTCH = 1.25, 0.01
+"""Notches in the edge of a pavement up to twice this (metres) are closed, from this area up (square metres)."""
+MIN_PAVEMENT_WIDTH = 0.6  # metres: narrower strips between lanes are rounding of a map made of middle lines
 JUNCTION_SPACING = 4.0
 KERB_HEIGHT = 0.12
 KERB_DEPTH = 0.35
 MARKING_WIDTH = 0.12
 MARKING_ABOVE = 0.012
 DASH_LENGTH, DASH_GAP = 3.0, 6.0
+MIN_PAINT, MAX_PAINTED_TWICE = 1e-9, 0.1  # square metres of paint that count, and share of it that may be painted twice
 STOP_LINE_WIDTH = 0.4
 STOP_LINE_SETBACK = 1.0
 SNAP_GRID = 1e-4  # grid (metres) that plans snap to when they are joined
 MIN_MARKED_WIDTH = 1.0  # lanes that are narrower than this (metres) somewhere are tapers; nothing is painted along them
+MIN_LOOSE_AREA = 400.0  # m²: pieces of streets, with pavements, that reach less into a scene are left out
 MAX_SEAM = 0.05  # gaps up to twice this (metres) between the lanes of two roads are closed in outlines
+MAX_OVERLAP = 0.002  # overlaps up to twice this wide (metres) are rounding of edges that meet
+MAX_FOLD = 0.1  # square metres of a road's lanes that may lie on each other, as rounding
 MIN_ISLAND_AREA = 15.0  # m²: smaller holes of a carriageway that was made of middle lines are no islands
+MAX_HOLE = 4.0  # m²: smaller holes between the lanes of other maps are none either
 MAX_ISLAND_AREA = 400.0  # holes of the carriageway smaller than this (m²) are islands, on which no post is assumed
 MAX_MEDIAN_WIDTH = 12.0  # holes narrower than this (metres) are medians: likewise
 MAX_OPEN_MEDIAN_WIDTH = 6.0  # narrower gaps (metres) between carriageways are medians though no junction closes them
@@ -112,9 +121,21 @@ def bare_sides(roadside: Roadside, pavement: BaseGeometry) -> BaseGeometry:
     return shapely.union_all([line for line in shapely.get_parts(bare) if line.length >= MIN_SIDE_LENGTH])
 
 
-def small_holes(area: BaseGeometry) -> BaseGeometry:
-    """Return the holes of an area that are too small for islands: between lanes where their number changes."""
-    return without(_without_holes(area, least=MIN_ISLAND_AREA), area)
+def without_small_holes(area: BaseGeometry) -> BaseGeometry:
+    """Return an area of a map's lanes without the holes that these leave between them in junctions."""
+    return _without_holes(area, least=MAX_HOLE)
+
+
+def without_gaps(roadside: Roadside, surfaces: Sequence[LaneSurface], *, fill: bool) -> BaseGeometry:
+    """Return the carriageway without the holes and seams that are too small for islands.
+
+    In a map that was made of middle lines (``fill``) they are where the number of lanes changes, and between lanes; in
+    others only holes count, where lanes that turn in a junction leave a gap that no lane of another kind covers.
+    """
+    if fill:
+        return _without_holes(roadside.carriageway, least=MIN_ISLAND_AREA)
+    holes = without(without_small_holes(roadside.carriageway), roadside.carriageway)
+    return holes if holes.is_empty else without(holes, _plan(in_groups(surfaces, NOT_DRIVEN)))
 
 
 def _is_corner(notch: BaseGeometry, kerb: BaseGeometry, walked: BaseGeometry) -> bool:
@@ -163,6 +184,26 @@ def cut_along(surface: LaneSurface, low: float, high: float) -> LaneSurface | No
     return _at_rows(surface, np.concatenate([ends[:1], inside, ends[1:]]))
 
 
+def without_loose_ends(
+    surfaces: Sequence[LaneSurface], region: BaseGeometry, extent: BaseGeometry
+) -> tuple[LaneSurface, ...]:
+    """Return lanes without small pieces of roads that lead to none of a region within an extent."""
+    plan = [shapely.make_valid(surface.polygon) for surface in surfaces]
+    parts = shapely.get_parts(closed(shapely.union_all(plan, grid_size=SNAP_GRID), MAX_SEAM))
+    loose = [part for part in parts if not part.intersects(region) and part.intersection(extent).area < MIN_LOOSE_AREA]
+    away = shapely.union_all(loose)
+    shapely.prepare(away)
+    lost = shapely.covers(away.buffer(MAX_SEAM), plan)
+    return tuple(surface for surface, is_lost in zip(surfaces, lost, strict=True) if not is_lost)
+
+
+def with_rows_at(surface: LaneSurface, places: Float) -> LaneSurface:
+    """Return a lane with rows of points at more places (n,) along the road, metres, as far as it reaches there."""
+    known = np.arange(len(surface.s))
+    inside = places[(places > surface.s[0]) & (places < surface.s[-1])]
+    return _at_rows(surface, np.unique(np.concatenate([known, np.interp(inside, surface.s, known)])))
+
+
 def group(surface: LaneSurface) -> str | None:
     """Return the group of a lane's type, None for one without a surface."""
     return GROUPS.get(surface.lane_type)
@@ -198,30 +239,74 @@ def without_crumbs(area: BaseGeometry, least: float = 0.5) -> BaseGeometry:
     return _without_holes(shapely.geometrycollections(parts), least=least)
 
 
-def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeometry, *, fill: bool = False) -> Float:
-    """Return the surface of one group of lanes within an extent, as (n, 3, 3) triangles.
+class SurfaceLayers:
+    """Surfaces of lanes that are laid one after the other, each without what lies under an earlier one.
 
-    Lanes that cross each other in a junction differ in height by some centimetres: there the group is laid anew as one
-    layer at their mean height, and groups other than driving lanes give way to these. Elsewhere lanes meet edge to edge
-    and stay as they are. With ``fill`` holes between the driving lanes of a junction are filled, and lanes of other
-    groups give way to driving lanes of other roads, too.
+    Lanes of a map overlap: in junctions, where roads merge, and where a map was made of middle lines. Two faces in one
+    place are drawn as black slivers, and both count in areas.
+
+    Parameters
+    ----------
+    surfaces : sequence of LaneSurface
+        All lanes, in local axes.
+    extent : shapely geometry
+        The surfaces end there.
+    fill : bool
+        Whether holes between the driving lanes of a junction are filled.
     """
-    lanes = in_groups(surfaces, [name])
-    pieces = [np.empty((0, 3, 3)), *(lane.triangles for lane in lanes if lane.junction_id is None)]
-    for junction in sorted({lane.junction_id for lane in lanes if lane.junction_id is not None}):
-        own = [lane for lane in lanes if lane.junction_id == junction]
-        area = lane_outline(own)
+
+    def __init__(self, surfaces: Sequence[LaneSurface], extent: BaseGeometry, *, fill: bool) -> None:
+        self._surfaces, self._fill = surfaces, fill
+        self._beyond = shapely.box(*extent.buffer(10 * MAX_STEP).bounds).difference(extent)
+        self._laid: list[BaseGeometry] = []
+
+    @property
+    def area(self) -> BaseGeometry:
+        """Area in plan that is covered."""
+        return united(self._laid)
+
+    def lay(self, triangles: Float, plan: BaseGeometry) -> Float:
+        """Lay triangles (n, 3, 3) whose outline in plan is known, and return what is not covered yet (m, 3, 3)."""
+        near = [area for area in self._laid if area.intersects(plan)]
+        if near:
+            covered = united(near)
+            if not shapely.intersection(covered, plan, grid_size=SNAP_GRID).buffer(-MAX_OVERLAP).is_empty:
+                triangles, plan = cut(triangles, covered), without(plan, covered)
+        if not plan.is_empty:
+            self._laid.append(plan)
+        return triangles
+
+    def lay_group(self, name: str) -> Float:
+        """Lay the lanes of one group and return their surface within the extent, (n, 3, 3).
+
+        Lanes that cross each other in a junction differ in height by some centimetres: there the group is laid anew as
+        one layer at their mean height, and groups other than driving lanes give way to these. Elsewhere lanes meet edge
+        to edge and stay as they are, unless they fold on to themselves in a narrow bend.
+        """
+        lanes = in_groups(self._surfaces, [name])
+        junctions = sorted({lane.junction_id for lane in lanes if lane.junction_id is not None})
+        inside = [self._lay_junction(name, [lane for lane in lanes if lane.junction_id == one]) for one in junctions]
+        roads = by_road([lane for lane in lanes if lane.junction_id is None])
+        outside = [self._lay_road(own) for own in roads.values()]
+        return cut(np.concatenate([np.empty((0, 3, 3)), *outside, *inside]), self._beyond)
+
+    def _lay_road(self, lanes: Sequence[LaneSurface]) -> Float:
+        triangles = np.concatenate([lane.triangles for lane in lanes])
+        plan = outline(triangles, SNAP_GRID)
+        if np.abs(signed_area(triangles)).sum() > plan.area + MAX_FOLD:
+            triangles = Terrain(triangles).drape(plan, spacing=JUNCTION_SPACING)
+        return self.lay(triangles, plan)
+
+    def _lay_junction(self, name: str, lanes: Sequence[LaneSurface]) -> Float:
+        area = lane_outline(lanes)
         if name == "driving":
-            area = filled(own) if fill else area
+            area = filled(lanes) if self._fill else area
         else:
-            driving = [lane for lane in in_groups(surfaces, ["driving"]) if lane.junction_id == junction]
-            area = without_crumbs(without(area, filled(driving) if fill and driving else _plan(driving)))
-        terrain = Terrain(np.concatenate([lane.triangles for lane in own]))
-        pieces.append(terrain.drape(area, spacing=JUNCTION_SPACING))
-    beyond = shapely.box(*extent.buffer(10 * MAX_STEP).bounds).difference(extent)
-    if fill and name != "driving":
-        beyond = beyond.union(_plan(in_groups(surfaces, ["driving"])).buffer(-MAX_SEAM))
-    return cut(np.concatenate(pieces), beyond)
+            number = lanes[0].junction_id
+            driving = [lane for lane in in_groups(self._surfaces, ["driving"]) if lane.junction_id == number]
+            area = without_crumbs(without(area, filled(driving) if self._fill and driving else _plan(driving)))
+        terrain = Terrain(np.concatenate([lane.triangles for lane in lanes]))
+        return self.lay(terrain.drape(area, spacing=JUNCTION_SPACING), area)
 
 
 def kerb_faces(pavement: Float, step: float | None = None) -> Float:
@@ -266,11 +351,40 @@ def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface], carriagew
     return Terrain(pavement).drape(shapely.union_all(corners), spacing=MAX_STEP)
 
 
-def markings(surfaces: Sequence[LaneSurface]) -> Float:
-    """Return (n, 4, 3) quads of lines between and beside the driving lanes, up to the stop lines of junctions."""
+def notch_pavements(pavement: Float, carriageway: BaseGeometry) -> Float:
+    """Return (n, 3, 3) triangles that close small notches in the edge of pavements (m, 3, 3).
+
+    On the inside of a tight corner the outer edge of the pavement folds; what is left of it is a notch.
+    """
+    if len(pavement) == 0:
+        return pavement
+    walked = outline(pavement, SNAP_GRID)
+    street = closed(carriageway.union(walked, grid_size=SNAP_GRID), MAX_SEAM)
+    notches = shapely.get_parts(without(closed(street, SMALL_NOTCH), street))
+    found = [notch for notch in notches if notch.area > MIN_NOTCH and notch.distance(walked) < MAX_SEAM]
+    return Terrain(pavement).drape(shapely.union_all(found), spacing=MAX_STEP)
+
+
+def slivers(pavement: Float) -> BaseGeometry:
+    """Return the parts of pavements (n, 3, 3) in plan that are narrower than `MIN_PAVEMENT_WIDTH`."""
+    walked = outline(pavement, SNAP_GRID)
+    wide = walked.buffer(-MIN_PAVEMENT_WIDTH / 2, join_style="mitre").buffer(
+        MIN_PAVEMENT_WIDTH / 2 + MAX_SEAM, join_style="mitre"
+    )
+    return shapely.union_all([part for part in shapely.get_parts(without(walked, wide)) if part.area > 0.0])
+
+
+def markings(surfaces: Sequence[LaneSurface], extent: BaseGeometry) -> Float:
+    """Return (n, 4, 3) quads of lines between and beside the driving lanes, up to the stop lines of junctions.
+
+    Parameters
+    ----------
+    extent : shapely geometry
+        The lines end there, as the surfaces do.
+    """
     lanes = {(lane.road_id, lane.section, lane.lane_id): lane for lane in surfaces if lane.junction_id is None}
-    unpainted = _junctions(surfaces).buffer(STOP_LINE_SETBACK + STOP_LINE_WIDTH)
-    shapely.prepare(unpainted)
+    painted = without(extent, _junctions(surfaces).buffer(STOP_LINE_SETBACK + STOP_LINE_WIDTH))
+    shapely.prepare(painted)
     quads = [np.empty((0, 4, 3))]
     for (road, section, number), lane in lanes.items():
         if group(lane) != "driving" or _is_taper(lane):
@@ -280,10 +394,25 @@ def markings(surfaces: Sequence[LaneSurface]) -> Float:
         outer = lanes.get((road, section, number + away))
         divides = inner is not None and group(inner) == "driving"
         if number != -1 or not divides:  # the middle line is painted once, by lane 1
-            quads += _line(inner_edge(lane), unpainted, dashed=divides and number != away)
+            quads += _line(inner_edge(lane), painted, dashed=divides and number != away)
         if outer is not None and group(outer) in ("shoulder", "biking", "parking", "border"):
-            quads += _line(outer_edge(lane), unpainted, dashed=False)
-    return np.concatenate(quads)
+            quads += _line(outer_edge(lane), painted, dashed=False)
+    return _painted_once(np.concatenate(quads))
+
+
+def _painted_once(quads: Float) -> Float:
+    """Return quads (n, 4, 3) without those that lie on an earlier one.
+
+    The two directions of a street may be roads of their own whose edge is the same line.
+    """
+    plan = shapely.polygons(quads[:, :, :2])
+    plan = np.where(shapely.is_valid(plan), plan, shapely.convex_hull(plan))
+    later, earlier = shapely.STRtree(plan).query(plan, predicate="intersects")
+    later, earlier = later[earlier < later], earlier[earlier < later]
+    shared = shapely.area(shapely.intersection(plan[later], plan[earlier]))
+    covered = np.bincount(later, shared, minlength=len(quads)) / np.maximum(shapely.area(plan), MIN_PAINT)
+    kept: Float = quads[covered <= MAX_PAINTED_TWICE]
+    return kept
 
 
 def stop_lines(surfaces: Sequence[LaneSurface]) -> Float:
@@ -383,10 +512,10 @@ def _is_taper(lane: LaneSurface) -> bool:
     return bool(np.hypot(*(lane.left - lane.right)[:, :2].T).min() < MIN_MARKED_WIDTH)
 
 
-def _line(edge: Float, unpainted: BaseGeometry, *, dashed: bool) -> list[Float]:
-    """Return quads of a painted line along a lane's edge (n, 3) outside an area."""
-    rest = shapely.LineString(edge).difference(unpainted)
-    parts = [part for part in shapely.get_parts(rest) if not part.is_empty]  # none is left within an area
+def _line(edge: Float, painted: BaseGeometry, *, dashed: bool) -> list[Float]:
+    """Return quads of a painted line along a lane's edge (n, 3) within an area."""
+    rest = shapely.line_merge(shapely.LineString(edge).intersection(painted))
+    parts = [part for part in shapely.get_parts(rest) if part.length > 0.0]
     paths = [shapely.get_coordinates(part, include_z=True) for part in parts]
     return [_ribbon(piece) for path in paths for piece in (_dashes(path) if dashed else [path])]
 

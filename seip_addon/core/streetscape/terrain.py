@@ -27,10 +27,13 @@ class Relief:
         Map coordinates.
     level : float, metres
         Height that the map gives the ground.
+    bridges : frozenset of str
+        Ids of the roads that lead straight from end to end, whatever the ground is between.
     """
 
     raster: HeightRaster
     level: float
+    bridges: frozenset[str] = frozenset()
 
     def rise(self, xy: Float) -> Float:
         """Return how far the ground lies above the map's own (n,) at places (n, 2), metres."""

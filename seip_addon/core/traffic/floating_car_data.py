@@ -18,11 +18,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Boolean, Float, Integer
+from ..counts import counted
 from ..errors import SeipError
+from ..limits import MAP_COORDINATE, SPEED, TIME
 from ..progress import Progress
 from ..storage.files import digest
 from ..storage.xml_stream import Attributes, opened, quoted, read_tags, short
-from .sumo_files import MAX_COORDINATE
 from .trajectories import RoadUser, Trajectories
 from .vehicle_types import CAR, PERSON, VehicleType
 
@@ -209,7 +210,7 @@ class _Rows:
 
     def begin(self, text: str) -> None:
         """Begin a step of the simulation."""
-        time = self._number(text, "time", "a time step", 1e11)
+        time = self._number(text, "time", "a time step", TIME.most)
         if time < self._time:
             raise SeipError(
                 f"{self._file}: times run backwards, {time:g} s comes after {self._time:g} s; "
@@ -223,8 +224,8 @@ class _Rows:
         if not self._window.begin <= self._time <= self._window.end:
             return
         name = row.get("id", "")
-        x = self._number(row.get("x", ""), "x", name, MAX_COORDINATE) - self._shift_x
-        y = self._number(row.get("y", ""), "y", name, MAX_COORDINATE) - self._shift_y
+        x = self._number(row.get("x", ""), "x", name, MAP_COORDINATE.most) - self._shift_x
+        y = self._number(row.get("y", ""), "y", name, MAP_COORDINATE.most) - self._shift_y
         left, low, right, high = self._window.bounds
         key = (name, walks)
         if not (left <= x <= right and low <= y <= high):
@@ -239,9 +240,9 @@ class _Rows:
             self._time,
             x,
             y,
-            math.nan if z == "nan" else self._number(z, "z", name, MAX_COORDINATE),
+            math.nan if z == "nan" else self._number(z, "z", name, MAP_COORDINATE.most),
             self._number(row.get("angle", ""), "angle", name, 1e4),
-            self._number(row.get("speed") or "0", "speed", name, 1e3),
+            self._number(row.get("speed") or "0", "speed", name, SPEED.most),
         )
         for column, value in zip(self._columns, values, strict=True):
             column.append(value)
@@ -339,8 +340,10 @@ def _paint(name: str) -> float:
 def _missing_sizes(unknown: list[str], count: int) -> tuple[str, ...]:
     if not unknown:
         return ()
+    one = len(unknown) == 1
     sentence = (
-        f"missing sizes: {len(unknown)} of {count} road users are of no known vehicle type ({listed(unknown)}) and get "
-        f"SUMO's default, for vehicles {CAR.length:g} × {CAR.width:g} × {CAR.height:g} m; name their route file"
+        f"missing sizes: {len(unknown)} of {counted(count, 'road user')} {'is' if one else 'are'} of no known vehicle "
+        f"type ({listed(unknown)}) and {'gets' if one else 'get'} SUMO's default, "
+        f"for vehicles {CAR.length:g} × {CAR.width:g} × {CAR.height:g} m; name their route file"
     )
     return (sentence,)

@@ -7,6 +7,7 @@ import numpy as np
 import shapely
 
 from ..arrays import Boolean, Float, Integer
+from ..counts import counted
 from ..errors import SeipError
 from ..geometry.plan import MIN_AREA, heights_over, plane_height, signed_area
 from ..site.scene_geometry import SceneGeometry, joined
@@ -20,6 +21,7 @@ ROAD_TOLERANCE = 1.0
 As far as that a bus of 12 m, which simulations move like a rod on its lane, cuts a tight corner.
 """
 
+MAX_SAMPLES = 2_000  # of trajectories, by which they are told from those of another site
 WHEELBASE_SHARE = 0.6  # of the length of a vehicle: its pitch is that of the road between two axles this far apart
 MAX_GAP = 2.5  # sampling intervals; between samples further apart than this a road user was somewhere else
 
@@ -71,6 +73,32 @@ def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> LoadedTr
     pitch = np.where(walks, 0.0, _pitch(height, plan, z, local.yaw, length))
     fitted = replace(local, position=np.column_stack([plan, z]), pitch=pitch)
     return LoadedTraffic(_rounded(_without_gaps(fitted, user, on_road)), warnings)
+
+
+def share_on_road(local: Trajectories, geometry: SceneGeometry) -> float:
+    """Return the share of vehicle samples near the region of interest that are on the road of the scene, 0 to 1.
+
+    On the road is within `ROAD_TOLERANCE` in plan and in height.
+
+    Parameters
+    ----------
+    local : Trajectories
+        In the local axes of the scene.
+
+    Returns
+    -------
+    float
+        Of at most `MAX_SAMPLES` samples, spread evenly; 1 where no vehicle is near.
+    """
+    user = np.repeat(np.arange(len(local)), np.diff(local.first))
+    drives = np.array([each.category != "pedestrian" for each in local.users], dtype=np.bool_)[user]
+    x, y = local.position[:, 0], local.position[:, 1]
+    near = np.flatnonzero(drives & shapely.contains_xy(geometry.region.convex_hull, x, y))
+    if not len(near) or not geometry.roads:
+        return 1.0
+    sample = local.position[near[np.linspace(0, len(near) - 1, min(len(near), MAX_SAMPLES)).astype(np.int64)]]
+    height = _RoadSurface(joined(geometry.roads)).height(sample[:, :2], sample[:, 2])
+    return float(np.mean(np.abs(height - sample[:, 2]) <= ROAD_TOLERANCE))
 
 
 class _RoadSurface:
@@ -125,22 +153,22 @@ def _off_the_road(local: Trajectories, user: Integer, near: Boolean, on_road: Bo
     visitors = int(np.count_nonzero(seen))
     if not visitors:
         raise SeipError(
-            f"FCD of another map: none of its {count} road users comes into the region of interest; "
+            f"FCD of another map: {counted(count, 'road user')}, none in the region of interest; "
             "simulate on the scene's own map, and name its .net.xml where that has a netOffset"
         )
     astray = [local.users[number].name for number in np.flatnonzero(off)]
     mostly = int(np.count_nonzero(off > seen / 2.0))
     if mostly > visitors / 2.0:
         raise SeipError(
-            f"FCD of another map: {mostly} of {visitors} road users in the region of interest are off the road, "
-            f"by more than {ROAD_TOLERANCE:g} m ({listed(astray)}); simulate on the scene's own map, and name its "
-            ".net.xml where that has a netOffset"
+            f"FCD of another map: {mostly} of {counted(visitors, 'road user')} in the region of interest "
+            f"{'is' if mostly == 1 else 'are'} off the road, by more than {ROAD_TOLERANCE:g} m "
+            f"({listed(astray)}); simulate on the scene's own map, and name its .net.xml where that has a netOffset"
         )
     if not astray:
         return ()
     sentence = (
-        f"{len(astray)} of {visitors} road users leave the road by more than {ROAD_TOLERANCE:g} m and are left out "
-        f"there: {listed(astray)}"
+        f"{len(astray)} of {counted(visitors, 'road user')} {'leaves' if len(astray) == 1 else 'leave'} the road by "
+        f"more than {ROAD_TOLERANCE:g} m and {'is' if len(astray) == 1 else 'are'} left out there: {listed(astray)}"
     )
     return (sentence,)
 

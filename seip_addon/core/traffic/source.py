@@ -8,17 +8,19 @@ from pathlib import Path
 
 import numpy as np
 
+from ..counts import counted
 from ..errors import SeipError
 from ..progress import Progress
 from ..site.scene_geometry import SceneGeometry, joined
 from .floating_car_data import Extent, read_floating_car_data, read_trajectories
 from .overlaps import find_overlaps
-from .road_fit import fit_to_road
+from .road_fit import fit_to_road, share_on_road
 from .sumo_files import read_net_offset
 from .trajectories import CATEGORIES, LoadedTraffic, Trajectories
 from .vehicle_types import read_vehicle_types
 
 MAX_REGION_DISTANCE = 500.0  # metres from the region beyond which traffic is another place's
+MIN_ON_ROAD = 0.98  # share of vehicle positions on the road below which traffic is another site's
 ROAD_MARGIN = 20.0  # metres beyond the road of the scene within which traffic is read
 OVERLAP_INTERVAL = 1.0  # seconds between the instants that are searched for overlapping road users
 
@@ -75,15 +77,41 @@ def load_trajectories(path: Path, geometry: SceneGeometry) -> Trajectories:
     Raises
     ------
     SeipError
-        The file cannot be read, or no road user in it comes near.
+        The file cannot be read, no road user in it comes near, or it is traffic of another site.
     """
     trajectories = Trajectories.load(path).moved_to(geometry.origin)
     left, bottom, right, top = geometry.region.bounds
     low, high = np.array([left, bottom]) - MAX_REGION_DISTANCE, np.array([right, top]) + MAX_REGION_DISTANCE
     plan = trajectories.position[:, :2]
     if not ((plan >= low) & (plan <= high)).all(axis=1).any():
-        raise SeipError(f"all traffic of {path} is far from this scene: name traffic that was made for its map")
+        raise SeipError(
+            f"{path} is traffic of another place, far from this scene: name traffic that was made for its map"
+        )
+    require_own_traffic(trajectories, geometry, str(path))
     return trajectories
+
+
+def require_own_traffic(trajectories: Trajectories, geometry: SceneGeometry, name: str) -> None:
+    """Check that vehicles drive on the road of a scene, as those of its own traffic do without exception.
+
+    Parameters
+    ----------
+    trajectories : Trajectories
+        In the scene's local axes.
+    name : str
+        Of the traffic, for messages.
+
+    Raises
+    ------
+    SeipError
+        Too many are off the road: it is traffic of another site, or the scene has changed since.
+    """
+    share = share_on_road(trajectories, geometry)
+    if share < MIN_ON_ROAD:
+        raise SeipError(
+            f"traffic of another site: {1 - share:.0%} of the vehicle positions of {name} near the region are off the "
+            "road of this scene; import or simulate traffic for it"
+        )
 
 
 def read_sumo(
@@ -113,9 +141,9 @@ def overlap_warnings(trajectories: Trajectories) -> Generator[Progress, None, tu
         return ()
     worst = int(overlaps.area.argmax())
     one, other = (trajectories.users[number].name for number in overlaps.pair[worst])
+    stand = counted(len(overlaps), "pair of road users stands", "pairs of road users stand")
     sentence = (
-        f"{len(overlaps)} pairs of road users stand in one another; {one} and {other} "
-        f"share {overlaps.area[worst]:.1f} m² at {overlaps.time[worst]:g} s"
+        f"{stand} in one another; {one} and {other} share {overlaps.area[worst]:.1f} m² at {overlaps.time[worst]:g} s"
     )
     return (sentence,)
 

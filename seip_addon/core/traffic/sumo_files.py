@@ -1,6 +1,5 @@
 """What all files of SUMO have in common."""
 
-import math
 import os
 from pathlib import Path
 
@@ -8,9 +7,8 @@ import numpy as np
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..limits import MAP_COORDINATE
 from ..storage.xml_stream import Attributes, read_tags
-
-MAX_COORDINATE = 1e8  # metres of a coordinate at most: more than the circumference of the Earth
 
 
 def read_net_offset(path: str | os.PathLike[str]) -> Float:
@@ -32,8 +30,7 @@ def read_net_offset(path: str | os.PathLike[str]) -> Float:
             break
     try:
         x, y = (float(number) for number in found[0].split(","))
-    except (IndexError, ValueError):
-        x = y = math.nan
-    if not (abs(x) <= MAX_COORDINATE and abs(y) <= MAX_COORDINATE):
-        raise SeipError(f"{Path(path).name} is no SUMO network: it says no netOffset; name a .net.xml")
+    except (IndexError, ValueError) as error:
+        raise SeipError(f"{Path(path).name} is no SUMO network: it says no netOffset; name a .net.xml") from error
+    MAP_COORDINATE.require([x, y], Path(path).name, "netOffset", "name a .net.xml that netconvert wrote")
     return np.array([x, y])

@@ -11,23 +11,22 @@ from typing import Any
 
 import numpy as np
 
+from .. import limits
 from ..arrays import Float, Integer
 from ..storage.array_file import ArrayFile, ArrayRule, ContentError
 from ..storage.files import digest
 
-MAX_USER_SIZE = 100.0  # metres of length, width or height of a road user at most
-MAX_DURATION = 30.0 * 86400.0  # seconds from the first sample of trajectories to the last at most: 30 days
 MAX_BEND = 0.6  # of the lines of a body along one axis
 MAX_EXTENT = 1e6  # metres from one sample to another at most, along each axis
 
 _ARRAYS = {
-    "origin": ArrayRule("f8", (3,), -1e8, 1e8),
-    "first": ArrayRule("i8", ("users + 1",), 0),
-    "time": ArrayRule("f8", ("samples",), -1e11, 1e11),
-    "position": ArrayRule("f8", ("samples", 3), -1e8, 1e8),
-    "yaw": ArrayRule("f8", ("samples",), -1e5, 1e5),
-    "pitch": ArrayRule("f8", ("samples",), -math.pi / 2.0, math.pi / 2.0),
-    "speed": ArrayRule("f8", ("samples",), -1e3, 1e3),
+    "origin": ArrayRule("f8", (3,), limits.MAP_COORDINATE),
+    "first": ArrayRule("i8", ("users + 1",), limits.COUNT),
+    "time": ArrayRule("f8", ("samples",), limits.TIME),
+    "position": ArrayRule("f8", ("samples", 3), limits.MAP_COORDINATE),
+    "yaw": ArrayRule("f8", ("samples",), limits.UNWRAPPED_ANGLE),
+    "pitch": ArrayRule("f8", ("samples",), limits.PITCH),
+    "speed": ArrayRule("f8", ("samples",), limits.SPEED),
 }
 FILE = ArrayFile(
     "seip.trajectories", 2, "file of trajectories", "import or simulate them again", _ARRAYS, undigested=True
@@ -251,9 +250,9 @@ def _check_users(users: tuple[RoadUser, ...]) -> None:
         sizes = (user.length, user.width, user.height)
         if not isinstance(user.name, str) or user.category not in CATEGORIES:
             raise ContentError(f"road user {str(user.name)[:40]!r} is {str(user.category)[:40]!r}")
-        if not all(isinstance(size, int | float) and 0.0 < size <= MAX_USER_SIZE for size in sizes):
+        if not limits.ROAD_USER_SIZE.allow(sizes):
             raise ContentError(f"road user {user.name[:40]!r} is {str(sizes)[:80]} m large")
-        if not (isinstance(user.paint, int | float) and 0.0 <= user.paint <= 1.0):
+        if not limits.SHARE.allow(user.paint):
             raise ContentError(f"the paint of road user {user.name[:40]!r} reflects {str(user.paint)[:40]}")
         if not is_shape(user.shape):
             raise ContentError(f"the shape of road user {user.name[:40]!r} is {str(user.shape)[:80]}")
@@ -281,7 +280,7 @@ def _check_samples(read: Trajectories) -> None:
     if (within & (np.abs(np.diff(read.yaw)) > math.pi + _TURN_TOLERANCE)).any():
         raise ContentError("a heading leaps by more than half a turn")
     begin, end = read.span
-    if end - begin > MAX_DURATION:
+    if not limits.DURATION.allow(end - begin):
         raise ContentError(f"it lasts {end - begin:g} s")
     widest = float(np.ptp(read.position, axis=0).max())
     if widest > MAX_EXTENT:

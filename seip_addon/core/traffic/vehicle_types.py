@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import SeipError
+from ..limits import ROAD_USER_SIZE
 from ..progress import Progress
 from ..storage.xml_stream import Attributes, quoted, read_tags
 
@@ -118,7 +119,7 @@ def _size(attributes: Attributes, what: str, usual: float, file: str) -> float:
         size = float(text)
     except ValueError:
         size = math.nan
-    if not 0.0 < size < 100.0:
+    if not ROAD_USER_SIZE.allow(size):
         kind = quoted(attributes.get("id", ""))
         raise SeipError(f"{file}: {what}={quoted(text)} of vType {kind} is no size in metres; correct it")
     return size

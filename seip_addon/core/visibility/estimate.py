@@ -89,7 +89,7 @@ def estimate_visibility(
     SeipError
         As for `compute_visibility`.
     """
-    yield Progress(0, 2, "triangles for the estimate")
+    yield Progress(0, 2, "triangles for the estimate", counted=False)
     began = time.perf_counter()
     poses = site.candidates
     used = find_models(models, np.unique(poses.sensor).tolist())
@@ -100,7 +100,7 @@ def estimate_visibility(
     drawn = [everywhere[place] for place in _spread_lot(len(everywhere), seed)]
     with thread_executor(task, threads) as submit:
         setting_up = time.perf_counter() - began
-        yield Progress(1, 2, "sample for the estimate")
+        yield Progress(1, 2, "sample for the estimate", counted=False)
         sample = yield from _compute_from(drawn, submit)
     per_place = sample.seconds / sample.places
     rays = sample.rays / sample.places
@@ -159,7 +159,7 @@ def _timed(some: Sequence[Integer], submit: Callable[[Integer], Future[Rows]]) -
     pending = set(futures)
     while pending:
         pending = wait(pending, REPORT_INTERVAL).not_done
-        yield Progress(1, 2, "sample for the estimate")
+        yield Progress(1, 2, "sample for the estimate", counted=False)
     return _Sample(len(some), time.perf_counter() - began, sum(future.result().rays for future in futures))
 
 

@@ -111,6 +111,8 @@ class VisibilityGrid:
             shape = (int(header["shape"][0]), int(header["shape"][1]))
             if min(shape) < 1 or packed.shape != (shape[0], (shape[1] + 7) // 8):
                 raise ContentError(f"it has bits of the shape {packed.shape} for a grid of {shape}")
+            if shape[1] % 8 and (packed[:, -1] & (0xFF >> shape[1] % 8)).any():
+                raise ContentError("it has bits beyond its last target")
             return cls(packed, shape, str(header["key"]), dict(header["parameters"]))
 
 

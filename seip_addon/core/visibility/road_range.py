@@ -69,10 +69,14 @@ def range_warnings(
         if beyond >= NEARLY_ALL or assumed:
             warnings.append(
                 f"{key}: detects this road ({reflectivity:.0%} reflectivity) with {settings.detection:.0%} probability "
-                f"up to {reach.max():.0f} m from {heights.max():g} m height: {beyond:.0%} of the region lie beyond its "
-                f"range from every candidate{assumed}"
+                f"up to {reach.max():.0f} m from {heights.max():g} m height"
+                f"{_beyond_message(beyond)}{assumed}"
             )
     return tuple(warnings)
+
+
+def _beyond_message(share: float) -> str:
+    return f": {share:.0%} of the region lies beyond its range from every candidate" if share >= NEARLY_ALL else ""
 
 
 def _share_beyond(site: Site, xyz: Float, reach: Float) -> float:

@@ -1,4 +1,4 @@
-"""Sight lines of one sensor, and the targets in range that it does not see."""
+"""Sight lines of one sensor, and the targets in range that it does not see, by why it does not."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from ..lidar import LidarModel
 from ..site.candidates import Candidates
 from ..site.site import Site
 from ..site.target_squares import target_squares
+from .ray_casting import Engine, engine_name, make_ray_caster
 
 MAX_LINES = 1500
 """Limit on the lines drawn: of more targets a sample is taken."""
@@ -35,19 +36,27 @@ class SightLines:
         How many it sees.
     in_range : int
         How many are within its range and its horizontal field of view.
-    shadows : (m, 4, 3) float64, metres
-        Squares of those that it does not see.
+    hidden : (m, 4, 3) float64, metres
+        Squares of those that something hides from it.
+    missed : (k, 4, 3) float64, metres
+        Squares of those in its view that it does not see: they lie between its rings, outside its vertical field of
+        view, or return too little light.
     """
 
     eye: Float
     ends: Float
     seen: int
     in_range: int
-    shadows: Float
+    hidden: Float
+    missed: Float
 
 
-def sight_lines(site: Site, pose: int, model: LidarModel, row: Boolean) -> SightLines:
+def sight_lines(
+    site: Site, pose: int, model: LidarModel, row: Boolean, delta: float, engine: Engine = "auto"
+) -> SightLines:
     """Return what a pose sees, and what it does not.
+
+    Something hides a target if the ray to it ends at a distance of δ or more before it.
 
     Parameters
     ----------
@@ -55,6 +64,8 @@ def sight_lines(site: Site, pose: int, model: LidarModel, row: Boolean) -> Sight
         Index among the site's candidates.
     row : (t,) bool
         Which targets it sees: its row of the visibility grid.
+    delta : float, metres
+        Within which a return is a target's, as for the grid.
     """
     targets = site.targets
     eye = site.candidates.xyz[pose]
@@ -62,12 +73,19 @@ def sight_lines(site: Site, pose: int, model: LidarModel, row: Boolean) -> Sight
     faced = model.faces((targets.xyz - eye) @ site.candidates.orientation(pose))
     in_range = row | (faced & (distance >= model.min_range) & (distance <= model.max_range))
     seen = np.flatnonzero(row)
+    unseen = np.flatnonzero(in_range & ~row)
+    away = distance[unseen]
+    caster = make_ray_caster(site.triangles, engine_name(engine))
+    first, _ = caster.cast(eye, (targets.xyz[unseen] - eye) / away[:, None], float(model.max_range))
+    hidden = first <= away - delta
+    squares = target_squares(targets)
     return SightLines(
         eye=eye,
         ends=targets.xyz[_sample(seen)],
         seen=len(seen),
         in_range=int(np.count_nonzero(in_range)),
-        shadows=target_squares(targets)[in_range & ~row],
+        hidden=squares[unseen[hidden]],
+        missed=squares[unseen[~hidden]],
     )
 
 

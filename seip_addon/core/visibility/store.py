@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .. import limits
 from ..errors import SeipError
 from ..lidar import LidarModel
 from ..progress import Progress
@@ -25,7 +26,7 @@ _CHUNK = ArrayFile(
     1,
     "chunk of a visibility grid",
     "delete it and compute it again",
-    {"packed": ArrayRule("u1", ("poses", "bytes")), "rays": ArrayRule("i8", (), 0)},
+    {"packed": ArrayRule("u1", ("poses", "bytes")), "rays": ArrayRule("i8", (), limits.COUNT)},
     compressed=False,
 )
 
@@ -98,10 +99,11 @@ def stored_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who 
     """
     key = visibility_key(site, models, settings, engine_name(engine))
     stored = _load(path)
+    checkpoint = CheckpointFolder(path, key)
     if stored is not None and stored.key == key and stored.shape == (len(site.candidates), len(site.targets)):
+        checkpoint.remove()  # what is left of a process that was killed between writing the grid and this
         yield Progress(len(site.candidates), len(site.candidates), "visibility, from an earlier run")
         return stored
-    checkpoint = CheckpointFolder(path, key)
     grid = yield from compute_visibility(site, models, settings, engine, checkpoint, scheduler, threads)
     grid.save(path)
     checkpoint.remove()
@@ -146,7 +148,7 @@ class GridFolder:
         return len(entries)
 
 
-_GRID = re.compile(r"[0-9a-f]{32}\.(npz|pieces)")
+_GRID = re.compile(r"[0-9a-f]{32}\.(npz|pieces|returns\.npz)")
 
 
 def _grids(folder: Path) -> list[Path]:

@@ -68,8 +68,8 @@ class VisibilityModel:
         cast : int
             Number of rays.
         """
-        if _is_upright(orientation):
-            return self.see_upright(models, xyz, _yaw(orientation))
+        if is_upright(orientation):
+            return self.see_upright(models, xyz, yaw_of(orientation))
         position = in_sensor_axes(self._position(models, xyz, 0.0), orientation)
         return seen_by_near_rays(position, rotated_surfaces(self._surfaces, xyz, orientation))
 
@@ -91,17 +91,19 @@ def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, surfaces: Near
     if tilt == 0:
         return seen_by_all_rays(position, surfaces)
     orientation = orientation_of(position.yaw, tilt)
-    if _is_upright(orientation):
-        return seen_by_all_rays(replace(position, yaw=_yaw(orientation)), surfaces)
+    if is_upright(orientation):
+        return seen_by_all_rays(replace(position, yaw=yaw_of(orientation)), surfaces)
     turned = rotated_surfaces(surfaces, position.origin, orientation)
     return seen_by_all_rays(in_sensor_axes(position, orientation), turned)
 
 
-def _is_upright(orientation: Float) -> bool:
+def is_upright(orientation: Float) -> bool:
+    """Return whether a sensor with an orientation (3, 3) stands upright, except for rounding."""
     return bool(orientation[2, 2] > 0 and math.hypot(*orientation[2, :2]) < _MAX_LEVEL_ANGLE)
 
 
-def _yaw(orientation: Float) -> float:
+def yaw_of(orientation: Float) -> float:
+    """Return the direction of azimuth zero of an upright sensor, in radians."""
     return math.atan2(orientation[1, 0], orientation[0, 0])
 
 

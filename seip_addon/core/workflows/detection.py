@@ -17,7 +17,7 @@ RECORD, ERRORS = "detection.json", "errors.png"
 INSTALL = "run `make detection` or `pip install '.[detection]'` in a checkout of this project"
 """How a Python gets PyTorch and this project."""
 
-_BAR = re.compile(r"^(.+?): +\d+%\|.*\| (\d+)/(\d+) \[", re.MULTILINE)
+_BAR = re.compile(r"^(.+?): +\d+%\|.*\| (\d+)/(\d+) \[[\d:]+(<?)", re.MULTILINE)
 _ERROR = re.compile(r"^(?:[\w-]+: )?error: (.+)$", re.MULTILINE)
 _SECONDS_BETWEEN_LINES = "1"
 
@@ -125,8 +125,8 @@ def _progress(said: str) -> Progress:
     bars = _BAR.findall(said)
     if not bars:
         return Progress(0, 0, "starting PyTorch")
-    what, done, total = bars[-1]
-    return Progress(int(done), int(total), what)
+    what, done, total, time_left = bars[-1]
+    return Progress(int(done), int(total), what, counted=bool(time_left))
 
 
 def _complaint(said: str, status: int, program: Path) -> str:

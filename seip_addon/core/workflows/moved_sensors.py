@@ -18,11 +18,12 @@ from ..placement.objective import MOVED, Objective, Solution, target_weights
 from ..progress import Progress
 from ..results.headings import degrees, tilt_degrees
 from ..results.placement_record import PlacementRecord
+from ..robustness.gain_band import with_gain_band
 from ..scans.sensor import MountedSensor
 from ..site.scene_geometry import joined
 from ..visibility.sight_lines import pose_at
 from ..visibility.visibility_model import VisibilityModel, visibility_model
-from .survey import Layout, Survey
+from .survey import Layout, Survey, surroundings
 
 BY_HAND = "by hand"
 """Name of a place that is no position of the site."""
@@ -76,7 +77,7 @@ def evaluate_moved_sensors(
         sensors.append(sensor)
         rows.append(visibility.see(sensor.model, sensor.xyz, sensor.orientation))
     seen = np.array(rows, dtype=bool).reshape(len(rows), len(site.targets))
-    deployment = deployment_of(site, sensors, seen)
+    deployment = yield from with_gain_band(surroundings(survey), deployment_of(site, sensors, seen))
     covered = float(target_weights(site, objective)[deployment.seen_by > 0].sum())
     placement = Placement(
         chosen=np.array([sensor.pose for sensor in sensors if sensor.pose is not None], dtype=np.int64),

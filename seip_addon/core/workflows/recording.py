@@ -124,7 +124,9 @@ def record(
     from ..pictures.scan_view import save_scan_view  # noqa: PLC0415  # matplotlib takes half a second to come
 
     manifest = yield from write_run(folder, run, simulation)
-    save_scan_view(folder / "frame.png", next(load_frames(folder))[1], run.static.region, run.sensors)
+    save_scan_view(
+        folder / "frame.png", next(load_frames(folder))[1], run.static.region, run.sensors, run.static.attribution
+    )
     for key in settings.formats:
         target = dataset_folder(folder, settings, key)
         yield from write_dataset(FORMATS[key], load_frames(folder), _traffic_run(folder, run, settings), target)

@@ -9,6 +9,7 @@ from ..errors import SeipError
 from ..placement.deployment import deploy
 from ..placement.objective import CHOSEN_FOR, Objective, Solution, placement_problem, with_count
 from ..progress import Progress
+from ..robustness.gain_band import with_gain_band
 from ..robustness.pose_study import PoseStudy, PoseStudySettings, pose_study, pose_warnings
 from ..robustness.risk import Risk
 from ..robustness.robust_study import RobustnessSettings, RobustStudy, robust_study
@@ -68,7 +69,7 @@ def place_robustly(
     around, problem = surroundings(survey), placement_problem(site, visible, models, objective)
     study = yield from robust_study(around, problem, settings, [settings.risk], survey.settings.limits)
     (chosen,) = study.robust
-    deployment = deploy(site, models, visible, chosen.placement.chosen)
+    deployment = yield from with_gain_band(around, deploy(site, models, visible, chosen.placement.chosen))
     tried = PoseStudySettings(settings.errors, settings.draws, min(DRAWS_OF_KIND, settings.draws), settings.seed + 1)
     under_errors = yield from pose_study(around, deployment, tried)
     note = f"{CHOSEN_FOR}for {chosen.name} over {settings.scenarios} scenarios: objective, bound and gap are of that"
@@ -80,8 +81,11 @@ def place_robustly(
 def robustness_message(study: RobustStudy) -> str:
     """Describe what a robust placement loses of the planned coverage, and what it saves under errors."""
     (chosen,) = study.robust
+    lost, nominal = study.price(chosen), study.beside(chosen).low
+    change = "less" if lost >= 0.0 else "more"
+    verdict = ": this is worse" if chosen.low.value < nominal.value else ""
     return (
-        f"against the placement for poses as planned it gives away {study.price(chosen):.2%} of planned coverage; "
+        f"as planned, it covers {100 * abs(lost):.2f} points {change} than the placement for poses as planned; "
         f"{chosen.evaluated_by.describe_outcome()} is at least {chosen.low.describe()} in nineteen of twenty of "
-        f"{study.settings.draws} unseen draws, not {study.beside(chosen).low.describe()}"
+        f"{study.settings.draws} unseen draws, and {nominal.describe()} with that placement{verdict}"
     )

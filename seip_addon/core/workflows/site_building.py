@@ -13,11 +13,11 @@ from ..arrays import Float
 from ..citymodel.at_place import AskedBuildings, with_city_model
 from ..elevation.at_place import AskedTerrain, MapSurroundings, with_terrain
 from ..elevation.obstacles import Merging
-from ..elevation.raised_map import raised_map
 from ..errors import SeipError
 from ..opendrive import RoadMap, lane_surfaces, read_map
 from ..opendrive.geo_reference import GeoReference
 from ..opendrive.junctions import STREETS
+from ..opendrive.read import with_attribution
 from ..openstreetmap.site import (
     STANDS_AROUND,
     ExtractPlace,
@@ -32,6 +32,7 @@ from ..streetscape import road_surface
 from ..streetscape.description import DEFAULT_RADIUS, SiteDescription, describe_place
 from ..streetscape.geographic_position import in_metres
 from ..streetscape.intersections import without_plain_joints
+from ..streetscape.levels import UnclearLevelError
 from ..streetscape.model import SiteModel, site_model
 from ..streetscape.place import SCENE_MARGIN, Place
 
@@ -93,22 +94,24 @@ class BuiltSite:
     merging: tuple[Merging, ...] = ()
 
 
-def build_site(source: Path, asked: AskedSite) -> Generator[Progress, None, BuiltSite]:
+def build_site(source: Path, asked: AskedSite, map_path: Path | None = None) -> Generator[Progress, None, BuiltSite]:
     """Model the site that is asked for.
 
     Parameters
     ----------
     source : Path
         An OpenDRIVE map, an extract of OpenStreetMap, or a site description that names a map.
+    map_path : Path, optional
+        Where the map of an extract's streets is written if a person must see it to choose a level.
 
     Raises
     ------
     SeipError
-        A file cannot be read, or holds no such place.
+        A file cannot be read, or holds no such place, or its level is not clear.
     """
     yield Progress(0, 0, "map")
     if is_extract(source):
-        return (yield from _of_extract(source, asked))
+        return (yield from _of_extract(source, asked, map_path))
     map_path, road_map, description = _of_map(source, asked)
     notes: tuple[str, ...] = ()
     if asked.osm is not None:
@@ -128,11 +131,15 @@ def save_map(built: BuiltSite, path: Path) -> None:
         The file cannot be written.
     """
     if built.map_text is not None:
-        with whole_file(path) as temporary:
-            temporary.write_text(built.map_text, encoding="utf-8")
+        _write_map(built.map_text, path)
 
 
-def _of_extract(source: Path, asked: AskedSite) -> Generator[Progress, None, BuiltSite]:
+def _write_map(text: str, path: Path) -> None:
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _of_extract(source: Path, asked: AskedSite, map_path: Path | None) -> Generator[Progress, None, BuiltSite]:
     if asked.near is not None or asked.osm is not None:
         raise SeipError(f"{source.name} is an extract of OpenStreetMap: give its place by --near-latlon LAT LON")
     if len(asked.junction) == 1:
@@ -146,9 +153,8 @@ def _of_extract(source: Path, asked: AskedSite) -> Generator[Progress, None, Bui
         left_hand=asked.left_hand,
     )
     with tempfile.TemporaryDirectory() as folder:
-        map_path = Path(folder) / "streets.xodr"
-        road_map, found, notes = yield from site_of_extract(source, place, map_path)
-        map_text = map_path.read_text(encoding="utf-8")
+        site = yield from site_of_extract(source, place, Path(folder) / "streets.xodr")
+    found = site.description
     _, described = describe_place(source, site=asked.site)
     description = replace(
         found.with_objects_of(described),
@@ -159,11 +165,18 @@ def _of_extract(source: Path, asked: AskedSite) -> Generator[Progress, None, Bui
         name=described.name or found.name,
         level=asked.level,
     )
-    description, more, merging = yield from _with_sources(road_map, description, asked)
-    if description.relief is not None:
-        map_text = raised_map(map_text, road_map, description.relief)
-    model = yield from site_model(road_map, description)
-    return BuiltSite(source.name, replace(model, notes=(*notes, *more, *model.notes)), map_text, merging)
+    description, more, merging = yield from _with_sources(site.road_map, description, asked)
+    yield Progress(0, 0, "heights of streets")
+    site = replace(site, description=description).on_ground()
+    try:
+        model = yield from site_model(site.road_map, site.description)
+    except UnclearLevelError as error:
+        if map_path is None:
+            raise
+        _write_map(with_attribution(site.map_text, site.description.attribution), map_path)
+        raise UnclearLevelError(f"{error}; {map_path} is written: the map of the streets there") from error
+    map_text = with_attribution(site.map_text, model.attribution)
+    return BuiltSite(source.name, replace(model, notes=(*site.notes, *more, *model.notes)), map_text, merging)
 
 
 def _with_sources(

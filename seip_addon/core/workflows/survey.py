@@ -16,13 +16,14 @@ from ..placement import Placement
 from ..placement.deployment import deploy, pose_prices
 from ..placement.integer_program import check_solver
 from ..placement.near_optimal import near_optimal_set
-from ..placement.objective import Objective, Solution, optimise, placement_problem, target_weights
-from ..placement.search_limits import SolverLimits
+from ..placement.objective import Objective, Solution, criterion_of, optimise, placement_problem, target_weights
+from ..placement.search_limits import DEFAULT_EFFORT, SolverLimits
 from ..progress import Progress
 from ..results.headings import tilt_degrees
 from ..results.located import LOCATED_FILES, missing_sentence
 from ..results.placement_record import PlacementRecord, Provenance, placement_record
 from ..robustness.assumed_heights import height_notes
+from ..robustness.gain_band import with_gain_band
 from ..robustness.pose_study import PoseStudySettings, pose_message, pose_study
 from ..robustness.visibility_under_errors import Surroundings
 from ..settings import setting
@@ -42,6 +43,7 @@ from ..visibility.ring_resolution import resolution_warnings
 from ..visibility.road_range import range_warnings, road_reflectivity
 from ..visibility.settings import VisibilitySettings
 from ..visibility.store import stored_visibility
+from .returns import place_by_returns, stored_pedestrian_returns
 
 POSES_TRIED = PoseStudySettings(draws=100, draws_of_kind=0)
 """What a placement is tried with where that is asked for."""
@@ -61,10 +63,10 @@ class SurveySettings:
         What casts the rays.
     solver : str
         ``auto``, ``highs``, ``cbc`` or ``gurobi``; ``auto`` is HiGHS where it is installed, else CBC.
-    time_limit : float, seconds
-        For each answer.
-    effort : float, units of work
-        Alike, but counted, so that an answer can be had again: see `placement.solve`.
+    time_limit : float, seconds, optional
+        Limit of the wall time of each search.
+    effort : float, units of work, optional
+        Limit of the counted work of each search, which gives the same result again: see `SolverLimits`.
     installed_cost : InstalledCost, optional
         Counted in every price where it is given; else prices are those of sensors alone.
     spacings_because : str
@@ -79,12 +81,12 @@ class SurveySettings:
     catalogue: tuple[Path, ...] = setting((), "catalogues of your own; a unit's beams as KEY=FILE", metavar="FILE")
     engine: Engine = setting("auto", "ray caster")
     solver: str = setting("auto", "auto (HiGHS where it is installed, else CBC), highs, cbc or gurobi")
-    time_limit: float = 60.0
-    effort: float = setting(
-        math.inf,
-        "for each answer, in counted work, a unit about a second of a core: the same answer again",
+    effort: float | None = setting(
+        None,
+        f"limit of each search in counted work, 1 is about a second of a core ({DEFAULT_EFFORT:g})",
         metavar="UNITS",
     )
+    time_limit: float | None = setting(None, "limit of each search in seconds, in place of counted work", metavar="S")
     installed_cost: InstalledCost | None = None
     spacings_because: str = ""
 
@@ -115,7 +117,7 @@ class SurveySettings:
 
     def as_record(self) -> dict[str, Any]:
         """Return the settings as records hold them: defaults included, values that JSON knows."""
-        limits = _finite({"time_limit_s": self.time_limit, "effort": self.effort})
+        limits = _finite({"time_limit_s": self.time_limit or math.inf, "effort": self.limits.work})
         return {
             "grid_spacing_m": self.grid_spacing,
             "candidates": _candidates_record(self.candidates),
@@ -185,7 +187,7 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
     near, far = without_far_objects(geometry, geometry.region, settings.reach())
     limits = (
         *far,
-        *bareness_warnings(near),
+        *bareness_warnings(near, np.concatenate([site.candidates.xyz[:, :2], site.targets.xyz[:, :2]])),
         *assumed_pole_warnings(geometry, site.candidates),
         *rounding_warnings(near),
         *resolution_warnings(site, models, settings.visibility),
@@ -208,9 +210,16 @@ def carla_warnings(models: Mapping[str, LidarModel], settings: SurveySettings) -
 
 @dataclass(frozen=True, eq=False)
 class Survey(Layout):
-    """A layout with its visibility grid."""
+    """A layout with its visibility grid.
+
+    Parameters
+    ----------
+    returns_path : path, optional
+        File of the returns grid, read and written when a placement is chosen by it; None to keep it in memory only.
+    """
 
     grid: VisibilityGrid
+    returns_path: Path | None = None
 
 
 def grid_key(layout: Layout) -> str:
@@ -250,12 +259,13 @@ def see(
     grid = yield from stored_visibility(
         path, layout.site, layout.models, settings.visibility, settings.engine, scheduler, threads
     )
-    return with_grid(layout, grid)
+    return with_grid(layout, grid, path)
 
 
-def with_grid(layout: Layout, grid: VisibilityGrid) -> Survey:
-    """Return the survey of a layout whose visibility grid is known."""
-    return Survey(**{**vars(layout), "grid": grid})
+def with_grid(layout: Layout, grid: VisibilityGrid, path: Path | None = None) -> Survey:
+    """Return the survey of a layout whose visibility grid is known, and stored in the file ``path`` if there is one."""
+    returns_path = None if path is None else path.with_suffix(".returns.npz")
+    return Survey(**{**vars(layout), "grid": grid, "returns_path": returns_path})
 
 
 def estimate(layout: Layout, threads: int | None = None) -> Generator[Progress, None, Estimate]:
@@ -272,18 +282,22 @@ def place(survey: Survey, objective: Objective, *, pose_errors: bool = False) ->
     what it sees where these are other (`height_notes`): rays are cast for that alone.
     """
     site, models, visible = survey.site, survey.models, survey.grid.visible
-    solution = yield from optimise(site, visible, models, objective, survey.settings.limits)
+    by_returns = criterion_of(objective, models) == "returns"
+    if by_returns:
+        solution = yield from place_by_returns(survey, objective)
+    else:
+        solution = yield from optimise(site, visible, models, objective, survey.settings.limits)
     notes = [*solution.placement.notes]
-    if solution.placement.status == "optimal" and not objective.cheapest:
+    if solution.placement.status == "optimal" and not objective.cheapest and not by_returns:
         problem = placement_problem(site, visible, models, objective)
         top = yield from near_optimal_set(problem, solution.placement.chosen)
         notes += [] if top is None else [top.message]
-    hung = solution.deployment
+    hung = yield from with_gain_band(surroundings(survey), solution.deployment)
     notes += height_notes(surroundings(survey), survey.geometry, hung.sensors, hung.coverage)
     if pose_errors and solution.deployment.sensors:
         study = yield from pose_study(surroundings(survey), solution.deployment, POSES_TRIED)
         notes.append(pose_message(study))
-    return replace(solution, placement=replace(solution.placement, notes=tuple(notes)))
+    return replace(solution, deployment=hung, placement=replace(solution.placement, notes=tuple(notes)))
 
 
 def surroundings(layout: Layout) -> Surroundings:
@@ -305,7 +319,7 @@ def record_of(
     """
     objective = {"goal": asdict(solution.objective), "pose_errors": False, "render": False}
     missing = missing_sentence(survey.site, LOCATED_FILES)
-    notes = (*solution.placement.notes, *([missing] if missing else []))
+    notes = (*solution.notes, *([missing] if missing else []))
     return placement_record(
         survey.site,
         replace(solution, placement=replace(solution.placement, notes=notes)),
@@ -349,4 +363,8 @@ def restored_solution(survey: Survey, record: PlacementRecord) -> Solution:
         price=record.price_usd,
         notes=record.notes,
     )
-    return Solution(objective, placement, None, deploy(site, survey.models, grid.visible, chosen))
+    deployment = deploy(site, survey.models, grid.visible, chosen)
+    known = replace(deployment, gain_band=record.coverage.gain_band, returns=record.returns)
+    if record.returns is not None:
+        known = replace(known, pedestrian_returns=stored_pedestrian_returns(survey, chosen))
+    return Solution(objective, placement, None, known)

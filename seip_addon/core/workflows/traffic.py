@@ -11,9 +11,11 @@ from typing import TypeVar
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..limits import SCENARIOS
 from ..placement.deployment import deploy
 from ..placement.objective import CHOSEN_FOR, Objective, Solution, placement_problem, with_count
 from ..progress import Progress
+from ..robustness.gain_band import with_gain_band
 from ..robustness.traffic_instants import check_runs, spread_instants
 from ..robustness.traffic_presence import road_user_seconds
 from ..robustness.traffic_study import LAYER_NAMES, TrafficStudy, traffic_scenarios, traffic_study, traffic_warnings
@@ -22,6 +24,7 @@ from ..settings import setting
 from ..site.site import Site
 from ..traffic import Trajectories
 from ..traffic.run_overlap import require_independent, vehicle_positions
+from ..traffic.source import load_trajectories
 from .robust import check_robust_objective
 from .survey import Layout, Survey, surroundings
 
@@ -50,16 +53,21 @@ class TrafficSettings:
 
     layer: TrafficLayer = setting("road", "what is to be seen: the road, or points at vehicles' height", option="see")
     weights_from_traffic: bool = setting(default=False, help="weigh targets by the time that road users are there")
-    instants: int = setting(24, "instants of traffic to choose on", minimum=1, metavar="N")
+    instants: int = setting(24, "instants of traffic to choose on", minimum=1, maximum=int(SCENARIOS.most), metavar="N")
     evaluation_instants: int = setting(
-        120, "instants of other runs to evaluate on", minimum=1, option="judged-at", metavar="N"
+        120,
+        "instants of other runs to evaluate on",
+        minimum=1,
+        maximum=int(SCENARIOS.most),
+        option="judged-at",
+        metavar="N",
     )
-    seed: int = setting(0, "of the instants; those to evaluate on have the next")
+    seed: int = setting(0, "of the instants; those to evaluate on have the next", minimum=0)
 
     def __post_init__(self) -> None:
         for number in (self.instants, self.evaluation_instants):
-            if number < 1:
-                raise SeipError(f"ask for one instant of traffic or more, not {number}")
+            if not SCENARIOS.allow(number):
+                raise SeipError(f"ask for {SCENARIOS} instants of traffic, not {number}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +157,7 @@ def read_runs(paths: Sequence[Path], layout: Layout) -> Generator[Progress, None
     runs: dict[str, Trajectories] = {}
     for number, path in enumerate(paths):
         yield Progress(number, len(paths), "reading runs of traffic")
-        (runs[str(path)],) = load_runs([path], layout.geometry.origin)
+        runs[str(path)] = load_trajectories(path, layout.geometry)
     return independent_runs(runs, layout.site)
 
 
@@ -205,12 +213,15 @@ def place_in_traffic(
     )
     weighed = ("targets weigh as many seconds as road users are there",) if settings.weights_from_traffic else ()
     notes = (note, *weighed, *placement.notes, *traffic_messages(study), *traffic_warnings(study))
-    deployment = deploy(site, models, visible, placement.chosen)
+    deployment = yield from with_gain_band(around, deploy(site, models, visible, placement.chosen))
     solution = Solution(with_count(objective, site), replace(placement, notes=notes), None, deployment)
     return TrafficSolution(solution, study)
 
 
 def traffic_messages(study: TrafficStudy) -> tuple[str, ...]:
-    """Describe what optimising on traffic gains, and whether it was evaluated on too few instants."""
-    gain = f"placing on traffic sees {study.gain(study.layer).describe()} more of the {LAYER_NAMES[study.layer]}"
-    return (gain,) if study.is_converged() else (gain, "every other instant says something else: evaluate on more")
+    """Describe what optimising on traffic gains or loses, and whether it was evaluated on too few instants."""
+    seen = f"of the {LAYER_NAMES[study.layer]} than the best placement for the empty road"
+    gain = f"this placement sees {study.gain(study.layer).as_change()} {seen}, in traffic that neither was chosen on"
+    if study.is_converged():
+        return (gain,)
+    return gain, "half of the instants give a different result: evaluate on more instants"

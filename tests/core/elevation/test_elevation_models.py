@@ -138,8 +138,20 @@ BROKEN = {
     "no tie point": (lambda path: write_dem(path, ONES, 0, 0, leave_out=(TIE_POINT,)), "no georeference"),
     "no keys": (lambda path: write_dem(path, ONES, 0, 0, leave_out=(KEYS,)), "names no reference system"),
     "its own system": (lambda path: write_dem(path, ONES, 0, 0, epsg=32767), "names no reference system"),
-    "steps of nothing": (lambda path: write_dem(path, ONES, 0, 0, step=0.0), "a georeference that is none"),
-    "not a number": (lambda path: write_dem(path, ONES, float("nan"), 0), "a georeference that is none"),
+    "steps of nothing": (
+        lambda path: write_dem(path, ONES, 0, 0, step=0.0),
+        "a georeference that lies nowhere on Earth",
+    ),
+    "not a number": (lambda path: write_dem(path, ONES, float("nan"), 0), "a georeference that lies nowhere on Earth"),
+    "a place off the Earth": (
+        lambda path: write_dem(path, ONES, 1e30, 0),
+        "a georeference that lies nowhere on Earth",
+    ),
+    "a latitude of 100 degrees": (
+        lambda path: write_dem(path, ONES, 13.0, 100.0, 0.001, 4326),
+        "a georeference that lies nowhere on Earth",
+    ),
+    "vast steps": (lambda path: write_dem(path, ONES, 0, 0, step=1e7), "a georeference that lies nowhere on Earth"),
     "feet": (lambda path: write_dem(path, ONES, 0, 0, keys=[3076, 0, 1, 9002]), "does not count in metres"),
     "nothing": (lambda path: write_dem(path, ONES * np.nan, 0, 0), "holds no height between"),
     "no data that is none": (lambda path: write_dem(path, ONES, 0, 0, no_data="none"), "damaged tags"),
@@ -179,3 +191,14 @@ def test_no_damage_breaks_the_reader(data, tmp_path_factory):
         read_geotiff(path)
     except SeipError:
         return
+
+
+def test_a_small_file_that_claims_many_pixels_is_refused(tmp_path):
+    """Its length was changed to 2 million rows: reading them took a gigabyte and seconds."""
+    path = write_dem(tmp_path / "dem.tif", np.full((40, 40), 30.0, dtype=np.float32), 0, 0)
+    content = bytearray(path.read_bytes())
+    entry = content.index(bytes([1, 1, 4, 0, 1, 0, 0, 0]))  # ImageLength, one LONG
+    content[entry + 8 : entry + 12] = (2_000_000).to_bytes(4, "little")
+    path.write_bytes(content)
+    with pytest.raises(SeipError, match=r"dem\.tif holds far fewer bytes than its size in pixels needs"):
+        read_geotiff(path)

@@ -35,6 +35,20 @@ def test_what_stands_on_edge_covers_nothing():
     assert np.isnan(surface_height(np.array([[2.0, 0.0]]), wall)).all()
 
 
+def test_corners_that_differ_by_rounding_are_one():
+    """A union of lanes left them, at which a mitre of no length divided by zero."""
+    corners = [(4.9043, -129.6512), (4.7935, -134.6487), (1.5943, -134.5778), (7.466, 130.2934), (13.8645, 130.1516)]
+    twins = [
+        (7.466000000000001, 130.2934),
+        (13.864500000000001, 130.1516),
+        (8.103500000000002, -129.7221),
+        (8.1035, -129.7221),
+    ]
+    area = shapely.Polygon([*corners, *twins])
+    assert area.is_valid
+    assert closed(area, 0.05).area == pytest.approx(area.area, abs=1e-6)
+
+
 def test_gaps_up_to_twice_the_width_are_closed():
     parts = shapely.union_all([shapely.box(0, 0, 4, 4), shapely.box(4.1, 0, 8, 4), shapely.box(8.3, 0, 12, 4)])
     assert shapely.get_num_geometries(closed(parts, 0.06)) == 2

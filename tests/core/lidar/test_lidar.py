@@ -144,9 +144,9 @@ def test_a_law_follows_from_published_ranges_or_is_assumed_and_said_to_be(tmp_pa
     assert published == (RangeEquation.of_ranges(20.0, 50.0, 0.8), "")
     assert law_of(detection_law="[-11.0, 1.1, 0.99]") == (RangeEquation(-11.0, 1.1, 0.99), "")
     law, assumed = law_of()
-    assert assumed.startswith("its longest range, 50 m, is taken to be that at 80 % reflectivity")
+    assert assumed.startswith("its longest range, 50 m, is taken to be the range at 10 % reflectivity")
     assert isinstance(law, RangeEquation)
-    assert law.reach(0.8, 0.9) == pytest.approx(50.0)
+    assert law.reach(0.1, 0.9) == pytest.approx(50.0)
     assert law_of(dropoff_general_rate="0.1") == (CarlaDropoff(general=0.1), "")  # as before there was another law
 
 
@@ -162,15 +162,15 @@ def test_a_law_follows_from_published_ranges_or_is_assumed_and_said_to_be(tmp_pa
         ({"field_of_view_deg": "[2.0, -10.0]"}, "increasing"),
         ({"field_of_view_deg": "[-10.0]"}, "2 numbers"),
         ({"field_of_view_deg": "[nan, 2.0]"}, "increasing"),
-        ({"field_of_view_deg": "[-90.0, 2.0]"}, "elevations"),
+        ({"field_of_view_deg": "[-90.0, 2.0]"}, "an elevation is -90, not -89.999 to 89.999 degrees"),
         ({"channels": None, "field_of_view_deg": None, "elevations_deg": "[]"}, "channel"),
-        ({"channels": None, "field_of_view_deg": None, "elevations_deg": "[1.0, nan]"}, "elevations"),
+        ({"channels": None, "field_of_view_deg": None, "elevations_deg": "[1.0, nan]"}, "an elevation is nan, not"),
         ({"channels": None, "field_of_view_deg": None, "elevations_deg": '["up"]'}, "numbers"),
         ({"elevations_deg": "[1.0]"}, "channels, field_of_view_deg"),
         ({"azimuth_offsets_deg": "[1.0]"}, "offset"),
         ({"azimuth_offsets_deg": "[1.0, 2.0, inf, 4.0]"}, "offset"),
         *(
-            ({"horizontal_field_of_view_deg": view}, "horizontal field of view must be above 0 and at most 360 degrees")
+            ({"horizontal_field_of_view_deg": view}, "the horizontal field of view is .*, not 0.001 to 360 degrees")
             for view in ("0", "-90.0", "360.1", "nan")
         ),
         ({"horizontal_field_of_view_deg": "[-60.0, 60.0]"}, "horizontal_field_of_view_deg must be a number"),
@@ -185,6 +185,7 @@ def test_a_law_follows_from_published_ranges_or_is_assumed_and_said_to_be(tmp_pa
         ({"rotation_rate_hz": '"fast"'}, "rotation_rate_hz"),
         ({"price_usd": "[3000, 1000]"}, "price"),
         ({"price_usd": "[0, 1000]"}, "price"),
+        ({"price_usd": "[1000, 2e9]"}, r"its price is 2e\+09, not 0 to 1e\+09 USD"),
         ({"range_noise_std_m": "-0.1"}, "noise"),
         ({"attenuation_per_m": "nan"}, "attenuation"),
         ({"dropoff_general_rate": "1.5"}, "drop-off"),
@@ -203,11 +204,11 @@ def test_a_law_follows_from_published_ranges_or_is_assumed_and_said_to_be(tmp_pa
         ({"detection_law": "[nan, 0.9, 0.9]"}, "the threshold of detection"),
         ({"detection_law": "[-11.0, 0.9, 0.9]", "detection_probability": "0.5"}, "either detection_law"),
         ({"range_noise_growth_per_m": "-1"}, "growth of the range noise"),
-        ({"range_noise_std_m": "1e300"}, "range noise must lie between 0 and 10 m"),
-        ({"azimuth_offsets_deg": "[1e9, 0.0, 0.0, 0.0]"}, "azimuth offsets must lie within two turns"),
+        ({"range_noise_std_m": "1e300"}, r"the range noise is 1e\+300, not 0 to 10 m"),
+        ({"azimuth_offsets_deg": "[1e9, 0.0, 0.0, 0.0]"}, r"an azimuth offset is 1e\+09, not -720 to 720 degrees"),
         ({"detection_range_m": "[150.0, 150.2]"}, "must be 1.3 times the one at 10 %"),
-        ({"detection_law": "[800.0, 0.9, 0.9]"}, "the threshold of detection must lie between -60 and 20"),
-        ({"detection_law": "[-12.0, 0.001, 0.95]"}, "the spread of detection must lie between 0.05 and 10"),
+        ({"detection_law": "[800.0, 0.9, 0.9]"}, r"the threshold of detection is 800, not -60 to 20 \(ln of 1/m²\)"),
+        ({"detection_law": "[-12.0, 0.001, 0.95]"}, r"the spread of detection is 0.001, not 0.05 to 10"),
     ],
 )
 def test_each_fault_of_a_model_has_its_sentence(tmp_path: Path, changes: dict[str, str | None], words: str) -> None:
@@ -299,3 +300,12 @@ def test_the_documented_example_is_a_catalogue(tmp_path: Path) -> None:
 def test_the_documentation_names_every_sensor() -> None:
     text = (Path(__file__).resolve().parents[3] / "docs" / "sensors.md").read_text(encoding="utf-8")
     assert all(f"| `{key}` |" in text for key in load_catalogue())
+
+
+def test_the_documentation_says_what_each_law_rests_on() -> None:
+    text = (Path(__file__).resolve().parents[3] / "docs" / "sensors.md").read_text(encoding="utf-8")
+    for key, model in load_catalogue().items():
+        row = next(line for line in text.splitlines() if line.startswith(f"| `{key}` |"))
+        low, high = model.gains
+        sheet = f"sheet, {low:g} to {high:g}"
+        assert f"| {'sweep' if model.calibration else sheet if low < high else '–'} |" in row

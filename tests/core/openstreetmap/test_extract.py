@@ -101,7 +101,7 @@ def test_places_that_are_none_and_repeats_are_counted(tmp_path):
     found = read(written(tmp_path, osm("".join(nodes))))
     assert sorted(found.nodes) == [1, 5, 6]
     assert found.nodes[1].latitude == 11
-    assert "gives 1 elements twice" in found.notes[0]
+    assert "gives 1 element twice" in found.notes[0]
     assert "gives 4 nodes no place on Earth" in found.notes[1]
 
 
@@ -160,3 +160,26 @@ def test_tags_are_one_line_of_at_most_255_characters(tmp_path):
     path = written(tmp_path, extract.text().replace("&amp;#10;", "&#10;"))
     names = [way.tags["name"] for way in read(path).ways.values()]
     assert names == ["Two Lines", "turned", "n" * 255, "\u06a9\u0648\u0686\u0647\u200c\u0627\u06cc"]
+
+
+@pytest.mark.parametrize(
+    ("head", "credit"),
+    [
+        ("<osm>", "© OpenStreetMap contributors (ODbL)"),
+        ('<osm copyright="OpenStreetMap and contributors">', "© OpenStreetMap contributors (ODbL)"),
+        (
+            '<osm><meta osm_base="2024-03-22T14:09:45Z"/>',
+            "© OpenStreetMap contributors (ODbL), data of 2024-03-22",
+        ),
+        ('<osm timestamp="2023-01-02T03:04:05Z">', "© OpenStreetMap contributors (ODbL), data of 2023-01-02"),
+        (
+            '<osm><node id="7" lat="1" lon="1" timestamp="2013-08-03T15:55:30Z"/>',
+            "© OpenStreetMap contributors (ODbL), changes up to 2013-08-03",
+        ),
+        ('<osm timestamp="yesterday">', "© OpenStreetMap contributors (ODbL)"),
+        ('<osm copyright="A\n&lt;b&gt; town">', "© A <b> town"),
+    ],
+)
+def test_the_credit_of_an_extract_names_its_holder_and_its_date(tmp_path, head, credit):
+    path = written(tmp_path, f'{head}<node id="1" lat="1" lon="1"/></osm>')
+    assert read(path).attribution == credit

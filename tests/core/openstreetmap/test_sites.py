@@ -10,6 +10,7 @@ from osm_text import JUNCTIONS, Extract, corner_houses, crossing, dual_carriagew
 from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.parts import Role
 from seip_addon.core.traffic import sumo_programs
@@ -50,6 +51,14 @@ def test_a_kind_of_junction_becomes_a_sound_site(name, tmp_path):
     driving = plan(model, "Driving lanes")
     holes = [ring for part in shapely.get_parts(driving) for ring in part.interiors]
     assert sum(shapely.Polygon(hole).area for hole in holes if shapely.Polygon(hole).area < 30) < 1.0
+
+
+def test_the_map_and_the_model_of_an_extract_carry_its_credit(tmp_path):
+    site = built(crossing(), tmp_path)
+    assert site.model.attribution == ("© OpenStreetMap contributors (ODbL)",)
+    again = tmp_path / "again.xodr"
+    again.write_text(site.map_text, encoding="utf-8")
+    assert read_map(again).attribution == site.model.attribution
 
 
 def test_the_same_extract_makes_the_same_map(tmp_path):
@@ -163,7 +172,7 @@ def test_streets_that_do_not_meet_are_named(tmp_path):
 def test_an_extract_without_streets_is_refused(tmp_path):
     extract = Extract()
     extract.house(0, 0, 10, 10)
-    with pytest.raises(SeipError, match=r"has no street near 52\.50000, 13\.40000"):
+    with pytest.raises(SeipError, match=r"has no street within 590 m of 52\.50000, 13\.40000"):
         built(extract, tmp_path)
 
 
@@ -391,6 +400,50 @@ def test_names_of_streets_are_as_in_the_extract(name, tmp_path):
     assert name in {place.name for place in model.places}
 
 
+@pytest.mark.parametrize(
+    ("asked", "name"),
+    [
+        ({}, "Avenue / Main Street"),
+        ({"near_latlon": None, "junction": ("Mill Lane", "Main Street")}, "Mill Lane / Main Street"),
+        ({"near_latlon": None, "junction": ("main street", "B 5")}, "Main Street / B 5"),
+        ({"near_latlon": None, "junction": ("Hauptweg", "Mill Lane")}, "Hauptweg / Mill Lane"),
+    ],
+)
+def test_the_title_is_what_was_asked_for_else_the_highest_classes(asked, name, tmp_path):
+    """A slip road and a lane come before the streets that they belong to, in the file and beside the middle."""
+    extract = Extract()
+    middle = extract.node(0, 0)
+    extract.way([(-45, 0), (-6, -22), (0, -45)], highway="primary_link", oneway="yes", name="Avenue Slip")
+    extract.way([middle, (140, 140)], highway="residential", name="Mill Lane")
+    extract.way([(-200, 0), (-45, 0), middle, (200, 0)], highway="tertiary", name="Main Street", alt_name="Hauptweg")
+    extract.way([(0, -200), (0, -45), middle, (0, 200)], highway="primary", name="Avenue", ref="B 5")
+    model = built(corner_houses(extract, near=60), tmp_path, **asked).model
+    assert model.name == name
+
+
+def test_two_sections_of_one_street_are_not_the_title(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0)], highway="primary", name="Ring Road Section 1")
+    extract.way([(0, 0), (200, 0)], highway="primary", name="Ring Road Section 2")
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="tertiary", name="Side Street")
+    assert built(corner_houses(extract), tmp_path).model.name == "Ring Road Section 1 / Side Street"
+
+
+def test_no_id_of_netconvert_is_the_name_of_a_street(tmp_path):
+    """The number of lanes changes before the junction, and so makes a joint there."""
+    extract = Extract()
+    extract.way([(-200, 0), (-50, 0)], highway="primary", lanes=2, name="Main Street")
+    extract.way([(-50, 0), (0, 0)], highway="primary", lanes=4, name="Main Street")
+    extract.way([(0, 0), (200, 0)], highway="primary", lanes=2, name="Main Street")
+    extract.way([(0, -200), (0, 0), (0, 60)], highway="residential", name="Side Street")
+    extract.way([(0, 60), (0, 200)], highway="residential", name="Back Street")
+    extract.way([(0, 0), (100, 100)], highway="unclassified")
+    site = built(corner_houses(extract, near=20), tmp_path)
+    assert 'name=":' not in site.map_text
+    names = {place.name for place in site.model.places if not place.name.startswith("Crossing")}
+    assert names == {"Main Street", "Side Street", "Back Street", "Unnamed street"}
+
+
 def test_an_outline_that_is_drawn_twice_counts_once(tmp_path):
     extract = crossing()
     for _ in range(3):
@@ -411,8 +464,8 @@ def test_a_bridge_without_a_layer_lies_above(tmp_path):
     assert above[0].solid.vertices[:, 2].max() > 5
 
 
-def test_streets_without_names_are_called_by_number_or_by_the_file(tmp_path):
-    for ref, name in (({"ref": "B 1"}, "B 1"), ({}, "place")):
+def test_a_site_without_street_names_is_named_by_road_number_or_position(tmp_path):
+    for ref, name in (({"ref": "B 1"}, "B 1"), ({}, "Junction at 52.50000, 13.40000")):
         extract = Extract()
         usual = {"highway": "primary", "oneway": "yes", "lanes": 2} | ref
         extract.way([(-250, -8), (0, -8), (250, -8)], **usual)
@@ -420,3 +473,145 @@ def test_streets_without_names_are_called_by_number_or_by_the_file(tmp_path):
         extract.way([(0, -200), (0, -8), (0, 8), (0, 200)], highway="unclassified")
         model = built(corner_houses(extract, near=24), tmp_path).model
         assert model.name == name
+
+
+PARALLEL = {
+    "a street of the same name": ([(60, 0), (66, 14), (240, 14)], "Avenue"),
+    "a street that forks off": ([(60, 0), (85, 10), (110, 14), (240, 16)], "Little Row"),
+    "a street along a part of it": ([(50, 0), (54, 14), (74, 14), (78, 0)], "Little Row"),
+}
+
+
+@pytest.mark.parametrize(("points", "name"), PARALLEL.values(), ids=PARALLEL)
+def test_a_residential_street_along_an_approach_is_not_studied(tmp_path, points, name):
+    extract = Extract()
+    middle = extract.node(0, 0, highway="traffic_signals")
+    ends = [points[0]] + [points[-1]] * (points[-1][1] == 0)
+    extract.way([(-250, 0), middle, *ends, (250, 0)], highway="secondary", lanes=2, name="Avenue")
+    extract.way([(0, -200), middle, (0, 200)], highway="tertiary", name="Side Street")
+    extract.way(points, highway="residential", name=name)
+    region = built(corner_houses(extract, near=30.0), tmp_path).model.region
+    assert region.intersection(shapely.box(points[0][0] - 5, 8, 200, 30)).area < 5
+    assert region.bounds[2] > 75
+
+
+def test_tracks_of_light_rail_are_laid(tmp_path):
+    extract = crossing()
+    extract.way([(-60, -200), (-60, 200)], railway="light_rail")
+    extract.way([(60, -200), (60, 200)], railway="light_rail", tunnel="yes")
+    tracks = plan(built(extract, tmp_path).model, "Tracks")
+    assert tracks.intersection(shapely.box(-70, 20, -50, 100)).area > 100
+    assert tracks.intersection(shapely.box(50, 20, 70, 100)).area == 0
+
+
+@pytest.mark.parametrize("kind", ["trunk", "primary", "secondary"])
+def test_a_street_without_a_number_of_lanes_has_one_each_way(tmp_path, kind):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway=kind, name="East Road", sidewalk="no")
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="residential", name="North Road", lanes=2, sidewalk="no")
+    site = built(corner_houses(extract), tmp_path)
+    across = shapely.LineString([(50, -30), (50, 30)])
+    assert plan(site.model, "Driving lanes").intersection(across).length == pytest.approx(6.4, abs=0.1)
+    note = "one lane is assumed in each direction of streets without a number of lanes in the extract: East Road"
+    assert note in site.model.notes
+
+
+RINGS = {
+    "secondary": (
+        "-3.9,9.4 -7.9,6.3 -9.8,1.7 -9.8,-4.1 -7.2,-8 -2.7,-10.6 2.7,-10.6 6.4,-9.3 9,-5.4 9.7,0 9,5 6.4,7.6 1.9,8.9",
+        {
+            0: "-10.8,26.1 -30,55.6 -75,106",
+            3: "-17.1,-8.3 -24.9,-14.8 -79,-104",
+            6: "7.3,-40.5 9.2,-66.4 14,-101",
+            10: "70.3,16.4 98.3,25.2 221,57",
+        },
+        {"highway": "secondary"},
+    ),
+    "with cycle lanes": (
+        "12,-5 12,1 6,10 1,13 -3,12 -9,10 -12,5 -12,-1 -9,-6 -5,-10 0,-13 8,-10",
+        {6: "-72,32 -168,77", 3: "1,32 8,86 27,237", 0: "40,-23 98,-49 206,-100", 10: "-6,-28 -13,-76"},
+        {"highway": "primary", "cycleway": "track"},
+    ),
+    "with an acute entry": (
+        "-6,9 -10,5 -11,0 -10,-6 -6,-11 0,-13 7,-11 11,-5 12,0 10,5 7,9 0,10",
+        {9: "58,34 80,48 167,91", 4: "-54,-35 -120,-70", 11: "-10,19 -21,25 -31,29 -90,50"},
+        {"highway": "primary", "cycleway": "lane"},
+    ),
+}
+"""Small roundabouts: the nodes of the ring, the arms by the node where they meet it, and the tags of the arms."""
+
+
+def points(text):
+    return [tuple(map(float, pair.split(","))) for pair in text.split()]
+
+
+@pytest.mark.parametrize("name", RINGS)
+def test_the_island_and_the_pavements_of_a_small_roundabout_are_whole(tmp_path, name):
+    ring, arms, tags = points(RINGS[name][0]), *RINGS[name][1:]
+    extract = Extract()
+    extract.way([*ring, ring[0]], highway=tags["highway"], junction="roundabout", name="Circus")
+    for index, path in arms.items():
+        extract.way([ring[index], *points(path)], name=f"Arm {index}", **tags)
+    model = built(extract, tmp_path).model
+    road, pavement = plan(model, "Driving lanes"), plan(model, "Pavements")
+    paved = shapely.union_all([road, plan(model, "Cycle lanes")])
+    (island,) = [
+        shapely.Polygon(hole)
+        for part in shapely.get_parts(paved)
+        for hole in part.interiors
+        if shapely.Polygon(hole).contains(shapely.Point(0, 0))
+    ]
+    middle_line = shapely.Polygon(ring)
+    assert 0.85 < island.area / middle_line.buffer(-1.6).area < 1.25
+    assert island.convex_hull.area < 1.05 * island.area
+    assert pavement.intersection(island).area == pytest.approx(0.0, abs=1e-3)
+    assert plan(model, "Verge strip").intersection(island).area == pytest.approx(0.0, abs=1e-3)
+    walked = shapely.set_precision(pavement, 1e-3)
+    wide = walked.buffer(-0.29, join_style="mitre").buffer(0.35, join_style="mitre")
+    assert walked.difference(wide).area < 0.02
+    street = shapely.union_all([paved, walked]).buffer(0.06, join_style="mitre").buffer(-0.06, join_style="mitre")
+    around = shapely.Point(0, 0).buffer(28)
+    rounded = street.buffer(1.0, join_style="mitre").buffer(-1.0, join_style="mitre")
+    assert rounded.difference(street).intersection(around).difference(island).area < 0.5
+
+
+@pytest.mark.parametrize(("width", "assumed"), [({}, 1), ({"width": "8"}, 0)])
+def test_lanes_whose_width_the_extract_does_not_give_are_assumed(tmp_path, width, assumed):
+    model = built(crossing(**width), tmp_path).model
+    rows = {row.kind: row for row in model.sources()}
+    assert rows["Driving lanes"].assumed == assumed
+    assert rows["Pavements"].assumed == 1
+
+
+def test_arms_of_streets_without_a_name_are_told_apart(tmp_path):
+    extract = Extract(52.5, 15.0)
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway="secondary", lanes=2)
+    extract.way([(0, 0), (0, 200)], highway="residential", name="North Road", lanes=2)
+    model = built(corner_houses(extract), tmp_path).model
+    found = {place.name: place.polygon.centroid for place in model.places if "Crossing" not in place.name}
+    assert set(found) == {"Unnamed street, west arm", "Unnamed street, east arm", "North Road"}
+    assert found["Unnamed street, east arm"].x > 30 > -30 > found["Unnamed street, west arm"].x
+
+
+def test_streets_that_assumed_ramps_raise_are_named(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway="secondary", name="Low Road", lanes=2)
+    over = {"highway": "primary", "name": "High Road", "lanes": 2}
+    extract.way([(60, -200), (60, -30)], **over)
+    extract.way([(60, -30), (60, 30)], bridge="yes", layer="1", **over)
+    extract.way([(60, 30), (60, 200)], **over)
+    extract.way([(0, 0), (0, 45), (60, 60)], highway="residential", name="Side Road", lanes=2)
+    model = built(corner_houses(extract), tmp_path)
+    (note,) = [note for note in model.model.notes if note.startswith("heights are assumed")]
+    assert re.search(r"High Road by up to \d\.\d\d m upwards", note)
+    assert re.search(r"Side Road by up to \d\.\d\d m upwards", note)
+    assert "Low Road" not in note
+
+
+def test_the_message_on_a_place_without_streets_does_not_tell_the_window_as_the_extent(tmp_path):
+    extract = Extract()
+    extract.way([(5000, 0), (5200, 0)], highway="residential", name="Far Street")
+    extract.node(0, 0)
+    with pytest.raises(SeipError, match="no street within 590 m") as raised:
+        built(extract, tmp_path)
+    assert "latitude and" not in str(raised.value)

@@ -6,7 +6,7 @@ from osm_text import Extract, dual_carriageway, left_hand, roundabout
 
 from seip_addon.core.openstreetmap.extract import read_extract, window
 from seip_addon.core.openstreetmap.handedness import drives_on_the_left
-from seip_addon.core.openstreetmap.streets import is_street, lane_counts, write_streets
+from seip_addon.core.openstreetmap.streets import has_lane_count, is_street, lane_counts, write_streets
 from seip_addon.core.progress import finish
 
 
@@ -26,6 +26,9 @@ def streets(extract, tmp_path, **options):
         ({"highway": "residential"}, True),
         ({"highway": "primary_link"}, True),
         ({"railway": "tram"}, True),
+        ({"railway": "light_rail"}, True),
+        ({"railway": "light_rail", "tunnel": "yes"}, False),
+        ({"railway": "rail"}, False),
         ({"highway": "service"}, False),
         ({"highway": "footway"}, False),
         ({"highway": "cycleway"}, False),
@@ -52,13 +55,44 @@ def test_driveways_are_streets_where_they_are_asked_for():
         ({"highway": "primary", "lanes": "3", "lanes:backward": "1"}, {"forward": 2, "backward": 1}),
         ({"highway": "primary", "lanes": "3", "lanes:forward": "2"}, {"forward": 2, "backward": 1}),
         ({"highway": "primary", "oneway": "yes", "lanes": "3"}, {"forward": 3}),
-        ({"highway": "motorway"}, {"forward": 1}),
+        ({"highway": "motorway"}, {"forward": 2}),
+        ({"highway": "motorway_link"}, {"forward": 1}),
+        ({"highway": "trunk", "oneway": "yes"}, {"forward": 2}),
+        ({"highway": "trunk"}, {"forward": 1, "backward": 1}),
+        ({"highway": "primary"}, {"forward": 1, "backward": 1}),
+        ({"highway": "primary", "oneway": "yes"}, {"forward": 1}),
+        ({"highway": "primary", "junction": "roundabout"}, {"forward": 1}),
+        ({"highway": "primary", "oneway": "yes", "turn:lanes": "left|through|"}, {"forward": 3}),
+        ({"highway": "primary", "turn:lanes:backward": "left|through"}, {"forward": 1, "backward": 2}),
         ({"highway": "primary", "lanes": "1"}, {"forward": 1, "backward": 1}),
         ({"highway": "primary", "lanes": "many"}, {"forward": 1, "backward": 1}),
+        ({"highway": "road", "lanes": "2", "lanes:forward": "2", "lanes:backward": "1"}, {"forward": 2, "backward": 1}),
     ],
 )
-def test_how_many_lanes_a_street_has(tags, lanes):
+def test_how_many_lanes_a_street_has(tags, lanes, tmp_path):
     assert lane_counts(tags) == lanes
+    extract = Extract()
+    extract.way([(-100, 0), (100, 0)], **tags)
+    _, (written,), _ = streets(extract, tmp_path)
+    own = {f"lanes:{way}": str(number) for way, number in lanes.items()} if len(lanes) > 1 else {}
+    assert {key: value for key, value in written.items() if key.startswith("lanes")} == (
+        {"lanes": str(sum(lanes.values()))} | own
+    )
+
+
+@pytest.mark.parametrize(
+    ("tags", "known"),
+    [
+        ({"highway": "primary"}, False),
+        ({"highway": "primary", "lanes": "0"}, False),
+        ({"highway": "primary", "lanes": "2"}, True),
+        ({"highway": "primary", "lanes:forward": "1"}, False),
+        ({"highway": "primary", "lanes:forward": "1", "turn:lanes:backward": "left|right"}, True),
+        ({"highway": "primary", "oneway": "yes", "turn:lanes": "left|right"}, True),
+    ],
+)
+def test_whether_the_extract_gives_the_number_of_lanes(tags, known):
+    assert has_lane_count(tags) is known
 
 
 def test_widths_are_shared_out_over_lanes_beside_pavements_and_cycle_lanes(tmp_path):

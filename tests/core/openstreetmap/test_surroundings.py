@@ -12,7 +12,7 @@ from osm_text import Extract
 from seip_addon.core.opendrive.geo_reference import projection
 from seip_addon.core.openstreetmap.buildings import USUAL_HEIGHT
 from seip_addon.core.openstreetmap.extract import read_extract
-from seip_addon.core.openstreetmap.plan_shapes import PlanShapes
+from seip_addon.core.openstreetmap.plan_shapes import MENDED, PlanShapes
 from seip_addon.core.openstreetmap.street_objects import surroundings
 from seip_addon.core.progress import finish
 
@@ -146,7 +146,7 @@ def test_an_outline_that_crosses_itself_is_mended(tmp_path):
     site, shapes = found(extract, tmp_path)
     assert sum(one.outline.area for one in site.buildings) == pytest.approx(200, rel=0.01)
     assert all(one.outline.is_valid for one in site.buildings)
-    assert shapes.dropped["outlines that cross themselves were mended"] == 1
+    assert shapes.dropped[MENDED] == 1
 
 
 def test_trees_lamps_posts_and_walls(tmp_path):

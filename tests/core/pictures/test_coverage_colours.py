@@ -1,7 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from seip_addon.core.pictures.coverage_colours import WEIGHT_COLOURS, as_placed, colouring
+from seip_addon.core.pictures.coverage_colours import as_placed, colouring, of_placement
+from seip_addon.core.pictures.palette import WEIGHT_COLOURS
+from seip_addon.core.placement.deployment import Deployment
 
 SEEN_BY = np.array([0, 1, 2, 3, 7, 0])
 WEIGHT = np.array([1.0, 1.0, 2.0, 4.0, 2.0, 1.0])
@@ -11,7 +15,7 @@ WEIGHT = np.array([1.0, 1.0, 2.0, 4.0, 2.0, 1.0])
     ("aspect", "words", "of"),
     [
         ("seen", ("not seen", "seen"), [0, 1, 1, 1, 1, 0]),
-        ("times", ("not seen", "seen by one sensor", "seen by two", "seen by three or more"), [0, 1, 2, 3, 3, 0]),
+        ("times", ("not seen", "seen by one sensor", "seen by two or more"), [0, 1, 2, 2, 2, 0]),
         ("weights", ("weight 1", "weight 2", "weight 4"), [0, 0, 1, 2, 1, 0]),
     ],
 )
@@ -36,3 +40,12 @@ def test_many_weights_share_classes_in_their_order():
 
 def test_one_weight_is_one_class():
     assert colouring("weights", np.zeros(3, dtype=int), np.ones(3)).words == ("weight 1",)
+
+
+def test_a_placement_by_returns_is_coloured_by_those_from_a_pedestrian():
+    rows = np.zeros((0, 6), dtype=bool)
+    by_coverage = Deployment((), np.array([0, 1, 2, 3, 0, 1]), 0.6, 0.3, None, 0.6, 0.0, rows)
+    assert of_placement(by_coverage).of.tolist() == [0, 1, 2, 2, 0, 1]
+    shown = of_placement(replace(by_coverage, pedestrian_returns=np.array([0.0, 0.99, 1.0, 5.0, 19.9, 20.0])))
+    assert shown.words == ("below 1", "1 to 5", "5 to 20", "20 or more")
+    assert shown.of.tolist() == [0, 0, 1, 2, 2, 3]

@@ -5,14 +5,18 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 import shapely
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.image import imread
-from matplotlib.patches import Wedge
+from matplotlib.patches import Rectangle, Wedge
 
-from seip_addon.core.pictures.drawing import markers_of, percent, summary
+from seip_addon.core.pictures.drawing import draw_title, markers_of, percent, summary
 from seip_addon.core.pictures.palette import SEEN_COLOURS
+from seip_addon.core.pictures.plan_legend import LEGEND_WIDTH
 from seip_addon.core.pictures.plan_view import draw_plan, save_plan_view
 from seip_addon.core.placement.deployment import deploy
+from seip_addon.core.placement.returns_summary import ReturnsSummary
 from seip_addon.core.site.scene_geometry import ASSUMED, Pole
 from tests.small_junction import make_example
 
@@ -81,6 +85,32 @@ def test_any_number_of_sensors_can_be_drawn(example, tmp_path, count):
     assert all(panel.get_ylim()[1] <= text.get_position()[1] <= panel.get_ylim()[0] for text in panel.texts)
 
 
+LAST_NOTE = "This last note has to be read to its end."
+
+
+@pytest.mark.parametrize("count", [3, 24, 45])
+def test_on_a_wide_site_all_labelled_sensors_are_listed_and_no_note_is_cut_off(example, count):
+    site = replace(example.site, region=shapely.box(-300, -20, 300, 20))
+    deployment = deploy(site, example.models, example.visible, np.arange(count))
+    notes = [f"Note {number}: " + 30 * "words " for number in range(8)] + [LAST_NOTE]
+    figure = draw_plan(example.geometry, site, deployment, notes)
+    figure.canvas.draw()
+    legend = figure.axes[1].texts
+    words = [text.get_text() for text in legend]
+    assert [f"S{number}" for number in range(1, min(count, 40) + 1)] == [
+        one for one in words if one[:1] == "S" and one[1:].isdigit()
+    ]
+    assert ("and 5 more" in words) == (count == 45)
+    assert LAST_NOTE in words
+    page = figure.bbox
+    boxes = [text.get_window_extent() for text in legend]
+    assert all(page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1 for box in boxes)
+    columns = sorted(
+        {round(text.get_position()[0], 3) for text in legend if text.get_weight() == "bold" and text.get_size() == 11}
+    )
+    assert len(columns) == 1 or np.diff(columns).min() > LEGEND_WIDTH
+
+
 @pytest.mark.parametrize("size", [(600, 40), (100, 100), (40, 600)])
 def test_a_metre_is_as_long_across_as_upwards_and_the_whole_region_is_shown(example, size):
     region = shapely.box(0, 0, *size)
@@ -90,6 +120,18 @@ def test_a_metre_is_as_long_across_as_upwards_and_the_whole_region_is_shown(exam
     (left, right), (bottom, top) = plan.get_xlim(), plan.get_ylim()
     assert box.width / (right - left) == pytest.approx(box.height / (top - bottom))
     assert shapely.box(left, bottom, right, top).contains(region)
+
+
+@pytest.mark.parametrize("corners", [((0, 0), (100, 80)), ((0, 0), (100, 20)), ((0, 30), (45, 100))])
+def test_neither_scale_nor_north_arrow_hides_the_region(example, corners):
+    (left, bottom), (right, top) = corners
+    region = shapely.LineString([(left, bottom), (right, top)]).buffer(4.0, cap_style="flat")
+    site = type(example.site)(**{**vars(example.site), "region": region})
+    plan = draw_plan(example.geometry, site, example.deployment).axes[0]
+    papers = [patch for patch in plan.patches if isinstance(patch, Rectangle) and patch.get_alpha() == 0.9]
+    assert len(papers) == 2
+    for paper in papers:
+        assert not region.intersects(shapely.box(*paper.get_bbox().extents))
 
 
 def test_the_legend_gives_the_weight_of_an_area_whether_or_not_it_counted(example):
@@ -144,6 +186,28 @@ def test_the_summary_says_what_was_placed(example):
     assert f"${sum(sensor.model.price for sensor in example.deployment.sensors):,.0f}" in words
 
 
+def test_the_summary_and_the_plan_name_installed_prices(example):
+    assert "installed" not in summary(example.deployment)
+    paid = tuple(replace(sensor, installation=9_000.0) for sensor in example.deployment.sensors)
+    deployment = replace(example.deployment, sensors=paid, price=sum(sensor.price for sensor in paid))
+    assert f"price ${deployment.price:,.0f} installed" in summary(deployment)
+    words = [text.get_text() for text in draw_plan(example.geometry, example.site, deployment).texts]
+    assert any("installed" in text for text in words)
+
+
+def test_the_legend_counts_one_post_as_one(example):
+    candidates = example.site.candidates
+    (first, *others), words = np.flatnonzero(~candidates.on_pole), []
+    for kept in ([first], [first, others[0]]):
+        on_pole = np.ones(len(candidates.position), dtype=bool)
+        on_pole[kept] = False
+        site = replace(example.site, candidates=replace(candidates, on_pole=on_pole))
+        figure = draw_plan(example.geometry, site, example.deployment)
+        words.append({text.get_text() for text in figure.axes[1].texts})
+    assert "1 possible new post" in words[0]
+    assert "2 possible new posts" in words[1]
+
+
 def test_assumed_poles_have_a_mark_of_their_own(example):
     """Those that carry nothing are drawn as well: they are in the way, and are not to be taken for the map's."""
     pole = Pole("guess", np.array((-12.0, 9.0, 0.1)), source=ASSUMED)
@@ -155,3 +219,24 @@ def test_assumed_poles_have_a_mark_of_their_own(example):
     assert not any("assumed" in text.get_text() for text in plain.axes[1].texts)
     marked = pixel_at(draw_plan(geometry, example.site, example.deployment), (-12.0, 9.0))
     assert np.abs(marked - pixel_at(plain, (-12.0, 9.0))).max() > 0.05
+
+
+def test_the_map_carries_the_credits_of_its_sources(example):
+    sources = ("© OpenStreetMap contributors (ODbL)", "Surveyors $& Sons")
+    credited, plain = (
+        [text.get_text() for text in draw_plan(example.geometry, site, example.deployment).axes[0].texts]
+        for site in (replace(example.site, attribution=sources), example.site)
+    )
+    assert "\n".join(sources) in credited
+    assert not any("OpenStreetMap" in text for text in plain)
+
+
+def test_the_summary_of_a_placement_by_returns_begins_with_them_and_fits_the_page(example):
+    returns = ReturnsSummary(98765.0, dict.fromkeys(("car", "cyclist", "pedestrian"), 98765.0), ())
+    deployment = replace(example.deployment, returns=returns)
+    assert summary(deployment).startswith("98,765 returns from a car, ")
+    figure = Figure((6.0, 4.0), dpi=100)
+    FigureCanvasAgg(figure)
+    draw_title(figure, example.site, deployment, 0.3)
+    line = figure.texts[-1].get_window_extent()
+    assert 29.9 <= line.x0 < line.x1 <= 571

@@ -1,10 +1,15 @@
 """Limits of time and of counted work."""
 
 import math
+from itertools import count
+
+from headless.lab.benchmark.street_visibility import street_problem
 
 import pytest
 
-from seip_addon.core.placement.search_limits import OPERATIONS_PER_UNIT, Clock
+from seip_addon.core.placement import SolverLimits, search_limits, solve
+from seip_addon.core.placement.search_limits import DEFAULT_EFFORT, OPERATIONS_PER_UNIT, Clock
+from seip_addon.core.progress import finish
 
 
 def test_work_counts_alike_on_every_machine() -> None:
@@ -37,3 +42,19 @@ def test_a_part_of_a_limit_of_time_may_be_counted() -> None:
     part = Clock(1000.0).counted_part(2.0)
     assert part.counts_work
     assert part.left == pytest.approx(2.0)
+
+
+def test_without_any_limit_given_a_search_is_limited_by_work_and_never_by_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = street_problem(60, 800, heights=1, count=6)
+    alone = finish(solve(problem))
+    ticks = count(0.0, 1000.0)  # a machine on which any step takes a quarter of an hour
+    monkeypatch.setattr(search_limits.time, "perf_counter", lambda: next(ticks))
+    loaded = finish(solve(problem))
+    first, second = ((one.status, one.bound, one.chosen.tolist(), one.notes) for one in (alone, loaded))
+    assert first == second
+
+
+def test_a_time_limit_replaces_the_default_limit_of_work() -> None:
+    assert SolverLimits().clock().left == DEFAULT_EFFORT
+    assert not SolverLimits(time_limit=5.0).clock().counts_work
+    assert SolverLimits(time_limit=1e6, effort=5.0).clock().left == 5.0

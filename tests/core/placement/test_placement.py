@@ -20,6 +20,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import (
     PlacementProblem,
     SolverLimits,
+    cheapest,
     cheapest_for_coverage,
     integer_program,
     solve,
@@ -35,6 +36,9 @@ from seip_addon.core.progress import Progress, finish
 if TYPE_CHECKING:
     from collections.abc import Generator
     from pathlib import Path
+
+    from seip_addon.core.arrays import Integer
+    from seip_addon.core.placement.reduced_problem import Instance
 
 
 def row_problem(visible: list[list[int]], **changes: object) -> PlacementProblem:
@@ -263,6 +267,21 @@ def test_a_program_out_of_time_is_not_called_infeasible(monkeypatch: pytest.Monk
         finish(solve(row_problem(halves, mandatory=first_two)))
 
 
+def test_the_note_on_an_unproven_price_fits_the_gap(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The gap is a share of the price that was found: half of it may be saved where it is 50%."""
+    monkeypatch.setattr(cheapest, "_cheapest", unproven)
+    placement = finish(cheapest.cheapest_for_coverage(row_problem(halves, prices=np.array([2.0, 4.0, 3.0, 5.0])), 0.9))
+    assert placement.bound == placement.objective / 2
+    assert placement.gap == 0.5
+    assert any("the gap is the share of its price that another one may save" in note for note in placement.notes)
+
+
+def unproven(instance: Instance, chosen: Integer, *_: object) -> Generator[Progress, None, tuple[Integer, float]]:
+    """Stand for a search that runs out of time with a bound of half the price."""
+    yield from ()
+    return chosen, math.fsum(instance.price[chosen]) / 2
+
+
 @pytest.mark.parametrize("limit", [0.0, -1.0, float("nan")])
 def test_a_time_limit_is_positive(limit: float) -> None:
     with pytest.raises(SeipError, match="give a positive number of seconds"):
@@ -426,7 +445,7 @@ def test_more_effort_proves_no_less() -> None:
 
 @pytest.mark.slow
 def test_an_answer_that_is_not_proven_says_what_more_time_does() -> None:
-    short, longer = (finish(solve(hard_problem(), SolverLimits("highs", math.inf, effort))) for effort in (0.5, 1.0))
+    short, longer = (finish(solve(hard_problem(), SolverLimits("highs", math.inf, effort))) for effort in (1.5, 2.0))
     assert "hardly closed in the second half of the time" in short.notes[1]
     assert "at half the time and is" in longer.notes[1]
 

@@ -16,10 +16,14 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import bounds
 from seip_addon.core.placement.bounds import lagrangian_bound
 from seip_addon.core.placement.decomposition import decomposition_bound
-from seip_addon.core.placement.greedy import greedy, tabu_search
+from seip_addon.core.placement.greedy import greedy
+from seip_addon.core.placement.local_search import composition_search
 from seip_addon.core.placement.reduced_problem import make_instance
 from seip_addon.core.placement.search_limits import Clock
+from seip_addon.core.placement.solver import Proof, lower_by_goals
 from seip_addon.core.progress import finish
+
+NONE = np.zeros(0, np.int64)  # no candidate chosen
 
 
 def forever():
@@ -63,6 +67,26 @@ def test_every_placement_that_reaches_the_goal_is_left(problem, share):
     assert all(instance.value(choice) <= bound.value + instance.slack for choice in reaching)
 
 
+@pytest.mark.parametrize("effort", [math.inf, 0.002])
+@cases(150)
+@given(small_problems())
+def test_goals_out_of_reach_bound_the_best_placement(effort, problem):
+    instance = reduced(problem)
+    assume(instance is not None)
+    best = max(map(instance.value, feasible(instance)), default=0.0)
+    chosen = min(feasible(instance), key=instance.value, default=None)
+    assume(chosen is not None)
+    keep, bound = finish(lagrangian_bound(instance, instance.value(chosen), forever()))
+    assume(np.isin(chosen, keep).all())
+    instance, chosen = instance.part(keep), np.searchsorted(keep, chosen)
+    known, clock = Proof(chosen, bound.value, optimal=False), Clock(math.inf, effort)
+    proof = finish(lower_by_goals(instance, bound, known, clock))
+    assert proof.bound >= best - instance.slack
+    assert instance.feasible(proof.chosen)
+    if proof.optimal:
+        assert instance.value(proof.chosen) >= best - instance.slack
+
+
 @cases(100)
 @given(small_problems())
 def test_tabu_search_keeps_the_constraints_and_never_ends_worse(problem):
@@ -70,7 +94,7 @@ def test_tabu_search_keeps_the_constraints_and_never_ends_worse(problem):
     assume(instance is not None)
     choices = feasible(instance)
     assume(choices)
-    found = finish(tabu_search(instance, choices[0], forever(), math.inf))
+    found = finish(composition_search(instance, choices[0], choices[0], forever()))
     assert instance.feasible(found)
     assert instance.value(found) >= instance.value(choices[0])
 
@@ -78,10 +102,10 @@ def test_tabu_search_keeps_the_constraints_and_never_ends_worse(problem):
 @pytest.mark.slow
 def test_districts_and_exchanges_close_most_of_the_gap_of_many_sensors():
     instance, _ = make_instance(street_problem(60, 800, blocks=2, count=7))
-    chosen = greedy(instance, np.zeros(0, np.int64))
-    searched = finish(tabu_search(instance, chosen, forever(), math.inf))
+    chosen = greedy(instance, NONE)
+    searched = finish(composition_search(instance, NONE, chosen, forever()))
     _, bound = finish(lagrangian_bound(instance, instance.value(searched), forever()))
     by_districts = finish(decomposition_bound(instance, instance.value(searched), forever(), math.inf))
     assert instance.value(chosen) < instance.value(searched) <= by_districts < bound.value
-    again = finish(tabu_search(instance, chosen, forever(), math.inf))
+    again = finish(composition_search(instance, NONE, chosen, forever()))
     np.testing.assert_array_equal(searched, again)

@@ -12,6 +12,7 @@ import shapely
 from seip_addon.core.opendrive.geo_reference import GeoReference
 from seip_addon.core.pictures.plan_view import save_plan_view
 from seip_addon.core.placement import Placement
+from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.objective import Objective, Solution, placement_problem
 from seip_addon.core.results.placement_record import Provenance, placement_record, save_placement_record
 from seip_addon.core.results.site_file import save_site_file
@@ -67,9 +68,11 @@ def make_folder(folder: Path, *, goal: Objective | None = None, place: GeoRefere
 
 def make_solution(example: Example, goal: Objective, **found) -> Solution:
     chosen = np.array([sensor.pose for sensor in example.deployment.sensors])
-    value = float(np.count_nonzero(example.deployment.seen_by))
+    deployment = example.deployment
+    if "chosen" in found:
+        chosen = found.pop("chosen")
+        deployment = deploy(example.site, example.models, example.visible, chosen)
+    value = float(np.count_nonzero(deployment.seen_by))
     values = {"objective": value, "bound": value, "gap": 0.0, "status": "optimal", **found}
-    placement = Placement(
-        chosen=chosen, solver="HiGHS", seconds=0.5, covered=value, price=example.deployment.price, **values
-    )
-    return Solution(goal, placement, None, example.deployment)
+    placement = Placement(chosen=chosen, solver="HiGHS", seconds=0.5, covered=value, price=deployment.price, **values)
+    return Solution(goal, placement, None, deployment)

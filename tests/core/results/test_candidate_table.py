@@ -27,6 +27,15 @@ def test_there_is_one_row_for_each_pose_with_all_columns(example, rows):
     assert [int(row["pose"]) for row in rows] == list(range(len(rows)))
 
 
+def test_a_name_that_is_a_formula_is_written_as_text(example, tmp_path):
+    names = example.site.candidates.position_name.astype("U64")
+    names[:] = '=HYPERLINK("http://example.com")'
+    site = replace(example.site, candidates=replace(example.site.candidates, position_name=names))
+    save_candidate_table(tmp_path / "a.csv", site, example.models, example.visible, example.deployment)
+    with (tmp_path / "a.csv").open(newline="", encoding="utf-8") as file:
+        assert '\'=HYPERLINK("http://example.com")' in {row["position"] for row in csv.DictReader(file)}
+
+
 def test_rows_say_what_each_pose_sees_and_where_it_is(example, rows):
     candidates, weight = example.site.candidates, example.site.targets.weight
     for pose in (0, 17, len(rows) - 1):

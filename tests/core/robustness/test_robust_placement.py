@@ -262,3 +262,37 @@ def test_too_few_sensors_are_refused():
     )
     with pytest.raises(SeipError, match="at least 2 sensors"):
         finish(solve_robust(problem, pack(problem.visible[None]), Risk(failure="worst")))
+
+
+def test_whole_weights_are_compared_exactly_however_many_sensors_must_see_a_target():
+    weights = np.array([2.0**32, 1.0])
+    sees = np.array([[1, 0], [1, 1], [0, 1]], dtype=bool)
+    problem = PlacementProblem(
+        visible=sees,
+        weights=weights,
+        prices=np.ones(3),
+        positions=np.arange(3),
+        xyz=np.column_stack([np.arange(3.0), np.zeros((3, 2))]),
+        labels=np.full(3, "type1"),
+        count=3,
+    )
+    for risk in (Risk(seen_by=2), Risk(seen_by=2, tail=0.5)):
+        answer = finish(solve_robust(problem, pack(np.stack([sees, sees])), risk))
+        assert (answer.objective, len(answer.chosen)) == (2.0**32 + 1, 3)  # the third sensor adds one unit of weight
+
+
+def test_ties_of_weights_without_a_common_unit_are_those_within_the_tolerance_of_the_best():
+    problem, _ = crowd(1, 5)
+    instance, _ = make_instance(problem)
+    root = finish(lagrangian_bound(instance, 0.0, Clock(math.inf)))
+    ones = [choice for choice in combinations(range(len(instance)), 3) if instance.feasible(np.array(choice))]
+    three, two, four = (
+        ones[0],
+        ones[0][:2],
+        next((*ones[0], last) for last in range(len(instance)) if instance.feasible(np.unique((*ones[0], last)))),
+    )
+    values = {tuple(sorted(choice)): value for choice, value in ((three, 10.0), (two, 9.1), (four, 10.5))}
+    search = BestUnderRisk(instance, 1.0, lambda choice: values[tuple(choice.tolist())], np.array(three), 1.0, root)
+    for choice in (two, four):  # the first ties with the one before, not with the best
+        search.offer(np.array(choice))
+    assert (tuple(search.best), search.value, search.goal) == (three, 10.0, 9.5)

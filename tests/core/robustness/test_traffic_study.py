@@ -24,12 +24,18 @@ from seip_addon.core.progress import finish
 from seip_addon.core.robustness.robust_placement import at_least
 from seip_addon.core.robustness.traffic_instants import NO_TRAFFIC, WARM_UP, spread_instants
 from seip_addon.core.robustness.traffic_presence import road_user_seconds
-from seip_addon.core.robustness.traffic_study import traffic_scenarios, traffic_study, traffic_warnings
+from seip_addon.core.robustness.traffic_study import (
+    LAYER_NAMES,
+    traffic_scenarios,
+    traffic_study,
+    traffic_warnings,
+)
 from seip_addon.core.robustness.visibility_in_traffic import visibility_in_traffic
 from seip_addon.core.robustness.visibility_under_errors import Surroundings
 from seip_addon.core.traffic import RoadUser
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.workflows.traffic import traffic_messages
 
 pytestmark = needs_any
 
@@ -129,7 +135,17 @@ def test_it_says_what_traffic_hides(study):
     assert "24 road users at a time" in rows[0].regime
     road = found.empty.seen["road"]
     assert f"of what the empty road promises vehicles hide {road.hidden.describe()}" in rows[0].begins
-    assert f", {found.gain(found.layer).as_points()} more" in rows[2].begins
+    assert f", {found.gain(found.layer).as_change()}" in rows[2].begins
+
+
+def test_a_result_that_is_worse_in_traffic_is_called_worse(study):
+    _, found = study
+    seen = found.empty.seen
+    worse = {layer: replace(one, at=one.at - 0.0071) for layer, one in seen.items()}
+    message = traffic_messages(replace(found, traffic=replace(found.traffic, seen=worse)))[0]
+    assert "this placement sees 0.71 points [" in message
+    assert f"] less of the {LAYER_NAMES[found.layer]} than the best placement for the empty road" in message
+    assert "-0.71" not in message
 
 
 def test_a_search_cut_short_returns_nothing_worse_than_the_placement_for_the_empty_road(study):

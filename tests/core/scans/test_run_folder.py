@@ -198,6 +198,14 @@ def _dazzling(arrays):
     arrays["intensity"][0] = 1e9
 
 
+def _miscounted(arrays):
+    arrays["labels.points"][0, 0] += 1
+
+
+def _rocket(arrays):
+    arrays["labels.speed"][0] = 1e30
+
+
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
@@ -207,6 +215,8 @@ def _dazzling(arrays):
         (_uncounted, "sensors that the labels do not count"),
         (_nowhere, "points has the value nan"),
         (_dazzling, "intensity has the value"),
+        (_miscounted, "the labels count other points than there are"),
+        (_rocket, "labels.speed has the value"),
     ],
 )
 def test_a_frame_that_contradicts_itself_is_refused(tmp_path, change, sentence) -> None:
@@ -217,6 +227,35 @@ def test_a_frame_that_contradicts_itself_is_refused(tmp_path, change, sentence) 
     FILE.save(path, header, arrays)
     with pytest.raises(SeipError, match=sentence):
         Frame.load(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda record: record["frames"][1].update(points=5), "contradicts 000001.npz"),
+        (lambda record: record["frames"][1].update(time_s=0.15), "contradicts 000001.npz"),
+        (lambda record: record["frames"][1].update(time_s=-3.0), "is damaged"),
+        (lambda record: record["frames"][1].update(time_s=1e300), "is damaged"),
+        (lambda record: record["frames"][1].update(points=-1), "is damaged"),
+        (lambda record: record["frames"][1].update(road_users=99), "is damaged"),
+        (lambda record: record["sensors"].append(record["sensors"][0]), "contradicts 000000.npz"),
+        (lambda record: record["sensors"][0].update(local_m=[1e30, 0.0, 0.0]), "is damaged"),
+    ],
+)
+def test_a_manifest_that_contradicts_its_frames_is_refused(tmp_path, change, sentence) -> None:
+    finish(steps(tmp_path, make_run()))
+    record = json.loads((tmp_path / "manifest.json").read_text())
+    change(record)
+    (tmp_path / "manifest.json").write_text(json.dumps(record))
+    with pytest.raises(SeipError, match=sentence):
+        list(load_frames(tmp_path))
+
+
+def test_a_run_is_not_written_into_the_folder_of_a_placement(tmp_path) -> None:
+    (tmp_path / "placement.json").write_text("{}")
+    with pytest.raises(SeipError, match="holds a placement"):
+        finish(steps(tmp_path, make_run()))
+    assert [path.name for path in tmp_path.iterdir()] == ["placement.json"]
 
 
 def test_a_manifest_of_another_version_has_its_sentence(tmp_path) -> None:

@@ -121,7 +121,7 @@ def test_no_sensor_hangs_above_its_pole():
     heights = {name: candidates.height[candidates.position_of == i] for i, name in enumerate(candidates.position_name)}
     assert heights["low"].tolist() == [3.5, 6.5]
     assert heights["mark"].tolist() == [3.5, 6.5, 6.6, 8.0]
-    assert candidates.dropped["higher than their pole"] == 2
+    assert candidates.dropped["higher than the pole"] == 2
 
 
 def test_what_lies_inside_an_object_is_dropped_and_counted():
@@ -165,7 +165,7 @@ def test_forbidden_areas_and_poles_are_left_out():
     assert "a" not in candidates.position_name
     assert "b" in candidates.position_name
     assert candidates.position[:, 0].min() > -10
-    assert candidates.dropped["forbidden poles"] == 1
+    assert candidates.dropped["on a forbidden pole"] == 1
     assert candidates.dropped["in a forbidden area"] > 0
 
 

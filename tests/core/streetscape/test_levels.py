@@ -1,6 +1,7 @@
 """Roads above roads: a scene has one level, told by how roads connect, or by the user."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import SiteDescription, read_site_description
+from seip_addon.core.streetscape.levels import Crossing
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.streetscape.parts import Role
 
@@ -143,3 +145,68 @@ def test_the_bridge_of_a_real_town_makes_no_curtain(near, roads, z):
     surface = [part for part in model.parts if part.name in {"Driving lanes", "Shoulders", "Verge", "Verge strip"}]
     for part in surface:
         np.testing.assert_allclose(part.solid.vertices[:, 2] + model.origin[2], z, atol=0.3)
+
+
+@pytest.mark.parametrize(
+    ("streets", "called"),
+    [
+        (("High Road", "Low Road"), "High Road lies 6.0 m above Low Road"),
+        (("High Road", ""), "High Road lies 6.0 m above a street without a name"),
+        (("", "Low Road"), "a street without a name lies 6.0 m above Low Road"),
+        (("Ring", "ring"), "Ring (road 5) lies 6.0 m above ring (road 2)"),
+        (("", ""), "road 5 lies 6.0 m above road 2"),
+    ],
+)
+def test_messages_name_streets_as_far_as_they_have_names(streets, called):
+    crossing = Crossing("5", "2", 6.0, (0.2, -0.3), streets)
+    assert str(crossing) == f"{called} at (0, 0)"
+    own = {name for name in (*streets, "5", "2") if name}
+    assert set(crossing.levels) <= own
+    assert len({level.casefold() for level in crossing.levels}) == 2
+
+
+def test_the_carriageways_of_one_street_are_one_note(tmp_path):
+    low = [street(str(n), x, 0, 60) for n, x in ((1, -90), (2, -30), (3, 30))]
+    high = [street(number, x, -90, 180, np.pi / 2, z=DECK) for number, x in (("4", -8), ("5", 8))]
+    road_map = read_text(tmp_path, document(*low, *high))
+    names = {"4": "High Road", "5": "High Road", "2": ""}
+    roads = tuple(replace(one, name=names.get(one.id, "")) for one in road_map.roads)
+    model = finish(site_model(replace(road_map, roads=roads), SiteDescription(near=(-40, 0), radius=50.0)))
+    notes = [note for note in model.notes if "another level" in note]
+    (note,) = notes
+    assert note == (
+        "High Road lies 6.0 m above a street without a name at (-8, 0): the upper one is on another level, in the way "
+        "but not studied"
+    )
+
+
+def test_of_two_roads_as_many_joints_away_the_nearer_one_is_studied(tmp_path):
+    """Road 1 leads to the lower road over 30 m, road 7 to the bridge over 130 m."""
+    middle = street("0", -90, 0, 60)
+    low = [street("1", -30, 0, 30), street("2", 0, 0, 60)]
+    ramp = road(
+        geometry(length=130.0, x=-90.0, y=0.0, hdg=-np.pi / 2), LANES, number="7",
+        elevation=f'<elevation s="0" a="0" b="{DECK / 130}" c="0" d="0"/>',
+    )  # fmt: skip
+    deck = street("8", -90, -130, 240, np.arctan2(170, 120), z=DECK)
+    model = built(tmp_path, (-60, 0), text=document(middle, *low, ramp, deck), radius=80.0)
+    assert any("road 8 lies 6.0 m above road" in note and "the upper one" in note for note in model.notes)
+
+
+def test_where_a_street_to_the_other_level_branches_off_the_surface_is_studied(tmp_path):
+    """Road 2 climbs from road 1 to a bridge; road 4 turns off road 1 on to road 6, which leads beneath the bridge."""
+    climb = road(
+        geometry(length=90.0, x=-30.0, y=0.0), LANES, number="2",
+        elevation=f'<elevation s="0" a="0" b="{DECK / 90}" c="0" d="0"/>',
+    )  # fmt: skip
+    turn = street("4", -45, 0, 30, -0.35)
+    end = np.array([-45 + 30 * np.cos(0.35), -30 * np.sin(0.35)])
+    beneath = street("6", *end, 130, 0.0961)
+    text = document(street("1", -90, 0, 60), climb, street("3", 60, 0, 60, z=DECK), turn, beneath)
+    model = built(tmp_path, (-60, 0), text=text, radius=170.0)
+    assert any("road 6" in note and "the lower one is on another level" in note for note in model.notes)
+    where = {part.name: part.solid.vertices + model.origin for part in model.parts}
+    assert where["Roads below"][:, 0].min() == pytest.approx(end[0], abs=2.0)
+    assert where["Driving lanes"][:, 1].min() < end[1]
+    above = where.get("Roads above", np.full((1, 3), DECK))
+    assert above[:, 2].min() > 5.0  # nothing hangs at knee height over the studied road

@@ -105,11 +105,11 @@ def test_a_long_fence_does_not_spread_the_ground_over_the_map(tmp_path):
     [
         (
             "[[building]]\noutline = [[0, 9], [9, 9], [9, 19]]\nheight = 90000",
-            "building 1: height must be at most 1000",
+            "building 1: height must be 0.01 to 1,000 m",
         ),
-        ("[[tree]]\nposition = [0, 9]\nheight = 2000", "tree 1: height must be at most 1000"),
-        ("[[street_light]]\nposition = [0, 9]\nheight = 2000", "street_light 1: height must be at most 1000"),
-        ("radius = 6000", "radius must be at most 5000"),
+        ("[[tree]]\nposition = [0, 9]\nheight = 2000", "tree 1: height must be 0.01 to 1,000 m"),
+        ("[[street_light]]\nposition = [0, 9]\nheight = 2000", "street_light 1: height must be 0.01 to 1,000 m"),
+        ("radius = 6000", "radius must be 0.1 to 5,000 m"),
         ("region = [[0, 0], [12000, 0], [0, 9]]", "region must be at most 10000 m across"),
     ],
 )
@@ -119,7 +119,7 @@ def test_a_description_has_limits_too(tmp_path, table, complaint):
     with pytest.raises(SeipError, match=complaint):
         read_site_description(path)
     if table.startswith("radius"):
-        with pytest.raises(SeipError, match="at most 5000 m"):
+        with pytest.raises(SeipError, match=r"must be 0\.1 to 5,000 m"):
             describe_place(tmp_path / "map.xodr", near=(0.0, 0.0), radius=6000.0)
 
 

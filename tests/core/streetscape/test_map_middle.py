@@ -34,6 +34,6 @@ def test_junctions_without_roads_are_left_out(tmp_path):
     assert [each.id for each in read_text(tmp_path, text).junctions_with_roads()] == ["5"]
 
 
-def test_a_line_that_lies_within_a_junction_is_not_painted():
+def test_a_line_outside_the_painted_area_is_not_painted():
     edge = np.array([(0.0, 0.0, 0.0), (10.0, 0.0, 0.0)])
-    assert _line(edge, shapely.box(-1, -1, 11, 1), dashed=True) == []
+    assert _line(edge, shapely.box(11, -1, 20, 1), dashed=True) == []

@@ -13,7 +13,7 @@ from street_map import street_map
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import assumed_pole_warnings, generate_candidates
-from seip_addon.core.site.scene_geometry import ASSUMED, DESCRIBED, FROM_MAP, Pole
+from seip_addon.core.site.scene_geometry import ASSUMED, DESCRIBED, FROM_EXTRACT, FROM_MAP, Pole
 from seip_addon.core.streetscape.description import Poles, SiteDescription
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.streetscape.parts import Role
@@ -173,9 +173,9 @@ def test_assumed_poles_are_no_candidates_unless_asked_for():
     scene = street(poles=(Pole("a", np.array((0.0, 9.0, 0.1)), source=ASSUMED), Pole("b", np.array((9.0, 9.0, 0.1)))))
     plain, asked = generate_candidates(scene, PLAIN), generate_candidates(scene, replace(PLAIN, assumed_poles=True))
     assert "a" not in plain.position_name
-    assert plain.dropped["assumed poles"] == 1
+    assert plain.dropped["on an assumed pole"] == 1
     assert "1 pole is assumed" in assumed_pole_warnings(scene, plain)[0]
-    assert "carry no sensors" in assumed_pole_warnings(scene, plain)[0]
+    assert "carries no sensors" in assumed_pole_warnings(scene, plain)[0]
     assert dict(zip(asked.position_name, asked.pole_source, strict=True))["a"] == ASSUMED
     assert "may carry sensors" in assumed_pole_warnings(scene, asked)[0]
     assert assumed_pole_warnings(street(), plain) == ()
@@ -184,3 +184,38 @@ def test_assumed_poles_are_no_candidates_unless_asked_for():
 def test_an_assumed_pole_that_is_marked_mandatory_is_meant():
     scene = street(poles=(Pole("a", np.array((0.0, 9.0, 0.1)), source=ASSUMED, mandatory=True),))
     assert "a" in generate_candidates(scene, PLAIN).position_name
+
+
+@pytest.mark.parametrize(("t", "carries"), [(-5.5, True), (-3.2, True), (-2.0, False)])
+def test_a_post_that_the_map_has_in_a_lane_carries_no_sensor(tmp_path, t, carries):
+    """The driving lanes end 3.5 m from the middle."""
+    built = model(tmp_path, furniture=obj("streetLamp", t=t, name="lamp", size='height="8"'))
+    (lamp,) = (part for part in built.parts if part.name == "lamp")
+    assert lamp.roles == ((Role.POLES,) if carries else (Role.OCCLUDERS,))
+
+
+@pytest.mark.parametrize(("y", "carries"), [(-5.5, True), (-3.2, True), (-2.0, False), (-0.1, None)])
+def test_a_lamp_of_an_extract_that_lies_in_a_lane_carries_no_sensor(tmp_path, y, carries):
+    lamp = Poles(np.array([[0.0, y]]), 8.0, 1.5, None, FROM_EXTRACT)
+    built = model(tmp_path, replace(HERE, street_lights=(lamp,)))
+    lamps = [part for part in built.parts if part.name.startswith("Street light")]
+    assert [part.roles for part in lamps] == ([] if carries is None else [(Role.POLES if carries else Role.OCCLUDERS,)])
+    assert any("in a lane" in note for note in built.notes) is (carries is not True)
+
+
+def test_what_keeps_sensors_off_a_pole_goes_with_it(tmp_path):
+    pole = Poles(np.array([[0.0, -8.0]]), 9.0, 0.0, None, FROM_EXTRACT, name="Power pole", keep_off="power-poles")
+    built = model(tmp_path, replace(HERE, posts=(pole,)))
+    (part,) = (part for part in built.parts if part.name == "Power pole 1")
+    assert (part.roles, part.keep_off) == ((Role.POLES,), "power-poles")
+
+
+@pytest.mark.parametrize("height", ["0", "1e-300", "0.004", "-3"])
+@pytest.mark.parametrize("signals", ["", signal()], ids=["alone", "with a signal"])
+def test_a_post_without_a_height_that_can_be_stands_as_high_as_others(tmp_path, height, signals):
+    own = obj(size=f'height="{height}" radius="0.1"')
+    built = model(tmp_path, furniture=own, signals=signals)
+    tops = [part.solid.vertices[:, 2].max() for part in built.parts if "pole" in part.name.lower()]
+    assert np.isfinite(tops).all()
+    assert min(tops, default=math.inf) > 4.0
+    assert all(np.isfinite(part.solid.vertices).all() for part in built.parts)

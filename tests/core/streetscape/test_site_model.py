@@ -332,3 +332,19 @@ def test_real_maps_become_one_sound_layer(name, place):
     if name == "Town05":  # its lanes cross each other in every junction
         assert plan_sum(driving) == pytest.approx(plan(driving).area, rel=0.002)
         assert sum(len(each.solid.faces) for each in built.parts) < 20_000
+
+
+CROSSWALK = (
+    '<object id="9" type="crosswalk" name="" s="100" t="0" zOffset="0" hdg="{heading}" length="{length}" '
+    'width="{width}"/>'
+)
+
+
+@pytest.mark.parametrize(("length", "width", "heading"), [(3, 7, 0), (7, 3, 1.5707963)])
+def test_new_posts_keep_off_the_landings_of_a_crossing_of_the_map(tmp_path, length, width, heading):
+    furniture = CROSSWALK.format(length=length, width=width, heading=heading)
+    built = model(tmp_path, replace(HERE, radius=30.0), furniture=furniture)
+    (landings,) = (one for one in built.parts if one.keep_off == "landings")
+    assert landings.roles == (Role.FORBIDDEN_AREAS,)
+    wanted = shapely.union_all([shapely.box(-11.5, y, -8.5, y + 2) for y in (3.5, -5.5)])
+    assert shapely.affinity.translate(plan(landings), *built.origin[:2]).symmetric_difference(wanted).area < 0.1

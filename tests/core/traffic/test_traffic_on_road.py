@@ -107,7 +107,7 @@ def test_pedestrians_walk_on_pavements_and_vehicles_do_not():
     region = shapely.box(-80.0, -4.0, 80.0, 12.0)
     walks = fit_to_road(moving([0.0, 1.0], 8.0, WALKER), scene(ground=ground, region=region)).trajectories
     assert (walks.position[:, 2] == 9.0).all()
-    with pytest.raises(SeipError, match="FCD of another map: 1 of 1 road users"):
+    with pytest.raises(SeipError, match="FCD of another map: 1 of 1 road user"):
         fit_to_road(moving([0.0, 1.0], 8.0), scene(ground=ground, region=region))
 
 
@@ -125,7 +125,7 @@ def test_who_leaves_the_road_is_named_and_cut_in_two():
     y = np.where(np.abs(np.arange(-20.0, 21.0)) < 3.0, 15.0, 0.0)
     fit = fit_to_road(together(moving(np.arange(-20.0, 21.0), y), moving([0.0, 1.0], 0.0)), scene(region=region))
     assert fit.warnings == (
-        f"1 of 2 road users leave the road by more than {ROAD_TOLERANCE:g} m and are left out there: car",
+        f"1 of 2 road users leaves the road by more than {ROAD_TOLERANCE:g} m and is left out there: car",
     )
     assert [user.name for user in fit.trajectories.users] == ["car", "car/2", "car"]
     assert np.diff(fit.trajectories.first).tolist() == [18, 18, 2]
@@ -187,7 +187,7 @@ def test_a_single_sample_is_no_stay():
 
 
 def test_the_traffic_of_another_map_is_refused_and_named():
-    with pytest.raises(SeipError, match="none of its 1 road users comes into the region"):
+    with pytest.raises(SeipError, match="1 road user, none in the region"):
         fit_to_road(moving([5000.0, 5001.0], 0.0), scene())
     region = shapely.box(-80.0, -40.0, 80.0, 40.0)
     strays = [moving([0.0, 1.0], 20.0, replace(CAR, name=f"stray {number}")) for number in range(7)]

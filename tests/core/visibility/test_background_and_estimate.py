@@ -1,16 +1,17 @@
 """Work in a thread that nobody waits for, and visibility that stops soon and is estimated well."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from engines import ANY
 from synthetic_junction import junction_site
 
-from seip_addon.background import Background, Pace
+from seip_addon.background import Background
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.progress import Progress, finish
+from seip_addon.core.progress import Pace, Progress, finish
 from seip_addon.core.visibility.estimate import estimate_visibility
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.settings import VisibilitySettings
@@ -50,6 +51,23 @@ def test_the_pace_tells_how_long_it_takes_still():
     assert pace.seconds_left is None
     pace.note(Progress(40, 100, "rays"), 56.0)
     assert pace.seconds_left == pytest.approx(12.0)
+
+
+@pytest.mark.parametrize("step", [Progress(41, 0, "rays"), Progress(41, 100, "rays", counted=False)])
+def test_no_time_is_left_of_a_search_or_of_stages(step):
+    pace = Pace()
+    for number, done in enumerate((0, 20, 40)):
+        pace.note(replace(step, done=done), float(number))
+        assert pace.seconds_left is None
+    pace.note(step, 3.0)
+    assert pace.seconds_left is None
+
+
+def test_work_that_begins_again_has_a_pace_of_its_own():
+    pace = Pace()
+    for now, done in ((0.0, 0), (1.0, 100), (2.0, 0), (12.0, 10)):
+        pace.note(Progress(done, 100, "rays"), now)
+    assert pace.seconds_left == pytest.approx(90.0)
 
 
 @pytest.mark.parametrize("engine", ["bvh", "auto"])

@@ -45,7 +45,7 @@ def test_warnings_say_which_share_lies_beyond_every_candidate():
     away = np.linalg.norm(site.targets.xyz[None] - site.candidates.xyz[:, None], axis=2).min(axis=0)
     share = np.count_nonzero(away > reach) / len(away)
     assert 0.1 < share < 1.0
-    assert f"up to {reach:.0f} m from 8 m height: {share:.0%} of the region lie beyond" in warning
+    assert f"up to {reach:.0f} m from 8 m height: {share:.0%} of the region lies beyond" in warning
 
 
 def test_sensors_that_see_through_any_weather_are_named():

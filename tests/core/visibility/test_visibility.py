@@ -220,6 +220,20 @@ def test_an_interrupted_run_goes_on_from_its_finished_pieces(tmp_path: Path) -> 
 
 
 @needs_any
+def test_pieces_that_a_process_left_when_it_was_killed_after_the_grid_go_with_the_next_run(tmp_path: Path) -> None:
+    site, models, settings = (
+        junction_site(positions=4, heights=[5.0], spacing=8.0),
+        load_catalogue(),
+        VisibilitySettings(),
+    )
+    grid = finish(stored_visibility(tmp_path / "grid.npz", site, models, settings, ANY))
+    CheckpointFolder(tmp_path / "grid.npz", grid.key).save(0, Rows(grid.packed, 7))
+    assert (tmp_path / "grid.pieces").is_dir()
+    finish(stored_visibility(tmp_path / "grid.npz", site, models, settings, ANY))
+    assert [path.name for path in tmp_path.iterdir()] == ["grid.npz"]
+
+
+@needs_any
 def test_pieces_of_another_grid_and_damaged_ones_are_not_used(tmp_path: Path) -> None:
     rows = Rows(np.ones((2, 3), dtype=np.uint8), 7)
     CheckpointFolder(tmp_path / "grid.npz", "a" * 64).save(0, rows)

@@ -1,0 +1,250 @@
+"""Physical limits of what is read and typed: every number is finite and within the limits of its kind.
+
+All readers and options take their limits from here. A limit is wide enough for every real site, and narrow enough that
+nothing computed from numbers within it overflows or loses the millimetre.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .arrays import Boolean
+from .errors import SeipError
+
+_MAX_QUOTED = 40  # characters of a value that a message repeats
+_OPEN = 1e15  # from which on messages name no end
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Allowed range of a quantity, both ends included; NaN and infinity are never allowed.
+
+    Parameters
+    ----------
+    least, most : float
+    unit : str
+        Unit for messages, or "" for none.
+    """
+
+    least: float
+    most: float
+    unit: str = ""
+
+    def each(self, values: NDArray[Any]) -> Boolean:
+        """Return which values of an array of numbers lie within the limits, bool of the same shape."""
+        within: Boolean = (values >= self.least) & (values <= self.most)
+        return within
+
+    def allow(self, values: ArrayLike) -> bool:
+        """Return whether all values are numbers within the limits."""
+        array = np.asarray(values)
+        return array.dtype.kind in "fiu" and bool(self.each(array).all())
+
+    def fault(self, values: ArrayLike) -> str:
+        """Return what is wrong with a value, or with the first wrong one of several, as part of a sentence.
+
+        Returns
+        -------
+        str
+            Such as ``is nan, not 0 to 1,000 m``; "" where all values are allowed.
+        """
+        if self.allow(values):
+            return ""
+        wrong: Any = values
+        array = np.asarray(values)
+        if array.dtype.kind in "fiu":
+            wrong = array[~self.each(array)].flat[0].item()  # NumPy 2 shows its own scalars with their type
+        shown = f"{wrong:g}" if isinstance(wrong, float) else repr(wrong)[:_MAX_QUOTED]
+        return f"is {shown}, not {self}"
+
+    def require(self, values: ArrayLike, file: object, field: str, cure: str = "correct it") -> None:
+        """Check the values of a field of a file.
+
+        Raises
+        ------
+        SeipError
+            A value is not a finite number within the limits; the message names file, field, value and limits.
+        """
+        if fault := self.fault(values):
+            raise SeipError(f"{file}: {field} {fault}; {cure}")
+
+    @staticmethod
+    def first_fault(checks: Mapping[str, tuple[ArrayLike, Limits]]) -> str:
+        """Return the first fault of several quantities as a sentence without a full stop, or "".
+
+        Parameters
+        ----------
+        checks : mapping of str to (value or values, Limits)
+            By the name of each quantity in words.
+        """
+        faults = ((name, limits.fault(values)) for name, (values, limits) in checks.items())
+        return next((f"{name} {fault}" for name, fault in faults if fault), "")
+
+    def __str__(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        if self.least <= -_OPEN and self.most >= _OPEN:
+            return f"a finite number{unit and ' of'}{unit}"
+        if self.least <= -_OPEN:
+            return f"at most {_shown(self.most)}{unit}"
+        if self.most >= _OPEN:
+            return f"at least {_shown(self.least)}{unit}"
+        return f"{_shown(self.least)} to {_shown(self.most)}{unit}"
+
+
+def _shown(value: float) -> str:
+    return f"{value:,.10g}" if 1e-3 <= abs(value) < 1e9 or not value else f"{value:g}"
+
+
+MAP_COORDINATE = Limits(-1e8, 1e8, "m")
+"""Coordinate of a map: more than the circumference of the Earth, which no projection exceeds."""
+
+LOCAL_COORDINATE = Limits(-1e7, 1e7, "m")
+"""Coordinate from the local origin of a site."""
+
+MODEL_COORDINATE = Limits(-20_000.0, 20_000.0, "m")
+"""Coordinate of a mesh from its own zero: beyond it 32 bits are coarser than a few millimetres."""
+
+GROUND = Limits(-500.0, 9_000.0, "m")
+"""Elevation of the ground above sea level."""
+
+ELEVATION = Limits(-10_000.0, 10_000.0, "m")
+"""Height above the zero of a map or model, of the ground and of everything on it."""
+
+HEIGHT = Limits(0.01, 1_000.0, "m")
+"""Height of an object from its foot to its top: no building is higher."""
+
+ABOVE_GROUND = Limits(-1_000.0, 1_000.0, "m")
+"""Height of a point of an object, or of a sensor, above the ground."""
+
+SIZE = Limits(0.001, 100_000.0, "m")
+"""Length, width, thickness or spacing of something that has an extent."""
+
+DISTANCE = Limits(0.0, 100_000.0, "m")
+"""Distance, which may be zero."""
+
+SITE_RADIUS = Limits(0.1, 5_000.0, "m")
+"""Distance from the middle of a place to the end of its region of interest."""
+
+ROAD_LENGTH = Limits(0.0, 1e6, "m")
+"""Length of a road, lane or street."""
+
+MAP_NUMBER = Limits(-1e9, 1e9)
+"""Any number of a road map, coefficients of polynomials among them."""
+
+ROAD_USER_SIZE = Limits(0.01, 100.0, "m")
+"""Length, width or height of a road user."""
+
+PRICE = Limits(0.0, 1e9, "USD")
+WEIGHT = Limits(0.0, 1e6)
+"""Weight of a target or region: with a million targets sums stay exact to a billionth."""
+
+CHOSEN_WEIGHT = Limits(1e-6, 1e6)
+"""Weight that a user gives to a region: above zero."""
+
+TOTAL_WEIGHT = Limits(0.0, 1e15)
+"""Sum of the weights of targets, or their weight times seconds."""
+
+SHARE = Limits(0.0, 1.0)
+ROUNDED_SHARE = Limits(0.0, 1.0 + 1e-5)
+"""Share as float32 may round it."""
+
+SIGNED_SHARE = Limits(-1.0, 1.0)
+"""Share that is lost, or gained where negative."""
+
+RELATIVE_GAP = Limits(-1e-6, 1e15)
+"""Gap between a value and its bound, relative to the value; solvers round."""
+
+COUNT = Limits(0, 1e12)
+INDEX = Limits(-1, 2**31 - 1)
+"""Index into a table; -1 for none."""
+
+DEGREES = Limits(-360.0, 360.0, "degrees")
+LATITUDE = Limits(-90.0, 90.0, "degrees")
+LONGITUDE = Limits(-180.0, 180.0, "degrees")
+YAW = Limits(-4.0, 4.0, "rad")
+"""Heading in [-π, π), as float32 may round it."""
+
+PITCH = Limits(-math.pi / 2.0, math.pi / 2.0, "rad")
+UNWRAPPED_ANGLE = Limits(-1e5, 1e5, "rad")
+"""Heading with whole turns."""
+
+TIME = Limits(-1e11, 1e11, "s")
+DURATION = Limits(0.0, 30.0 * 86400.0, "s")
+"""Length of a simulation or recording: 30 days."""
+
+TIME_STEP = Limits(0.001, 86400.0, "s")
+"""Time from frame to frame."""
+
+DELAY = Limits(-1e3, 1e3, "s")
+SPEED = Limits(-1e3, 1e3, "m/s")
+APPARENT_SPEED = Limits(-1e6, 1e6, "m/s")
+"""Speed of an animated object, which may leap from one frame to the next."""
+
+FRAMES = Limits(1, 1_000_000)
+"""Frames of a recording or of the test of a detector."""
+
+SCENARIOS = Limits(1, 10_000)
+"""Scenarios, or instants of traffic, to optimise on: the visibility of all candidates in each is kept."""
+
+DRAWS = Limits(1, 100_000)
+"""Random draws to evaluate a placement on."""
+
+SENSORS = Limits(1, 100_000)
+SEED = Limits(0, 2**63 - 1)
+EFFORT = Limits(0.0, 1e9)
+"""Counted work."""
+
+LIDAR_RANGE = Limits(0.0, 10_000.0, "m")
+"""Distance of a return from its sensor."""
+
+DETECTION_RANGE = Limits(0.1, 10_000.0, "m")
+"""Range at which a data sheet says that a surface is detected."""
+
+POINT_RATE = Limits(1.0, 1e9)
+"""Points per second of a sensor."""
+
+ROTATION_RATE = Limits(0.01, 1_000.0, "Hz")
+CHANNELS = Limits(2, 10_000)
+"""Channels at even elevations."""
+
+UNIT_BEAMS = Limits(2, 1_000)
+"""Beams of a calibration file."""
+
+BEAM_ELEVATION = Limits(-89.999, 89.999, "degrees")
+"""Elevation of a beam, short of straight up and down, where it has no azimuth."""
+
+BEAM_OFFSET = Limits(-720.0, 720.0, "degrees")
+"""What a channel's azimuth is ahead of the sensor's head: two turns at most."""
+
+HORIZONTAL_VIEW = Limits(0.001, 360.0, "degrees")
+ACCUMULATION = Limits(0.001, 100.0, "s")
+"""Time over which the points of a rosette make a frame."""
+
+PRISM_RATE = Limits(0.001, 1_000.0, "Hz")
+PRISM_WEDGE = Limits(0.001, 45.0, "degrees")
+REFRACTIVE_INDEX = Limits(1.001, 4.0)
+"""Of a prism: germanium has 4."""
+
+GAIN = Limits(1e-3, 1e3)
+"""Power received, as a multiple of what the law of detection says."""
+
+RANGE_NOISE = Limits(0.0, 10.0, "m")
+NOISE_GROWTH = Limits(0.0, 0.01, "per metre")
+"""What is added to the range noise for each square metre of the squared range."""
+
+DETECTION_THRESHOLD = Limits(-60.0, 20.0, "(ln of 1/m²)")
+DETECTION_SPREAD = Limits(0.05, 10.0)
+POSITIVE_SHARE = Limits(1e-15, 1.0)
+"""Share that is above zero."""
+
+EXTINCTION = Limits(0.0, 10.0, "per metre")
+"""Share of the light that the air takes."""
+
+ATTENUATION = Limits(0.0, 1e9, "per metre")
+"""Decay of CARLA's intensity: as steep as it takes to stand for any law of detection."""

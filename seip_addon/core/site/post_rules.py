@@ -1,0 +1,117 @@
+"""Rules on where a new post may stand, by name; a survey may allow what a rule excludes."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ..arrays import Boolean, Float
+from ..errors import SeipError
+from ..geometry.plan import closed, without
+
+RuleName = Literal["cycle-tracks", "driveways", "landings", "private", "islands", "power-poles"]
+
+MIN_ISLAND_WIDTH = 4.0
+"""Metres: islands and medians narrower than this are reserved for pedestrians, signals and signs."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One rule that excludes positions.
+
+    Parameters
+    ----------
+    title : str
+        Name of the excluded areas, for panel and scene.
+    reason : str
+        Reason in counts of excluded positions, as in "12 on a driveway".
+    clearance : float, metres
+        Distance from the areas within which posts are excluded as well.
+    """
+
+    title: str
+    reason: str
+    clearance: float = 0.0
+
+
+RULES: dict[RuleName, Rule] = {
+    "cycle-tracks": Rule("Cycle tracks", "within 0.5 m of a cycle track", 0.5),
+    "driveways": Rule("Driveways", "on a driveway"),
+    "landings": Rule("Crossing landings", "on a crossing landing"),
+    "private": Rule("Private ground", "on private ground"),
+    "islands": Rule("Narrow islands", f"on an island narrower than {MIN_ISLAND_WIDTH:g} m"),
+    "power-poles": Rule("Power poles", "power poles"),
+}
+"""The rules in the order in which they are applied: a position is counted for the first that excludes it."""
+
+
+@dataclass(frozen=True, eq=False)
+class KeepOffArea:
+    """An area in plan that a rule keeps new posts off, local site axes in metres."""
+
+    name: str
+    polygon: BaseGeometry
+    rule: RuleName
+
+
+def check_allowed(names: Sequence[str]) -> None:
+    """Raise SeipError where a name is not that of a rule."""
+    for name in names:
+        if name not in RULES:
+            raise SeipError(f"there is no rule {name!r} to allow: choose among {', '.join(RULES)}")
+
+
+def excluded_posts(
+    plan: Float, areas: Sequence[KeepOffArea], road: BaseGeometry, allow: Collection[str]
+) -> dict[RuleName, Boolean]:
+    """Positions that each rule excludes, without those that an earlier rule excludes.
+
+    Parameters
+    ----------
+    plan : (n, 2) float64, metres
+        Positions of new posts.
+    areas : sequence of KeepOffArea
+    road : shapely geometry
+        Outline of the carriageways in plan: islands follow from it.
+    allow : collection of str
+        Names of the rules that do not apply.
+
+    Returns
+    -------
+    dict of str to (n,) bool
+        By rule, only rules that apply to new posts.
+    """
+    left = np.ones(len(plan), dtype=bool)
+    excluded: dict[RuleName, Boolean] = {}
+    for name, rule in RULES.items():
+        if name in allow or name == "power-poles":
+            continue
+        shapes = [area.polygon for area in areas if area.rule == name]
+        if name == "islands":
+            shapes.append(narrow_islands(road))
+        hit = left & _within(plan, shapely.union_all(shapes), rule.clearance)
+        excluded[name] = hit
+        left &= ~hit
+    return excluded
+
+
+def narrow_islands(road: BaseGeometry, width: float = MIN_ISLAND_WIDTH) -> BaseGeometry:
+    """Return the islands and medians between carriageways that are narrower than ``width`` metres.
+
+    These are the gaps that a morphological closing of the carriageway fills. Its mitred offsets keep the corners of
+    wider areas, which a closing with a disc would fill as well.
+    """
+    return road if road.is_empty else without(closed(road, width / 2), road)
+
+
+def _within(plan: Float, area: BaseGeometry, distance: float) -> Boolean:
+    if area.is_empty or not len(plan):
+        return np.zeros(len(plan), dtype=bool)
+    shapely.prepare(area)
+    near: Boolean = shapely.dwithin(area, shapely.points(plan), distance)
+    return near

@@ -1,0 +1,107 @@
+"""Placement by expected returns from road users as one job."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from ..arrays import Float, Integer
+from ..errors import SeipError
+from ..placement.deployment import deploy
+from ..placement.objective import CHOSEN_FOR, Objective, Solution, placement_problem, weights_in_regions, with_count
+from ..placement.returns_solver import greedy_returns, solve_returns
+from ..placement.returns_summary import CrossingReturns, ReturnsSummary
+from ..progress import Progress
+from ..returns.returns_grid import ReturnsGrid, returns_key, stored_returns
+from ..returns.road_users import BODIES, RoadUsers, road_users
+from ..site.targets import Targets
+from ..visibility.ray_casting import engine_name
+
+if TYPE_CHECKING:
+    from .survey import Survey
+
+
+def place_by_returns(survey: Survey, objective: Objective) -> Generator[Progress, None, Solution]:
+    """Choose the placement with the most returns from road users.
+
+    Raises
+    ------
+    SeipError
+        As for `placement_problem` and `solve_returns`.
+    """
+    site, models, visible = survey.site, survey.models, survey.grid.visible
+    users = road_users(survey.geometry)
+    grid = yield from stored_returns(survey.returns_path, site, users, models, survey.settings.engine)
+    problem = replace(
+        placement_problem(site, visible, models, objective),
+        visible=grid.returns > 0,
+        weights=user_weights(users, objective),
+    )
+    placement = yield from solve_returns(problem, grid.returns, survey.settings.limits)
+    greedy = yield from greedy_returns(problem, grid.returns)
+    summary = summarised(grid, users, objective, placement.chosen)
+    note = f"{CHOSEN_FOR}for returns from road users: {summary.describe()} in one revolution (geometric means)"
+    return Solution(
+        with_count(objective, site),
+        replace(placement, notes=(note, *summary.warnings(), *placement.notes)),
+        greedy,
+        replace(
+            deploy(site, models, visible, placement.chosen),
+            returns=summary,
+            pedestrian_returns=_near_targets(site.targets, users, grid, placement.chosen),
+        ),
+    )
+
+
+def stored_pedestrian_returns(survey: Survey, chosen: Integer) -> Float | None:
+    """Return the expected returns from a pedestrian near each target, (t,), if the returns grid is stored."""
+    users = road_users(survey.geometry)
+    key = returns_key(survey.site, users, survey.models, engine_name(survey.settings.engine))
+    try:
+        grid = None if survey.returns_path is None else ReturnsGrid.load(survey.returns_path)
+    except SeipError:
+        return None
+    return None if grid is None or grid.key != key else _near_targets(survey.site.targets, users, grid, chosen)
+
+
+def _near_targets(targets: Targets, users: RoadUsers, grid: ReturnsGrid, chosen: Integer) -> Float:
+    """Return the expected returns from the pedestrian nearest to each target, (t,) float64."""
+    on_foot = np.flatnonzero(users.body == BODIES.index("pedestrian"))
+    together: Float = grid.returns[np.ix_(chosen, on_foot)].sum(axis=0, dtype=np.float64)
+    tree = shapely.STRtree(shapely.points(users.xyz[on_foot, :2]))
+    nearest: Float = together[tree.nearest(shapely.points(targets.xyz[:, :2]))]
+    return nearest
+
+
+def user_weights(users: RoadUsers, objective: Objective) -> Float:
+    """Return the weight of each road user under an objective, (m,) float64.
+
+    The shares of the objective are those of all cars, all cyclists and all pedestrians on the carriageway; pedestrians
+    at the pavements' edges weigh as much as those.
+    """
+    weights: Float = weights_in_regions(objective, users.weight, users.central) * np.array(objective.shares)[users.body]
+    return weights
+
+
+def summarised(grid: ReturnsGrid, users: RoadUsers, objective: Objective, chosen: Integer) -> ReturnsSummary:
+    """Return the figures of chosen poses."""
+    together = grid.returns[chosen].sum(axis=0, dtype=np.float64)
+    weight = user_weights(users, objective)
+    in_regions = weights_in_regions(objective, users.weight, users.central)
+    kinds = [(name, users.body == body) for body, name in enumerate(BODIES)]
+    of_each: dict[str, float] = {name: _typical(together[own], in_regions[own]) for name, own in kinds}
+    crossings = tuple(
+        CrossingReturns(name, float(together[users.crossing == number].min()))
+        for number, name in enumerate(users.crossings)
+        if (users.crossing == number).any()
+    )
+    return ReturnsSummary(_typical(together, weight), of_each, crossings)
+
+
+def _typical(returns: Float, weight: Float) -> float:
+    """Return the weighted geometric mean of 1 + returns, less 1."""
+    return float(np.expm1(np.average(np.log1p(returns), weights=weight)))

@@ -1,0 +1,56 @@
+"""Rows that show each item of an enumeration as a segment of its own: Blender leaves it blank if the text is empty."""
+
+import ast
+from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
+
+import pytest
+
+from seip_addon.panels.placement import SEIP_PT_placement
+
+ADD_ON = Path(__file__).resolve().parents[2] / "seip_addon"
+
+
+def nameless_rows(source):
+    """Return the lines of a source at which a property may be expanded and has an empty text."""
+    calls = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
+    options = [{one.arg: one.value for one in call.keywords} for call in calls]
+    return [
+        call.lineno
+        for call, option in zip(calls, options, strict=True)
+        if isinstance(option.get("text"), ast.Constant)
+        and option["text"].value == ""
+        and not (
+            isinstance(option.get("expand"), ast.Constant | None) and not getattr(option.get("expand"), "value", 0)
+        )
+    ]
+
+
+def test_no_panel_expands_a_property_without_its_names():
+    faults = {path.name: nameless_rows(path.read_text(encoding="utf-8")) for path in ADD_ON.rglob("*.py")}
+    assert {name: lines for name, lines in faults.items() if lines} == {}
+
+
+@pytest.mark.parametrize(
+    ("call", "wrong"),
+    [
+        ("row.prop(goal, 'limit', text='', expand=True)", True),
+        ("row.prop(goal, 'limit', text='', expand=not is_narrow(context))", True),
+        ("row.prop(goal, 'limit', text='', expand=False)", False),
+        ("row.prop(goal, 'limit', text='')", False),
+        ("row.prop(goal, 'limit', expand=True)", False),
+    ],
+)
+def test_the_search_finds_rows_without_names(call, wrong):
+    assert bool(nameless_rows(call)) is wrong
+
+
+@pytest.mark.parametrize(("width", "expanded"), [(400, True), (120, False)])
+def test_the_goals_are_segments_with_names_or_a_list_where_there_is_no_room(junction, width, expanded):
+    layout = MagicMock()
+    preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
+    context = SimpleNamespace(scene=junction, region=SimpleNamespace(width=width), preferences=preferences)
+    SEIP_PT_placement.draw(SimpleNamespace(layout=layout), context)
+    drawn = [call for call in layout.mock_calls if call.args[1:] == ("limit",)]
+    assert [(call.kwargs.get("expand", False), "text" in call.kwargs) for call in drawn] == [(expanded, not expanded)]
