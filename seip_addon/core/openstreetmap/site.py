@@ -44,7 +44,7 @@ NAMES = ("name", "name:en", "alt_name", "ref")
 RANKS = (*(kind for kind in CLASSES if not kind.endswith("_link")), "service", *CLASSES)
 """Classes of streets, the highest first, and slip roads last."""
 MAX_ROUNDABOUT = 200.0  # metres across which a roundabout is one place at most
-MIN_RAMP = 0.05  # metres by which a ramp moves a street that a note names
+MIN_RAMP = 0.05  # metres by which a bridge or ramp moves a street that a note names
 MAX_NAMED = 6  # streets that a note names
 STANDS_AROUND = 20.0  # metres beyond the scene within which what stands there counts
 
@@ -141,11 +141,11 @@ class ExtractSite:
         return replace(raised, description=replace(self.description, relief=relief))
 
     def _ramp_notes(self, heights: StreetHeights) -> Iterator[str]:
-        """Yield a note on streets in the area that lead up to bridges or down to underpasses, by assumed heights."""
+        """Yield a note on streets in the area whose heights are assumed: bridges, underpasses and their ramps."""
         names = street_names(self.road_map)
         moved: dict[str, float] = {}
         for number, (along, above) in heights.above_ground.items():
-            if number in heights.bridges or not np.abs(above).max() >= MIN_RAMP:
+            if not np.abs(above).max() >= MIN_RAMP:
                 continue
             (road,) = (road for road in self.road_map.roads if road.id == number)
             places = shapely.points(road.frame(along).origin[:, :2])
@@ -160,8 +160,8 @@ class ExtractSite:
                 for name, most in sorted(moved.items(), key=lambda one: (-abs(one[1]), one[0]))[:MAX_NAMED]
             )
             yield (
-                f"heights are assumed where streets lead to bridges and underpasses: they move {listed}; junctions "
-                "there may have a hump that the place does not have"
+                f"the heights of bridges, underpasses and their ramps are assumed: they move {listed}; junctions on "
+                "ramps may have a hump that the place does not have"
             )
 
 

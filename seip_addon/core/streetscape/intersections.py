@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..geometry.plan import closed, united
-from ..opendrive import LaneSurface, junction_area
+from ..opendrive import LaneSurface, Road, junction_area
 
 FOOTPATHS = {"sidewalk", "walking", "none"}
 MIN_ARMS = 3  # arms of a junction; where fewer meet, a street goes on
@@ -103,6 +103,27 @@ def intersection(
         found |= near
         waiting += sorted(near)
     return frozenset(found)
+
+
+def ring_roads(
+    roads: Iterable[Road], junctions: frozenset[str], roundabouts: Iterable[frozenset[str]]
+) -> frozenset[str]:
+    """Return the ids of the roads that lead around the roundabouts of an intersection, between their arms.
+
+    Parameters
+    ----------
+    junctions : frozenset of str
+        Ids of the junctions of the intersection.
+    roundabouts : iterable of frozenset of str
+        Ids of the junctions that are one roundabout each.
+    """
+    rings = [one for one in roundabouts if one & junctions]
+
+    def in_ring(road: Road, ring: frozenset[str]) -> bool:
+        ends = (road.predecessor, road.successor)
+        return road.junction_id in ring or all(end is not None and end.id in ring for end in ends)
+
+    return frozenset(road.id for road in roads if any(in_ring(road, ring) for ring in rings))
 
 
 def with_other_carriageways(

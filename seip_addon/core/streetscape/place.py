@@ -17,7 +17,7 @@ from . import road_surface
 from .approaches import approach_lanes
 from .description import DEFAULT_RADIUS, SiteDescription
 from .geographic_position import looks_like_degrees
-from .intersections import JUNCTION_REACH, box_along, filled, intersection, with_other_carriageways
+from .intersections import JUNCTION_REACH, box_along, filled, intersection, ring_roads, with_other_carriageways
 from .levels import Levels, split_levels
 from .named_places import street_names
 
@@ -125,8 +125,8 @@ class Place:
 
     def _title(self, junction: Junction) -> str:
         """Return what a junction is called: by its streets where the map was made of them, else by its id."""
-        named = self.description.from_centre_lines and self.description.name
-        return f"Junction {self.description.name if named else junction.id}"
+        name = self.description.name if self.description.from_centre_lines else ""
+        return name if name.startswith("Junction ") else f"Junction {name or junction.id}"
 
     def _lanes_of_region(self) -> Sequence[LaneSurface]:
         """Return the lanes that the region of interest may lie on.
@@ -178,7 +178,10 @@ class Place:
     def _central_box(self, junction: Junction) -> BaseGeometry:
         """Return the smallest rectangle around a junction's driving lanes; it lies along the roads' axes."""
         if self.description.from_centre_lines:
-            return box_along(self._driving_area(junction), road_surface.in_groups(self.surfaces, ["driving"]))
+            driving = road_surface.in_groups(self.surfaces, ["driving"])
+            ring = ring_roads(self.road_map.roads, self._one_place(junction), self.description.roundabouts)
+            around = [shapely.make_valid(lane.polygon) for lane in driving if lane.road_id in ring]
+            return box_along(shapely.union_all([self._driving_area(junction), *around]), driving)
         return shapely.minimum_rotated_rectangle(self._driving_area(junction))
 
     def _no_driving_lane(self) -> SeipError:

@@ -602,10 +602,46 @@ def test_streets_that_assumed_ramps_raise_are_named(tmp_path):
     extract.way([(60, 30), (60, 200)], **over)
     extract.way([(0, 0), (0, 45), (60, 60)], highway="residential", name="Side Road", lanes=2)
     model = built(corner_houses(extract), tmp_path)
-    (note,) = [note for note in model.model.notes if note.startswith("heights are assumed")]
+    (note,) = [note for note in model.model.notes if "ramps are assumed" in note]
     assert re.search(r"High Road by up to \d\.\d\d m upwards", note)
     assert re.search(r"Side Road by up to \d\.\d\d m upwards", note)
     assert "Low Road" not in note
+
+
+def test_bridges_that_begin_at_the_place_are_among_the_assumed_heights(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0)], highway="secondary", name="Low Road", lanes=2)
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="residential", name="Side Road", lanes=2)
+    extract.way([(0, 0), (120, 0)], highway="secondary", name="Viaduct", lanes=2, bridge="yes", layer="1")
+    extract.way([(120, 0), (300, 0)], highway="secondary", name="Far Road", lanes=2)
+    extract.way([(60, -200), (60, 200)], highway="primary", name="Under Road", lanes=2)
+    model = built(corner_houses(extract), tmp_path)
+    (note,) = [note for note in model.model.notes if "ramps are assumed" in note]
+    assert re.search(r"Viaduct by up to \d\.\d\d m upwards", note)
+
+
+def test_a_weighted_region_without_street_names_is_named_once(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway="secondary", lanes=2)
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="residential", lanes=2)
+    model = built(corner_houses(extract), tmp_path).model
+    (name,) = [part.name for part in model.parts if Role.WEIGHTED_REGIONS in part.roles]
+    assert name.startswith("Junction at ")
+
+
+@pytest.mark.parametrize("radius", [14, 24])
+def test_the_weighted_region_of_a_roundabout_has_all_of_its_ring(radius, tmp_path):
+    extract = Extract()
+    ring = [extract.node(radius * np.cos(at), radius * np.sin(at)) for at in np.arange(24) * np.pi / 12]
+    extract.way([*ring, ring[0]], highway="secondary", junction="roundabout", name="Circus")
+    for name, index, end in (("East", 0, (200, 0)), ("North", 5, (40, 200)), ("Slip", 3, (150, 150))):
+        extract.way([ring[index], end], highway="secondary", name=f"{name} Street", lanes=2)
+    model = built(corner_houses(extract), tmp_path).model
+    weighted = next(part for part in model.parts if Role.WEIGHTED_REGIONS in part.roles)
+    area = shapely.MultiPoint(weighted.solid.vertices[:, :2]).convex_hull.buffer(0.01)
+    (island,) = map(shapely.Polygon, model.region.interiors)
+    ring = plan(model, "Driving lanes").intersection(island.buffer(2.5))
+    assert ring.difference(area).area == pytest.approx(0.0, abs=0.1)
 
 
 def test_the_message_on_a_place_without_streets_does_not_tell_the_window_as_the_extent(tmp_path):
