@@ -11,8 +11,6 @@ VERBS = {
     "place": "choose the sensors of a scene",
     "report": "write a report on a placement, HTML and PDF",
     "study": "coverage of types × heights × numbers",
-    "robust": "choose sensors for pose errors, failures or several looks",
-    "in-traffic": "choose sensors for a road full of traffic",
     "traffic": "put traffic on the road, recorded or simulated by SUMO",
     "simulate": "scan traffic with the sensors of a scene",
     "generate-sites": "generate random sites with traffic, to train detectors on",

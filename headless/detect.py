@@ -22,7 +22,7 @@ from headless.charts.detection import PrecisionRecallLine, save_parts_chart, sav
 from headless.charts.error_view import save_error_view
 from headless.detection.average_precision import precision_recall, too_few_runs
 from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
-from headless.detection.case_study import read_runs
+from headless.detection.case_study import sampled_runs
 from headless.detection.chart_data import error_view, parts
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
 from headless.detection.inference import seconds_of
@@ -69,7 +69,7 @@ def main(argv: list[str]) -> None:
     ]
     changed = changed_beams(bpy.context.scene, sensors)
     runtime.warn(changed)
-    runs = read_runs(options.traffic, geometry.origin, options.every)
+    runs = sampled_runs(options.traffic, geometry.origin, options.every)
     for run in runs:
         require_own_traffic(run.trajectories, geometry, run.name)
     if len(runs) > 1:

@@ -79,7 +79,7 @@ def main(argv: list[str]) -> None:
     surveyed, watch = site.surveyed, site.stopwatch
     limits = surveyed.settings.limits
     study = watch.run("study", coverage_study(surveyed.site, surveyed.models, surveyed.grid.visible, limits))
-    learnt, aside, tests = case_study.split_runs(fixed, geometry.origin, options.every)
+    learnt, aside, tests = case_study.split_sampled(fixed, geometry.origin, options.every)
     copies = NearCopies(learnt, aside, tests[:COPIES_TESTED])
     steps = detection_of_case(
         site.simulator,

@@ -18,14 +18,18 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime, survey
+from headless.charts.evaluation import save_evaluation_charts
 from headless.convergence import coarsest_settings
-from headless.options import add_objective, add_settings, new_parser, read_objective, real_number
+from headless.options import add_objective, new_parser, read_objective, real_number
 
 from seip_addon.core.limits import SHARE
 from seip_addon.core.placement.deployment import price_text
-from seip_addon.core.placement.objective import Objective, Solution, check_objective
+from seip_addon.core.placement.objective import Solution, check_objective
 from seip_addon.core.placement.returns_summary import share_reached
-from seip_addon.core.workflows.survey import place
+from seip_addon.core.progress import finish
+from seip_addon.core.workflows.placing import place
+from seip_addon.core.workflows.survey import Layout
+from seip_addon.core.workflows.traffic_runs import TrafficRuns, read_runs
 
 
 def main(argv: list[str]) -> None:
@@ -34,14 +38,22 @@ def main(argv: list[str]) -> None:
     objective = read_objective(options)
     tolerance = options.tolerance
     refine = None if tolerance is None else partial(coarsest_settings, objective=objective, tolerance=tolerance)
-    surveyed, watch = survey.survey(
-        options, lambda layout: check_objective(layout.site, layout.models, objective), refine
-    )
-    solution = watch.run("placement", place(surveyed, objective, pose_errors=options.pose_errors))
+    traffic: list[TrafficRuns] = []
+
+    def check(layout: Layout) -> None:
+        check_objective(layout.site, layout.models, objective)
+        if objective.scenarios.kind == "traffic":
+            traffic.append(finish(read_runs(options.traffic or survey.runs_beside(options.scene), layout)))
+
+    surveyed, watch = survey.survey(options, check, refine)
+    runs = traffic[0] if traffic else None
+    if runs is not None:
+        runtime.LOG.info(runs.overlap)
+    solution = watch.run("placement", place(surveyed, objective, runs))
     runtime.print_line(_in_words(solution))
     with runtime.incomplete_if_interrupted(options.output):
-        asked = {"render": not options.no_render, "pose_errors": options.pose_errors}
-        survey.save_solution(surveyed, watch, solution, options.output, asked)
+        save_evaluation_charts(options.output, surveyed, solution)
+        survey.save_solution(surveyed, watch, solution, options.output, render=not options.no_render)
     runtime.print_line(f"written to {options.output}/")
 
 
@@ -53,6 +65,7 @@ def _in_words(solution: Solution) -> str:
     ]
     central = "" if deployment.central is None else f", central {deployment.central:.2%}"
     lines += [] if deployment.returns is None else [deployment.returns.describe()]
+    lines += [] if solution.evaluation is None else solution.evaluation.summary()
     price = price_text(deployment.price, installed=deployment.installed)
     lines.append(f"coverage {deployment.coverage:.2%}{central}, price {price}")
     lines.append(solution.certificate)
@@ -68,17 +81,12 @@ def _in_words(solution: Solution) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("place", "Place roadside LiDARs in a scene.")
     survey.add_options(parser, in_full=True)
-    add_settings(add_objective(parser), Objective, "coverage", "criterion", "shares")
+    add_objective(parser)
     parser.add_argument(
         "--tolerance",
         type=real_number(SHARE),
         metavar="SHARE",
         help="pick the coarsest --grid and --spacing whose placement covers as much but for this share",
-    )
-    parser.add_argument(
-        "--pose-errors",
-        action="store_true",
-        help="try the placement with sensors that do not hang quite as planned, which casts rays",
     )
     parser.add_argument("--no-render", action="store_true", help="leave out the rendered view")
     return parser

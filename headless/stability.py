@@ -24,7 +24,7 @@ from seip_addon.core.placement.objective import DEFAULT_COUNT, Objective, check_
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.workflows.survey import grid_key
-from seip_addon.core.workflows.traffic import load_runs
+from seip_addon.core.workflows.traffic_runs import load_runs
 
 PAGE, CHARTS = "stability.md", "stability"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import logging
 import time
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -33,7 +33,7 @@ from seip_addon.core.site.weather import weather_of
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.visibility.triangle_culling import culling_message
 from seip_addon.core.workflows.survey import Layout, Survey, SurveySettings, lay_out, record_of, see
-from seip_addon.core.workflows.traffic import runs_in, traffic_folder
+from seip_addon.core.workflows.traffic_runs import runs_in, traffic_folder
 from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.result_folder import write_result_folder
@@ -161,10 +161,8 @@ def survey(
     return surveyed, watch
 
 
-def save_solution(
-    surveyed: Survey, watch: Stopwatch, solution: Solution, folder: Path, asked: Mapping[str, object]
-) -> None:
-    """Write a solution of a survey, with its record, to the folder of results; for what was asked see `record_of`."""
+def save_solution(surveyed: Survey, watch: Stopwatch, solution: Solution, folder: Path, *, render: bool) -> None:
+    """Write a solution of a survey, with its record, to the folder of results."""
     now = Provenance(datetime.now(UTC), watch.seconds, versions(blender=bpy.app.version_string))
     write_result_folder(
         folder,
@@ -172,10 +170,10 @@ def save_solution(
         surveyed.geometry,
         surveyed.site,
         solution,
-        record_of(surveyed, solution, now, asked),
+        record_of(surveyed, solution, now, render=render),
         visible=surveyed.grid.visible,
         models=surveyed.models,
-        render=bool(asked["render"]),
+        render=render,
     )
 
 

@@ -20,7 +20,7 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime, survey
 from headless.charts.detection import save_training_chart
-from headless.detection.case_study import AT_ONCE, read_runs, simulated
+from headless.detection.case_study import AT_ONCE, sampled_runs, simulated
 from headless.detection.detector import check_device
 from headless.detection.frames import SampledRecording
 from headless.detection.learnt_site import LearntSite
@@ -127,7 +127,7 @@ def read_site(scene: Path, learning: LearningSettings) -> LearntSite:
     asked = SurveySettings(candidates=CandidateSettings(sensors=learning.sensors, heights=HEIGHTS, tilts=TILTS))
     models = asked.models()
     candidates = make_site(geometry, asked.candidates, asked.grid_spacing, asked.reach(), models).candidates
-    runs = read_runs(survey.runs_beside(scene), geometry.origin, learning.every)
+    runs = sampled_runs(survey.runs_beside(scene), geometry.origin, learning.every)
     if not runs:
         raise SeipError(f"{scene} has no runs of traffic beside it: simulate some with headless/traffic.py")
     for run in runs:

@@ -66,9 +66,6 @@ def settings() -> dict[str, Any]:
         "time_limit_s": {"type": "number", "minimum": 0},
         "effort": number("number", EFFORT),
         "spacings_because": text,
-        "pose_errors": truth,
-        "robustness": anything,
-        "traffic": anything,
         "render": truth,
     }
     return {"type": "object", "required": ["candidates", "goal"], "properties": known}

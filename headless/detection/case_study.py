@@ -20,6 +20,7 @@ from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import FRAMES, TIME_STEP
 from seip_addon.core.progress import Progress, side_by_side, within
+from seip_addon.core.robustness.traffic_instants import WARM_UP
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.parked import shared_bays
 from seip_addon.core.traffic.run_overlap import MATCH_RADIUS, require_independent, vehicle_positions
@@ -48,7 +49,6 @@ SPLIT = "the last half for tests, an eighth before it (one at least) for validat
 """How runs are split, in words."""
 
 TEST_STRIDE = 2  # frames to learn from for each to test on: what is seen now is seen again soon, and only costs time
-WARM_UP = 2.0  # seconds from the first sample of a run to its first frame
 AT_ONCE = (os.cpu_count() or 1) + 1  # works in threads on the CPU: one more than cores, as each also waits
 
 
@@ -105,24 +105,24 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     SeipError
         There are too few, or one is too short.
     """
-    return Traffic(*split_runs(paths, origin, every))
+    return Traffic(*split_sampled(paths, origin, every))
 
 
-def split_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[tuple[SampledRun, ...], ...]:
+def split_sampled(paths: Sequence[Path], origin: Float, every: float) -> tuple[tuple[SampledRun, ...], ...]:
     """Return the runs to learn from, for validation and for tests, whether they are independent or not."""
     if len(paths) < MIN_RUNS:
         raise SeipError(
             f"{len(paths)} runs of traffic are too few: name {MIN_RUNS} or more with --traffic, better "
             f"{RUNS_PER_TEST * ADVISED_TEST_RUNS}, made by headless/traffic.py with a seed each: {SPLIT}"
         )
-    runs = read_runs(paths, origin, every)
+    runs = sampled_runs(paths, origin, every)
     tested = len(runs) // RUNS_PER_TEST
     learnt = len(runs) - tested - max(1, len(runs) // RUNS_PER_VALIDATION)
     sparse = tuple(replace(run, times=run.times[::TEST_STRIDE]) for run in runs[learnt:])
     return runs[:learnt], sparse[:-tested], sparse[-tested:]
 
 
-def read_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[SampledRun, ...]:
+def sampled_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[SampledRun, ...]:
     """Read runs, each looked at from `WARM_UP` on; see `read_traffic`."""
     if not TIME_STEP.allow(every):
         raise SeipError(f"the time between frames must be {TIME_STEP}, not {every:g} s")

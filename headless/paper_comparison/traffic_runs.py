@@ -26,7 +26,7 @@ from seip_addon.core.traffic.run_overlap import VehiclePositions, overlap_of, ve
 from seip_addon.core.traffic.source import TrafficFiles
 from seip_addon.core.traffic.sumo_files import read_net_offset
 from seip_addon.core.traffic.sumo_programs import find_sumo
-from seip_addon.core.workflows.traffic import traffic_folder
+from seip_addon.core.workflows.traffic_runs import traffic_folder
 
 MIN_ON_ROAD = 0.8  # share of a network's lanes in the region that lie on the road of the scene, if it is of its map
 SIGNAL_CYCLE = 120  # seconds; drawn runs begin at any of as many, so that signals are at other phases

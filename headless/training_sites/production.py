@@ -27,7 +27,7 @@ from seip_addon.core.traffic.sumo_programs import find_sumo
 from seip_addon.core.traffic.varied_bodies import shaped
 from seip_addon.core.workflows.site_building import AskedSite, build_site, save_map
 from seip_addon.core.workflows.survey import SurveySettings, lay_out
-from seip_addon.core.workflows.traffic import traffic_folder
+from seip_addon.core.workflows.traffic_runs import traffic_folder
 from seip_addon.scene.blend_file import new_file, save_blend
 from seip_addon.scene.build import build_scene
 from seip_addon.scene.check import contents_of

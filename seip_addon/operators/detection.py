@@ -15,7 +15,7 @@ from ..core.progress import Progress
 from ..core.results.detection_record import MAIN_RULE, parsed_detection
 from ..core.storage.files import check_folder, digest, unfinished_name
 from ..core.workflows.detection import INSTALL, DetectionJob, detect_elsewhere
-from ..core.workflows.traffic import found_runs
+from ..core.workflows.traffic_runs import found_runs
 from ..properties.conversion import absolute, output_folder, runs_folder
 from ..scene import contract
 from ..scene.blend_file import save_blend

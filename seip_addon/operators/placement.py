@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator
-from dataclasses import asdict, replace
+from collections.abc import Generator
+from dataclasses import replace
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -14,21 +13,18 @@ import bpy
 
 from .. import scene_survey, selection
 from ..core.errors import SeipError
-from ..core.placement.objective import Objective, Solution, check_objective
+from ..core.placement.objective import Objective, check_objective
 from ..core.progress import Progress
 from ..core.results.placement_record import Provenance, versions
-from ..core.robustness.robust_study import RobustnessSettings
-from ..core.workflows.robust import check_robust_objective, place_robustly
-from ..core.workflows.survey import Survey, place, record_of
-from ..core.workflows.traffic import TrafficSettings, found_runs, place_in_traffic, read_runs
+from ..core.workflows.placing import place
+from ..core.workflows.survey import record_of
+from ..core.workflows.traffic_runs import found_runs, read_runs
 from ..properties.conversion import runs_folder
 from ..scene.write import write_result
 from ..session import SceneState
 from ..viewport import coverage
 from .base import ForReadyScene, LongWork, Outcome, attempt
 from .results import keep_result
-
-_Placing = Callable[[Survey], Generator[Progress, None, Solution]]
 
 
 class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
@@ -39,27 +35,17 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneState], bpy.types.Ope
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Read the scene where it has changed, and state the objective."""
-        asked = scene.seip.goal
-        objective, robustness, traffic = asked.goal(), asked.robustness(), asked.traffic()
-        if robustness is not None or traffic is not None:
-            check_robust_objective(objective, robustness and robustness.risk)
-        surveying = scene_survey.survey(scene)
-        self._asked: dict[str, object] = {}
-        if traffic is not None:
-            self._asked = {"traffic": asdict(traffic)}
-            return _placed_in_traffic(surveying, objective, traffic, runs_folder(asked.runs))
-        if robustness is not None:
-            self._asked = {"robustness": robustness.as_record()}
-            return _placed(surveying, objective, partial(_robust, objective=objective, settings=robustness))
-        self._asked = {"pose_errors": asked.pose_errors}
-        return _placed(surveying, objective, partial(place, objective=objective, pose_errors=asked.pose_errors))
+        goal = scene.seip.goal
+        objective = goal.objective()
+        folder = runs_folder(goal.runs) if objective.scenarios.kind == "traffic" else None
+        return _placed(scene_survey.survey(scene), objective, folder)
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Put the sensors into the scene, and all that is needed to go on later into the file."""
         survey, solution = result.placed()
         deployment = solution.deployment
         provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
-        record = record_of(survey, solution, provenance, self._asked)
+        record = record_of(survey, solution, provenance)
         write_result(scene, survey.site, deployment)
         keep_result(scene, result, record)
         coverage.show_colours(scene)
@@ -67,33 +53,16 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneState], bpy.types.Ope
 
 
 def _placed(
-    surveying: Generator[Progress, None, SceneState], objective: Objective, placing: _Placing
+    surveying: Generator[Progress, None, SceneState], objective: Objective, folder: Path | None
 ) -> Generator[Progress, None, SceneState]:
-    return (yield from _placed_on((yield from surveying), objective, placing))
-
-
-def _placed_on(state: SceneState, objective: Objective, placing: _Placing) -> Generator[Progress, None, SceneState]:
+    """Place sensors on a survey; runs of traffic are read, and the objective is checked, before any ray is cast."""
+    state = yield from surveying
+    runs = None if folder is None else (yield from read_runs(found_runs(folder), state.layout))
     check_objective(state.layout.site, state.layout.models, objective)
     state, survey = yield from scene_survey.with_visibility(state)
     began = time.perf_counter()
-    solution = yield from placing(survey)
+    solution = yield from place(survey, objective, runs)
     return replace(state, solution=solution, durations=state.timed("placement", began))
-
-
-def _robust(survey: Survey, objective: Objective, settings: RobustnessSettings) -> Generator[Progress, None, Solution]:
-    return (yield from place_robustly(survey, objective, settings)).solution
-
-
-def _placed_in_traffic(
-    surveying: Generator[Progress, None, SceneState], objective: Objective, settings: TrafficSettings, folder: Path
-) -> Generator[Progress, None, SceneState]:
-    state = yield from surveying
-    runs = yield from read_runs(found_runs(folder), state.layout)  # refuses before any ray is cast
-
-    def placing(survey: Survey) -> Generator[Progress, None, Solution]:
-        return (yield from place_in_traffic(survey, objective, runs, settings)).solution
-
-    return (yield from _placed_on(state, objective, placing))
 
 
 class SEIP_OT_add_rule(bpy.types.Operator):

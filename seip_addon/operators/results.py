@@ -302,7 +302,7 @@ class SEIP_OT_evaluate_sensors(ForPlacement, LongWork[SceneState], bpy.types.Ope
         live_coverage.stop()
         take_over(scene, survey.site, solution.deployment, labelled_sensors(scene, hidden=True))
         provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
-        keep_result(scene, result, record_of(survey, solution, provenance, {}))
+        keep_result(scene, result, record_of(survey, solution, provenance))
         self.report({"INFO"}, f"coverage {solution.deployment.coverage:.2%} where the sensors hang")
 
 

@@ -10,7 +10,7 @@ from .. import scene_status
 from ..core.placement.objective import certificate, purpose
 from ..core.placement.returns_summary import returns_text
 from ..core.results.placement_record import PlacementRecord, parsed_record, relevant_warnings
-from ..core.workflows.traffic import traffic_folder
+from ..core.workflows.traffic_runs import traffic_folder
 from ..operators.placement import SEIP_OT_solve_placement
 from ..operators.results import SEIP_OT_evaluate_sensors, no_placement
 from ..operators.visibility import SEIP_OT_compare_scene
@@ -19,8 +19,12 @@ from .run_button import draw_run
 from .sidebar import OfSite, RowList, Sidebar, is_narrow, settings_column
 from .wrapped_text import draw_sentence
 
-_ERRING = ("position_error", "tilt_error", "seen_by", "failure")
-_IN_TRAFFIC = ("layer", "weights_from_traffic", "instants", "evaluation_instants")
+_SHOWN = {
+    "nominal": ("failures", "seen_by"),
+    "pose-errors": ("risk", "position_error", "tilt_error", "failures", "seen_by"),
+    "traffic": ("risk", "weights_from_traffic", "instants", "held_out"),
+}
+"""Properties of the objective that are shown for each kind of scenarios."""
 
 
 class SEIP_UL_rules(RowList, bpy.types.UIList):
@@ -71,30 +75,28 @@ class SEIP_PT_placement(Sidebar, bpy.types.Panel):
             _draw_answer(layout, scene)
 
 
-class SEIP_PT_placement_precaution(OfSite, bpy.types.Panel):
-    """What the placement is to stand."""
+class SEIP_PT_placement_objective(OfSite, bpy.types.Panel):
+    """Panel: criterion, scenarios and risk measure."""
 
-    bl_idname = "SEIP_PT_placement_precaution"
+    bl_idname = "SEIP_PT_placement_objective"
     bl_parent_id = "SEIP_PT_placement"
-    bl_label = "Robustness"
+    bl_label = "Criterion and Scenarios"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw what the placement is chosen for."""
+        """Draw the criterion and the settings of the chosen scenarios."""
         goal = context.scene.seip.goal
         layout = settings_column(self.layout)
-        layout.prop(goal, "objective")
-        if goal.objective == "PLANNED":
-            layout.prop(goal, "criterion")
-            layout.prop(goal, "pose_errors")
-            return
-        in_traffic = goal.objective == "TRAFFIC"
-        if in_traffic:
+        layout.prop(goal, "criterion")
+        layout.prop(goal, "scenarios")
+        if goal.scenarios == "traffic":
             layout.prop(goal, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
-        for name in _IN_TRAFFIC if in_traffic else _ERRING:
+        for name in _SHOWN[goal.scenarios]:
             layout.prop(goal, name)
-        looks = f"at {goal.instants} instants" if in_traffic else "in twenty draws"
-        draw_sentence(layout, f"This looks from every candidate {looks} and takes minutes.", icon="INFO")
+        if goal.scenarios == "nominal" or goal.risk == "none":
+            return
+        number = f"{goal.instants} instants" if goal.scenarios == "traffic" else "twenty draws"
+        draw_sentence(layout, f"Rays are cast from every candidate in {number}, which takes minutes.", icon="INFO")
 
 
 class SEIP_PT_placement_rules(OfSite, bpy.types.Panel):
@@ -195,7 +197,7 @@ def _warnings(record: PlacementRecord) -> list[str]:
 CLASSES = (
     SEIP_UL_rules,
     SEIP_PT_placement,
-    SEIP_PT_placement_precaution,
+    SEIP_PT_placement_objective,
     SEIP_PT_placement_rules,
     SEIP_PT_placement_solver,
 )

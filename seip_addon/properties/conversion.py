@@ -10,7 +10,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ..core.errors import SeipError
 from ..core.settings import settings_of
-from ..core.workflows.traffic import traffic_folder
+from ..core.workflows.traffic_runs import traffic_folder
 
 _KINDS = {bool: BoolProperty, int: IntProperty, float: FloatProperty, str: EnumProperty}
 _UNITS = {"m": {"unit": "LENGTH"}, "rad": {"subtype": "ANGLE"}}

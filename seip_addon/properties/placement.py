@@ -5,19 +5,13 @@ from __future__ import annotations
 from typing import Literal
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from .. import selection
 from ..core.placement.objective import DEFAULT_COUNT, Objective
-from ..core.robustness.pose_errors import MAX_ANGLE_STD, PoseErrors
-from ..core.robustness.risk import Risk
-from ..core.robustness.robust_study import RobustnessSettings
+from ..core.placement.scenarios import DEFAULT_COUNTS, MAX_ANGLE_STD, PoseErrors, Scenarios
 from ..core.robustness.traffic_study import LAYER_NAMES
-from ..core.workflows.traffic import TrafficSettings
 from .conversion import as_typed, of_setting
-
-TAILS = {"EXPECTED": 1.0, "CVAR": 0.25, "WORST": 0.0}
-"""Share of the scenarios, the worst ones, that count, by objective."""
 
 
 class SEIP_PG_position_rule(bpy.types.PropertyGroup):
@@ -75,54 +69,59 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             ("auto", "By Sensor", "Returns if a sensor has a range law, as real ones have; otherwise road seen"),
             ("road", "Road Seen", "The share of the road that sensors see"),
             ("returns", "Returns", "The expected returns from cars, cyclists and pedestrians"),
+            ("height", "Vehicles' Height", f"The {LAYER_NAMES['height']}, in traffic"),
         ),
     )
-    objective: EnumProperty(
-        name="Optimise for",
-        description="Whether the placement trusts the map, or is chosen for what may go wrong",
+    scenarios: EnumProperty(
+        name="Scenarios",
+        description="What the placement is optimised over",
         items=(
-            ("PLANNED", "Nominal Poses", "The coverage of sensors that hang just where they should"),
-            ("EXPECTED", "Expected Coverage", "Coverage on average over poses that err"),
-            ("CVAR", "CVaR of the Worst Quarter", "Coverage on average over the worst quarter of poses that err"),
-            ("WORST", "Worst Case", "Coverage in the worst of the poses that were tried"),
-            ("TRAFFIC", "Coverage in Traffic", "Coverage on average over instants at which vehicles block the view"),
+            ("nominal", "Nominal", "Poses as planned on the empty road"),
+            ("pose-errors", "Pose Errors", "Random errors of the sensors' poses"),
+            ("traffic", "Traffic", "Instants of traffic at which vehicles block the view"),
+        ),
+    )
+    risk: of_setting(
+        Objective,
+        "risk",
+        "Risk Measure",
+        items=(
+            ("auto", "Default", "Worst quarter of pose errors, mean of traffic"),
+            ("none", "Evaluate Only", "Optimise for nominal poses and the empty road, and report the loss"),
+            ("mean", "Mean", "Mean over the scenarios"),
+            ("worst-quarter", "Worst Quarter", "Mean over the worst quarter of the scenarios (CVaR)"),
+            ("worst", "Worst", "The worst of the scenarios"),
         ),
     )
     position_error: of_setting(PoseErrors, "position", "Position Error", min=0.0)
     tilt_error: of_setting(PoseErrors, "tilt", "Tilt Error", min=0.0, max=MAX_ANGLE_STD)
-    seen_by: of_setting(Risk, "seen_by", "Seen by", max=8)
-    failure: EnumProperty(
-        name="Sensor Failure",
-        description="Whether coverage is counted after one of the sensors has failed",
+    seen_by: of_setting(Objective, "seen_by", "Seen by", max=8)
+    failures: of_setting(
+        Objective,
+        "failures",
+        "Sensor Failure",
         items=(
-            ("none", "None", "All of them work"),
-            ("worst", "Worst Sensor", "The one that is missed most has failed"),
-            ("mean", "Any Sensor", "On average over all of them"),
+            ("none", "None", "All sensors work"),
+            ("worst", "Worst Sensor", "The sensor that matters most has failed"),
+            ("mean", "Any Sensor", "Mean over the failures of each sensor"),
         ),
     )
     runs: StringProperty(
         name="Runs",
-        description="Folder with runs of traffic (.npz), two or more: the last third evaluates what is chosen on the "
-        "others. Empty for the folder SCENE_traffic beside the file",
+        description="Folder with two or more runs of traffic (.npz); the last third of the runs is for evaluation. "
+        "Empty for the folder SCENE_traffic beside the file",
         subtype="DIR_PATH",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
-    layer: of_setting(
-        TrafficSettings,
-        "layer",
-        "See",
-        items=(
-            ("road", "Road", f"The {LAYER_NAMES['road']}"),
-            ("height", "Vehicles' Height", f"The {LAYER_NAMES['height']}"),
-        ),
+    weights_from_traffic: of_setting(Scenarios, "weights_from_traffic", "Weights from Traffic")
+    instants: IntProperty(
+        name="Instants", description="Instants of traffic to optimise over", default=DEFAULT_COUNTS["traffic"][0], min=1
     )
-    weights_from_traffic: of_setting(TrafficSettings, "weights_from_traffic", "Weights from Traffic")
-    instants: of_setting(TrafficSettings, "instants", "Instants")
-    evaluation_instants: of_setting(TrafficSettings, "evaluation_instants", "Evaluated At")
-    pose_errors: BoolProperty(
-        name="Test Pose Errors",
-        description="Note with the placement what it loses where sensors do not hang quite as planned; this casts rays",
-        default=False,
+    held_out: IntProperty(
+        name="Held-out Instants",
+        description="Instants of other runs to evaluate on",
+        default=DEFAULT_COUNTS["traffic"][1],
+        min=1,
     )
     rules: CollectionProperty(type=SEIP_PG_position_rule)
     active_rule: IntProperty(name="Position")
@@ -132,44 +131,42 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         search=selection.search_positions,
     )
 
-    def goal(self) -> Objective:
-        """Return what is asked, as the core takes it.
+    def objective(self) -> Objective:
+        """Return the objective that the panel states.
 
         Raises
         ------
         SeipError
-            It contradicts itself.
+            Its parts contradict each other.
         """
+        nominal = self.scenarios == "nominal"
         return Objective(
             count=self.count if self.limit == "COUNT" else None,
             budget=as_typed(self.budget) if self.limit == "BUDGET" else None,
             coverage=as_typed(self.coverage) / 100 if self.limit == "COVERAGE" else None,
             central_weight=self._weight(),
             min_distance=as_typed(self.min_distance),
-            criterion=self.criterion if self.objective == "PLANNED" and self.limit != "COVERAGE" else "auto",
+            criterion=self.criterion,
             forbidden=tuple(one.name for one in self.rules if one.rule == "FORBIDDEN"),
             mandatory=tuple(one.name for one in self.rules if one.rule == "MANDATORY"),
+            scenarios=self._scenarios(),
+            risk="auto" if nominal else self.risk,
+            failures="none" if self.scenarios == "traffic" else self.failures,
+            seen_by=1 if self.scenarios == "traffic" else self.seen_by,
         )
 
-    def robustness(self) -> RobustnessSettings | None:
-        """Return what the placement is to stand, None where it trusts the poses.
-
-        Raises
-        ------
-        SeipError
-            It makes no sense.
-        """
-        if self.objective not in TAILS:
-            return None
-        position, tilt = as_typed(self.position_error), as_typed(self.tilt_error)
-        risk = Risk(TAILS[self.objective], self.seen_by, self.failure)
-        return RobustnessSettings(risk, PoseErrors(position, position, tilt, tilt))
-
-    def traffic(self) -> TrafficSettings | None:
-        """Return how the placement is chosen on traffic, None where it is not."""
-        if self.objective != "TRAFFIC":
-            return None
-        return TrafficSettings(self.layer, self.weights_from_traffic, self.instants, self.evaluation_instants)
+    def _scenarios(self) -> Scenarios:
+        if self.scenarios == "traffic":
+            return Scenarios(
+                "traffic",
+                weights_from_traffic=self.weights_from_traffic,
+                count=self.instants,
+                held_out=self.held_out,
+            )
+        if self.scenarios == "pose-errors":
+            position, tilt = as_typed(self.position_error), as_typed(self.tilt_error)
+            return Scenarios("pose-errors", PoseErrors(position, position, tilt, tilt))
+        return Scenarios()
 
     def _weight(self) -> float | Literal["scene"] | None:
         if self.weighting == "SCENE":

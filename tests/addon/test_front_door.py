@@ -215,5 +215,5 @@ def test_a_panel_says_one_line_where_there_is_nothing_yet(scene, name, monkeypat
     panel.draw(own, bpy.context)
     assert len(said) == 1
     assert not layout.operator.called
-    for details in ("visibility_details", "placement_rules", "placement_solver", "placement_precaution"):
+    for details in ("visibility_details", "placement_rules", "placement_solver", "placement_objective"):
         assert not getattr(bpy.types, f"SEIP_PT_{details}").poll(bpy.context)

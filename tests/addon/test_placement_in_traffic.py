@@ -4,14 +4,14 @@ import shutil
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
-from headless import in_traffic
+from headless import place
 
 import bpy
 import pytest
 
 from seip_addon.core.results.placement_record import comparable, load_placement_record, parsed_record
 from seip_addon.operators.placement import SEIP_OT_solve_placement
-from seip_addon.panels.placement import SEIP_PT_placement_precaution
+from seip_addon.panels.placement import SEIP_PT_placement_objective
 from seip_addon.session import session
 from tests.scene_by_hand import make_scene
 from tests.small_junction import make_example
@@ -19,7 +19,8 @@ from tests.small_scene import make_run
 
 OPTIONS = [
     *("--sensor", "vlp16", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--delta", "6", "--count", "2"),
-    *("--see", "height", "--weights-from-traffic", "--instants", "2", "--judged-at", "8", "--no-render"),
+    *("--traffic", "--criterion", "height", "--weights-from-traffic", "--scenarios", "2", "--held-out", "8"),
+    "--no-render",
 ]
 
 
@@ -30,15 +31,15 @@ def coarse(junction):
     survey.heights, survey.grid, survey.spacing, survey.delta = "5.4", 8.0, 25.0, 6.0
     for one in survey.types:
         one.use = one.name == "vlp16"
-    goal.objective, goal.instants, goal.evaluation_instants = "TRAFFIC", 2, 8
+    goal.scenarios, goal.instants, goal.held_out = "traffic", 2, 8
     return junction
 
 
 @pytest.mark.slow
 def test_panel_and_batch_place_alike_and_what_it_was_chosen_on_stays_with_it(coarse, tmp_path, small_scene):
     goal = coarse.seip.goal
-    goal.layer, goal.weights_from_traffic = "height", True
-    goal.pose_errors = True  # left from another objective, and not shown for this one
+    goal.criterion, goal.weights_from_traffic = "height", True
+    goal.failures = "worst"  # left from other scenarios, and not shown for these
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
     certificate, purpose, band = session.state_of(coarse).solution.caption
     assert band.startswith("over plausible gains")
@@ -56,20 +57,20 @@ def test_panel_and_batch_place_alike_and_what_it_was_chosen_on_stays_with_it(coa
     bpy.ops.seip.load_traffic()
     bpy.ops.seip.try_in_traffic()
     assert parsed_record(seip.result.record).notes[:-1] == panel.notes
-    in_traffic.main([str(small_scene), *OPTIONS, "-o", str(tmp_path)])
+    place.main([str(small_scene), *OPTIONS, "-o", str(tmp_path)])
     assert comparable(panel) == comparable(load_placement_record(tmp_path / "placement.json"))
 
 
 def test_the_panel_shows_what_the_objective_asks_for(coarse):
     layout = MagicMock()
-    SEIP_PT_placement_precaution.draw(SimpleNamespace(layout=layout), bpy.context)
+    SEIP_PT_placement_objective.draw(SimpleNamespace(layout=layout), bpy.context)
     column = layout.column.return_value
     names = [call.args[1] for call in column.prop.call_args_list]
-    assert names == ["objective", "runs", "layer", "weights_from_traffic", "instants", "evaluation_instants"]
+    assert names == ["criterion", "scenarios", "runs", "risk", "weights_from_traffic", "instants", "held_out"]
     assert all(hasattr(coarse.seip.goal, name) for name in names)
-    assert column.prop.call_args_list[1].kwargs == {"placeholder": "small_traffic"}
+    assert column.prop.call_args_list[2].kwargs == {"placeholder": "small_traffic"}
     said = " ".join(call.kwargs["text"] for call in column.column.return_value.label.call_args_list)
-    assert said == "This looks from every candidate at 2 instants and takes minutes."
+    assert said == "Rays are cast from every candidate in 2 instants, which takes minutes."
 
 
 def test_runs_are_read_in_work_that_can_be_stopped(coarse):
@@ -122,7 +123,7 @@ def test_runs_that_are_of_no_use_are_refused_before_any_ray_is_cast(coarse, tmp_
 def test_runs_beside_a_file_that_was_never_saved_have_their_sentence(add_on):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scene = make_scene(make_example().geometry)
-    scene.seip.goal.objective = "TRAFFIC"
+    scene.seip.goal.scenarios = "traffic"
     for folder in ("", "//runs"):
         scene.seip.goal.runs = folder
         with pytest.raises(RuntimeError, match="the file has not been saved: save it first, or choose another folder"):

@@ -7,7 +7,7 @@ from collections.abc import Generator
 from dataclasses import replace
 from types import SimpleNamespace
 
-from headless import place, robust
+from headless import place
 
 import bpy
 import pytest
@@ -47,12 +47,12 @@ def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scen
 
 
 @pytest.mark.slow
-def test_pose_errors_are_tried_where_that_is_asked_for(junction, tmp_path, small_scene):
-    junction.seip.goal.pose_errors = True
+def test_pose_errors_are_only_evaluated_where_that_is_the_risk_measure(junction, tmp_path, small_scene):
+    junction.seip.goal.scenarios, junction.seip.goal.risk = "pose-errors", "none"
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
     panel = parsed_record(junction.seip.result.record)
     assert any("in one of twenty cases" in note for note in panel.notes)
-    place.main([str(small_scene), *OPTIONS, "--pose-errors", "-o", str(tmp_path)])
+    place.main([str(small_scene), *OPTIONS, "--pose-errors", "--risk", "none", "-o", str(tmp_path)])
     assert comparable(panel) == comparable(load_placement_record(tmp_path / "placement.json"))
 
 
@@ -239,10 +239,11 @@ def test_a_folder_that_cannot_be_written_has_its_sentence(junction, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("objective", ["EXPECTED", "CVAR", "WORST"])
-def test_panel_and_batch_place_alike_for_what_may_go_wrong(junction, tmp_path, objective, small_scene):
+@pytest.mark.parametrize("risk", ["mean", "worst-quarter", "worst"])
+def test_panel_and_batch_place_alike_over_pose_errors(junction, tmp_path, risk, small_scene):
     goal = junction.seip.goal
-    goal.objective, goal.position_error, goal.tilt_error, goal.failure = objective, 0.5, math.radians(3), "mean"
+    goal.scenarios, goal.risk, goal.failures = "pose-errors", risk, "mean"
+    goal.position_error, goal.tilt_error = 0.5, math.radians(3)
     types = junction.seip.survey
     types.grid, types.spacing = 8.0, 25.0
     bpy.ops.seip.list_sensor_types()
@@ -251,14 +252,14 @@ def test_panel_and_batch_place_alike_for_what_may_go_wrong(junction, tmp_path, o
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
     panel = parsed_record(junction.seip.result.record)
     options = ["--heights", "8", "--grid", "8", "--spacing", "25", "--count", "2", "--no-render", "--sensor", "type1"]
-    wrong = ["--position-error", "0.5", "--tilt-error", "3", "--failure", "mean", "--objective", objective.lower()]
-    robust.main([str(small_scene), *options, *wrong, "-o", str(tmp_path)])
+    wrong = ["--position-error", "0.5", "--tilt-error", "3", "--failures", "mean", "--risk", risk]
+    place.main([str(small_scene), *options, *wrong, "-o", str(tmp_path)])
     batch = load_placement_record(tmp_path / "placement.json")
     assert comparable(panel) == comparable(replace(batch, settings={**batch.settings, "render": False}))
     assert any("in nineteen of twenty" in note for note in panel.notes)
 
 
-def test_a_coverage_to_reach_allows_no_precaution(junction):
-    junction.seip.goal.limit, junction.seip.goal.objective = "COVERAGE", "WORST"
+def test_a_coverage_to_reach_is_not_optimised_over_scenarios(junction):
+    junction.seip.goal.limit, junction.seip.goal.scenarios = "COVERAGE", "pose-errors"
     with pytest.raises(RuntimeError, match="needs a number of sensors or a budget"):
         bpy.ops.seip.solve_placement()

@@ -56,7 +56,7 @@ def test_an_object_in_edit_mode_counts_as_it_is_shown_there(junction):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda record: record.clear(), "has the schema None, not 'seip-placement/2'; place the sensors again"),
+        (lambda record: record.clear(), "has the schema None, not 'seip-placement/3'; place the sensors again"),
         (
             lambda record: record["sensors"][0].pop("pose"),
             r"damaged .*: sensors\[0\]\.pose is missing; place",

@@ -21,7 +21,7 @@ from small_scene import make_run
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.traffic import Trajectories
-from seip_addon.core.workflows.traffic import runs_in
+from seip_addon.core.workflows.traffic_runs import runs_in
 
 COARSE = ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "20"]
 BRIEF = ["--every", "29", "--steps", "2", "--trainings", "2"]

@@ -12,15 +12,14 @@ import pytest
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import Limits
 from seip_addon.core.placement.objective import Objective
-from seip_addon.core.robustness.risk import Risk
+from seip_addon.core.placement.scenarios import PoseErrors, Scenarios
 from seip_addon.core.scans import ScanSettings
 from seip_addon.core.settings import settings_of
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.workflows.survey import SurveySettings
-from seip_addon.core.workflows.traffic import TrafficSettings
 
-ALL = (CandidateSettings, VisibilitySettings, SurveySettings, Objective, Risk, ScanSettings, TrafficSettings)
+ALL = (CandidateSettings, VisibilitySettings, SurveySettings, Objective, Scenarios, ScanSettings)
 
 
 def surveyed(*typed):
@@ -77,7 +76,7 @@ def test_help_has_a_line_for_each_option_and_names_its_default(monkeypatch):
 
 def test_help_names_the_options_of_a_survey_where_another_command_explains_them(monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")
-    parser = new_parser("robust", "Place sensors.")
+    parser = new_parser("study", "Study coverage.")
     add_options(parser)
     text = parser.format_help()
     assert "--heights --tilts --yaws --assumed-poles --installed-cost (see: seip place --help)\n" in text
@@ -96,6 +95,25 @@ def test_weights_are_the_scene_s_or_one_for_all():
     for typed, weight in wanted.items():
         assert read_objective(parser.parse_args(typed)).central_weight == weight
     assert read_objective(parser.parse_args(["--require", "a", "b"])) == Objective(mandatory=("a", "b"))
+
+
+@pytest.mark.parametrize(
+    ("typed", "scenarios"),
+    [
+        ([], Scenarios()),
+        (["--pose-errors"], Scenarios("pose-errors")),
+        (
+            ["--position-error", "0.5", "--yaw-error", "5", "--scenarios", "7"],
+            Scenarios("pose-errors", PoseErrors(0.5, 0.5, math.radians(5), math.radians(2)), count=7),
+        ),
+        (["--traffic", "a.npz", "--held-out", "9", "--seed", "3"], Scenarios("traffic", held_out=9, seed=3)),
+        (["--traffic", "--weights-from-traffic"], Scenarios("traffic", weights_from_traffic=True)),
+    ],
+)
+def test_scenarios_are_those_that_the_options_name(typed, scenarios):
+    parser = argparse.ArgumentParser()
+    add_objective(parser)
+    assert read_objective(parser.parse_args(typed)).scenarios == scenarios
 
 
 def parsed(*typed):

@@ -14,8 +14,6 @@ JUNCTION = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 NONE = "missing.blend"
 COMMANDS = {
     "place": (),
-    "robust": (),
-    "in_traffic": (),
     "study": (),
     "simulate": ("--dataset", "data/set"),
     "stability": ("--work", "work"),
@@ -68,11 +66,10 @@ def test_ctrl_c_leaves_no_folder(tmp_path, monkeypatch, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("command", ["place", "robust"])
-def test_what_cannot_be_had_on_a_scene_leaves_no_folder(command, tmp_path, monkeypatch, capsys):
+def test_what_cannot_be_had_on_a_scene_leaves_no_folder(tmp_path, monkeypatch, capsys):
     """The error comes after the scene is read and the site is laid out."""
     options = ["--grid", "8", "--spacing", "40", "--forbid", "nowhere"]
-    assert fails(monkeypatch, command, JUNCTION, "-o", tmp_path / "out", *options) == "1"
+    assert fails(monkeypatch, "place", JUNCTION, "-o", tmp_path / "out", *options) == "1"
     assert "nowhere" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 

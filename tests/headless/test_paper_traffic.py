@@ -18,7 +18,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.sumo_programs import find_sumo, run
-from seip_addon.core.workflows.traffic import runs_in
+from seip_addon.core.workflows.traffic_runs import runs_in
 
 FLOWS = '<routes><route id="WE" edges="w e"/><flow id="f" vehsPerHour="{}" route="WE"/>{}</routes>'
 

@@ -10,8 +10,8 @@ from headless.lab.stability import chapters as stability_chapters
 import pytest
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.placement.scenarios import Scenarios
 from seip_addon.core.robustness.pose_study import PoseStudySettings
-from seip_addon.core.robustness.robust_study import RobustnessSettings
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 COARSE = [
@@ -33,7 +33,7 @@ LITTLE = stability_chapters.StabilityScope(
     rays=200,
     instances=2,
     poses=PoseStudySettings(draws=20, draws_of_kind=5),
-    robust=RobustnessSettings(scenarios=3, draws=20),
+    robust=Scenarios("pose-errors", count=3, held_out=20),
     instants=(2, 12),
 )
 

@@ -84,14 +84,15 @@ def _press(window: Window, what: str, seconds: float = 200) -> Steps:
 
 
 def _pose_errors_are_asked_for(window: Window) -> Steps:
-    yield from window.open_below("seip.solve_placement(", "seip.goal.objective")
+    yield from window.open_below("seip.solve_placement(", "seip.goal.scenarios")
     yield from _press(window, "seip.compute_visibility(")
     rays = _counted_rays()
     yield from _press(window, "seip.solve_placement(")
     assert len(_sensors()) == 2
     assert sum(rays) == 0, f"{sum(rays)} rays were cast with the grid at hand"
     assert not any("one of twenty" in note for note in _record()["notes"])
-    yield from window.click("seip.goal.pose_errors")
+    _scene().seip.goal.scenarios, _scene().seip.goal.risk = "pose-errors", "none"
+    yield 0.5
     yield from _press(window, "seip.solve_placement(")
     assert sum(rays) > 0
     assert any("one of twenty" in note for note in _record()["notes"])
@@ -99,13 +100,13 @@ def _pose_errors_are_asked_for(window: Window) -> Steps:
 
 def _traffic_is_placed_on(window: Window) -> Steps:
     goal = _scene().seip.goal
-    yield from window.open_below("seip.solve_placement(", "seip.goal.objective")
-    goal.objective, goal.runs = "TRAFFIC", str((Path("scenes") / "junction_traffic").resolve())
+    yield from window.open_below("seip.solve_placement(", "seip.goal.scenarios")
+    goal.scenarios, goal.risk, goal.runs = "traffic", "auto", str((Path("scenes") / "junction_traffic").resolve())
     yield from window.enter("seip.goal.instants", "4")
-    yield from window.enter("seip.goal.evaluation_instants", "8")
+    yield from window.enter("seip.goal.held_out", "8")
     yield from window.picture("in-traffic")
     yield from _press(window, "seip.solve_placement(")
-    assert _record()["settings"]["traffic"]["instants"] == 4
+    assert _record()["settings"]["goal"]["scenarios"]["count"] == 4
     assert any(note.startswith("this placement sees ") for note in _record()["notes"])
     assert (yield from _says(window, "this placement sees "))
 

@@ -75,7 +75,7 @@ def detector_limits(
     practice = TrialSite(simulator.site, simulator, traffic.validation)
     (tried,) = yield from trials(practice, main, Disturbance(), candidates.tested[:1], folder)
     elsewhere = []
-    dense = case_study.read_runs(survey.runs_beside(scene, "_dense"), origin, TEST_INTERVAL)
+    dense = case_study.sampled_runs(survey.runs_beside(scene, "_dense"), origin, TEST_INTERVAL)
     if dense:
         elsewhere.append(OtherSite(TrialSite("denser traffic", simulator, dense), (main,)))
     for other in others:
@@ -108,7 +108,7 @@ def _on_other_scene(
     candidates = replace(settings.candidates, sensors=(main.sensor,))
     layout = lay_out(reading.geometry, replace(settings, candidates=candidates), reading.warnings)
     there = yield from case_study.place_all((yield from see(layout, folder / f"visibility_{scene.stem}.npz")))
-    runs = case_study.read_runs(survey.runs_beside(scene), layout.geometry.origin, TEST_INTERVAL)
+    runs = case_study.sampled_runs(survey.runs_beside(scene), layout.geometry.origin, TEST_INTERVAL)
     return OtherSite(TrialSite(layout.site.name, _studio(layout), runs), (_most(there),))
 
 

@@ -7,23 +7,24 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from headless.charts import robust as robust_charts
+from headless.charts import pose_errors as pose_error_charts
 from headless.charts import traffic as traffic_charts
 
 from seip_addon.core.placement import PlacementProblem, SolverLimits, solve
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.near_optimal import NearOptimalSet, near_optimal_set
 from seip_addon.core.placement.objective import DEFAULT_COUNT, Objective, placement_problem
+from seip_addon.core.placement.risk import Risk
+from seip_addon.core.placement.scenarios import Scenarios
 from seip_addon.core.progress import Progress
 from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study
-from seip_addon.core.robustness.risk import Risk
-from seip_addon.core.robustness.robust_study import RobustnessSettings, robust_study
+from seip_addon.core.robustness.robust_study import robust_study
 from seip_addon.core.robustness.traffic_instants import spread_instants
 from seip_addon.core.robustness.traffic_study import traffic_scenarios, traffic_study
 from seip_addon.core.scans import MountedSensor
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.workflows.survey import Survey, surroundings
-from seip_addon.core.workflows.traffic import split_runs
+from seip_addon.core.workflows.traffic_runs import split_runs
 
 from . import charts as limits_charts
 from .arithmetic import arithmetic_rows, arithmetic_study
@@ -66,7 +67,7 @@ class StabilityScope:
     rays: int = 20_000
     instances: int = 60
     poses: PoseStudySettings = field(default_factory=PoseStudySettings)
-    robust: RobustnessSettings = field(default_factory=RobustnessSettings)
+    robust: Scenarios = Scenarios("pose-errors")
     instants: tuple[int, int] = (24, 120)
     detector: Mapping[str, int] = field(default_factory=dict)
 
@@ -198,9 +199,9 @@ def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     chosen = study.nominal[0].placement.chosen
     deployment = deploy(survey.site, survey.models, survey.grid.visible, chosen)
     under_errors = yield from pose_study(around, deployment, scene.scope.poses)
-    robust_charts.save_spread_chart(scene.charts / "spread.png", study, f"{scene.placed} under pose errors")
-    robust_charts.save_loss_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
-    robust_charts.save_frontier_chart(
+    pose_error_charts.save_spread_chart(scene.charts / "spread.png", study, f"{scene.placed} under pose errors")
+    pose_error_charts.save_loss_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
+    pose_error_charts.save_frontier_chart(
         scene.charts / "frontier.png", study, f"{scene.placed}: what robustness costs and saves"
     )
     return Chapter(
@@ -220,7 +221,7 @@ def failures(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study placements under sensor failures and multi-cover."""
     around, problem = surroundings(scene.survey), scene.problem(scene.sensor)
     study = yield from robust_study(around, problem, scene.scope.robust, RISKS, scene.survey.settings.limits)
-    robust_charts.save_spread_chart(scene.charts / "failures.png", study, f"{scene.placed}: failures")
+    pose_error_charts.save_spread_chart(scene.charts / "failures.png", study, f"{scene.placed}: failures")
     caption = "Distribution over unseen draws of what is left: placements for failures beside the nominal optimum"
     return Chapter(f"Failures: {scene.placed}", robust_rows(study), (Chart("failures.png", caption),))
 

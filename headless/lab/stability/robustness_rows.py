@@ -27,7 +27,7 @@ def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
             f"mean {mean_of(study.together.whole).describe()}",
             f"{settings.draws} draws, all sensors erring; half of them "
             f"{'say the same' if study.is_converged() else 'say something else: take more'}",
-            "placement over pose scenarios; `--pose-errors` says what the 5 % quantile loses",
+            "placement over pose errors: `seip place --pose-errors`; `--risk none` reports the 5 % quantile",
         ),
         Row(
             "a sensor's own error",
@@ -54,8 +54,8 @@ def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
 
 def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
     """Return what the study says as a row of the page of stability for each placement."""
-    settings, errors = study.settings, study.settings.errors
-    regime = f"σ {errors.position:g} m, {np.degrees(errors.tilt):.3g}°; {settings.scenarios} scenarios"
+    scenarios, errors = study.scenarios, study.scenarios.pose_errors
+    regime = f"σ {errors.position:g} m, {np.degrees(errors.tilt):.3g}°; {scenarios.optimised} scenarios"
     return tuple(
         Row(
             f"placement for {contender.name}",
@@ -64,7 +64,7 @@ def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
             f"{contender.evaluated_by.describe_outcome()} {contender.low.describe()} against "
             f"{study.beside(contender).low.describe()} of the nominal optimum: "
             f"{study.saving(contender).as_change()}",
-            f"{settings.draws} draws that nothing was chosen on; half of them "
+            f"{scenarios.evaluated} draws that nothing was chosen on; half of them "
             f"{'say the same' if study.is_converged(contender) else 'say something else: take more'}",
             f"certificate: within {contender.placement.gap:.2%} of the best objective possible",
         )

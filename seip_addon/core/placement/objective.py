@@ -1,10 +1,10 @@
-"""Objective and constraints of a placement, and the problem that they make of a site."""
+"""Criterion, scenarios, risk measure and constraints of a placement, and the problem that they make of a site."""
 
 import difflib
 import math
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from ..settings import setting
 from ..site.site import Candidates, Site
 from . import Placement, PlacementProblem, cheapest_for_coverage, solve, solve_greedy
 from .deployment import BAND, UNRANKED, Deployment, deploy, pose_prices
+from .risk import Failure, Risk
+from .scenarios import Scenarios
 from .search_limits import DEFAULT_LIMITS, SolverLimits
 
 DEFAULT_COUNT = 4  # sensors to place where neither a number nor a budget nor a coverage is asked for: the study's four
@@ -24,10 +26,15 @@ MOVED = "moved by hand"  # status of a placement whose sensors hang where a hand
 MOVED_MESSAGE = "Moved by hand: evaluated where the sensors hang; nothing is proven of it."
 CHOSEN_FOR = "chosen "  # how a note begins that says what was optimised in place of nominal coverage
 
+TAILS = {"mean": 1.0, "worst-quarter": 0.25, "worst": 0.0}
+"""Share of the scenarios, the worst ones, over which each risk measure averages."""
+
 
 @dataclass(frozen=True)
 class Objective:
-    """Objective and constraints: the most coverage for N sensors or a budget, or the least price for a coverage.
+    """Objective and constraints: a criterion over scenarios with a risk measure, for N sensors or a budget.
+
+    The reverse problem asks for the least price of a coverage.
 
     Parameters
     ----------
@@ -44,10 +51,26 @@ class Objective:
         Least distance between two sensors.
     forbidden, mandatory : tuple of str
         Names of positions that must not, and that must, carry a sensor.
-    criterion : {"auto", "road", "returns"}
-        What is to be large: the road seen, or the returns from road users; see `criterion_of`.
+    criterion : {"auto", "road", "returns", "height"}
+        What is maximised: the road seen, the expected returns from road users, or the points above the road that beams
+        pass, as traffic leaves them; see `criterion_of`.
     shares : (float, float, float)
         Importance of cars, cyclists and pedestrians for the returns, in proportion.
+    scenarios : Scenarios
+        What the placement is optimised over, and evaluated on.
+    risk : {"auto", "none", "mean", "worst-quarter", "worst"}
+        Risk measure over the scenarios: their mean, or that of the worst quarter (the conditional value at risk), or
+        the worst. ``auto`` is the worst quarter of pose errors and the mean of traffic; with ``none`` the placement is
+        optimised for the nominal scenario, and only evaluated on the others.
+    failures : {"none", "worst", "mean"}
+        What counts after one sensor has failed: the one that matters most, or any, on average.
+    seen_by : int
+        Number of sensors that must see a target.
+
+    Raises
+    ------
+    SeipError
+        A number is out of its limits, or the parts contradict each other.
     """
 
     count: int | None = setting(
@@ -65,8 +88,10 @@ class Objective:
     min_distance: float = setting(0.0, "least distance between two sensors", unit="m", minimum=0.0, metavar="M")
     forbidden: tuple[str, ...] = setting((), "positions without sensor", option="forbid", metavar="POSITION")
     mandatory: tuple[str, ...] = setting((), "positions with a sensor", option="require", metavar="POSITION")
-    criterion: Literal["auto", "road", "returns"] = setting(
-        "auto", "optimise the road seen or the returns from road users (auto: returns, if sensors have a range law)"
+    criterion: Literal["auto", "road", "returns", "height"] = setting(
+        "auto",
+        "optimise the road seen, the returns from road users, or points above the road in traffic (auto: returns, if "
+        "sensors have a range law)",
     )
     shares: tuple[float, float, float] = setting(
         (1.0, 1.0, 1.0),
@@ -75,6 +100,13 @@ class Objective:
         maximum=CHOSEN_WEIGHT.most,
         metavar="W",
     )
+    scenarios: Scenarios = Scenarios()
+    risk: Literal["auto", "none", "mean", "worst-quarter", "worst"] = setting(
+        "auto",
+        "measure over the scenarios (auto: worst-quarter of pose errors, mean of traffic; none: only evaluate)",
+    )
+    failures: Failure = setting("none", "optimise what is left after the worst sensor, or any sensor (mean), fails")
+    seen_by: int = setting(1, "number of sensors that must see a target", minimum=1, metavar="K")
 
     def __post_init__(self) -> None:
         for name, limits in (("budget", PRICE), ("min_distance", DISTANCE)):
@@ -95,6 +127,39 @@ class Objective:
         both = sorted(set(self.forbidden) & set(self.mandatory))
         if both:
             raise SeipError(f"position {both[0]!r} is both forbidden and mandatory: take it out of one of the two")
+        self._check_scenarios()
+
+    def _check_scenarios(self) -> None:
+        kind, measure = self.scenarios.kind, self.measure
+        looks = self.failures != "none" or self.seen_by > 1
+        if looks and (self.risk == "none" or kind == "traffic"):
+            other = "the risk none" if self.risk == "none" else "traffic"
+            raise SeipError(f"sensor failures and several sensors per target do not go with {other}: leave one out")
+        if self.criterion == "height" and (kind != "traffic" or measure is None):
+            raise SeipError("the criterion height is of traffic: add --traffic, or choose another criterion")
+        if measure is None:
+            return
+        if self.cheapest:
+            raise SeipError(
+                "optimising over scenarios or for failures needs a number of sensors or a budget, not a coverage to "
+                "reach: give one of these, or only evaluate (--risk none)"
+            )
+        if self.criterion == "returns":
+            raise SeipError(
+                "returns from road users are optimised for nominal poses and the empty road: choose the criterion road "
+                "for scenarios or failures, or only evaluate (--risk none)"
+            )
+        if self.count is not None:
+            measure.require_sensors(self.count)
+
+    @property
+    def measure(self) -> Risk | None:
+        """Risk measure that is maximised over the scenarios; None for nominal poses on the empty road."""
+        looks = self.failures != "none" or self.seen_by > 1
+        if self.risk == "none" or (self.scenarios.kind == "nominal" and not looks):
+            return None
+        usual = "worst-quarter" if self.scenarios.kind == "pose-errors" else "mean"
+        return Risk(TAILS[usual if self.risk == "auto" else self.risk], self.seen_by, self.failures)
 
     @property
     def weighted(self) -> bool:
@@ -107,7 +172,7 @@ class Objective:
         return self.coverage is not None
 
 
-def criterion_of(objective: Objective, models: Mapping[str, LidarModel]) -> Literal["road", "returns"]:
+def criterion_of(objective: Objective, models: Mapping[str, LidarModel]) -> Literal["road", "returns", "height"]:
     """Return the criterion of an objective for the sensor types to choose from.
 
     Coverage of the road predicts detection where every return counts, as for the sensors of the SEIP paper. Sensors of
@@ -116,25 +181,38 @@ def criterion_of(objective: Objective, models: Mapping[str, LidarModel]) -> Lite
     if objective.criterion != "auto":
         return objective.criterion
     range_laws = any(not isinstance(model.law, CarlaDropoff) for model in models.values())
-    return "returns" if range_laws and not objective.cheapest else "road"
+    return "returns" if range_laws and not objective.cheapest and objective.measure is None else "road"
+
+
+class Evaluation(Protocol):
+    """Evaluation of a placement on held-out scenarios."""
+
+    def messages(self) -> tuple[str, ...]:
+        """Return notes on the placement: what it gains over the nominal optimum, and warnings."""
+
+    def summary(self) -> tuple[str, ...]:
+        """Return lines that compare the placement with the nominal optimum."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A solution: an objective with its placement, certificate and deployment.
+    """A solution: an objective with its placement, certificate, deployment and evaluation.
 
     Parameters
     ----------
     objective : Objective
         With the number of sensors filled in where none was asked for.
     greedy : Placement or None
-        The greedy answer to the same question; None for the reverse problem.
+        Greedy solution of the same problem; None for the reverse problem and over scenarios.
+    evaluation : Evaluation, optional
+        On held-out scenarios, where the placement was optimised over scenarios.
     """
 
     objective: Objective
     placement: Placement
     greedy: Placement | None
     deployment: Deployment
+    evaluation: Evaluation | None = None
 
     @property
     def certificate(self) -> str:

@@ -8,11 +8,13 @@ from dataclasses import asdict
 from typing import Any
 
 from ..placement.objective import Objective
+from ..placement.scenarios import PoseErrors, Scenarios
 from ..placement.search_limits import DEFAULT_EFFORT
 from ..results.placement_record import PlacementRecord
 from ..settings import settings_of
 from ..site.candidates import CandidateSettings
 from ..site.installed_cost import load_installed_cost
+from ..storage.json_dataclass import as_json
 from ..visibility.settings import VisibilitySettings
 
 DEFAULT_GRID = 1.0  # metres, of `SurveySettings`
@@ -21,12 +23,11 @@ DEFAULT_GRID = 1.0  # metres, of `SurveySettings`
 def repeating_command(record: PlacementRecord) -> str:
     """Return what to type in the folder of a result to have it again; empty where no one command makes it."""
     settings: Mapping[str, Any] = record.settings
-    if record.objective.solver == "none" or "robustness" in settings or "traffic" in settings:
-        return ""
+    if record.objective.solver == "none" or record.asked.goal.scenarios.kind == "traffic":
+        return ""  # moved by hand, or optimised on runs of traffic that the record does not name
     words = ["seip", "place", "placed.blend", *_of_candidates(settings), *_of_survey(settings)]
     words += _options(VisibilitySettings, settings.get("visibility", {}))
-    words += _of_goal(settings["goal"])
-    words += ["--pose-errors"] if settings.get("pose_errors") else []
+    words += _of_objective(record.asked.goal)
     words += [] if settings.get("render") else ["--no-render"]
     return shlex.join([*words, "-o", "again"])
 
@@ -38,12 +39,19 @@ def _of_candidates(settings: Mapping[str, Any]) -> Iterator[str]:
     yield from _options(CandidateSettings, candidates)
 
 
-def _of_goal(goal: Mapping[str, Any]) -> Iterator[str]:
-    values = dict(goal)
-    if values.get("central_weight") == "scene":
+def _of_objective(objective: Objective) -> Iterator[str]:
+    values = {name: getattr(objective, name) for name in settings_of(Objective)}
+    if values["central_weight"] == "scene":
         del values["central_weight"]
         yield "--weighted"
     yield from _options(Objective, values)
+    scenarios = objective.scenarios
+    if scenarios.errs:
+        yield "--pose-errors"
+        if scenarios.pose_errors != PoseErrors():
+            for name, value in as_json(scenarios.pose_errors).items():
+                yield from (f"--{name.removesuffix('_deg')}-error", f"{value:.12g}")
+        yield from _options(Scenarios, {name: getattr(scenarios, name) for name in settings_of(Scenarios)})
 
 
 def _of_survey(settings: Mapping[str, Any]) -> Iterator[str]:

@@ -19,7 +19,7 @@ from ..results.placement_record import RecordedObjective, relevant_warnings
 from ..site.sources import source_table
 from .blind_spots import BlindSpot, blind_spots, centres, seen_places
 from .blocks import Block, Bullets, Code, Paragraph, Picture, Report, Section, Table
-from .evidence import ROBUST_PICTURES, TRAFFIC_PICTURES, Evidence
+from .evidence import POSE_ERROR_PICTURES, TRAFFIC_PICTURES, Evidence
 from .figures import blind_spot_map, front_chart
 from .losses import FrontPoint, equal_prices, failures
 from .repeat import repeating_command
@@ -369,13 +369,14 @@ def _losses(evidence: Evidence) -> Iterator[Block]:
             frozenset({1, 2}),
         )
     errors = [_sentence(note) for note in record.notes if note.startswith(POSE_ERRORS)]
-    if not errors and "robustness" not in record.settings:
-        errors = ["What is lost where sensors do not hang quite as planned was not evaluated (option --pose-errors)."]
-    if "traffic" not in record.settings:
-        errors.append("The road is empty: what vehicles hide was not evaluated (command seip in-traffic).")
+    scenarios = record.asked.goal.scenarios
+    if not errors and not scenarios.errs:
+        errors = ["The loss from errors of the sensors' poses was not evaluated (option --pose-errors)."]
+    if scenarios.kind != "traffic":
+        errors.append("The road is empty: what vehicles hide was not evaluated (option --traffic).")
     if errors:
         yield Bullets(tuple(errors))
-    for name in (*ROBUST_PICTURES, *TRAFFIC_PICTURES):
+    for name in (*POSE_ERROR_PICTURES, *TRAFFIC_PICTURES):
         if name in evidence.pictures:
             yield Picture(evidence.pictures[name], CAPTIONS[name])
 

@@ -44,7 +44,7 @@ Total = Annotated[float, limits.TOTAL_WEIGHT]
 Count = Annotated[int, limits.COUNT]
 Seconds = Annotated[float, limits.DURATION]
 
-SCHEMA = "seip-placement/2"
+SCHEMA = "seip-placement/3"
 LIBRARIES = ("numpy", "shapely", "pulp", "highspy")
 MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 

@@ -13,9 +13,8 @@ the new y axis (nose down is positive), then roll about the new x axis.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,64 +22,12 @@ from ..arrays import Boolean, Float
 from ..errors import SeipError
 from ..geometry.orientation import orientations
 from ..limits import DRAWS
-from ..settings import setting
+from ..placement.scenarios import PoseErrors
 from ..site.obstruction import inside_any
 from ..site.scene_geometry import Mesh
 
 _MICROMETRE = 1e-6
 _KINDS_DRAWN = 6  # x, y, z, yaw, pitch, roll
-MAX_OFFSET_STD, MAX_ANGLE_STD = 100.0, 1.0  # metres and radians; larger standard deviations are taken for typing errors
-
-
-@dataclass(frozen=True)
-class PoseErrors:
-    """Standard deviations of the errors of a sensor's pose.
-
-    Parameters
-    ----------
-    position : float, metres
-        Of x and of y.
-    height : float, metres
-    yaw : float, radians
-    tilt : float, radians
-        Of pitch and of roll.
-    """
-
-    position: float = setting(
-        0.3, "standard deviation of x and of y", unit="m", maximum=MAX_OFFSET_STD, option="position-error", metavar="M"
-    )
-    height: float = setting(
-        0.3, "as of the position if not given", unit="m", maximum=MAX_OFFSET_STD, option="height-error", metavar="M"
-    )
-    yaw: float = setting(
-        math.radians(2.0), "as of the tilt if not given", unit="rad", maximum=math.pi, option="yaw-error", metavar="DEG"
-    )
-    tilt: float = setting(
-        math.radians(2.0),
-        "standard deviation of pitch and of roll",
-        unit="rad",
-        maximum=MAX_ANGLE_STD,
-        option="tilt-error",
-        metavar="DEG",
-    )
-
-    def __post_init__(self) -> None:
-        for name in ("position", "height"):
-            value = getattr(self, name)
-            if not 0 <= value <= MAX_OFFSET_STD:
-                raise SeipError(f"the error of {name} must be 0 to {MAX_OFFSET_STD:g} m, not {value:g} m")
-        for name, most in (("tilt", MAX_ANGLE_STD), ("yaw", math.pi)):
-            value = getattr(self, name)
-            if not 0 <= value <= most:
-                limit, shown = math.degrees(most), math.degrees(value)
-                raise SeipError(f"the error of {name} must be 0 to {limit:.0f}°, not {shown:g}°")
-
-    def alone(self, kind: str) -> PoseErrors:
-        """Return the errors of one kind, all others zero."""
-        return replace(self, **{name: 0.0 for name in ERROR_KINDS if name != kind})
-
-
-ERROR_KINDS = tuple(field.name for field in fields(PoseErrors))
 
 
 @dataclass(frozen=True, eq=False)

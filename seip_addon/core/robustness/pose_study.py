@@ -13,9 +13,9 @@ import numpy as np
 from ..arrays import Boolean, Float
 from ..estimates import IntervalEstimate, mean_of, quantile_of
 from ..placement.deployment import Deployment
+from ..placement.scenarios import ERROR_KINDS, PoseErrors
 from ..progress import Progress
 from ..site.site import Site
-from .pose_errors import ERROR_KINDS, PoseErrors
 from .scenario_visibility import ScenarioVisibility
 from .visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 

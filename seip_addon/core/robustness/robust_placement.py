@@ -39,10 +39,10 @@ from ..placement.feasibility import starting_choice
 from ..placement.greedy import swap_search
 from ..placement.problem import TIE_TOLERANCE, assess, relative_gap
 from ..placement.reduced_problem import WHOLE_SLACK, Instance, common_unit, make_instance, merge_targets
+from ..placement.risk import Risk
 from ..placement.search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 from ..placement.solver import solve_within
 from ..progress import Progress, within
-from .risk import Risk
 from .robust_search import BestUnderRisk, swap_search_by_risk, swap_search_from_pairs
 from .scenario_visibility import ScenarioVisibility
 

@@ -1,63 +1,23 @@
-"""Price and benefit of robust placements, evaluated on unseen draws."""
+"""Price and benefit of robust placements, evaluated on held-out scenarios."""
 
 from collections.abc import Generator, Sequence
-from dataclasses import asdict, astuple, dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Float
-from ..errors import SeipError
+from ..arrays import Float, Integer
 from ..estimates import IntervalEstimate, mean_of, quantile_gain, quantile_of
-from ..limits import DRAWS, SCENARIOS
 from ..placement import Placement, PlacementProblem, SolverLimits, solve
+from ..placement.risk import Risk
+from ..placement.scenarios import Scenarios
 from ..placement.search_limits import DEFAULT_LIMITS
 from ..progress import Progress, within
-from ..results.headings import tilt_degrees
-from ..settings import setting
-from .pose_errors import PoseErrors, require_draws
-from .risk import Risk
 from .robust_placement import at_least, foresee, outcomes_of, solve_robust
+from .scenario_visibility import ScenarioVisibility
 from .visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 
 LOW_QUANTILE = 0.05  # quantile of coverage by which placements are compared
 COMPARED_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))  # compared by default
-
-
-@dataclass(frozen=True)
-class RobustnessSettings:
-    """Settings of robust placement: risk measure, pose errors, scenarios, and draws to evaluate on.
-
-    Parameters
-    ----------
-    scenarios : int
-        Draws to choose on.
-    draws : int
-        Unseen draws to evaluate on.
-    seed : int
-        Of the scenarios; the unseen draws have the next one.
-
-    Raises
-    ------
-    SeipError
-        There is no scenario to optimise on, or no draw to evaluate on.
-    """
-
-    risk: Risk = field(default_factory=Risk)
-    errors: PoseErrors = field(default_factory=PoseErrors)
-    scenarios: int = setting(20, "draws to choose on", minimum=1, maximum=int(SCENARIOS.most))
-    draws: int = setting(500, "unseen draws to evaluate on", minimum=1, maximum=int(DRAWS.most))
-    seed: int = setting(0, "of the scenarios; unseen draws have the next", minimum=0)
-
-    def __post_init__(self) -> None:
-        if not SCENARIOS.allow(self.scenarios):
-            raise SeipError(f"asked for {self.scenarios} draws or scenarios of pose errors; ask for {SCENARIOS}")
-        require_draws(self.draws)
-
-    def as_record(self) -> dict[str, object]:
-        """Return the settings as records hold them, angles in degrees."""
-        position, height, yaw, tilt = astuple(self.errors)
-        degrees = {"yaw_deg": tilt_degrees(yaw), "tilt_deg": tilt_degrees(tilt)}
-        return asdict(self) | {"errors": {"position_m": position, "height_m": height, **degrees}}
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +62,8 @@ class RobustStudy:
 
     Parameters
     ----------
+    scenarios : Scenarios
+        Of pose errors, or nominal: then the one scenario is also what placements are evaluated on.
     nominal : tuple of Contender
         The placement chosen for the poses as planned, once for each way in which the others are evaluated.
     robust : tuple of Contender
@@ -110,7 +72,7 @@ class RobustStudy:
         Weight of all targets, the unit of placements' objectives.
     """
 
-    settings: RobustnessSettings
+    scenarios: Scenarios
     nominal: tuple[Contender, ...]
     robust: tuple[Contender, ...]
     total: float
@@ -137,11 +99,11 @@ class RobustStudy:
 def robust_study(
     around: Surroundings,
     problem: PlacementProblem,
-    settings: RobustnessSettings,
+    scenarios: Scenarios,
     risks: Sequence[Risk] = COMPARED_RISKS,
     limits: SolverLimits = DEFAULT_LIMITS,
 ) -> Generator[Progress, None, RobustStudy]:
-    """Optimise for the planned poses and for each risk, and evaluate all placements on unseen draws.
+    """Optimise for the planned poses and for each risk measure, and evaluate all placements on held-out scenarios.
 
     Parameters
     ----------
@@ -150,10 +112,9 @@ def robust_study(
     risks : sequence of Risk
         A risk measure for each placement that is compared.
     """
-    every = np.flatnonzero(problem.allowed)  # what may not be chosen need not be looked from
-    drawn, _ = draws_for(around, every, settings.errors, settings.scenarios, settings.seed)
-    scenarios = yield from visibility_under_errors(around, every, drawn)
-    spread = scenarios.spread_to(every, len(problem.visible))
+    every = np.flatnonzero(problem.allowed)  # no rays are cast from poses that may not be chosen
+    views = yield from _views(around, problem, scenarios, every)
+    spread = views.spread_to(every, len(problem.visible))
     nominal = yield from solve(problem, limits)
     foreseen = None
     if any(risk.seen_by == 1 for risk in risks):
@@ -166,23 +127,33 @@ def robust_study(
         steps = solve_robust(problem, spread, risk, limits, foreseen)
         found: Placement = yield from within(here, steps)
         placed = at_least(found, nominal, risk.of(outcomes_of(problem, spread, risk, nominal.chosen)))
-        entries.append((risk.describe(), placed, risk.alone))
-    contenders = yield from _evaluated(around, problem, settings, entries)
+        entries.append((risk.describe() if scenarios.errs else risk.describe_outcome(), placed, risk.alone))
+    contenders = yield from _evaluated(around, problem, scenarios, entries)
     return RobustStudy(
-        settings, tuple(contenders[: len(ways)]), tuple(contenders[len(ways) :]), float(problem.weights.sum())
+        scenarios, tuple(contenders[: len(ways)]), tuple(contenders[len(ways) :]), float(problem.weights.sum())
     )
+
+
+def _views(
+    around: Surroundings, problem: PlacementProblem, scenarios: Scenarios, poses: Integer, *, held_out: bool = False
+) -> Generator[Progress, None, ScenarioVisibility]:
+    """Compute the visibility of poses in the scenarios to optimise over, or in the held-out ones."""
+    if not scenarios.errs:
+        return ScenarioVisibility(np.packbits(problem.visible[poses], axis=1)[None], problem.visible.shape[1])
+    number, seed = (scenarios.evaluated, scenarios.seed + 1) if held_out else (scenarios.optimised, scenarios.seed)
+    drawn, _ = draws_for(around, poses, scenarios.pose_errors, number, seed)
+    return (yield from visibility_under_errors(around, poses, drawn))
 
 
 def _evaluated(
     around: Surroundings,
     problem: PlacementProblem,
-    settings: RobustnessSettings,
+    scenarios: Scenarios,
     entries: Sequence[tuple[str, Placement, Risk]],
 ) -> Generator[Progress, None, list[Contender]]:
-    """Evaluate placements on draws of another seed, all chosen poses at once."""
+    """Evaluate placements on held-out scenarios, all chosen poses at once."""
     used = np.unique(np.concatenate([placement.chosen for _, placement, _ in entries]))
-    drawn, _ = draws_for(around, used, settings.errors, settings.draws, settings.seed + 1)
-    views = yield from visibility_under_errors(around, used, drawn)
+    views = yield from _views(around, problem, scenarios, used, held_out=True)
     planned = replace(views, packed=np.packbits(problem.visible[used], axis=1)[None])
     total = float(problem.weights.sum())
     contenders = []

@@ -15,9 +15,9 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer
 from ..estimates import IntervalEstimate, mean_over_time
 from ..placement import Placement, PlacementProblem, SolverLimits, solve
+from ..placement.risk import Risk
 from ..placement.search_limits import DEFAULT_LIMITS
 from ..progress import Progress
-from .risk import Risk
 from .robust_placement import at_least, outcomes_of, solve_robust
 from .scenario_visibility import ScenarioVisibility
 from .traffic_instants import NO_TRAFFIC, Instants, TrafficObstacles
@@ -27,6 +27,8 @@ from .visibility_under_errors import Surroundings
 NOTABLE_LOSS = 0.01  # share of the targets' weight whose loss in traffic is worth a warning
 IN_TRAFFIC = "in traffic"  # first words of a `traffic_message`, and of no other
 MOSTLY_SEEN_SHARE = 0.9  # share of time from which on a target counts as mostly seen
+
+MEAN = Risk()
 
 LAYER_NAMES: Mapping[TrafficLayer, str] = {"road": "road", "height": f"points {LAYER_HEIGHT:g} m above the road"}
 """For messages and charts."""
@@ -151,6 +153,39 @@ class TrafficStudy:
         batch = self.empty.seen[self.layer].batch
         return all(mean_over_time(row[::2], batch[::2]).agrees_with(mean_over_time(row, batch)) for row in rows)
 
+    def messages(self) -> tuple[str, ...]:
+        """Return what optimising on traffic gains or loses, and warnings where traffic costs much."""
+        seen = f"of the {LAYER_NAMES[self.layer]} than the best placement for the empty road"
+        gain = self.gain(self.layer)
+        messages = [f"this placement sees {gain.as_change()} {seen}, in traffic that neither was chosen on"]
+        if not self.is_converged():
+            messages.append("half of the instants give a different result: evaluate on more instants (--held-out)")
+        messages += [
+            f"the best placement for the empty road sees {seen.mean.value:.1%} of the {LAYER_NAMES[layer]} on average "
+            f"over time in traffic ({self.road_users:.0f} road users at a time), not {seen.empty:.1%}: "
+            f"{seen.loss.value:.1%} less"
+            for layer, seen in self.empty.seen.items()
+            if seen.loss.value >= NOTABLE_LOSS
+        ]
+        if gain.low <= 0 and not np.array_equal(self.empty.placement.chosen, self.traffic.placement.chosen):
+            messages.append(
+                "on held-out traffic this placement is not significantly better than the empty-road optimum: use more "
+                "instants (--scenarios), or keep that one"
+            )
+        return tuple(messages)
+
+    def summary(self) -> tuple[str, ...]:
+        """Return a line for each placement: its coverage in traffic and on the empty road."""
+        return tuple(
+            f"chosen for {placed.name}: "
+            + "; ".join(
+                f"{seen.mean.describe()} of the {LAYER_NAMES[layer]} on average over time, {seen.empty:.2%} on the "
+                "empty road"
+                for layer, seen in placed.seen.items()
+            )
+            for placed in (self.empty, self.traffic)
+        )
+
 
 def traffic_scenarios(
     around: Surroundings, problem: PlacementProblem, instants: Instants, layer: TrafficLayer = "road"
@@ -168,6 +203,7 @@ def traffic_study(
     scenarios: TrafficScenarios,
     evaluation: Instants,
     limits: SolverLimits = DEFAULT_LIMITS,
+    risk: Risk = MEAN,
 ) -> Generator[Progress, None, TrafficStudy]:
     """Optimise for the empty road and for traffic, and evaluate both placements at other instants.
 
@@ -177,11 +213,13 @@ def traffic_study(
         Of all candidates of the site; what they see is taken from the scenarios.
     evaluation : Instants
         Of runs that are not those of the scenarios.
+    risk : Risk
+        Measure over the instants that is maximised.
     """
     problem = replace(problem, visible=scenarios.empty)
     empty = yield from solve(problem, limits)
-    found = yield from solve_robust(problem, scenarios.views, Risk(), limits)
-    reached = Risk().of(outcomes_of(problem, scenarios.views, Risk(), empty.chosen))
+    found = yield from solve_robust(problem, scenarios.views, risk, limits)
+    reached = risk.of(outcomes_of(problem, scenarios.views, risk, empty.chosen))
     placed = at_least(found, empty, reached)
     used = np.unique(np.concatenate([empty.chosen, placed.chosen]))
     obstacles = evaluation.obstacles()
@@ -234,22 +272,3 @@ def traffic_message(
 
 def _users(obstacles: Sequence[TrafficObstacles]) -> float:
     return float(np.mean([len(instant.hulls) for instant in obstacles]))
-
-
-def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
-    """Return warnings where traffic costs much coverage, and where optimising for it is not known to gain any."""
-    losses = tuple(
-        f"the best placement for the empty road sees {seen.mean.value:.1%} of the {LAYER_NAMES[layer]} on average over "
-        f"time in traffic ({study.road_users:.0f} road users at a time), not {seen.empty:.1%}: "
-        f"{seen.loss.value:.1%} less"
-        for layer, seen in study.empty.seen.items()
-        if seen.loss.value >= NOTABLE_LOSS
-    )
-    gain = study.gain(study.layer)
-    if gain.low > 0 or np.array_equal(study.empty.placement.chosen, study.traffic.placement.chosen):
-        return losses
-    doubt = (
-        "this placement is not known to see more in traffic that it was not chosen on than the best one for the empty "
-        "road: choose on more instants, or keep that one"
-    )
-    return (*losses, doubt)

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..arrays import Boolean, Integer
 from ..lidar import LidarModel
+from ..placement.scenarios import PoseErrors
 from ..progress import Progress
 from ..site.scene_geometry import Mesh
 from ..site.site import Site
@@ -14,7 +15,7 @@ from ..visibility.chunks import sharing_rays
 from ..visibility.ray_casting import Engine, engine_name, make_ray_caster
 from ..visibility.settings import VisibilitySettings
 from ..visibility.visibility_model import VisibilityModel
-from .pose_errors import PoseDraws, PoseErrors, draw_errors, out_of_objects
+from .pose_errors import PoseDraws, draw_errors, out_of_objects
 from .scenario_visibility import ScenarioVisibility, each_in_threads
 
 

@@ -1,14 +1,16 @@
-"""Dataclasses from JSON, each value held to the type of its field."""
+"""Dataclasses from JSON, each value held to the type of its field, and settings as JSON."""
 
+import math
 import reprlib
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache, partial
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from ..limits import Limits
+from ..settings import settings_of
 
 Value = TypeVar("Value")
 
@@ -29,7 +31,8 @@ def from_json(kind: type[Value], content: object, where: str = "") -> Value:
 
     Fields are ``str``, ``bool``, ``int``, ``float`` (whole numbers stay as they are), ``object`` (anything), literals,
     dataclasses, and tuples, mappings by name and unions of these. A type that is annotated with `Limits` holds values
-    within them: ``Annotated[float, PRICE]``. Keys without a field are passed over.
+    within them: ``Annotated[float, PRICE]``. Keys without a field are passed over. Settings in radians are in degrees
+    in JSON, under their name with ``_deg``.
 
     Parameters
     ----------
@@ -43,6 +46,28 @@ def from_json(kind: type[Value], content: object, where: str = "") -> Value:
     """
     read: Value = _read(kind, content, where)
     return read
+
+
+def as_json(value: object) -> Any:  # noqa: ANN401 -- values of any kind
+    """Return the JSON value of a dataclass, from which `from_json` makes an equal one."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {_key(value, each): _written(value, each) for each in fields(value)}
+    return [as_json(one) for one in value] if isinstance(value, tuple | list) else value
+
+
+def _is_angle(kind: object, name: str) -> bool:
+    kind = kind if isinstance(kind, type) else type(kind)
+    return name in (known := settings_of(kind)) and known[name][0].unit == "rad"
+
+
+def _key(kind: object, each: "Field[Any]") -> str:
+    return f"{each.name}_deg" if _is_angle(kind, each.name) else each.name
+
+
+def _written(holder: object, each: "Field[Any]") -> object:
+    value = getattr(holder, each.name)
+    # a millionth of a degree hides the last bits in which platforms differ
+    return round(math.degrees(value), 6) + 0.0 if _is_angle(holder, each.name) else as_json(value)
 
 
 def _read(kind: Any, value: Any, where: str) -> Any:  # noqa: ANN401 -- types and values of any kind
@@ -83,10 +108,12 @@ def _one_of(literals: tuple[Any, ...], value: object, where: str) -> object:
 def _object(kind: Any, content: dict[str, Any], where: str) -> Any:  # noqa: ANN401 -- as above
     hints, values = _hints(kind), {}
     for each in fields(kind):
-        if each.name in content:
-            values[each.name] = _read(hints[each.name], content[each.name], _at(where, each.name))
+        key = _key(kind, each)
+        if key in content:
+            read = _read(hints[each.name], content[key], _at(where, key))
+            values[each.name] = math.radians(read) if key != each.name else read
         elif each.default is MISSING:
-            raise ValueError(f"{_at(where, each.name)} is missing")
+            raise ValueError(f"{_at(where, key)} is missing")
     return kind(**values)
 
 

@@ -1,4 +1,4 @@
-"""Surveys: site layout, visibility grid and placement as one job."""
+"""Surveys: site layout and visibility grid, and the record of a placement on them."""
 
 from __future__ import annotations
 
@@ -15,16 +15,12 @@ from ..lidar import CarlaDropoff, LidarModel, find_models, load_catalogue
 from ..placement import Placement
 from ..placement.deployment import deploy, pose_prices
 from ..placement.integer_program import check_solver
-from ..placement.near_optimal import near_optimal_set
-from ..placement.objective import Objective, Solution, criterion_of, optimise, placement_problem, target_weights
+from ..placement.objective import Solution, target_weights
 from ..placement.search_limits import DEFAULT_EFFORT, SolverLimits
 from ..progress import Progress
 from ..results.headings import tilt_degrees
 from ..results.located import LOCATED_FILES, missing_sentence
 from ..results.placement_record import PlacementRecord, Provenance, placement_record
-from ..robustness.assumed_heights import height_notes
-from ..robustness.gain_band import with_gain_band
-from ..robustness.pose_study import PoseStudySettings, pose_message, pose_study
 from ..robustness.visibility_under_errors import Surroundings
 from ..settings import setting
 from ..site.candidates import CandidateSettings, assumed_pole_warnings
@@ -35,6 +31,7 @@ from ..site.scene_geometry import SceneGeometry
 from ..site.site import Site, make_site
 from ..site.weather import Weather
 from ..storage.files import digest
+from ..storage.json_dataclass import as_json
 from ..visibility.estimate import Estimate, estimate_visibility
 from ..visibility.float32_precision import rounding_warnings
 from ..visibility.grid import VisibilityGrid, visibility_key
@@ -43,10 +40,7 @@ from ..visibility.ring_resolution import resolution_warnings
 from ..visibility.road_range import range_warnings, road_reflectivity
 from ..visibility.settings import VisibilitySettings
 from ..visibility.store import stored_visibility
-from .returns import place_by_returns, stored_pedestrian_returns
-
-POSES_TRIED = PoseStudySettings(draws=100, draws_of_kind=0)
-"""What a placement is tried with where that is asked for."""
+from .returns import stored_pedestrian_returns
 
 
 @dataclass(frozen=True)
@@ -274,57 +268,28 @@ def estimate(layout: Layout, threads: int | None = None) -> Generator[Progress, 
     return estimate_visibility(layout.site, layout.models, settings.visibility, settings.engine, threads)
 
 
-def place(survey: Survey, objective: Objective, *, pose_errors: bool = False) -> Generator[Progress, None, Solution]:
-    """Optimise a placement on a survey, and note how far it can be trusted.
-
-    The notes of the placement say how many others are as good (`near_optimal_set`). With ``pose_errors`` they also say
-    what it loses where its sensors do not hang quite as planned (`pose_message`), and in a scene with assumed heights
-    what it sees where these are other (`height_notes`): rays are cast for that alone.
-    """
-    site, models, visible = survey.site, survey.models, survey.grid.visible
-    by_returns = criterion_of(objective, models) == "returns"
-    if by_returns:
-        solution = yield from place_by_returns(survey, objective)
-    else:
-        solution = yield from optimise(site, visible, models, objective, survey.settings.limits)
-    notes = [*solution.placement.notes]
-    if solution.placement.status == "optimal" and not objective.cheapest and not by_returns:
-        problem = placement_problem(site, visible, models, objective)
-        top = yield from near_optimal_set(problem, solution.placement.chosen)
-        notes += [] if top is None else [top.message]
-    hung = yield from with_gain_band(surroundings(survey), solution.deployment)
-    notes += height_notes(surroundings(survey), survey.geometry, hung.sensors, hung.coverage)
-    if pose_errors and solution.deployment.sensors:
-        study = yield from pose_study(surroundings(survey), solution.deployment, POSES_TRIED)
-        notes.append(pose_message(study))
-    return replace(solution, deployment=hung, placement=replace(solution.placement, notes=tuple(notes)))
-
-
 def surroundings(layout: Layout) -> Surroundings:
     """Return where the sensors of a survey may hang, and what they see there."""
     settings = layout.settings
     return Surroundings(layout.site, layout.models, settings.visibility, layout.geometry.occluders, settings.engine)
 
 
-def record_of(
-    survey: Survey, solution: Solution, provenance: Provenance, asked: Mapping[str, object]
-) -> PlacementRecord:
+def record_of(survey: Survey, solution: Solution, provenance: Provenance, *, render: bool = False) -> PlacementRecord:
     """Return what ``placement.json`` holds of a solution.
 
     Parameters
     ----------
-    asked : mapping
-        What was asked for beside the objective, by name: ``render`` for a rendered view, ``pose_errors`` for a trial
-        (see `place`), the settings of ``robustness`` or of ``traffic`` that the solution was chosen with.
+    render : bool
+        Whether a rendered view belongs to the result.
     """
-    objective = {"goal": asdict(solution.objective), "pose_errors": False, "render": False}
+    objective = {"goal": as_json(solution.objective), "render": render}
     missing = missing_sentence(survey.site, LOCATED_FILES)
     notes = (*solution.notes, *([missing] if missing else []))
     return placement_record(
         survey.site,
         replace(solution, placement=replace(solution.placement, notes=notes)),
         provenance,
-        settings={**survey.settings.as_record(), **objective, **asked},
+        settings={**survey.settings.as_record(), **objective},
         inputs=inputs_of(survey) | {"visibility": survey.grid.key},
         warnings=survey.warnings,
     )

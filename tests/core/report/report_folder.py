@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from seip_addon.core.placement.objective import Objective, Solution, placement_p
 from seip_addon.core.results.placement_record import Provenance, placement_record, save_placement_record
 from seip_addon.core.results.site_file import save_site_file
 from seip_addon.core.site.scene_geometry import NamedArea
+from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.core.visibility.grid import VisibilityGrid
 from tests.small_junction import Example, make_example
 
@@ -45,8 +46,7 @@ def make_folder(folder: Path, *, goal: Objective | None = None, place: GeoRefere
     settings = {
         "grid_spacing_m": 2.0,
         "candidates": {"sensors": ["type1", "type2"], "heights": [3.5, 5.4]},
-        "goal": asdict(goal),
-        "pose_errors": False,
+        "goal": as_json(goal),
         "render": False,
     }
     record = placement_record(

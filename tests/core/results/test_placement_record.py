@@ -380,7 +380,7 @@ def test_a_bound_that_was_not_found_is_null(example, run, tmp_path):
         ('{"schema": "seip-placement/0"}', "seip-placement/0"),
         ("[1]", "None"),
         (
-            '{"schema": "seip-placement/2", "site": 3}',
+            '{"schema": "seip-placement/3", "site": 3}',
             "json is damaged .*: site must be an object, not 3; place",
         ),
         ("[" * 100_000, "damaged"),

@@ -17,8 +17,9 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import mean_of, quantile_gain, quantile_of
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.placement.deployment import deploy
+from seip_addon.core.placement.scenarios import ERROR_KINDS, PoseErrors
 from seip_addon.core.progress import finish
-from seip_addon.core.robustness.pose_errors import ERROR_KINDS, PoseDraws, PoseErrors, draw_errors, out_of_objects
+from seip_addon.core.robustness.pose_errors import PoseDraws, draw_errors, out_of_objects
 from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study, pose_warnings
 from seip_addon.core.robustness.visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 from seip_addon.core.scans.sensor import level_orientation

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 from functools import cache
 
-from headless.charts.robust import save_frontier_chart, save_loss_chart, save_spread_chart
+from headless.charts.pose_errors import save_frontier_chart, save_loss_chart, save_spread_chart
 from headless.lab.stability.robustness_rows import robust_rows
 
 import numpy as np
@@ -17,16 +17,16 @@ from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.placement import SolverLimits, solve
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.objective import Objective, placement_problem
+from seip_addon.core.placement.risk import Risk
+from seip_addon.core.placement.scenarios import PoseErrors, Scenarios
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.robustness.pose_errors import PoseErrors
 from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study
-from seip_addon.core.robustness.risk import Risk
-from seip_addon.core.robustness.robust_study import RobustnessSettings, robust_study
+from seip_addon.core.robustness.robust_study import robust_study
 from seip_addon.core.robustness.visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
 
 MODELS = load_catalogue()
-SETTINGS = RobustnessSettings(scenarios=4, draws=20)
+SCENARIOS = Scenarios("pose-errors", count=4, held_out=20)
 LIMITS = SolverLimits(time_limit=20.0)
 
 
@@ -41,7 +41,7 @@ def laid_out():
 
 @pytest.fixture(scope="module")
 def study(laid_out):
-    return finish(robust_study(*laid_out, SETTINGS, [Risk(), Risk(tail=0.0)], LIMITS))
+    return finish(robust_study(*laid_out, SCENARIOS, [Risk(), Risk(tail=0.0)], LIMITS))
 
 
 @pytest.mark.slow
@@ -51,9 +51,9 @@ def test_all_are_judged_by_draws_that_none_was_chosen_on(laid_out, study):
     assert nominal.placement.chosen.tolist() == finish(solve(problem)).chosen.tolist()
     for contender in (nominal, *study.robust):
         chosen = contender.placement.chosen
-        drawn, _ = draws_for(around, chosen, SETTINGS.errors, SETTINGS.draws, SETTINGS.seed + 1)
+        drawn, _ = draws_for(around, chosen, SCENARIOS.pose_errors, SCENARIOS.evaluated, SCENARIOS.seed + 1)
         views = finish(visibility_under_errors(around, chosen, drawn))
-        expected = [views.seen(draw).any(axis=0).mean() for draw in range(SETTINGS.draws)]
+        expected = [views.seen(draw).any(axis=0).mean() for draw in range(SCENARIOS.evaluated)]
         assert contender.unseen == pytest.approx(expected, abs=1e-12)
         assert not problem.forbidden[chosen].any()
 
@@ -68,7 +68,7 @@ def test_a_search_that_found_worse_than_the_nominal_optimum_is_not_followed(laid
         return replace(finish(solve(problem)), chosen=np.array([worst]), objective=0.0, status="feasible")
 
     monkeypatch.setattr("seip_addon.core.robustness.robust_study.solve_robust", poor)
-    found = finish(robust_study(around, problem, SETTINGS, [Risk(tail=0.0)], LIMITS))
+    found = finish(robust_study(around, problem, SCENARIOS, [Risk(tail=0.0)], LIMITS))
     (contender,), (nominal,) = found.robust, found.nominal
     assert contender.placement.chosen.tolist() == nominal.placement.chosen.tolist()
     assert contender.placement.objective > 0
@@ -92,7 +92,7 @@ LOSSES = [Risk(failure="worst"), Risk(tail=0.5, seen_by=2), Risk(seen_by=2), Ris
 
 @pytest.fixture(scope="module")
 def study_of_losses(laid_out):
-    return finish(robust_study(*laid_out, SETTINGS, LOSSES, LIMITS))
+    return finish(robust_study(*laid_out, SCENARIOS, LOSSES, LIMITS))
 
 
 @pytest.mark.slow
@@ -108,14 +108,14 @@ def test_who_was_chosen_for_a_loss_is_judged_by_that_loss_as_is_the_nominal_opti
     @cache
     def looks(*chosen):
         poses = np.array(chosen)
-        drawn, _ = draws_for(around, poses, SETTINGS.errors, SETTINGS.draws, SETTINGS.seed + 1)
+        drawn, _ = draws_for(around, poses, SCENARIOS.pose_errors, SCENARIOS.evaluated, SCENARIOS.seed + 1)
         return finish(visibility_under_errors(around, poses, drawn))
 
     for contender, risk in zip(study_of_losses.robust, LOSSES, strict=True):
         for judged in (contender, study_of_losses.beside(contender)):
             chosen = judged.placement.chosen
             views = looks(*chosen.tolist())
-            expected = [outcome(views.seen(draw), risk) for draw in range(SETTINGS.draws)]
+            expected = [outcome(views.seen(draw), risk) for draw in range(SCENARIOS.evaluated)]
             assert judged.unseen == pytest.approx(expected, abs=1e-12)
             assert judged.undisturbed == pytest.approx(outcome(problem.visible[chosen], risk), abs=1e-12)
         assert (contender.unseen < contender.planned).any()
@@ -136,8 +136,8 @@ def test_it_says_what_is_compared(study, study_of_losses, tmp_path):
 
 
 def test_without_errors_robustness_is_free(laid_out):
-    settings = replace(SETTINGS, errors=PoseErrors(0.0, 0.0, 0.0, 0.0), scenarios=2, draws=2)
-    study = finish(robust_study(*laid_out, settings, [Risk(tail=0.5)]))
+    scenarios = Scenarios("pose-errors", PoseErrors(0.0, 0.0, 0.0, 0.0), count=2, held_out=2)
+    study = finish(robust_study(*laid_out, scenarios, [Risk(tail=0.5)]))
     (robust,) = study.robust
     assert robust.placement.chosen.tolist() == study.nominal[0].placement.chosen.tolist()
     assert (robust.unseen == robust.planned).all()

@@ -28,14 +28,12 @@ from seip_addon.core.robustness.traffic_study import (
     LAYER_NAMES,
     traffic_scenarios,
     traffic_study,
-    traffic_warnings,
 )
 from seip_addon.core.robustness.visibility_in_traffic import visibility_in_traffic
 from seip_addon.core.robustness.visibility_under_errors import Surroundings
 from seip_addon.core.traffic import RoadUser
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.settings import VisibilitySettings
-from seip_addon.core.workflows.traffic import traffic_messages
 
 pytestmark = needs_any
 
@@ -120,16 +118,17 @@ def test_it_says_what_traffic_hides(study):
     _, found = study
     hidden = found.empty.seen["height"]
     assert hidden.loss.value > 0.01
-    assert any(f"{hidden.loss.value:.1%} less" in sentence for sentence in traffic_warnings(found))
+    assert any(f"{hidden.loss.value:.1%} less" in sentence for sentence in found.messages())
     nothing = replace(hidden, at=np.full_like(hidden.at, hidden.empty - 0.004))
     quiet = replace(found, empty=replace(found.empty, seen={"road": nothing, "height": nothing}))
     quiet = replace(quiet, traffic=quiet.empty)
-    assert traffic_warnings(quiet) == ()
+    assert quiet.messages()[1:] == ()
     other = replace(found.traffic, placement=replace(found.traffic.placement, chosen=np.array([0, 1])))
     doubtful = replace(quiet, traffic=replace(other, seen=quiet.empty.seen))
-    assert ["not known to see more" in sentence for sentence in traffic_warnings(doubtful)] == [True]
+    assert ["not significantly better" in sentence for sentence in doubtful.messages()[1:]] == [True]
     better = replace(nothing, at=nothing.at + 0.1)
-    assert traffic_warnings(replace(quiet, traffic=replace(other, seen={"road": better, "height": better}))) == ()
+    gains = replace(quiet, traffic=replace(other, seen={"road": better, "height": better}))
+    assert gains.messages()[1:] == ()
     rows = traffic_rows(found)
     assert [row.method for row in rows[:2]] == ["view of the road", "view of the points 1.5 m above the road"]
     assert "24 road users at a time" in rows[0].regime
@@ -142,7 +141,7 @@ def test_a_result_that_is_worse_in_traffic_is_called_worse(study):
     _, found = study
     seen = found.empty.seen
     worse = {layer: replace(one, at=one.at - 0.0071) for layer, one in seen.items()}
-    message = traffic_messages(replace(found, traffic=replace(found.traffic, seen=worse)))[0]
+    message = replace(found, traffic=replace(found.traffic, seen=worse)).messages()[0]
     assert "this placement sees 0.71 points [" in message
     assert f"] less of the {LAYER_NAMES[found.layer]} than the best placement for the empty road" in message
     assert "-0.71" not in message
@@ -168,7 +167,7 @@ def test_without_anyone_on_the_road_nothing_is_lost(laid_out):
     for seen in found.empty.seen.values():
         assert (seen.at == seen.empty).all()
         assert seen.rarely_seen == 0.0
-    assert traffic_warnings(found) == ()
+    assert found.messages()[1:] == ()
     assert (scenarios.views.seen(0) == finish(visibility_in_traffic(around, np.arange(16), [NO_TRAFFIC])).seen(0))[
         problem.allowed
     ].all()

@@ -1,14 +1,15 @@
-"""The command that places in traffic, from a scene and its runs to the folder of its result."""
+"""Placement over instants of traffic by the command, from a scene and its runs to the folder of its result."""
 
 import json
 
-from headless import in_traffic
+from headless import place
 
 import numpy as np
 import pytest
 from small_junction import ORIGIN
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.report.evidence import TRAFFIC_PICTURES
 from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.scene.result_folder import FILES
 
@@ -18,9 +19,8 @@ COARSE = ["--sensor", "vlp16", "--heights", "5.4", "--grid", "8", "--spacing", "
 @pytest.fixture(scope="module")
 def run(small_scene):
     def run(folder, *options):
-        in_traffic.main(
-            [str(small_scene), "-o", str(folder), *COARSE, "--instants", "4", "--judged-at", "24", *options]
-        )
+        numbers = ["--scenarios", "4", "--held-out", "24"]
+        place.main([str(small_scene), "-o", str(folder), *COARSE, "--traffic", *numbers, *options])
 
     return run
 
@@ -41,21 +41,33 @@ def trajectories(path, *, x=0.0, end=30.0):
 
 
 @pytest.mark.parametrize(
-    "options", [[], pytest.param(["--see", "height", "--weights-from-traffic"], marks=pytest.mark.slow)]
+    "options", [[], pytest.param(["--criterion", "height", "--weights-from-traffic"], marks=pytest.mark.slow)]
 )
 def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, options, run):
     run(tmp_path, "--count", "2", *options)
     names = {path.name for path in tmp_path.iterdir()}
-    assert {*FILES, *in_traffic.CHARTS, "visibility.npz"} - {"view.png"} <= names
+    assert {*FILES, *TRAFFIC_PICTURES, "visibility.npz"} - {"view.png"} <= names
     record = json.loads((tmp_path / "placement.json").read_text(encoding="utf-8"))
-    asked, notes = record["settings"]["traffic"], record["notes"]
-    assert (asked["layer"], asked["instants"], asked["evaluation_instants"]) == ("height" if options else "road", 4, 24)
+    goal, notes = record["settings"]["goal"], record["notes"]
+    assert goal["criterion"] == ("height" if options else "auto")
+    assert (goal["scenarios"]["kind"], goal["scenarios"]["count"], goal["scenarios"]["held_out"]) == ("traffic", 4, 24)
     assert "in traffic, on average over 4 instants" in notes[0]
     assert ("targets weigh as many seconds as road users are there" in notes) == bool(options)
     said = capsys.readouterr().out
     assert "chosen for the empty road: " in said
     assert "vehicles of one run within 1 m of one of another at the same instant: " in said
     assert any(note.startswith("this placement sees ") and note in said for note in notes)
+
+
+def test_a_risk_measure_over_traffic_is_named_and_evaluation_only_is_a_note(tmp_path, run):
+    run(tmp_path / "worst", "--count", "2", "--risk", "worst")
+    run(tmp_path / "none", "--count", "2", "--risk", "none")
+    worst, none = (
+        json.loads((tmp_path / name / "placement.json").read_text(encoding="utf-8")) for name in ("worst", "none")
+    )
+    assert "in traffic, in the worst of 4 instants" in worst["notes"][0]
+    assert [note.startswith("in traffic (") for note in none["notes"]].count(True) == 1
+    assert none["objective"]["sought"] == "most returns"  # as without traffic
 
 
 def test_traffic_that_is_of_no_use_is_refused(tmp_path, run):
@@ -71,5 +83,5 @@ def test_traffic_that_is_of_no_use_is_refused(tmp_path, run):
         run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "short.npz", x=5.0, end=1.0))
     with pytest.raises(SeipError, match=r"here.npz and .*again.npz are nearly the same traffic"):
         run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "again.npz", x=0.5))
-    with pytest.raises(SeipError, match="--instants must be 1 to 10,000, not 0"):
-        run(tmp_path / "out", "--instants", "0")
+    with pytest.raises(SeipError, match="--scenarios must be 1 to 10,000, not 0"):
+        run(tmp_path / "out", "--scenarios", "0")

@@ -30,8 +30,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Float, Integer
 from ..errors import SeipError
-from ..placement.multi_cover import MultiCover, multi_cover
-from ..settings import setting
+from .multi_cover import MultiCover, multi_cover
 
 Failure = Literal["none", "worst", "mean"]
 
@@ -51,8 +50,8 @@ class Risk:
     """
 
     tail: float = 1.0
-    seen_by: int = setting(1, "sensors that must see a target", minimum=1, metavar="K")
-    failure: Failure = setting("none", "of one sensor: the worst, or any")
+    seen_by: int = 1
+    failure: Failure = "none"
 
     def __post_init__(self) -> None:
         if not 0 <= self.tail <= 1:

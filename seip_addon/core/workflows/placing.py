@@ -1,0 +1,155 @@
+"""Optimise a placement on a survey: one criterion over scenarios with a risk measure, under constraints."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import SeipError
+from ..placement.deployment import deploy
+from ..placement.near_optimal import near_optimal_set
+from ..placement.objective import (
+    CHOSEN_FOR,
+    Objective,
+    Solution,
+    criterion_of,
+    optimise,
+    placement_problem,
+    target_weights,
+    with_count,
+)
+from ..placement.risk import Risk
+from ..progress import Progress
+from ..robustness.assumed_heights import height_notes
+from ..robustness.gain_band import with_gain_band
+from ..robustness.pose_error_evaluation import PoseErrorEvaluation
+from ..robustness.pose_study import PoseStudySettings, pose_message, pose_study
+from ..robustness.robust_study import robust_study
+from ..robustness.traffic_instants import spread_instants
+from ..robustness.traffic_presence import road_user_seconds
+from ..robustness.traffic_study import LAYER_NAMES, traffic_message, traffic_scenarios, traffic_study
+from ..robustness.visibility_in_traffic import TrafficLayer
+from .returns import place_by_returns
+from .survey import Survey, surroundings
+from .traffic_runs import TrafficRuns
+
+DRAWS_OF_KIND = 100
+"""Largest number of draws with one kind of pose error only."""
+
+_OVER_INSTANTS = {1.0: "on average over", 0.25: "in the worst quarter of", 0.0: "in the worst of"}
+
+
+def place(survey: Survey, objective: Objective, runs: TrafficRuns | None = None) -> Generator[Progress, None, Solution]:
+    """Optimise a placement, evaluate it on held-out scenarios, and note how far it can be trusted.
+
+    The notes give the number of near-optimal placements (`near_optimal_set`), what changes where heights of the scene
+    are assumed (`height_notes`), and what the evaluation shows.
+
+    Parameters
+    ----------
+    runs : TrafficRuns, optional
+        Needed where the scenarios are traffic.
+
+    Raises
+    ------
+    SeipError
+        As for `placement_problem`, `solve`, `solve_robust` and `spread_instants`.
+    """
+    measure, scenarios = objective.measure, objective.scenarios
+    if measure is None:
+        solution = yield from _nominal(survey, objective)
+    elif scenarios.kind == "traffic":
+        solution = yield from _in_traffic(survey, objective, measure, _required(runs))
+    else:
+        solution = yield from _under_risk(survey, objective, measure)
+    around = surroundings(survey)
+    deployment = yield from with_gain_band(around, solution.deployment)
+    notes = [*solution.placement.notes]
+    notes += height_notes(around, survey.geometry, deployment.sensors, deployment.coverage)
+    if measure is None and deployment.sensors:
+        notes += yield from _evaluated(survey, replace(solution, deployment=deployment), runs)
+    return replace(solution, deployment=deployment, placement=replace(solution.placement, notes=tuple(notes)))
+
+
+def _nominal(survey: Survey, objective: Objective) -> Generator[Progress, None, Solution]:
+    """Optimise for nominal poses on the empty road."""
+    site, models, visible = survey.site, survey.models, survey.grid.visible
+    if criterion_of(objective, models) == "returns":
+        return (yield from place_by_returns(survey, objective))
+    solution = yield from optimise(site, visible, models, objective, survey.settings.limits)
+    placement = solution.placement
+    if placement.status != "optimal" or objective.cheapest:
+        return solution
+    top = yield from near_optimal_set(placement_problem(site, visible, models, objective), placement.chosen)
+    notes = placement.notes if top is None else (*placement.notes, top.message)
+    return replace(solution, placement=replace(placement, notes=notes))
+
+
+def _under_risk(survey: Survey, objective: Objective, measure: Risk) -> Generator[Progress, None, Solution]:
+    """Optimise a risk measure over pose errors, or what sensor failures leave of the nominal scenario."""
+    site, models, visible = survey.site, survey.models, survey.grid.visible
+    around, scenarios = surroundings(survey), objective.scenarios
+    problem = placement_problem(site, visible, models, objective)
+    study = yield from robust_study(around, problem, scenarios, [measure], survey.settings.limits)
+    (chosen,) = study.robust
+    deployment = deploy(site, models, visible, chosen.placement.chosen)
+    under_errors = None
+    if scenarios.errs:
+        draws = scenarios.evaluated
+        settings = PoseStudySettings(scenarios.pose_errors, draws, min(DRAWS_OF_KIND, draws), scenarios.seed + 1)
+        under_errors = yield from pose_study(around, deployment, settings)
+    evaluation = PoseErrorEvaluation(study, under_errors)
+    over = f" over {scenarios.optimised} scenarios" if scenarios.errs else ""
+    note = f"{CHOSEN_FOR}for {chosen.name}{over}: objective, bound and gap are of that"
+    notes = (note, *chosen.placement.notes, *evaluation.messages())
+    placement = replace(chosen.placement, notes=notes)
+    return Solution(with_count(objective, site), placement, None, deployment, evaluation)
+
+
+def _in_traffic(
+    survey: Survey, objective: Objective, measure: Risk, runs: TrafficRuns
+) -> Generator[Progress, None, Solution]:
+    """Optimise a risk measure over instants of traffic, whose vehicles block the view."""
+    site, models, visible = survey.site, survey.models, survey.grid.visible
+    around, scenarios = surroundings(survey), objective.scenarios
+    layer: TrafficLayer = "height" if objective.criterion == "height" else "road"
+    problem = placement_problem(site, visible, models, objective)
+    if scenarios.weights_from_traffic:
+        seconds = yield from road_user_seconds(site.targets, runs.optimisation)
+        problem = replace(problem, weights=problem.weights * seconds)
+    instants = spread_instants(runs.optimisation, scenarios.optimised, scenarios.seed)
+    views = yield from traffic_scenarios(around, problem, instants, layer)
+    held_out = spread_instants(runs.evaluation, scenarios.evaluated, scenarios.seed + 1)
+    study = yield from traffic_study(around, problem, views, held_out, survey.settings.limits, measure)
+    note = (
+        f"{CHOSEN_FOR}to see the {LAYER_NAMES[layer]} in traffic, {_OVER_INSTANTS[measure.tail]} {len(instants)} "
+        "instants: objective, bound and gap are of that"
+    )
+    weights = ("targets weigh as many seconds as road users are there",) if scenarios.weights_from_traffic else ()
+    placement = study.traffic.placement
+    placement = replace(placement, notes=(note, *weights, *placement.notes, *study.messages()))
+    deployment = deploy(site, models, visible, placement.chosen)
+    return Solution(with_count(objective, site), placement, None, deployment, study)
+
+
+def _evaluated(survey: Survey, solution: Solution, runs: TrafficRuns | None) -> Generator[Progress, None, list[str]]:
+    """Return a message on a nominal placement in the scenarios of its objective."""
+    objective, around = solution.objective, surroundings(survey)
+    scenarios = objective.scenarios
+    if scenarios.errs:
+        settings = PoseStudySettings(scenarios.pose_errors, scenarios.evaluated, 0, scenarios.seed + 1)
+        return [pose_message((yield from pose_study(around, solution.deployment, settings)))]
+    if scenarios.kind == "traffic":
+        held_out = spread_instants(_required(runs).evaluation, scenarios.evaluated, scenarios.seed + 1)
+        poses = np.array([one.pose for one in solution.deployment.sensors if one.pose is not None], dtype=np.int64)
+        weights = target_weights(survey.site, objective)
+        return [(yield from traffic_message(around, poses, weights, held_out))]
+    return []
+
+
+def _required(runs: TrafficRuns | None) -> TrafficRuns:
+    if runs is None:
+        raise SeipError("the scenarios are traffic: name runs of traffic")
+    return runs

@@ -1,0 +1,127 @@
+"""Runs of traffic beside a scene, split into those to optimise a placement on and those to evaluate it on."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import TypeVar
+
+from ..arrays import Float
+from ..errors import SeipError
+from ..progress import Progress
+from ..robustness.traffic_instants import check_runs
+from ..site.site import Site
+from ..traffic import Trajectories
+from ..traffic.run_overlap import require_independent, vehicle_positions
+from ..traffic.source import load_trajectories
+from .survey import Layout
+
+_Run = TypeVar("_Run")
+
+EVALUATION_SHARE = 1 / 3
+"""Share of the runs, the last ones, that placements are evaluated on and not optimised on."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrafficRuns:
+    """Runs of traffic, split into those to optimise on and those to evaluate on.
+
+    Parameters
+    ----------
+    optimisation, evaluation : list of Trajectories
+        To optimise a placement on, and to evaluate it on.
+    overlap : str
+        Message on how much the two overlap.
+    """
+
+    optimisation: list[Trajectories]
+    evaluation: list[Trajectories]
+    overlap: str
+
+
+def split_runs(runs: Sequence[_Run]) -> tuple[list[_Run], list[_Run]]:
+    """Return the runs to optimise on, and those to evaluate on."""
+    last = max(1, round(EVALUATION_SHARE * len(runs)))
+    return list(runs[:-last]), list(runs[-last:])
+
+
+def traffic_folder(scene: Path, kind: str = "") -> Path:
+    """Return the folder for runs beside the file of a scene: ``junction_traffic`` beside ``junction.blend``.
+
+    Parameters
+    ----------
+    kind : str
+        What else the folder's name ends with: ``_dense`` for ``junction_traffic_dense``.
+    """
+    return scene.parent / f"{scene.stem}_traffic{kind}"
+
+
+def runs_in(folder: Path) -> list[Path]:
+    """Return the files of runs in a folder by their names, numbers as such; none where there is no such folder."""
+
+    def by_number(path: Path) -> list[tuple[int, str]]:
+        return [(int(part), "") if part.isdecimal() else (0, part) for part in re.split(r"([0-9]+)", path.stem)]
+
+    return sorted(folder.glob("*.npz"), key=by_number)
+
+
+def found_runs(folder: Path) -> list[Path]:
+    """Return the files of runs in a folder, one or more.
+
+    Raises
+    ------
+    SeipError
+        There is none.
+    """
+    paths = runs_in(folder)
+    if not paths:
+        raise SeipError(
+            f"there is no run of traffic (.npz) in {folder}: choose another folder, or make two or more runs with "
+            "headless/traffic.py, a seed each"
+        )
+    return paths
+
+
+def load_runs(paths: Sequence[Path], origin: Float) -> list[Trajectories]:
+    """Read runs, in the local axes of an origin."""
+    return [Trajectories.load(path).moved_to(origin) for path in paths]
+
+
+def read_runs(paths: Sequence[Path], layout: Layout) -> Generator[Progress, None, TrafficRuns]:
+    """Read the runs that a survey's sensors are to be placed on.
+
+    Raises
+    ------
+    SeipError
+        A file is named twice or cannot be read, or as for `independent_runs`.
+    """
+    for path in paths:
+        if paths.count(path) > 1:
+            raise SeipError(f"{path} is named twice: name each run of traffic once")
+    runs: dict[str, Trajectories] = {}
+    for number, path in enumerate(paths):
+        yield Progress(number, len(paths), "reading runs of traffic")
+        runs[str(path)] = load_trajectories(path, layout.geometry)
+    return independent_runs(runs, layout.site)
+
+
+def independent_runs(runs: Mapping[str, Trajectories], site: Site) -> TrafficRuns:
+    """Split runs, given by name in the axes of the site, and check that both parts show traffic of their own there.
+
+    Raises
+    ------
+    SeipError
+        There are fewer than two, one is of another place, or two are nearly the same.
+    """
+    if len(runs) < 2:
+        raise SeipError(
+            f"two runs of traffic or more are needed, not {len(runs)}: make them by headless/traffic.py with a seed "
+            "each; what is chosen on the others is evaluated on the last third"
+        )
+    check_runs(list(runs.values()), site.region)
+    positions = [vehicle_positions(name, run) for name, run in runs.items()]
+    overlap = require_independent(product(*split_runs(positions)))
+    return TrafficRuns(*split_runs(list(runs.values())), overlap)

@@ -1,0 +1,115 @@
+"""Placement over pose errors and sensor failures by the command, from a scene to the folder of its result."""
+
+import json
+
+from headless import place
+
+import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.report.evidence import POSE_ERROR_PICTURES
+from seip_addon.scene.result_folder import FILES
+
+COARSE = ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--delta", "6", "--no-render"]
+
+
+@pytest.fixture(scope="module")
+def run(small_scene):
+    def run(folder, *options):
+        place.main([str(small_scene), "-o", str(folder), *COARSE, *options])
+
+    return run
+
+
+ERRORS = ["--pose-errors", "--scenarios", "3", "--held-out", "20"]
+
+
+def test_it_writes_a_result_with_the_objective_and_the_evaluation(tmp_path, capsys, run):
+    run(tmp_path, "--count", "2", *ERRORS, "--risk", "worst")
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {*FILES, *POSE_ERROR_PICTURES, "visibility.npz"} - {"view.png"} <= names
+    record = json.loads((tmp_path / "placement.json").read_text(encoding="utf-8"))
+    assert "coverage in the worst scenario" in json.dumps(record)
+    goal = record["settings"]["goal"]
+    assert (goal["risk"], goal["scenarios"]["pose_errors"]["tilt_deg"]) == ("worst", 2.0)
+    assert "unseen draws" in capsys.readouterr().out
+    run(tmp_path, "--count", "2")  # of another result
+    assert not {*POSE_ERROR_PICTURES} & {path.name for path in tmp_path.iterdir()}
+
+
+def test_errors_that_are_only_evaluated_leave_the_placement_as_it_is(tmp_path, run):
+    run(tmp_path / "nominal", "--count", "2")
+    run(tmp_path / "evaluated", "--count", "2", *ERRORS, "--risk", "none")
+    names = ("nominal", "evaluated")
+    texts = [(tmp_path / name / "placement.json").read_text(encoding="utf-8") for name in names]
+    nominal, evaluated = map(json.loads, texts)
+    assert evaluated["sensors"] == nominal["sensors"]
+    (note,) = (note for note in evaluated["notes"] if note not in nominal["notes"])
+    assert note.startswith("with errors of 0.3 m")
+
+
+def test_failures_of_nominal_sensors_are_optimised_without_pose_errors(tmp_path, capsys, run):
+    run(tmp_path, "--count", "2", "--failures", "worst")
+    record = json.loads((tmp_path / "placement.json").read_text(encoding="utf-8"))
+    assert record["settings"]["goal"]["scenarios"]["kind"] == "nominal"
+    assert record["notes"][0].startswith("chosen for coverage after the loss of the most important sensor: ")
+    left = min(one["coverage_alone"] for one in record["sensors"])  # of two sensors the better one fails
+    assert record["objective"]["value"] == pytest.approx(left * record["counts"]["targets"])
+    assert f"coverage after the loss of the most important sensor: {left:.2%}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--pose-errors", "--coverage", "0.5"], "needs a number of sensors or a budget"),
+        (["--pose-errors", "--criterion", "returns"], "choose the criterion road"),
+        (["--criterion", "height"], "the criterion height is of traffic: add --traffic"),
+        (["--failures", "worst", "--risk", "none"], "do not go with the risk none"),
+        (["--pose-errors", "--traffic"], "leave out --pose-errors or --traffic"),
+        (["--seen-by", "2", "--traffic"], "do not go with traffic"),
+        (["--weights-from-traffic"], "--weights-from-traffic needs --traffic"),
+    ],
+)
+def test_parts_of_an_objective_that_contradict_each_other_are_refused(tmp_path, run, options, sentence):
+    with pytest.raises(SeipError, match=sentence):
+        run(tmp_path / "out", *options)
+    assert not (tmp_path / "out").exists()
+
+
+def test_errors_that_cannot_be_meant_are_refused(tmp_path, run):
+    with pytest.raises(SeipError, match=r"--tilt-error must be at most 57\.3 degrees, not 90"):
+        run(tmp_path, "--tilt-error", "90")
+
+
+def test_one_sensor_cannot_be_lost_of_one(tmp_path, run):
+    with pytest.raises(SeipError, match="at least 2 sensors"):
+        run(tmp_path, "--count", "1", "--failures", "worst")
+    assert not (tmp_path / "visibility.npz").exists()  # refused before any ray is cast
+
+
+@pytest.mark.parametrize(
+    ("option", "sentence"),
+    [
+        (("--tilt-error", "-2"), "the error of tilt must be 0 to 57°, not -2°"),  # not of yaw, which follows it
+        (("--position-error", "-1"), "the error of position must be 0 to 100 m"),
+    ],
+)
+def test_a_slip_is_named_before_any_work(tmp_path, option, sentence, run):
+    with pytest.raises(SeipError, match=sentence):
+        run(tmp_path / "out", *option)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "sentence"),
+    [
+        (("--scenarios", "0"), "--scenarios must be 1 to 10,000, not 0"),
+        (("--scenarios", "1000000000"), "--scenarios must be 1 to 10,000, not 1000000000"),
+        (("--held-out", "0"), "--held-out must be 1 to 100,000, not 0"),
+        (("--central-weight", "1e308"), "--central-weight must be 0 to 1,000,000, not 1e308"),
+    ],
+)
+def test_a_number_out_of_its_limits_is_named_by_its_option(tmp_path, option, sentence, run):
+    with pytest.raises(SeipError, match=sentence):
+        run(tmp_path / "out", *option)
+    assert not (tmp_path / "out").exists()
