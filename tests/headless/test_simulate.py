@@ -203,6 +203,13 @@ def test_traffic_of_another_site_with_the_same_coordinates_is_refused(folder):
         simulate.main(arguments(folder, "wrong", "--traffic", str(folder / "above.npz")))
 
 
+def test_traffic_that_never_comes_to_the_scene_is_refused(folder):
+    traffic = make_traffic(ORIGIN + np.array([0.0, 300.0, 0.0]))
+    traffic.save(folder / "beside.npz")
+    with pytest.raises(SeipError, match="traffic of another site: 100%"):
+        simulate.main(arguments(folder, "wrong", "--traffic", str(folder / "beside.npz")))
+
+
 def test_traffic_of_another_place_has_its_sentence(folder):
     make_traffic(np.array([9e5, 0.0, 0.0])).save(folder / "elsewhere.npz")
     with pytest.raises(SeipError, match="far from this scene"):

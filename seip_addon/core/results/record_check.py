@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
+from datetime import datetime
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -11,7 +13,8 @@ if TYPE_CHECKING:
 
 _CENT = 0.01  # dollars to which prices are rounded
 _SHARE_ERROR = 2e-9  # by which a rounded share may exceed another
-_VALUE_ERROR = 1e-6  # by which a value may exceed its bound, relatively: solvers round
+_VALUE_ERROR = 1e-6  # by which a value may exceed its bound, and gaps may differ, relatively: solvers round
+_COORDINATE_ERROR = 2e-3  # metres: eastings and northings are rounded to the millimetre
 
 
 def check_consistency(record: PlacementRecord) -> None:
@@ -22,7 +25,15 @@ def check_consistency(record: PlacementRecord) -> None:
     ValueError
         Two figures contradict each other.
     """
-    for check in (_check_sensors, _check_prices, _check_coverage, _check_objective, _check_counts):
+    for check in (
+        _check_sensors,
+        _check_prices,
+        _check_coverage,
+        _check_objective,
+        _check_greedy,
+        _check_counts,
+        _check_times,
+    ):
         check(record)
 
 
@@ -39,6 +50,13 @@ def _check_sensors(record: PlacementRecord) -> None:
             for local, origin, on_map in zip(sensor.local_m, record.site.origin_m, sensor.map_m, strict=True)
         )
         _require(off <= 1e-5, f"local_m and map_m of sensor {sensor.id[:40]!r} are {off:g} m apart")
+        known, projected = record.site.geo_reference, (sensor.easting_m, sensor.northing_m)
+        if known is not None:
+            for on_map, offset, value in zip(sensor.map_m, known.header_offset_m, projected, strict=False):
+                _require(
+                    value is None or abs(on_map + offset - value) <= _COORDINATE_ERROR,
+                    f"easting_m and northing_m of sensor {sensor.id[:40]!r} are not its map_m with the map's offset",
+                )
 
 
 def _check_prices(record: PlacementRecord) -> None:
@@ -73,6 +91,35 @@ def _check_objective(record: PlacementRecord) -> None:
     value, bound = objective.value, objective.bound
     beyond = value < bound - slack if objective.cheapest else value > bound + slack
     _require(not beyond, f"objective.value {value:g} is better than objective.bound {bound:g}")
+    _require(
+        objective.status != "optimal" or abs(bound - value) <= slack,
+        f"objective.status is 'optimal', and objective.bound {bound:g} is not objective.value {value:g}",
+    )
+    if objective.gap is not None and value > 0:
+        of_returns = objective.sought == "most returns"  # whose values are logarithms
+        gap = math.expm1(min(bound - value, 700.0)) if of_returns else abs(bound - value) / value
+        _require(
+            abs(objective.gap - gap) <= _VALUE_ERROR * (1 + gap),
+            f"objective.gap is {objective.gap:g}, and value and bound are {gap:g} apart",
+        )
+
+
+def _check_greedy(record: PlacementRecord) -> None:
+    objective, greedy = record.objective, record.greedy
+    if greedy is None or objective.bound is None or objective.cheapest:
+        return
+    slack = _VALUE_ERROR * max(objective.bound, 1.0)
+    _require(
+        greedy.value <= objective.bound + slack,
+        f"greedy.value {greedy.value:g} is above objective.bound {objective.bound:g}",
+    )
+
+
+def _check_times(record: PlacementRecord) -> None:
+    try:
+        datetime.fromisoformat(record.times.created)
+    except ValueError:
+        _require(False, f"times.created is no date and time: {record.times.created[:40]!r}")  # noqa: FBT003
 
 
 def _check_counts(record: PlacementRecord) -> None:

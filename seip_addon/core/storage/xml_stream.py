@@ -18,6 +18,7 @@ SUMO_CURE = "let SUMO finish writing it"
 _MAX_QUOTED = 60  # characters of a file that a message repeats
 _CHUNK = 1 << 20
 _MAX_TOKEN = 8 << 20  # bytes of one tag, comment or text: expat reads an unfinished one again with each chunk
+_MAX_DEPTH = 1000  # elements within each other: maps and simulations have a dozen, and each level costs memory
 _MAX_RATIO = 200  # of unpacked to packed bytes; DEFLATE reaches 1,032 on content that says nothing
 _ALWAYS_UNPACKED = 1 << 30  # bytes that any file may unpack to: standing traffic repeats itself as well
 _GZIP = b"\x1f\x8b"
@@ -108,18 +109,7 @@ def read_tags(
         one a file can reach for other files or blow up in memory.
     """
     name = Path(path).name
-
-    def refuse(*_: object) -> None:
-        raise SeipError(f"{name} declares a document type or entities, which may not be; remove them")
-
-    parser = expat.ParserCreate()
-    parser.StartDoctypeDeclHandler = refuse
-    parser.StartElementHandler = take
-    parser.EndElementHandler = leave
-    # Newer expat defers unfinished tags until its buffer has doubled. Its byte index then lags far behind what it was
-    # given, and `_MAX_TOKEN` would reject files of ordinary tags.
-    if hasattr(parser, "SetReparseDeferralEnabled"):
-        parser.SetReparseDeferralEnabled(False)  # noqa: FBT003  # takes no name
+    parser = _parser(name, take, leave, cure)
     taken = 0
     with opened(path) as (stream, progress):
         try:
@@ -137,6 +127,39 @@ def read_tags(
             raise SeipError(f"{name} is broken or unfinished XML ({error}); {cure}") from error
         except (LookupError, ValueError) as error:  # of an encoding that Python knows not, or expat does not take
             raise SeipError(f"{name} is XML in an encoding that cannot be read ({error}); save it as UTF-8") from error
+
+
+def _parser(
+    name: str, take: Callable[[str, Attributes], object], leave: Callable[[str], object] | None, cure: str
+) -> expat.XMLParserType:
+    """Return a parser that refuses document types and deep nesting; see `read_tags`."""
+    depth = 0
+
+    def refuse(*_: object) -> None:
+        raise SeipError(f"{name} declares a document type or entities, which may not be; remove them")
+
+    def start(tag: str, attributes: Attributes) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > _MAX_DEPTH:
+            raise SeipError(f"{name} has more than {_MAX_DEPTH:,} elements within each other; {cure}")
+        take(tag, attributes)
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        if leave is not None:
+            leave(tag)
+
+    parser = expat.ParserCreate()
+    parser.StartDoctypeDeclHandler = refuse
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    # Newer expat defers unfinished tags until its buffer has doubled. Its byte index then lags far behind what it was
+    # given, and `_MAX_TOKEN` would reject files of ordinary tags.
+    if hasattr(parser, "SetReparseDeferralEnabled"):
+        parser.SetReparseDeferralEnabled(False)  # noqa: FBT003  # takes no name
+    return parser
 
 
 def short(text: str) -> str:

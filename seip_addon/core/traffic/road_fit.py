@@ -76,8 +76,9 @@ def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> LoadedTr
 
 
 def share_on_road(local: Trajectories, geometry: SceneGeometry) -> float:
-    """Return the share of vehicle samples near the region of interest that are on the road of the scene, 0 to 1.
+    """Return the share of vehicle samples that are on the road of the scene, 0 to 1.
 
+    Samples are those near the region of interest; where no vehicle comes near it, those within the extent of the roads.
     On the road is within `ROAD_TOLERANCE` in plan and in height.
 
     Parameters
@@ -88,14 +89,19 @@ def share_on_road(local: Trajectories, geometry: SceneGeometry) -> float:
     Returns
     -------
     float
-        Of at most `MAX_SAMPLES` samples, spread evenly; 1 where no vehicle is near.
+        Of at most `MAX_SAMPLES` samples, spread evenly; 1 without vehicles, and 0 where all of them are elsewhere.
     """
     user = np.repeat(np.arange(len(local)), np.diff(local.first))
     drives = np.array([each.category != "pedestrian" for each in local.users], dtype=np.bool_)[user]
-    x, y = local.position[:, 0], local.position[:, 1]
-    near = np.flatnonzero(drives & shapely.contains_xy(geometry.region.convex_hull, x, y))
-    if not len(near) or not geometry.roads:
+    if not drives.any() or not geometry.roads:
         return 1.0
+    x, y = local.position[:, 0], local.position[:, 1]
+    extent = shapely.MultiPoint(joined(geometry.roads)[:, :, :2].reshape(-1, 2)).envelope
+    areas = (geometry.region.convex_hull, extent)
+    within = (np.flatnonzero(drives & shapely.contains_xy(area, x, y)) for area in areas)
+    near = next((samples for samples in within if len(samples)), None)
+    if near is None:
+        return 0.0
     sample = local.position[near[np.linspace(0, len(near) - 1, min(len(near), MAX_SAMPLES)).astype(np.int64)]]
     height = _RoadSurface(joined(geometry.roads)).height(sample[:, :2], sample[:, 2])
     return float(np.mean(np.abs(height - sample[:, 2]) <= ROAD_TOLERANCE))

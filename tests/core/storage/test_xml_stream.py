@@ -51,3 +51,20 @@ def test_large_files_of_ordinary_tags_are_read(tmp_path):
     tags: list[str] = []
     finish(read_tags(path, lambda tag, _: tags.append(tag)))
     assert tags == ["net", *["edge"] * 12]
+
+
+def test_elements_nested_without_end_are_refused_at_once(tmp_path):
+    path = tmp_path / "place.osm.gz"
+    path.write_bytes(gzip.compress(b"<a>" * 1_000_000))
+    tags: list[str] = []
+    with pytest.raises(SeipError, match=r"place\.osm\.gz has more than 1,000 elements within each other"):
+        finish(read_tags(path, lambda tag, _: tags.append(tag)))
+    assert len(tags) == 1000
+
+
+def test_elements_next_to_each_other_are_not_nested(tmp_path):
+    path = tmp_path / "net.xml"
+    path.write_text(f"<net>{'<lane><param/></lane>' * 3000}</net>", encoding="utf-8")
+    tags: list[str] = []
+    finish(read_tags(path, lambda tag, _: tags.append(tag)))
+    assert len(tags) == 6001
