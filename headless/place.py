@@ -49,7 +49,8 @@ def main(argv: list[str]) -> None:
     runs = traffic[0] if traffic else None
     if runs is not None:
         runtime.LOG.info(runs.overlap)
-    solution = watch.run("placement", place(surveyed, objective, runs))
+    acceptance = runtime.accepted_by_enter()
+    solution = watch.run("placement", place(surveyed, objective, runs, acceptance))
     runtime.print_line(_in_words(solution))
     with runtime.incomplete_if_interrupted(options.output):
         save_evaluation_charts(options.output, surveyed, solution)

@@ -8,6 +8,7 @@ import logging
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -21,6 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from headless.system_libraries import complaint, missing_libraries
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.placement.search_limits import Acceptance
 from seip_addon.core.progress import Pace, Progress, finish
 from seip_addon.core.storage import files as storage
 
@@ -196,6 +198,22 @@ def progress_bar() -> Iterator[Callable[[Progress], None]]:
             bar.update(progress.done - bar.n if known else 1)
 
         yield report
+
+
+def accepted_by_enter() -> Acceptance | None:
+    """Return what Enter in a terminal accepts: the best placement of a search so far; None without a terminal."""
+    if not (sys.stdin and sys.stdin.isatty() and sys.stderr.isatty()):
+        return None
+    acceptance = Acceptance()
+
+    def wait() -> None:
+        while sys.stdin.readline() and not acceptance.accepted:
+            if acceptance.searching:
+                acceptance.accept()
+
+    threading.Thread(target=wait, daemon=True).start()
+    LOG.info("press Enter to end the search with the best placement found so far")
+    return acceptance
 
 
 def _line_reporter() -> Callable[[Progress], None]:

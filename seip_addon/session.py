@@ -18,6 +18,7 @@ from .core.arrays import Boolean
 from .core.errors import SeipError
 from .core.lidar import LidarModel
 from .core.placement.objective import Solution
+from .core.placement.search_limits import Acceptance
 from .core.scans import Frame, MountedSensor, Simulation
 from .core.scans.run_folder import Run
 from .core.storage.files import check_folder
@@ -143,6 +144,8 @@ class RunningWork:
         Reading of `time.monotonic`.
     timer : bpy.types.Timer or None
         Has somebody look at it from time to time.
+    acceptance : Acceptance, optional
+        Ends a search with the best placement found so far.
     """
 
     operator: str
@@ -150,6 +153,7 @@ class RunningWork:
     began: float = field(default_factory=time.monotonic)
     timer: bpy.types.Timer | None = None
     stop: bool = False
+    acceptance: Acceptance | None = None
 
 
 @dataclass

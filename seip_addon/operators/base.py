@@ -10,6 +10,7 @@ import bpy
 from .. import scene_status
 from ..background import Background
 from ..core.errors import SeipError
+from ..core.placement.search_limits import Acceptance
 from ..core.progress import Progress, finish
 from ..session import RunningWork, scene_of, session
 
@@ -64,6 +65,8 @@ class LongWork(Generic[Result]):
 
     bl_options = {"REGISTER", "UNDO"}
     stopped_message = "stopped; nothing was changed"
+    acceptance: Acceptance | None = None
+    """Set by an operator whose search a user can end with the best result so far."""
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, Result]:
         """Read the inputs from the scene, on the main thread, and return the work.
@@ -116,7 +119,8 @@ class LongWork(Generic[Result]):
         self._scene = context.scene.session_uid
         # of the class, as panels spell it: Blender gives the instance's as SEIP_OT_…
         name = type(self).bl_idname  # type: ignore[attr-defined]  # of Blender's operators
-        self._running = session.running = RunningWork(name, Background(self.prepare(context.scene)))
+        work = Background(self.prepare(context.scene))
+        self._running = session.running = RunningWork(name, work, acceptance=self.acceptance)
         self._running.timer = context.window_manager.event_timer_add(TIMER_INTERVAL, window=context.window)
         context.window_manager.modal_handler_add(self)
 
@@ -177,7 +181,29 @@ class SEIP_OT_stop(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (SEIP_OT_stop,)
+class SEIP_OT_accept(bpy.types.Operator):
+    """End the search with the best placement found so far"""
+
+    bl_idname = "seip.accept"
+    bl_label = "Use Best So Far"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Return whether a search for a placement is running."""
+        running = session.running
+        searching = running is not None and running.acceptance is not None and running.acceptance.searching
+        if not searching:
+            cls.poll_message_set("no search for a placement is running")
+        return searching
+
+    def execute(self, _context: bpy.types.Context) -> Outcome:
+        """Ask the search to end."""
+        if session.running is not None and session.running.acceptance is not None:
+            session.running.acceptance.accept()
+        return {"FINISHED"}
+
+
+CLASSES = (SEIP_OT_stop, SEIP_OT_accept)
 
 
 def detach() -> None:

@@ -14,6 +14,7 @@ import bpy
 from .. import scene_survey, selection
 from ..core.errors import SeipError
 from ..core.placement.objective import Objective, check_objective
+from ..core.placement.search_limits import Acceptance
 from ..core.progress import Progress
 from ..core.results.placement_record import Provenance, versions
 from ..core.workflows.placing import place
@@ -38,7 +39,8 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneState], bpy.types.Ope
         goal = scene.seip.goal
         objective = goal.objective()
         folder = runs_folder(goal.runs) if objective.scenarios.kind == "traffic" else None
-        return _placed(scene_survey.survey(scene), objective, folder)
+        self.acceptance = Acceptance()
+        return _placed(scene_survey.survey(scene), objective, folder, self.acceptance)
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Put the sensors into the scene, and all that is needed to go on later into the file."""
@@ -53,7 +55,10 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneState], bpy.types.Ope
 
 
 def _placed(
-    surveying: Generator[Progress, None, SceneState], objective: Objective, folder: Path | None
+    surveying: Generator[Progress, None, SceneState],
+    objective: Objective,
+    folder: Path | None,
+    acceptance: Acceptance,
 ) -> Generator[Progress, None, SceneState]:
     """Place sensors on a survey; runs of traffic are read, and the objective is checked, before any ray is cast."""
     state = yield from surveying
@@ -61,7 +66,7 @@ def _placed(
     check_objective(state.layout.site, state.layout.models, objective)
     state, survey = yield from scene_survey.with_visibility(state)
     began = time.perf_counter()
-    solution = yield from place(survey, objective, runs)
+    solution = yield from place(survey, objective, runs, acceptance)
     return replace(state, solution=solution, durations=state.timed("placement", began))
 
 

@@ -23,6 +23,8 @@ def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE", text
     row = column.row(align=True)
     row.progress(factor=progress.done / progress.total if progress.total else 0.0, text=progress.what)
     row.operator("seip.stop", text="", icon="X")
+    if running.acceptance is not None and running.acceptance.searching:
+        column.operator("seip.accept", icon="CHECKMARK")
     column.label(text=times_in_words(time.monotonic() - running.began, running.work.seconds_left))
 
 

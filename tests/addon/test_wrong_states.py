@@ -11,6 +11,7 @@ import pytest
 
 from seip_addon import live_coverage, preferences, registration, scene_status, scene_survey
 from seip_addon.background import Background
+from seip_addon.core.placement.search_limits import Acceptance, SolverLimits
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.results.placement_record import parsed_record
 from seip_addon.operators import base, results
@@ -239,3 +240,13 @@ def test_work_asks_blender_for_nothing_once_it_is_under_way(junction, monkeypatc
         monkeypatch.setattr(preferences, name, asked)
     _, survey = finish(seeing)
     assert survey.grid.visible.any()
+
+
+def test_the_best_so_far_can_be_used_while_a_search_runs_and_only_then(placed, monkeypatch):
+    assert not bpy.ops.seip.accept.poll()
+    acceptance = Acceptance()
+    monkeypatch.setattr(session, "running", RunningWork("seip.solve_placement", MagicMock(), acceptance=acceptance))
+    assert not bpy.ops.seip.accept.poll()  # rays are still cast
+    SolverLimits(acceptance=acceptance).clock()
+    assert bpy.ops.seip.accept() == {"FINISHED"}
+    assert acceptance.accepted

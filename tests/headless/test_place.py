@@ -7,7 +7,9 @@ import signal
 import struct
 import subprocess
 import sys
+import termios
 import time
+from functools import partial
 from pathlib import Path
 
 from headless import place, runtime
@@ -19,6 +21,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.placement.scenarios import Scenarios
 from seip_addon.core.results.placement_record import comparable, load_placement_record
 from seip_addon.core.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
+from seip_addon.core.workflows.placing import ACCEPTED_MESSAGE
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = ROOT / "scenes" / "junction.blend"
@@ -299,3 +302,36 @@ def test_an_impossible_limit_is_refused_before_any_ray_is_cast(tmp_path, limit):
     with pytest.raises(SeipError, match=r"give a positive number|--effort must be a finite number"):
         place.main(["scenes/junction.blend", *limit, "-o", str(tmp_path / "out")])
     assert not list(tmp_path.rglob("visibility.npz"))
+
+
+def _read_terminal(file):
+    """Return what a terminal shows, nothing once its program has ended."""
+    try:
+        return os.read(file, 4096)
+    except OSError:
+        return b""
+
+
+@pytest.mark.slow
+def test_enter_ends_the_search_with_the_best_placement_so_far(tmp_path):
+    """Eight sensors are not proven optimal within an hour of work; Enter ends the search before."""
+    scene = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
+    options = ["--sensor", "type2", "--count", "8", "--grid", "2", "--spacing", "8", "--effort", "3600", "--no-render"]
+    ours, theirs = os.openpty()
+    termios.tcsetwinsize(theirs, (24, 200))
+    command = [sys.executable, "-m", "headless.place", str(scene), *options, "-o", str(tmp_path)]
+    process = subprocess.Popen(  # noqa: S603  # our own interpreter and script
+        command, stdin=theirs, stdout=theirs, stderr=theirs, cwd=scene.parents[1], close_fds=True
+    )
+    os.close(theirs)
+    shown = b""
+    while b"covered so far" not in shown:
+        shown += os.read(ours, 4096)
+    os.write(ours, b"\n")
+    shown += b"".join(iter(partial(_read_terminal, ours), b""))
+    os.close(ours)
+    assert process.wait(60) == 0
+    assert b"press Enter to end the search" in shown
+    record = load_placement_record(tmp_path / "placement.json")
+    assert record.objective.status == "feasible"
+    assert ACCEPTED_MESSAGE in record.notes

@@ -139,7 +139,7 @@ def _record(problem: PlacementProblem, chosen: Integer, bound: float, best: Plac
     notes = [*scale_notes(problem)]
     if not optimal:
         notes.append(
-            "the time was too short to prove this placement the cheapest: the gap is the share of its price that "
+            "the search ended before this placement was proven the cheapest: the gap is the share of its price that "
             "another one may save"
         )
     if best.status != "optimal":

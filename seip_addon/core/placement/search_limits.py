@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ..errors import SeipError
 
@@ -12,6 +13,29 @@ OPERATIONS_PER_UNIT = 1e10  # multiplications that make a unit of work: about a 
 OVERHEAD_OPERATIONS = 3e6  # multiplications that take as long as what goes on around each counted step
 DEFAULT_EFFORT = 60.0  # units of work for an answer where nothing else limits it
 MIN_PART = 0.01  # seconds, or units of work, of a part of a limit where nothing is left
+
+
+class Acceptance:
+    """A user's request, from another thread, to end a search with the best placement found so far.
+
+    Attributes
+    ----------
+    searching : bool
+        Whether the search has begun, so that there is something to accept.
+    """
+
+    def __init__(self) -> None:
+        self._event = threading.Event()
+        self.searching = False
+
+    def accept(self) -> None:
+        """End the search at its next step."""
+        self._event.set()
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the search is to end."""
+        return self._event.is_set()
 
 
 @dataclass(frozen=True)
@@ -29,11 +53,14 @@ class SolverLimits:
     effort : float, units of work, optional
         Limit of counted work, about a second of one processor core for each unit. The same inputs give the same
         result on every machine. Default: `DEFAULT_EFFORT`, or no limit where there is a time limit.
+    acceptance : Acceptance, optional
+        Ends the search early where a user asks for that.
     """
 
     solver: str = "highs"
     time_limit: float | None = None
     effort: float | None = None
+    acceptance: Acceptance | None = field(default=None, compare=False, repr=False)
 
     @property
     def work(self) -> float:
@@ -50,7 +77,10 @@ class SolverLimits:
         SeipError
             A limit is not a positive number.
         """
-        return Clock(math.inf if self.time_limit is None else self.time_limit, self.work)
+        if self.acceptance is not None:
+            self.acceptance.searching = True
+        limit = math.inf if self.time_limit is None else self.time_limit
+        return Clock(limit, self.work, acceptance=self.acceptance)
 
 
 DEFAULT_LIMITS = SolverLimits()
@@ -70,6 +100,8 @@ class Clock:
         About as many seconds of one processor core. May be infinite.
     whole : Clock, optional
         What this is a part of: work that is done here is done there as well.
+    acceptance : Acceptance, optional
+        Once it is accepted, nothing is left.
 
     Attributes
     ----------
@@ -82,7 +114,13 @@ class Clock:
         A limit is no positive number.
     """
 
-    def __init__(self, limit: float, effort: float = math.inf, whole: Clock | None = None) -> None:
+    def __init__(
+        self,
+        limit: float,
+        effort: float = math.inf,
+        whole: Clock | None = None,
+        acceptance: Acceptance | None = None,
+    ) -> None:
         if math.isnan(limit) or limit <= 0:
             raise SeipError(f"the time limit is {limit:g} s; give a positive number of seconds")
         if math.isnan(effort) or effort <= 0:
@@ -91,6 +129,7 @@ class Clock:
         self._limit = limit
         self._effort = effort
         self._whole = whole
+        self.acceptance = acceptance
         self.work = 0.0
 
     def spend(self, operations: float) -> None:
@@ -103,13 +142,13 @@ class Clock:
         """Return a limit within this one, in the same measure; what is spent there is spent here."""
         share = max(min(most, self.left), least)
         if self.counts_work:
-            return Clock(max(self.seconds_left, least), share, self)
-        return Clock(share, whole=self)
+            return Clock(max(self.seconds_left, least), share, self, self.acceptance)
+        return Clock(share, whole=self, acceptance=self.acceptance)
 
     def counted_part(self, most: float) -> Clock:
         """Return a limit of so many units of work within what is left of this one."""
         limit = min(most, self.left) if self.counts_work else most
-        return Clock(max(self.seconds_left, MIN_PART), max(limit, MIN_PART), self)
+        return Clock(max(self.seconds_left, MIN_PART), max(limit, MIN_PART), self, self.acceptance)
 
     @property
     def counts_work(self) -> bool:
@@ -123,7 +162,9 @@ class Clock:
 
     @property
     def seconds_left(self) -> float:
-        """Seconds until the limit of time, negative after it."""
+        """Seconds until the limit of time, negative after it, or once the user has accepted what was found."""
+        if self.acceptance is not None and self.acceptance.accepted:
+            return -1.0
         return self._limit - self.seconds
 
     @property

@@ -166,7 +166,7 @@ def solve_within(
     else:
         chosen = drop_redundant(instance, proof.chosen, instance.value(proof.chosen))
         notes += [
-            "the time was too short to prove this placement optimal: the gap says by how much it may fall short",
+            "the search ended before this placement was proven optimal: the gap says by how much it may fall short",
             *_outlook(instance, proof),
         ]
     if problem.count is not None and len(chosen) < problem.count:
@@ -408,11 +408,13 @@ def _outlook(instance: Instance, proof: Proof) -> list[str]:
     before, now = (bound / value - 1 for bound in (proof.halfway, proof.bound))
     if before - now < MIN_GAP_PROGRESS * before:
         slow = (
-            "the gap has hardly closed in the second half of the time: a proof may take many times as long; fewer "
+            "the gap has hardly closed in the second half of the search: a proof may take many times as long; fewer "
             "candidates (a larger spacing, fewer heights) or fewer sensors make it easier"
         )
         return [slow]
-    return [f"the gap was {before:.2%} at half the time and is {now:.2%} now: a longer time limit may close more of it"]
+    return [
+        f"the gap was {before:.2%} halfway through the search and is {now:.2%} now: a higher limit may close more of it"
+    ]
 
 
 def _surplus(asked: int, used: int) -> str:

@@ -51,7 +51,9 @@ SCENARIO_SHARE = 0.5  # share of the time for the problems of single scenarios
 MIN_SECONDS = 1.0  # or units of work, for what comes after them, however slow they were
 
 
-UNPROVEN_MESSAGE = "the time was too short to prove this placement the best: the gap says how far"
+UNPROVEN_MESSAGE = (
+    "the search ended before this placement was proven optimal: the gap says by how much it may fall short"
+)
 
 
 def solve_robust(

@@ -21,6 +21,7 @@ from ..placement.objective import (
     with_count,
 )
 from ..placement.risk import Risk
+from ..placement.search_limits import Acceptance, SolverLimits
 from ..progress import Progress
 from ..robustness.assumed_heights import height_notes
 from ..robustness.gain_band import with_gain_band
@@ -38,10 +39,14 @@ from .traffic_runs import TrafficRuns
 DRAWS_OF_KIND = 100
 """Largest number of draws with one kind of pose error only."""
 
+ACCEPTED_MESSAGE = "accepted before the end of the search: running it to its end may find a better placement"
+
 _OVER_INSTANTS = {1.0: "on average over", 0.25: "in the worst quarter of", 0.0: "in the worst of"}
 
 
-def place(survey: Survey, objective: Objective, runs: TrafficRuns | None = None) -> Generator[Progress, None, Solution]:
+def place(
+    survey: Survey, objective: Objective, runs: TrafficRuns | None = None, acceptance: Acceptance | None = None
+) -> Generator[Progress, None, Solution]:
     """Optimise a placement, evaluate it on held-out scenarios, and note how far it can be trusted.
 
     The notes give the number of near-optimal placements (`near_optimal_set`), what changes where heights of the scene
@@ -51,6 +56,8 @@ def place(survey: Survey, objective: Objective, runs: TrafficRuns | None = None)
     ----------
     runs : TrafficRuns, optional
         Needed where the scenarios are traffic.
+    acceptance : Acceptance, optional
+        Lets a user end the search with the best placement found so far.
 
     Raises
     ------
@@ -58,27 +65,30 @@ def place(survey: Survey, objective: Objective, runs: TrafficRuns | None = None)
         As for `placement_problem`, `solve`, `solve_robust` and `spread_instants`.
     """
     measure, scenarios = objective.measure, objective.scenarios
+    limits = replace(survey.settings.limits, acceptance=acceptance)
     if measure is None:
-        solution = yield from _nominal(survey, objective)
+        solution = yield from _nominal(survey, objective, limits)
     elif scenarios.kind == "traffic":
-        solution = yield from _in_traffic(survey, objective, measure, _required(runs))
+        solution = yield from _in_traffic(survey, objective, limits, measure, _required(runs))
     else:
-        solution = yield from _under_risk(survey, objective, measure)
+        solution = yield from _under_risk(survey, objective, limits, measure)
     around = surroundings(survey)
     deployment = yield from with_gain_band(around, solution.deployment)
     notes = [*solution.placement.notes]
+    if acceptance is not None and acceptance.accepted and solution.placement.status != "optimal":
+        notes.append(ACCEPTED_MESSAGE)
     notes += height_notes(around, survey.geometry, deployment.sensors, deployment.coverage)
     if measure is None and deployment.sensors:
         notes += yield from _evaluated(survey, replace(solution, deployment=deployment), runs)
     return replace(solution, deployment=deployment, placement=replace(solution.placement, notes=tuple(notes)))
 
 
-def _nominal(survey: Survey, objective: Objective) -> Generator[Progress, None, Solution]:
+def _nominal(survey: Survey, objective: Objective, limits: SolverLimits) -> Generator[Progress, None, Solution]:
     """Optimise for nominal poses on the empty road."""
     site, models, visible = survey.site, survey.models, survey.grid.visible
     if criterion_of(objective, models) == "returns":
-        return (yield from place_by_returns(survey, objective))
-    solution = yield from optimise(site, visible, models, objective, survey.settings.limits)
+        return (yield from place_by_returns(survey, objective, limits))
+    solution = yield from optimise(site, visible, models, objective, limits)
     placement = solution.placement
     if placement.status != "optimal" or objective.cheapest:
         return solution
@@ -87,12 +97,14 @@ def _nominal(survey: Survey, objective: Objective) -> Generator[Progress, None, 
     return replace(solution, placement=replace(placement, notes=notes))
 
 
-def _under_risk(survey: Survey, objective: Objective, measure: Risk) -> Generator[Progress, None, Solution]:
+def _under_risk(
+    survey: Survey, objective: Objective, limits: SolverLimits, measure: Risk
+) -> Generator[Progress, None, Solution]:
     """Optimise a risk measure over pose errors, or what sensor failures leave of the nominal scenario."""
     site, models, visible = survey.site, survey.models, survey.grid.visible
     around, scenarios = surroundings(survey), objective.scenarios
     problem = placement_problem(site, visible, models, objective)
-    study = yield from robust_study(around, problem, scenarios, [measure], survey.settings.limits)
+    study = yield from robust_study(around, problem, scenarios, [measure], limits)
     (chosen,) = study.robust
     deployment = deploy(site, models, visible, chosen.placement.chosen)
     under_errors = None
@@ -109,7 +121,7 @@ def _under_risk(survey: Survey, objective: Objective, measure: Risk) -> Generato
 
 
 def _in_traffic(
-    survey: Survey, objective: Objective, measure: Risk, runs: TrafficRuns
+    survey: Survey, objective: Objective, limits: SolverLimits, measure: Risk, runs: TrafficRuns
 ) -> Generator[Progress, None, Solution]:
     """Optimise a risk measure over instants of traffic, whose vehicles block the view."""
     site, models, visible = survey.site, survey.models, survey.grid.visible
@@ -122,7 +134,7 @@ def _in_traffic(
     instants = spread_instants(runs.optimisation, scenarios.optimised, scenarios.seed)
     views = yield from traffic_scenarios(around, problem, instants, layer)
     held_out = spread_instants(runs.evaluation, scenarios.evaluated, scenarios.seed + 1)
-    study = yield from traffic_study(around, problem, views, held_out, survey.settings.limits, measure)
+    study = yield from traffic_study(around, problem, views, held_out, limits, measure)
     note = (
         f"{CHOSEN_FOR}to see the {LAYER_NAMES[layer]} in traffic, {_OVER_INSTANTS[measure.tail]} {len(instants)} "
         "instants: objective, bound and gap are of that"

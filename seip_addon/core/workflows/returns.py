@@ -15,6 +15,7 @@ from ..placement.deployment import deploy
 from ..placement.objective import CHOSEN_FOR, Objective, Solution, placement_problem, weights_in_regions, with_count
 from ..placement.returns_solver import greedy_returns, solve_returns
 from ..placement.returns_summary import CrossingReturns, ReturnsSummary
+from ..placement.search_limits import SolverLimits
 from ..progress import Progress
 from ..returns.returns_grid import ReturnsGrid, returns_key, stored_returns
 from ..returns.road_users import BODIES, RoadUsers, road_users
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from .survey import Survey
 
 
-def place_by_returns(survey: Survey, objective: Objective) -> Generator[Progress, None, Solution]:
+def place_by_returns(survey: Survey, objective: Objective, limits: SolverLimits) -> Generator[Progress, None, Solution]:
     """Choose the placement with the most returns from road users.
 
     Raises
@@ -41,7 +42,7 @@ def place_by_returns(survey: Survey, objective: Objective) -> Generator[Progress
         visible=grid.returns > 0,
         weights=user_weights(users, objective),
     )
-    placement = yield from solve_returns(problem, grid.returns, survey.settings.limits)
+    placement = yield from solve_returns(problem, grid.returns, limits)
     greedy = yield from greedy_returns(problem, grid.returns)
     summary = summarised(grid, users, objective, placement.chosen)
     note = f"{CHOSEN_FOR}for returns from road users: {summary.describe()} in one revolution (geometric means)"
