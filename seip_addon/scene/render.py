@@ -246,6 +246,8 @@ def _set_up(stage: bpy.types.Scene, raw: Path) -> None:
     stage.cycles.seed = 0
     stage.cycles.use_adaptive_sampling = False
     stage.cycles.use_denoising = has_denoiser()
+    # at the highest quality, denoising takes five times as long as two samples: the picture hardly differs
+    stage.cycles.denoising_quality = stage.cycles.denoising_prefilter = "FAST"
     stage.cycles.max_bounces = 2
 
 
