@@ -36,6 +36,12 @@ MIN_STEP = 1e-3
 REDUCTION_INTERVAL, MAX_KEPT_SHARE = 25, 0.8
 """Every so many steps candidates are ruled out, where no more than such a share of them would be left."""
 
+AVERAGED_SHARE, MIN_LEFT_TO_GAIN = 0.03, 0.03
+"""Weight of the last selection in the running average of all, and the share of the distance between bound and goal that
+the multipliers must still be able to close: the average of the selections nearly solves the linear relaxation, so what
+it covers says how far the bound can fall (the volume algorithm: Barahona and Anbil 2000).
+"""
+
 MAX_LISTED_CHOICES = 10_000  # the search ends when no more choices than these are left
 FACTORS = (0.8, 0.95, 1.0, 1.05, 1.25)  # factors by which the budget's multiplier may change in a step
 PRICES_TRIED = 200  # multipliers of the price that are tried for a bound on it
@@ -114,6 +120,36 @@ def select(instance: Constrained, score: Float, near: float = 0.0) -> Selection:
         else:
             high = middle
     return best
+
+
+class _Average:
+    """Running average of selections: what it covers estimates the linear relaxation from below.
+
+    What exceeds the budget or falls short of the mandatory groups is charged at their multipliers.
+    """
+
+    def __init__(self, layers: Float) -> None:
+        self._layers = layers
+        self._seen: Float = np.zeros(layers.shape[1])
+        self._charge = 0.0
+        self._weight = 0.0
+
+    def record(self, seen: Integer, bound: Bound, instance: Instance) -> None:
+        """Add a selection, with how often it sees each target."""
+        selection = bound.selection
+        charge = bound.groups @ (1.0 - instance.mandatory[:, selection.picked].sum(axis=1))
+        if selection.multiplier > 0:
+            charge += selection.multiplier * (float(instance.price[selection.picked].sum()) - instance.budget)
+        self._seen += AVERAGED_SHARE * (seen - self._seen)
+        self._charge += AVERAGED_SHARE * (float(charge) - self._charge)
+        self._weight += AVERAGED_SHARE * (1.0 - self._weight)
+
+    @property
+    def value(self) -> float:
+        """Objective value of the average, as a linear relaxation counts it."""
+        depth = np.arange(len(self._layers))[:, None]
+        covered = (self._layers * np.clip(self._seen / self._weight - depth, 0.0, 1.0)).sum()
+        return float(covered) - self._charge / self._weight
 
 
 B = TypeVar("B", bound=HasValue)
@@ -237,11 +273,14 @@ def lagrangian_bound(
     # group multipliers live on the scale of scores, those of targets on that of weights
     stretch = instance.visible.sum() / len(instance) if len(groups) else 1.0
     descent = SubgradientDescent(bound_from(instance, targets, groups, layers, exact=False), float(layers.sum()))
+    total, average = float(layers.sum()), _Average(layers)
     for iteration in range(iterations):
         best = descent.best
         if best.value < goal - instance.margin or descent.step < MIN_STEP or clock.left <= 0:
             break
         due = iteration % REDUCTION_INTERVAL == REDUCTION_INTERVAL - 1
+        if due and min(best.value, total) - average.value <= MIN_LEFT_TO_GAIN * (best.value - goal):
+            break
         if due and len(can_reach(instance, best, goal)) <= MAX_KEPT_SHARE * len(keep):
             within = can_reach(instance, bound_from(instance, best.targets, best.groups, layers), goal)
             if math.comb(len(within), min(instance.count, len(within) // 2)) <= MAX_LISTED_CHOICES:
@@ -253,6 +292,7 @@ def lagrangian_bound(
         current = descent.current
         picked = current.selection.picked
         seen = instance.visible[picked].sum(axis=0)
+        average.record(seen, current, instance)
         # the subgradient nearest to zero: where a multiplier meets layers any number of these may count
         slope = np.maximum(
             seen - (layers >= current.targets).sum(axis=0), np.minimum(seen - (layers > current.targets).sum(axis=0), 0)
