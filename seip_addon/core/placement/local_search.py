@@ -23,7 +23,7 @@ SHORT_PATIENCE, LONG_PATIENCE = 60, 50
 """Swaps in a row without a better choice that end a tabu search of each composition, and, for each sensor, of the best.
 """
 
-SEARCHED_AGAIN = 5  # compositions that are searched with the longer patience
+SEARCHED_AGAIN = 5  # compositions that are searched with the longer patience; of so few, none is searched before
 MAX_COMPOSITIONS = 30  # compositions that are searched at most; of more, those that promise most
 
 RENEWAL_INTERVAL, RENEWED_SHARE = 120, 0.3  # swaps without a better choice, and share of the sensors replaced then
@@ -155,11 +155,11 @@ def composition_search(
     spends = len(unlimited) > 1 and math.isfinite(instance.budget)
     rooms = compositions(instance, tier) if spends else [unlimited]
     beginnings = [(start, room) for room in rooms if (np.bincount(tier[start], minlength=len(room)) <= room).all()]
-    found = []
-    for beginning, room in [(chosen, unlimited), *beginnings]:
-        searched = yield from tabu_search(instance, beginning, clock, SHORT_PATIENCE, tier, room)
-        found.append((searched, room))
-    found.sort(key=lambda one: -instance.value(one[0]))  # of equal ones the first stays first
+    found = [(chosen, unlimited), *beginnings]
+    if len(found) > SEARCHED_AGAIN:
+        for number, (beginning, room) in enumerate(found):
+            found[number] = (yield from tabu_search(instance, beginning, clock, SHORT_PATIENCE, tier, room)), room
+        found.sort(key=lambda one: -instance.value(one[0]))  # of equal ones the first stays first
     best = [one[0] for one in found]
     for beginning, room in found[:SEARCHED_AGAIN]:
         best.append((yield from tabu_search(instance, beginning, clock, LONG_PATIENCE * instance.count, tier, room)))

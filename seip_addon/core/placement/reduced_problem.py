@@ -242,13 +242,14 @@ def merge_targets(visible: Boolean, weight: Float) -> tuple[Boolean, Float]:
         Distinct columns in ascending order, and the summed weight of each.
     """
     seen = np.flatnonzero(visible.any(axis=0) & (weight > 0))
-    visible, weight = visible.take(seen, axis=1), weight[seen]
+    visible, weight = np.take(visible, seen, axis=1), weight[seen]
     if len(seen) == 0:
         return visible, weight
     packed = np.ascontiguousarray(np.packbits(visible, axis=0).T)
     keys = packed.view(np.dtype((np.void, packed.shape[1])))[:, 0]
     _, first, group = np.unique(keys, return_index=True, return_inverse=True)
-    return visible.take(first, axis=1), np.bincount(group, weight).astype(np.float64)
+    merged: Boolean = np.take(visible, first, axis=1)  # indexed, it would hold the rows of targets together in memory
+    return merged, np.bincount(group, weight).astype(np.float64)
 
 
 def conflicts(positions: Integer, xyz: Float, min_distance: float) -> Boolean:
