@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from PIL import Image
@@ -40,11 +39,11 @@ def as_png(figure: Figure) -> bytes:
 
     A palette of the 256 colours that stand for all others makes a file a third to a fifth as large.
     """
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format="rgba")
+    pixels = Image.frombytes("RGBA", figure.canvas.get_width_height(), drawn.getvalue()).convert("RGB")
     # Octrees keep rare colours, which here carry meaning; the median cut would mix them with frequent ones.
-    picture = drawn.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    picture = pixels.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     content = io.BytesIO()
     picture.save(content, format="PNG", optimize=True, dpi=(figure.dpi, figure.dpi))
     return content.getvalue()
