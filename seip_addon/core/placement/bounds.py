@@ -36,10 +36,12 @@ MIN_STEP = 1e-3
 REDUCTION_INTERVAL, MAX_KEPT_SHARE = 25, 0.8
 """Every so many steps candidates are ruled out, where no more than such a share of them would be left."""
 
-AVERAGED_SHARE, MIN_LEFT_TO_GAIN = 0.03, 0.03
-"""Weight of the last selection in the running average of all, and the share of the distance between bound and goal that
-the multipliers must still be able to close: the average of the selections nearly solves the linear relaxation, so what
-it covers says how far the bound can fall (the volume algorithm: Barahona and Anbil 2000).
+AVERAGED_SHARE = 0.03  # weight of the last selection in the running average of all
+MIN_GAP_LEFT, MIN_BOUND_LEFT = 0.03, 0.001
+"""Shares of the distance between bound and goal, and of the bound, that further steps must be able to gain.
+
+The average of the selections nearly solves the linear relaxation, so what it covers says how far the bound can fall
+(the volume algorithm: Barahona and Anbil 2000).
 """
 
 MAX_LISTED_CHOICES = 10_000  # the search ends when no more choices than these are left
@@ -279,7 +281,8 @@ def lagrangian_bound(
         if best.value < goal - instance.margin or descent.step < MIN_STEP or clock.left <= 0:
             break
         due = iteration % REDUCTION_INTERVAL == REDUCTION_INTERVAL - 1
-        if due and min(best.value, total) - average.value <= MIN_LEFT_TO_GAIN * (best.value - goal):
+        least = min(MIN_GAP_LEFT * (best.value - goal), MIN_BOUND_LEFT * best.value)
+        if due and min(best.value, total) - average.value <= least:
             break
         if due and len(can_reach(instance, best, goal)) <= MAX_KEPT_SHARE * len(keep):
             within = can_reach(instance, bound_from(instance, best.targets, best.groups, layers), goal)

@@ -39,10 +39,8 @@ from .search_limits import Clock
 
 MIN_SENSORS = 3  # with so many sensors to come, or more, a node is bounded by Lagrangian relaxation as well
 
-MIN_CHILDREN = 60
-"""... where at least so many children are left, and each sensor adds no more than the one before it ...
-
-Elsewhere branching itself tightens the bound, and sooner.
+MIN_CHILDREN = 20
+"""... where at least so many children are left: elsewhere branching itself tightens the bound, and sooner ...
 """
 
 TRIALS, MAX_KEPT_SHARE = 4, 0.5
@@ -220,7 +218,7 @@ class Search:
             self._take_leaves(node, children)
             return []
         known = node.multipliers is not None and not node.chosen
-        if children >= MIN_CHILDREN and self.instance.cover.concave and not known and self._relaxation_pays(left):
+        if children >= MIN_CHILDREN and not known and self._relaxation_pays(left):
             before = children
             node, children = yield from self._relaxed(node, left, goal)
             self._left_over.setdefault(left, []).append(children / before)
@@ -337,7 +335,7 @@ class Search:
         if instance.cover.concave:  # the same however many are to come
             return node.gains
         increments = instance.increments(times, left).astype(self._matrix.dtype)
-        gains: Numbers = (self._matrix @ increments)[node.followers]
+        gains: Numbers = self._matrix[node.followers] @ increments
         return gains
 
     def _overlaps(self, times: Integer, left: int, followers: Integer, children: int) -> Numbers:
