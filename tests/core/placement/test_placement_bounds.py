@@ -67,6 +67,18 @@ def test_every_placement_that_reaches_the_goal_is_left(problem, share):
     assert all(instance.value(choice) <= bound.value + instance.slack for choice in reaching)
 
 
+def test_a_descent_ends_where_the_relaxation_covers_everything():
+    instance = reduced(street_problem(99, 991))
+    goal = instance.value(greedy(instance, NONE))
+    clock, patient = forever(), forever()
+    _, bound = finish(lagrangian_bound(instance, goal, clock))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bounds, "MIN_BOUND_LEFT", -1.0)
+        _, least = finish(lagrangian_bound(instance, goal, patient))
+    assert clock.work < 0.5 * patient.work
+    assert min(bound.value, instance.total) <= least.value * (1 + 2 * bounds.MIN_BOUND_LEFT)
+
+
 @pytest.mark.parametrize("effort", [math.inf, 0.002])
 @cases(150)
 @given(small_problems())
