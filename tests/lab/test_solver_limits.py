@@ -171,7 +171,7 @@ def test_a_search_cut_short_lists_the_best_and_what_differs_in_one_sensor(seed: 
     found = without_padding(top.placements)
     chosen = set(best.chosen.tolist())
     assert not top.complete
-    assert top.message.startswith("more than")
+    assert top.message.startswith("at least")
     assert found <= every
     assert {row for row in every if len(chosen - set(row)) <= 1 and len(row) == len(chosen)} <= found
 
