@@ -33,7 +33,7 @@ import numpy as np
 
 from ..arrays import Float, Integer
 from ..placement import Placement, PlacementProblem, solve
-from ..placement.bounds import lagrangian_bound
+from ..placement.bounds import Bound, lagrangian_bound
 from ..placement.branch_and_bound import FIRST_STEPS
 from ..placement.feasibility import starting_choice
 from ..placement.greedy import swap_search
@@ -41,13 +41,15 @@ from ..placement.problem import TIE_TOLERANCE, assess, relative_gap
 from ..placement.reduced_problem import WHOLE_SLACK, Instance, common_unit, make_instance, merge_targets
 from ..placement.risk import Risk
 from ..placement.search_limits import DEFAULT_LIMITS, Clock, SolverLimits
-from ..placement.solver import solve_within
+from ..placement.solver import BRANCHING_SHARE, MIN_CLOSED_SHARE, Proof, lower_by_goals, solve_within
 from ..progress import Progress, within
 from .robust_search import BestUnderRisk, swap_search_by_risk, swap_search_from_pairs
 from .scenario_visibility import ScenarioVisibility
 
 ROUNDS = 16  # of fictitious play; weights of scenarios are multiples of 1 / (ROUNDS · m)
 SCENARIO_SHARE = 0.5  # share of the time for the problems of single scenarios
+GOALS_SHARE = 0.98  # share of the time for proofs that goals cannot be reached, where branching lowers no bound
+WEAK_BRANCHING_SHARE = 0.05  # share of the time for a first branch and bound where its bounds are weak
 MIN_SECONDS = 1.0  # or units of work, for what comes after them, however slow they were
 
 
@@ -216,17 +218,46 @@ def _searched(
     goal = (game.evaluate(chosen) - slack) * unit
     root = yield from lagrangian_bound(instance, goal, clock, iterations=FIRST_STEPS)
     search = BestUnderRisk(instance, unit, game.evaluate, chosen, slack, root)
-    finished = yield from search.run(clock, clock.left)
+    finished, bound = yield from _bounded_by_goals(search, instance, unit, root, clock)
     return assess(
         problem,
         whole.original[search.best],
-        search.bound,
+        bound,
         optimal=finished,
         solver="branch and bound",
         seconds=clock.seconds,
         notes=() if finished else (UNPROVEN_MESSAGE,),
         objective=search.value,
     )
+
+
+def _bounded_by_goals(
+    search: BestUnderRisk, instance: Instance, unit: float, root: tuple[Integer, Bound], clock: Clock
+) -> Generator[Progress, None, tuple[bool, float]]:
+    """Run a branch and bound; where its bound hardly falls, lower it goal by goal, then go on with the time left.
+
+    F bounds T, so that a proof that no placement reaches a goal in F is one in T as well.
+
+    Returns
+    -------
+    bool
+        Whether the search has ended.
+    float
+        Bound on T.
+    """
+    # where several sensors must see a target, bounds of branches are weak, and a short trial tells
+    share = BRANCHING_SHARE if instance.cover.concave else WEAK_BRANCHING_SHARE
+    finished = yield from search.run(clock, share * clock.left)
+    keep, bound = root  # what can reach the first incumbent, which all that follow are among
+    value = search.value * unit
+    closing = search.bound * unit - value <= (1 - MIN_CLOSED_SHARE) * (bound.value - value)
+    if finished or closing or not np.isin(search.best, keep).all():
+        finished = finished or (yield from search.run(clock, clock.left))
+        return finished, search.bound
+    known = Proof(np.searchsorted(keep, search.best), search.bound * unit, optimal=False)
+    proof = yield from lower_by_goals(instance.part(keep), bound, known, clock.part(GOALS_SHARE * clock.left))
+    finished = yield from search.run(clock, clock.left)
+    return finished, search.bound if finished else max(search.value, min(search.bound, proof.bound / unit))
 
 
 class FictitiousPlay:

@@ -138,6 +138,20 @@ def test_without_time_the_bound_still_holds(risk, monkeypatch):
         assert answer.status == "optimal" or any("search ended" in note for note in answer.notes)
 
 
+@pytest.mark.parametrize("risk", RISKS)
+def test_a_bound_that_is_lowered_goal_by_goal_still_holds(risk, monkeypatch):
+    module = "seip_addon.core.robustness.robust_placement"
+    monkeypatch.setattr(f"{module}.MIN_CLOSED_SHARE", 2.0)  # goals even where branching closes the gap
+    for name in ("BRANCHING_SHARE", "WEAK_BRANCHING_SHARE"):
+        monkeypatch.setattr(f"{module}.{name}", 1e-9)
+    for seed in range(6):
+        problem, views = crowd(seed, 4)
+        answer = finish(solve_robust(problem, pack(views), risk, SolverLimits(effort=0.05)))
+        best = reached_at_most(problem, views, risk)
+        assert answer.objective <= best + 1e-9
+        assert answer.bound >= best - 1e-9
+
+
 @pytest.mark.parametrize("risk", [Risk(seen_by=2), Risk(seen_by=3), Risk(seen_by=2, failure="worst")])
 @pytest.mark.parametrize("waiting", [10_000, 3])
 def test_the_bound_only_falls_and_never_below_what_can_be_reached(risk, waiting, monkeypatch):
