@@ -105,6 +105,11 @@ def street_heights(
     return StreetHeights(above, profiles, bridges, tuple(_flat_notes(flat)))
 
 
+def has_heights(road_map: RoadMap) -> bool:
+    """Return whether a map has heights of its own."""
+    return any(road.elevation.coefficients.any() for road in road_map.roads)
+
+
 @dataclass(frozen=True, eq=False)
 class _Strand:
     """A street between two junctions: both of its directions, whose heights are the same.
@@ -281,11 +286,6 @@ class _Network:
                     found[node] += _across(lanes, np.clip([s - half, s, s + half], 0.0, road.length))
         return [shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *one]))) for one in found]
 
-    @property
-    def has_heights(self) -> bool:
-        """Whether the map has heights of its own."""
-        return any(road.elevation.coefficients.any() for road in self.road_map.roads)
-
     def of_way(self, nodes: Integer, ids: Sequence[int], layer: int, heading: float) -> Integer:
         """Return the places of a way, by its ids; where its roads have those of others by layer and direction."""
         named: Integer = nodes[np.isin(self.streets[nodes], ids)]
@@ -382,7 +382,7 @@ def _crossing_places(network: _Network, shapes: PlanShapes) -> list[_Place]:
     found = []
     for crossing in crossings:
         ids = numbers.get(id(crossing.other.tags), [])
-        if not ids and network.has_heights:
+        if not ids and has_heights(network.road_map):
             continue  # heights of the extract are those of its bridges, too
         own, other = shapes.line(crossing.way), shapes.line(crossing.other)
         for street_area, other_area in corridors(crossing, own, other):

@@ -27,8 +27,9 @@ from ..streetscape.intersections import SAME_DIRECTION, TOUCH, intersection, wit
 from ..streetscape.levels import UNNAMED_ROAD
 from ..streetscape.named_places import street_names
 from ..streetscape.place import SCENE_MARGIN
+from ..streetscape.terrain import FlatLand
 from .extract import EARTH_RADIUS, MAX_LATITUDE, Extract, Node, Way, cropped, read_extract, window
-from .heights import StreetHeights, street_heights
+from .heights import StreetHeights, has_heights, street_heights
 from .mapped_crossings import guessed_crossings, with_mapped_crossings
 from .netconvert import convert
 from .plan_shapes import PlanShapes
@@ -129,16 +130,20 @@ class ExtractSite:
         ground = None if relief is None else relief.rise
         heights = street_heights(self.road_map, self.lanes, self.sources, self.streets, self.shapes, ground)
         raised = replace(self, notes=(*self.notes, *heights.notes, *self._ramp_notes(heights)))
-        if any(along_road.any() for _, along_road in heights.profiles.values()):
+        is_raised = any(along_road.any() for _, along_road in heights.profiles.values())
+        if is_raised:
             raised = replace(
                 raised,
                 road_map=raised_map(self.road_map, heights.above_ground),
                 map_text=raised_text(self.map_text, self.road_map, heights.profiles),
             )
-        if relief is None:
-            return raised
-        relief = replace(relief, bridges=heights.bridges)
-        return replace(raised, description=replace(self.description, relief=relief))
+        if relief is not None:
+            relief = replace(relief, bridges=heights.bridges)
+            return replace(raised, description=replace(self.description, relief=relief))
+        if is_raised and not has_heights(self.road_map):
+            land = FlatLand(0.0, heights.bridges)
+            return replace(raised, description=replace(self.description, flat_land=land))
+        return raised
 
     def _ramp_notes(self, heights: StreetHeights) -> Iterator[str]:
         """Yield a note on streets in the area whose heights are assumed: bridges, underpasses and their ramps."""

@@ -20,6 +20,9 @@ DEFAULT_WEIGHT = 2.0
 DEFAULT_REFLECTIVITY = 0.3
 """Of a surface that is not known to reflect otherwise."""
 
+OTHER_LEVELS = "Roads on other levels"
+"""Name of the ground that is roads of other levels than the studied one; plans show it."""
+
 FROM_MAP, DESCRIBED, ASSUMED = "map", "site description", "assumed"
 FROM_EXTRACT, FROM_CITY_MODEL, FROM_SURVEY = "extract", "city model", "survey"
 FROM_MESH = "mesh file"

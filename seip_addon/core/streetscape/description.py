@@ -25,7 +25,7 @@ from ..site.scene_geometry import DEFAULT_WEIGHT, DESCRIBED, FROM_EXTRACT, FROM_
 from ..storage.toml_table import Key, Reader, is_number, number, parse_toml, read_table, text
 from .roofs import FLAT, Roof
 from .street_furniture import Solid
-from .terrain import Relief
+from .terrain import FlatLand, Relief
 
 DEFAULT_RADIUS = 80.0
 DESCRIPTION_SUFFIX = ".toml"
@@ -233,6 +233,8 @@ class SiteDescription:
         Where rules keep new posts off, map coordinates.
     relief : Relief or None
         Ground that the map, which is flat, is laid on.
+    flat_land : FlatLand or None
+        Level land beside the map's ramps and underpasses; None where the map does not tell the height of the land.
     from_centre_lines : bool
         Whether the map was made of the middle lines of streets: then junctions within `JUNCTION_REACH` metres of each
         other are one, and holes between their lanes no islands.
@@ -268,6 +270,7 @@ class SiteDescription:
     solids: tuple[PlacedSolid, ...] = ()
     keep_off_areas: tuple[KeepOffArea, ...] = ()
     relief: Relief | None = None
+    flat_land: FlatLand | None = None
     from_centre_lines: bool = False
     roundabouts: tuple[frozenset[str], ...] = ()
     map_source: str = FROM_MAP

@@ -1,7 +1,7 @@
 """From a map and a site description to the parts of a scene, in local axes."""
 
 from collections import Counter
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,7 +17,7 @@ from ..opendrive import LaneSurface, PlacedObject, Road, RoadMap, lane_surfaces,
 from ..progress import Progress
 from ..site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
 from ..site.post_rules import RULES
-from ..site.scene_geometry import ASSUMED, DESCRIBED, NamedArea
+from ..site.scene_geometry import ASSUMED, DESCRIBED, OTHER_LEVELS, NamedArea
 from ..site.sources import SourceCount, count_sources
 from . import road_surface, street_furniture
 from .clearing import MAX_IN_LANE, clear
@@ -51,7 +51,7 @@ from .road_surface import Roadside, SurfaceLayers, without_crumbs
 from .roofs import house
 from .signal_posts import signal_parts, split_posts
 from .tapers import with_tapers
-from .terrain import Relief, Terrain, cut
+from .terrain import Embankments, FlatLand, Relief, Terrain, cut, embankment_width
 
 STAGES = 6  # pieces of work that a model is made in once the map's lanes are known
 ROADS_PER_STEP = 20
@@ -64,6 +64,8 @@ MAX_GROUND_DISTANCE = 300.0  # how far from the extent (metres) it goes on at mo
 VERGE_SPACING = 12.0
 KERB_STEP, RELIEF_SPACING = 2.5, 6.0  # metres: as ground on which nothing is farther off than some centimetres needs
 OVERLAY_SPACING = 4.0  # as the surface of junctions: coarser veils would rise through the coverage on curved roads
+MIN_BRIDGE_HEIGHT = 1.0  # metres above the land from which a road on a bridge is in the air
+MIN_WALL = 0.02  # metres of height, of both ends together, from which a gap beside a road below has a wall
 UNNAMED_STREET = "Unnamed street"
 AREA_OVERLAYS = {
     Role.REGION: (0.03, "region veil"),
@@ -136,8 +138,46 @@ class SiteModel:
 
 
 @dataclass(frozen=True, eq=False)
+class _OtherLevels:
+    """Roads on other levels, and what carries roads that cross each other, in local axes.
+
+    Parameters
+    ----------
+    lanes : tuple of LaneSurface
+        Of the roads on other levels.
+    above, below : (n, 3, 3) float64, metres
+        Surfaces of these roads in the air, and on the ground.
+    decks : shapely geometry
+        Where roads of the studied level are in the air: the ground goes on below them.
+    """
+
+    lanes: tuple[LaneSurface, ...]
+    above: Float
+    below: Float
+    decks: BaseGeometry
+
+    @cached_property
+    def area(self) -> BaseGeometry:
+        """Area in plan of the roads on the ground."""
+        return outline(self.below, road_surface.SNAP_GRID)
+
+    @cached_property
+    def off_posts(self) -> BaseGeometry:
+        """Area in plan next to which no post stands on the verge."""
+        return self.area.union(self.decks)
+
+
+@dataclass(frozen=True, eq=False)
 class _Surroundings:
-    """Ground, roadside and region that the parts of a site are placed by, in local axes."""
+    """Ground, roadside and region that the parts of a site are placed by, in local axes.
+
+    Parameters
+    ----------
+    terrain : Terrain
+        Height of the studied roads, and of the ground next to them.
+    ground : Terrain
+        Height of the ground, below bridges too.
+    """
 
     origin: Float
     lanes: tuple[LaneSurface, ...]
@@ -145,7 +185,10 @@ class _Surroundings:
     extent: BaseGeometry
     roadside: Roadside
     terrain: Terrain
+    ground: Terrain
     relief: Relief | None
+    land: Relief | FlatLand | None
+    crossing: "_OtherLevels"
 
     @cached_property
     def lane_interiors(self) -> BaseGeometry:
@@ -192,7 +235,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     region = place.region()
     origin = _origin(place, description.relief)
     yield next(stages)
-    street = _surroundings(place.surfaces, origin, shifted(region, -origin), description)
+    street = _surroundings(levels, place.surfaces, origin, shifted(region, -origin), description)
     yield next(stages)
     on_map = (shifted(area, origin) for area in (street.roadside.carriageway, street.roadside.mouths))
     description, clear_notes = clear(description, *on_map)
@@ -209,15 +252,14 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     others, lights = split_posts(placed, local_signals, street.roadside)
     signals = [_checked_pole(part, street) for part in signal_parts(lights, street.roadside, street.terrain)]
     objects = [_checked_pole(part, street) for part in object_parts(others, street.roadside.carriageway)]
-    other_lanes = _strips(levels.others, street.origin, street.extent, street.relief)
-    other_levels, below = _other_level_parts(other_lanes, street)
+    other_levels = _other_level_parts(street)
     furniture = [*objects, *signals, *_described_parts(description, street)]
     yield next(stages)
     layers = SurfaceLayers(street.lanes, street.extent, fill=description.from_centre_lines)
     carriageway = _surface_parts(street, layers, fill=description.from_centre_lines)
     yield next(stages)
-    pavement, notes = _pavement_parts(street, layers, below, off_lanes=description.from_centre_lines)
-    beside, side_notes = _side_way_parts(description, street, layers, below)
+    pavement, notes = _pavement_parts(street, layers, off_lanes=description.from_centre_lines)
+    beside, side_notes = _side_way_parts(description, street, layers)
     yield next(stages)
     weighted = place.weighted_areas()
     parts = [
@@ -225,11 +267,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         *pavement,
         *beside,
         _verge_part(
-            street,
-            furniture,
-            [*carriageway, *pavement, *beside],
-            below,
-            from_centre_lines=description.from_centre_lines,
+            street, furniture, [*carriageway, *pavement, *beside], from_centre_lines=description.from_centre_lines
         ),
         *other_levels,
         _marking_part(street, stop_lines=bool(signals or description.signal_poles)),
@@ -243,7 +281,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     names = street_names(road_map)
     seen = _sight_area(region, origin, parts)
     bare = () if any(_hides(part, seen) for part in occluders) else (NO_OBSTACLES_MESSAGE,)
-    warnings = road_warnings(road_map, (*street.lanes, *other_lanes), names, origin)
+    warnings = road_warnings(road_map, (*street.lanes, *street.crossing.lanes), names, origin)
     yield next(stages)
     return SiteModel(
         name=description.name or road_map.name,
@@ -358,33 +396,27 @@ def _level_notes(levels: Levels) -> Iterator[str]:
             yield f"{crossing}: the {away} one is on another level, in the way but not studied"
 
 
-def _other_level_parts(lanes: Sequence[LaneSurface], street: _Surroundings) -> tuple[list[Part], BaseGeometry]:
-    """Return the roads of other levels, above and below, and the area in plan of those below; lanes in local axes."""
-    if not lanes:
-        return [], shapely.Polygon()
-    triangles = np.concatenate([lane.triangles for lane in lanes])
-    middles = triangles.mean(axis=1)
-    above = middles[:, 2] > street.terrain.height(middles[:, :2])
-    parts = [
-        Part("Roads above", _solid(triangles[above], "asphalt"), (Role.OCCLUDERS,)),
-        Part("Roads below", _solid(triangles[~above], "asphalt"), (Role.GROUND,)),
+def _other_level_parts(street: _Surroundings) -> list[Part]:
+    """Return the roads of other levels, above and below."""
+    above, below = street.crossing.above, street.crossing.below
+    return [
+        Part("Roads above", _solid(above, "asphalt"), (Role.OCCLUDERS,)),
+        Part(OTHER_LEVELS, _solid(below, "asphalt"), (Role.GROUND,)),
+        Part("Retaining walls", _solid(_retaining_walls(below, street), "wall"), (Role.GROUND,)),
     ]
-    below = outline(triangles[~above], road_surface.SNAP_GRID)
-    walls = _retaining_walls(below, Terrain(triangles[~above]), street)
-    return [*parts, Part("Retaining walls", _solid(walls, "wall"), (Role.DRESSING,))], below
 
 
-def _retaining_walls(below: BaseGeometry, roads: Terrain, street: _Surroundings) -> Float:
-    """Return (n, 3, 3) upright triangles that close the gap between roads below and the ground beside them."""
-    if below.is_empty:
-        return np.empty((0, 3, 3))
-    sides = shapely.boundary(below).intersection(street.extent.buffer(-road_surface.MAX_STEP / 2))
+def _retaining_walls(below: Float, street: _Surroundings) -> Float:
+    """Return (n, 3, 3) upright triangles that close the gap between roads below (m, 3, 3) and higher ground."""
+    sides = shapely.boundary(street.crossing.area)
     quads = [np.empty((0, 4, 3))]
+    roads = Terrain(below) if len(below) else street.ground
     for line in shapely.get_parts(shapely.segmentize(sides, KERB_STEP)):
         plan = shapely.get_coordinates(line)
-        low = np.column_stack([plan, roads.height(plan)])
-        high = np.column_stack([plan, np.maximum(street.terrain.height(plan), low[:, 2])])
-        quads.append(np.stack([low[:-1], low[1:], high[1:], high[:-1]], axis=1))
+        low, high = roads.height(plan), street.ground.height(plan)
+        corners = np.stack([np.column_stack([plan, low]), np.column_stack([plan, np.maximum(high, low)])], axis=1)
+        walled = (high - low)[:-1] + (high - low)[1:] > MIN_WALL
+        quads.append(np.stack([corners[:-1, 0], corners[1:, 0], corners[1:, 1], corners[:-1, 1]], axis=1)[walled])
     faces = np.concatenate(quads)
     return np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
 
@@ -426,13 +458,13 @@ def _risen(placed: PlacedObject, relief: Relief | None) -> PlacedObject:
 
 
 def _strips(
-    surfaces: Sequence[LaneSurface], origin: Float, area: BaseGeometry, relief: Relief | None
+    surfaces: Sequence[LaneSurface], origin: Float, area: BaseGeometry, relief: Relief | None, *, kerbs: bool = True
 ) -> tuple[LaneSurface, ...]:
     """Return the lanes near an area in local axes, on the ground that the map is laid on."""
     if relief is None:
-        return road_surface.local_strips(surfaces, origin, area)
+        return road_surface.local_strips(surfaces, origin, area, kerbs=kerbs)
     surfaces = [_bridged(lane, relief) if lane.road_id in relief.bridges else lane for lane in surfaces]
-    lanes = road_surface.local_strips(surfaces, origin * [1, 1, 0], area)
+    lanes = road_surface.local_strips(surfaces, origin * [1, 1, 0], area, kerbs=kerbs)
     shift, height = origin * [1, 1, 0], origin * [0, 0, 1]
 
     def risen(edge: Float) -> Float:
@@ -460,17 +492,97 @@ def _bridged(lane: LaneSurface, relief: Relief) -> LaneSurface:
 
 
 def _surroundings(
-    surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry, description: SiteDescription
+    levels: Levels,
+    surfaces: Sequence[LaneSurface],
+    origin: Float,
+    region: BaseGeometry,
+    description: SiteDescription,
 ) -> _Surroundings:
     extent, relief = region.convex_hull.buffer(SCENE_MARGIN, quad_segs=16), description.relief
     lanes = _strips(surfaces, origin, extent, relief)
     if description.from_centre_lines:
         lanes = road_surface.without_loose_ends(lanes, region, extent)
-    triangles = np.concatenate([lane.triangles for lane in lanes])
+    others = _strips(levels.others, origin, extent, relief, kerbs=False)
     roadside = road_surface.roadside(lanes)
     shapely.prepare(roadside.carriageway)
-    beyond = None if relief is None else lambda xy: relief.raster.at(xy + origin[:2]) - origin[2]
-    return _Surroundings(origin, lanes, region, extent, roadside, Terrain(triangles, beyond), relief)
+    land = description.relief or description.flat_land
+    terrain, ground, crossing = _ground(levels, lanes, others, origin, land)
+    beyond = shapely.box(*extent.buffer(10 * road_surface.MAX_STEP).bounds).difference(extent)
+    crossing = replace(crossing, above=cut(crossing.above, beyond), below=cut(crossing.below, beyond))
+    return _Surroundings(origin, lanes, region, extent, roadside, terrain, ground, relief, land, crossing)
+
+
+def _ground(
+    levels: Levels,
+    lanes: tuple[LaneSurface, ...],
+    others: tuple[LaneSurface, ...],
+    origin: Float,
+    land: Relief | FlatLand | None,
+) -> tuple[Terrain, Terrain, _OtherLevels]:
+    """Return the terrain of the studied roads, the ground beside and below them, and the roads of other levels.
+
+    Where the height of the land is not known it is that of the nearest studied road: one that lies lower is in a
+    cutting between walls. Otherwise roads lie on embankments and in cuttings with slopes.
+    """
+    studied, away = _triangles(lanes), _triangles(others)
+    if land is None:
+        terrain = Terrain(studied)
+        middles = away.mean(axis=1)
+        above = middles[:, 2] > terrain.height(middles[:, :2])
+        return terrain, terrain, _OtherLevels(others, away[above], away[~above], shapely.Polygon())
+
+    def height(xy: Float) -> Float:
+        local: Float = land.at(xy + origin[:2]) - origin[2]
+        return local
+
+    bridges = frozenset(
+        lane.road_id
+        for lane in (*lanes, *others)
+        if lane.road_id in land.bridges and (lane.left[:, 2] - height(lane.left[:, :2])).max() > MIN_BRIDGE_HEIGHT
+    )
+    spans = tuple(_spans(levels, (*lanes, *others), origin))
+    on_ground, in_air = _lifted(lanes, bridges, spans)
+    others_on_ground, others_in_air = _lifted(others, bridges, spans)
+    embankments = Embankments(np.concatenate([on_ground, others_on_ground]), height)
+    ground = Terrain(np.concatenate([on_ground, others_on_ground]), embankments.height, embankments.steep)
+    decks = without(outline(in_air, road_surface.SNAP_GRID), outline(on_ground, road_surface.SNAP_GRID))
+    return (
+        Terrain(studied, embankments.height, embankments.steep),
+        ground,
+        _OtherLevels(others, others_in_air, others_on_ground, decks),
+    )
+
+
+def _triangles(lanes: Sequence[LaneSurface]) -> Float:
+    return np.concatenate([np.empty((0, 3, 3)), *(lane.triangles for lane in lanes)])
+
+
+def _spans(levels: Levels, lanes: Sequence[LaneSurface], origin: Float) -> Iterator[tuple[BaseGeometry, float]]:
+    """Yield where roads cross others, with room for slopes below, and the height above which they are in the air."""
+    roads = road_surface.by_road(lanes)
+    for crossing in levels.crossings:
+        above, below = (_triangles(roads.get(road, [])) for road in (crossing.above, crossing.below))
+        place = shapely.Point(np.array(crossing.place) - origin[:2])
+        common = outline(above, road_surface.SNAP_GRID).intersection(outline(below, road_surface.SNAP_GRID))
+        part = min(shapely.get_parts(common), key=place.distance, default=None)
+        if part is not None:
+            low = float(Terrain(below).height(shapely.get_coordinates(part)).max())
+            yield part.buffer(float(embankment_width(np.array(crossing.height)))), low + MIN_LEVEL_HEIGHT
+
+
+def _lifted(
+    lanes: Sequence[LaneSurface], bridges: Collection[str], spans: Iterable[tuple[BaseGeometry, float]]
+) -> tuple[Float, Float]:
+    """Return the surfaces of lanes (n, 3, 3) that lie on the ground, and those in the air, on bridges."""
+    on_ground = _triangles([lane for lane in lanes if lane.road_id not in bridges])
+    in_air = [_triangles([lane for lane in lanes if lane.road_id in bridges])]
+    for area, low in spans:
+        high = on_ground[:, :, 2].min(axis=1) > low
+        outside = shapely.box(*area.buffer(SCENE_MARGIN).bounds).difference(area)
+        near = high & shapely.intersects(area, shapely.polygons(on_ground[:, :, :2]))
+        in_air.append(cut(on_ground[near], outside))
+        on_ground = np.concatenate([on_ground[~near], cut(on_ground[near], area)])
+    return on_ground, np.concatenate(in_air)
 
 
 def _surface_parts(street: _Surroundings, layers: SurfaceLayers, *, fill: bool) -> list[Part]:
@@ -496,7 +608,7 @@ def _surface_parts(street: _Surroundings, layers: SurfaceLayers, *, fill: bool) 
 
 
 def _pavement_parts(
-    street: _Surroundings, layers: SurfaceLayers, below: BaseGeometry, *, off_lanes: bool
+    street: _Surroundings, layers: SurfaceLayers, *, off_lanes: bool
 ) -> tuple[list[Part], tuple[str, ...]]:
     """Return pavements near the region (where posts may stand), those beyond, their kerbs, verges, and notes.
 
@@ -506,7 +618,7 @@ def _pavement_parts(
     if off_lanes:
         own = cut(own, street.roadside.carriageway)
     if len(own) == 0:
-        verge = _verge_strip(street, street.roadside.sides(), below)
+        verge = _verge_strip(street, street.roadside.sides())
         return [verge], ("the map has no pavements: new posts may stand on a strip of verge",)
     corners = road_surface.corner_pavements(own, street.lanes, street.roadside.carriageway)
     corners = layers.lay(corners, outline(corners, road_surface.SNAP_GRID))
@@ -518,7 +630,7 @@ def _pavement_parts(
         triangles = cut(triangles, road_surface.slivers(triangles))
     plan = shapely.polygons(triangles[:, :, :2])
     near = shapely.distance(street.region, plan) <= CANDIDATE_MARGIN
-    kerbs = road_surface.kerb_faces(triangles, None if street.relief is None else KERB_STEP)
+    kerbs = road_surface.kerb_faces(triangles, None if street.land is None else KERB_STEP)
     parts = [
         Part("Pavements", _solid(triangles[near], "pavement"), (Role.GROUND, Role.CANDIDATE_AREAS)),
         Part("Pavements beyond", _solid(triangles[~near], "pavement"), (Role.GROUND,)),
@@ -532,7 +644,7 @@ def _pavement_parts(
             f"added to its {had:,.0f} m²"
         )
     bare = road_surface.bare_sides(street.roadside, shapely.union_all(plan, grid_size=road_surface.SNAP_GRID))
-    verge = _verge_strip(street, bare, below)
+    verge = _verge_strip(street, bare)
     if verge.solid.faces:
         parts.append(verge)
         length = bare.intersection(street.region.buffer(CANDIDATE_MARGIN)).length
@@ -541,14 +653,14 @@ def _pavement_parts(
     return parts, tuple(notes)
 
 
-def _verge_strip(street: _Surroundings, sides: BaseGeometry, below: BaseGeometry) -> Part:
+def _verge_strip(street: _Surroundings, sides: BaseGeometry) -> Part:
     """Return the verge along sides of the carriageway.
 
     There is none where the map ends and the road goes on, nor beside a bridge.
     """
     inner, outer = VERGE_STRIP
     strip = without(sides.buffer(outer, cap_style="flat"), street.roadside.filled.buffer(inner))
-    strip = without(strip, below.buffer(outer))
+    strip = without(strip, street.crossing.off_posts.buffer(outer))
     near = strip.intersection(street.region.buffer(CANDIDATE_MARGIN))
     return _area_part("Verge strip", near, Role.CANDIDATE_AREAS, street)
 
@@ -557,7 +669,6 @@ def _verge_part(
     street: _Surroundings,
     furniture: Sequence[Part],
     surfaces: Sequence[Part],
-    below: BaseGeometry,
     *,
     from_centre_lines: bool,
 ) -> Part:
@@ -573,16 +684,18 @@ def _verge_part(
     gardens = built_up.buffer(GROUND_MARGIN).intersection(street.extent.buffer(MAX_GROUND_DISTANCE))
     ground = street.extent if built_up.is_empty else street.extent.union(gardens).convex_hull
     covered = road_surface.lane_outline(street.lanes).intersection(street.extent)
-    lanes = covered.buffer(-road_surface.MAX_SEAM, join_style="mitre").union(below)
+    roads = united([covered, street.crossing.area])
+    lanes = roads.buffer(-road_surface.MAX_SEAM, join_style="mitre")
     laid = united([_plan(part) for part in surfaces if {Role.ROADS, Role.GROUND} & set(part.roles)])
     if from_centre_lines:  # strips of pavement that were too narrow are ground
         bare = without(covered, laid.buffer(road_surface.MAX_SEAM)).buffer(2 * road_surface.MAX_SEAM)
         lanes = without(lanes, bare)
     others = without(laid, covered).buffer(-road_surface.MAX_SEAM)
     lanes = lanes if others.is_empty else lanes.union(others)
+    lanes = without(lanes, street.crossing.decks.buffer(road_surface.MAX_SEAM, join_style="mitre"))
     beside = road_surface.without_crumbs(without(ground, lanes))
     spacing = VERGE_SPACING if street.relief is None else RELIEF_SPACING
-    triangles = street.terrain.drape(beside, spacing=spacing, above=-VERGE_BELOW)
+    triangles = street.ground.drape(beside, spacing=spacing, above=-VERGE_BELOW)
     return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
 
 
@@ -703,13 +816,13 @@ def _told(part: Part, item: Building | Wall | Slab | Trees | Poles) -> Part:
 
 
 def _side_way_parts(
-    description: SiteDescription, street: _Surroundings, layers: SurfaceLayers, below: BaseGeometry
+    description: SiteDescription, street: _Surroundings, layers: SurfaceLayers
 ) -> tuple[list[Part], tuple[str, ...]]:
     """Return ways beside the road, by kind, where no lane, building or other road lies, and notes."""
     lanes = road_surface.lane_outline(street.lanes)
     standing: list[Building | PlacedSolid] = [*description.buildings, *description.solids]
     houses = shapely.union_all([shifted(one.outline, -street.origin) for one in standing])
-    covered = [lanes, street.roadside.filled, layers.area, houses, below]
+    covered = [lanes, street.roadside.filled, layers.area, houses, street.crossing.area]
     taken = shapely.union_all(covered).buffer(road_surface.MAX_SEAM)
     pavement = road_surface.lane_outline(road_surface.in_groups(street.lanes, ["sidewalk"]))
     shapely.prepare(pavement)

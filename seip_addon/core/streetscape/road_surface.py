@@ -155,7 +155,9 @@ def _without_holes(area: BaseGeometry, *, least: float = np.inf, narrow: float =
     return shapely.union_all([shapely.Polygon(part.exterior, list(filter(kept, part.interiors))) for part in parts])
 
 
-def local_strips(surfaces: Iterable[LaneSurface], origin: Float, area: BaseGeometry) -> tuple[LaneSurface, ...]:
+def local_strips(
+    surfaces: Iterable[LaneSurface], origin: Float, area: BaseGeometry, *, kerbs: bool = True
+) -> tuple[LaneSurface, ...]:
     """Return the lanes near an area, in local axes, with a row of points at least each ten metres.
 
     Parameters
@@ -166,11 +168,13 @@ def local_strips(surfaces: Iterable[LaneSurface], origin: Float, area: BaseGeome
         Map coordinates of the local origin.
     area : shapely geometry
         In local axes. Whole rows are kept: the lanes end a little beyond.
+    kerbs : bool
+        Whether pavements that the map leaves flush are raised.
     """
     shapely.prepare(area)
     moved = (_moved(surface, origin) for surface in surfaces if surface.lane_type in GROUPS)
-    near = _with_kerbs([surface for surface in moved if is_near(surface, area)])
-    trimmed = (_trimmed(_densified(surface), area) for surface in near)
+    near = [surface for surface in moved if is_near(surface, area)]
+    trimmed = (_trimmed(_densified(surface), area) for surface in (_with_kerbs(near) if kerbs else near))
     return tuple(surface for surface in trimmed if len(surface.left) > 1)
 
 

@@ -14,7 +14,12 @@ from ..geometry.plan import plane_height, signed_area
 
 MIN_AREA = 1e-6  # triangles smaller than this in plan (m²) carry nothing and are left out
 SNAP_GRID = 1e-6  # grid (metres) that cut outlines snap to; without one slivers arise that cannot be triangulated
-ROADSIDE = 5.0  # metres beside the lanes over which their heights go over into those of the ground beyond
+ROADSIDE, MAX_ROADSIDE = 5.0, 15.0
+"""Width (metres) of the strip beside a road in which the ground changes from its height to that of the land."""
+EMBANKMENT_RUN = 2.2  # metres of that width for each metre of height between the two
+MIN_EMBANKMENT = 0.25  # metres of height from which the strip needs a finer grid than flat ground
+STEEP_DIVISIONS = 4  # parts of a cell's side where the ground is steep
+_TOUCHING = 1e-3  # metres from a road within which the ground has its height
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +44,30 @@ class Relief:
         """Return how far the ground lies above the map's own (n,) at places (n, 2), metres."""
         return self.raster.at(xy) - self.level
 
+    def at(self, xy: Float) -> Float:
+        """Return the heights of the land (n,) at places (n, 2), metres."""
+        return self.raster.at(xy)
+
+
+@dataclass(frozen=True)
+class FlatLand:
+    """Level land that the streets of a map rise above on ramps and bridges, or lie below in underpasses.
+
+    Parameters
+    ----------
+    level : float, metres
+        Height of the land, map coordinates.
+    bridges : frozenset of str
+        Ids of the roads on bridges.
+    """
+
+    level: float
+    bridges: frozenset[str] = frozenset()
+
+    def at(self, xy: Float) -> Float:
+        """Return the heights of the land (n,) at places (n, 2), metres."""
+        return np.full(len(xy), self.level)
+
 
 class Terrain:
     """Heights on a set of triangles that overlap at most slightly in plan.
@@ -47,12 +76,16 @@ class Terrain:
     ----------
     triangles : (n, 3, 3) float64, metres
         None of them upright.
-    beyond : callable, optional
-        Heights (n,) of the ground at places (n, 2), `ROADSIDE` metres and more beside the triangles.
+    beside : callable, optional
+        Heights (n,) of the ground at places (n, 2) on none of the triangles.
+    steep : shapely geometry, optional
+        Area in plan in which `drape` divides each cell of its grid further.
     """
 
-    def __init__(self, triangles: Float, beyond: Callable[[Float], Float] | None = None) -> None:
-        self._beyond = beyond
+    def __init__(
+        self, triangles: Float, beside: Callable[[Float], Float] | None = None, steep: BaseGeometry | None = None
+    ) -> None:
+        self._beside, self._steep = beside, steep
         self._triangles = triangles[np.abs(signed_area(triangles)) > MIN_AREA]
         self._plan = shapely.polygons(self._triangles[:, :, :2])
         self._tree = shapely.STRtree(self._plan)
@@ -67,19 +100,22 @@ class Terrain:
         Returns
         -------
         (n,) float64, metres
-            The mean of the triangles there; beside all, the height at the nearest point of one, or the ground beyond.
+            The mean of the triangles there; next to them that of the ground, or of the nearest point of a triangle.
         """
         points = shapely.points(xy)
-        nearest = self._tree.nearest(points)
-        on_triangle = shapely.get_coordinates(shapely.shortest_line(self._plan[nearest], points))[::2]
-        height = plane_height(self._triangles[nearest], on_triangle)
-        if self._beyond is not None:
-            share = np.minimum(np.hypot(*(xy - on_triangle).T) / ROADSIDE, 1.0)
-            height = (1 - share) * height + share * self._beyond(xy)
         point, triangle = self._tree.query(points, predicate="intersects")
         found = np.bincount(point, minlength=len(xy))
         total = np.bincount(point, plane_height(self._triangles[triangle], xy[point]), minlength=len(xy))
-        return np.where(found > 0, total / np.maximum(found, 1), height)
+        height: Float = total / np.maximum(found, 1)
+        off = found == 0
+        height[off] = self._nearest_height(points[off]) if self._beside is None else self._beside(xy[off])
+        return height
+
+    def _nearest_height(self, points: NDArray[np.object_]) -> Float:
+        """Return the heights (n,) of the nearest points of triangles."""
+        nearest = self._tree.nearest(points)
+        on_triangle = shapely.get_coordinates(shapely.shortest_line(self._plan[nearest], points))[::2]
+        return plane_height(self._triangles[nearest], on_triangle)
 
     def drape(self, area: BaseGeometry, *, spacing: float, above: float = 0.0) -> Float:
         """Return an area in plan as triangles that lie on the terrain at their corners, without cracks.
@@ -88,7 +124,7 @@ class Terrain:
         ----------
         area : shapely geometry
         spacing : float, metres
-            Side of the square grid along which the area is divided.
+            Side of the square grid along which the area is divided; a fraction of it where the ground is steep.
         above : float, metres
             Height over the terrain.
 
@@ -97,15 +133,77 @@ class Terrain:
         (n, 3, 3) float64, metres
             Normals up.
         """
-        plan = triangulate(_cells(area, spacing))
+        plan = triangulate(_cells(area, spacing, self._steep))
         corners = plan.reshape(-1, 2)
         if len(corners) == 0:
             return np.empty((0, 3, 3))
         return _raised(corners, self.height(corners) + above)
 
 
-def _cells(area: BaseGeometry, spacing: float) -> NDArray[np.object_]:
-    """Return the polygons that a square grid through the origin divides an area into."""
+class Embankments:
+    r"""Heights of the ground next to roads: slopes lead from these to the land.
+
+    Next to a road the ground is as high as the road; from a width :math:`b` on it is as high as the land, which lies at
+    :math:`g`. At a distance :math:`d < b` from the nearest road it is at
+
+    .. math:: (1 - s) r + s g, \qquad s = \frac{d^2}{d^2 + (b - d)^2}.
+
+    Several roads are near where one climbs next to another one. Their height :math:`r` is the mean over triangles
+    :math:`i` within the greatest width :math:`B`, weighted by :math:`((B - d_i) / (B d_i))^2` (Franke and Little's
+    weights): at the edge of each road it is that road's, and it has no steps in between.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float64, metres
+        Roads that lie on the ground; no bridges.
+    land : callable
+        Heights (n,) of the land at places (n, 2).
+    """
+
+    def __init__(self, triangles: Float, land: Callable[[Float], Float]) -> None:
+        self._land = land
+        self._triangles = triangles[np.abs(signed_area(triangles)) > MIN_AREA]
+        self._plan = shapely.polygons(self._triangles[:, :, :2])
+        self._tree = shapely.STRtree(self._plan)
+        corners = self._triangles.reshape(-1, 3)
+        above = np.abs(corners[:, 2] - land(corners[:, :2])).reshape(-1, 3).max(axis=1)
+        width = embankment_width(above)
+        high = above > MIN_EMBANKMENT
+        self.steep = shapely.union_all(shapely.buffer(self._plan[high], width[high]))
+        self._reach = float(width.max(initial=ROADSIDE))
+
+    def height(self, xy: Float) -> Float:
+        """Return the heights of the ground (n,) at places (n, 2), metres."""
+        land = self._land(xy)
+        points = shapely.points(xy)
+        point, triangle = self._tree.query(points, predicate="dwithin", distance=self._reach)
+        nearest = shapely.get_coordinates(shapely.shortest_line(self._plan[triangle], points[point]))[::2]
+        away = np.hypot(*(xy[point] - nearest).T)
+        weight = (np.maximum(self._reach - away, 0.0) / (self._reach * np.maximum(away, _TOUCHING))) ** 2
+        total = np.bincount(point, weight, minlength=len(xy))
+        known = total > 0.0
+        mean = np.bincount(point, weight * plane_height(self._triangles[triangle], nearest), minlength=len(xy))
+        roads = np.where(known, mean / np.where(known, total, 1.0), land)
+        distance = np.full(len(xy), np.inf)
+        np.minimum.at(distance, point, away)
+        width = embankment_width(np.abs(roads - land))
+        distance = np.minimum(distance, width)
+        share = distance**2 / (distance**2 + (width - distance) ** 2)
+        ground: Float = (1 - share) * roads + share * land
+        return ground
+
+
+def embankment_width(height: Float) -> Float:
+    """Return the width (n,) of the strip beside roads at heights (n,) above or below the land, metres."""
+    width: Float = np.clip(EMBANKMENT_RUN * height, ROADSIDE, MAX_ROADSIDE)
+    return width
+
+
+def _cells(area: BaseGeometry, spacing: float, steep: BaseGeometry | None = None) -> NDArray[np.object_]:
+    """Return the polygons that a square grid through the origin divides an area into.
+
+    Cells that meet a steep area are divided into `STEEP_DIVISIONS` squares a side.
+    """
     if area.is_empty:
         return np.array([], dtype=object)
     low = np.floor(np.array(area.bounds[:2]) / spacing)
@@ -115,6 +213,19 @@ def _cells(area: BaseGeometry, spacing: float) -> NDArray[np.object_]:
     shapely.prepare(area)
     squares = shapely.box(x, y, x + spacing, y + spacing)
     met = squares[shapely.intersects(area, squares)]
+    if steep is not None and not steep.is_empty:
+        shapely.prepare(steep)
+        divided = shapely.intersects(steep, met)
+        low = shapely.bounds(met[divided])[:, :2]
+        side = spacing / STEEP_DIVISIONS
+        offsets = side * np.stack(np.meshgrid(*[np.arange(STEEP_DIVISIONS)] * 2), axis=-1).reshape(-1, 2)
+        x, y = (low[:, None] + offsets).reshape(-1, 2).T
+        whole = met[~divided]
+        # Cells next to them get the same corners along the common side, so that no cracks open between both.
+        border = shapely.segmentize(shapely.boundary(shapely.union_all(met[divided])), side)
+        beside = shapely.intersects(whole, border)
+        whole[beside] = shapely.snap(whole[beside], shapely.extract_unique_points(border), SNAP_GRID)
+        met = np.concatenate([whole, shapely.box(x, y, x + side, y + side)])
     parts = shapely.get_parts(shapely.intersection(met, area, grid_size=SNAP_GRID))
     kept: NDArray[np.object_] = parts[shapely.area(parts) > MIN_AREA]
     return kept

@@ -1,6 +1,7 @@
 """Bridges and underpasses of extracts: their height, the grade of their ramps, and what has no room for them."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -12,8 +13,11 @@ from sumo_here import needs_sumo
 
 from seip_addon.core.elevation.at_place import AskedTerrain
 from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.plan import surface_height
 from seip_addon.core.opendrive import lane_surfaces, read_map
 from seip_addon.core.progress import finish
+from seip_addon.core.site.scene_geometry import OTHER_LEVELS
+from seip_addon.core.streetscape.terrain import MAX_ROADSIDE
 from seip_addon.core.workflows.site_building import AskedSite, build_site
 
 pytestmark = needs_sumo
@@ -312,25 +316,78 @@ def test_a_bridge_is_in_the_way_of_what_lies_below(tmp_path):
     trunk(extract)
     site, _ = built(extract, tmp_path, level=("Trunk Road",))
     deck = next(part for part in site.model.parts if part.name == "Roads above")
-    assert deck.solid.vertices[:, 2].max() + site.model.origin[2] == pytest.approx(
-        ROAD_CLEARANCE + 0.12, abs=0.01
-    )  # its kerbs
+    assert deck.solid.vertices[:, 2].max() + site.model.origin[2] == pytest.approx(ROAD_CLEARANCE, abs=0.01)
 
 
-def test_walls_close_the_gap_beside_a_road_below(tmp_path):
+
+
+@pytest.mark.parametrize("level", ["High Road", "Trunk Road"])
+@pytest.mark.parametrize("half", [2.0, 15.0])
+def test_the_ground_lies_on_the_land_and_slopes_lead_up_to_ramps(tmp_path, level, half):
+    extract = corner_houses(Extract(), near=40.0)
+    bridge(extract, half=half)
+    trunk(extract)
+    site, _ = built(extract, tmp_path, level=(level,))
+    model, land = site.model, -site.model.origin[2]
+    verge = surfaces(model, "Verge").reshape(-1, 3)
+    roads = surfaces(model, "Driving lanes", "Pavements", "Pavements beyond", OTHER_LEVELS, "Roads above")
+    away = shapely.distance(shapely.multipolygons(shapely.polygons(roads[:, :, :2])), shapely.points(verge[:, :2]))
+    np.testing.assert_allclose(verge[away > MAX_ROADSIDE, 2], land, atol=0.05)
+    assert (away > MAX_ROADSIDE).sum() > 50
+    low, high = verge[:, 2].min(), verge[:, 2].max()
+    assert low > land - 0.2
+    assert high > land + ROAD_CLEARANCE - 1.5  # the ramps lie on embankments
+    houses = [
+        part.foot[2] + part.solid.vertices[:, 2].min()
+        for part in model.parts
+        if re.fullmatch(r"Building \d+", part.name)
+    ]
+    np.testing.assert_allclose(houses, land, atol=0.05)
+
+
+def test_the_ground_beside_and_below_a_bridge_is_closed(tmp_path):
+    """Under the deck there is ground or the lower road; beside it the surface has no holes and no cliffs."""
     extract = Extract()
     bridge(extract)
     trunk(extract)
     site, _ = built(extract, tmp_path, level=("High Road",))
-    parts = {part.name: part.solid.vertices for part in site.model.parts}
-    low, high = (parts["Retaining walls"][:, 2].min(), parts["Retaining walls"][:, 2].max())
-    assert low == pytest.approx(parts["Roads below"][:, 2].min(), abs=0.01)
-    assert high == pytest.approx(parts["Verge"][:, 2].max(), abs=0.2)
-    over = shapely.union_all([shapely.Polygon(face) for face in faces_in_plan(site.model, "Roads below")]).boundary
-    walls = shapely.points(parts["Retaining walls"][:, :2])
-    assert shapely.distance(over, walls).max() < 0.01
+    model = site.model
+    lower = surfaces(model, "Verge", OTHER_LEVELS)
+    trunk_at = shapely.union_all([shapely.Polygon(face) for face in faces_in_plan(model, OTHER_LEVELS)]).centroid
+    x, y = np.meshgrid(np.arange(-14.0, 14.1, 0.7), np.arange(-12.0, 12.1, 0.7))
+    places = np.column_stack([x.ravel() + trunk_at.x, y.ravel() + trunk_at.y]) + 0.013
+    below = surface_height(places, lower)
+    assert np.isfinite(below).all()
+    rows = below.reshape(x.shape)
+    assert np.abs(np.diff(rows, axis=0)).max() < 1.0
+    assert np.abs(np.diff(rows, axis=1)).max() < 1.2
+    deck = surface_height(places, surfaces(model, "Driving lanes"))
+    over = np.isfinite(deck) & (np.abs(places[:, 0] - trunk_at.x) < 3.0)
+    assert over.any()
+    assert (deck - below)[over].min() > ROAD_CLEARANCE - 0.1
+
+
+def test_a_street_in_an_underpass_lies_in_a_cutting(tmp_path):
+    extract = corner_houses(Extract(), near=40.0)
+    extract.way([(-300, 0), (0, 0), (300, 0)], highway="secondary", name="High Road", lanes=2)
+    low = {"highway": "primary", "name": "Low Road", "lanes": 2}
+    extract.way([(0, -300), (0, -30)], **low)
+    extract.way([(0, -30), (0, 30)], layer="-1", **low)
+    extract.way([(0, 30), (0, 300)], **low)
+    site, _ = built(extract, tmp_path, level=("Low Road",))
+    verge = surfaces(site.model, "Verge").reshape(-1, 3) + np.array([0, 0, site.model.origin[2]])
+    assert verge[:, 2].max() == pytest.approx(0.0, abs=0.13)  # up to the pavements
+    assert verge[:, 2].min() < -4.0
+    (deck,) = [part for part in site.model.parts if part.name == "Roads above"]
+    assert deck.solid.vertices[:, 2] + site.model.origin[2] == pytest.approx(0.0, abs=0.05)
 
 
 def faces_in_plan(model, name):
     part = next(part for part in model.parts if part.name == name)
     return [part.solid.vertices[list(face), :2] for face in part.solid.faces]
+def surfaces(model, *names):
+    """Return the triangles (n, 3, 3), local axes, of the parts with names."""
+    corners = [
+        part.solid.vertices[list(face)] for part in model.parts if part.name in names for face in part.solid.faces
+    ]
+    return np.array(corners).reshape(-1, 3, 3)

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from opendrive_text import document, geometry, lane, read_text, road, section
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
+from seip_addon.core.site.scene_geometry import OTHER_LEVELS
 from seip_addon.core.streetscape.description import SiteDescription, read_site_description
 from seip_addon.core.streetscape.levels import Crossing
 from seip_addon.core.streetscape.model import site_model
@@ -70,7 +72,8 @@ def test_road_ground_and_posts_are_all_on_one_level(tmp_path, near, roads, z):
     model = built(tmp_path, near, roads)
     assert model.origin[2] == z
     np.testing.assert_allclose(heights(model, Role.ROADS, Role.CANDIDATE_AREAS, Role.REGION), z, atol=0.1)
-    ground = [part for part in model.parts if Role.GROUND in part.roles and part.name != "Roads below"]
+    lower = {OTHER_LEVELS, "Retaining walls"}
+    ground = [part for part in model.parts if Role.GROUND in part.roles and part.name not in lower]
     assert np.abs(np.concatenate([part.solid.vertices[:, 2] for part in ground]) + model.origin[2] - z).max() < 0.5
     across = 1 if z == 0 else 0
     assert model.region.bounds[across] == pytest.approx(-3.5 - model.origin[across], abs=0.1)
@@ -82,9 +85,24 @@ def test_the_road_above_is_in_the_way_and_the_one_below_is_ground(tmp_path):
     (deck,) = [part for part in below.parts if part.name == "Roads above"]
     assert deck.roles == (Role.OCCLUDERS,)
     np.testing.assert_allclose(deck.solid.vertices[:, 2], DECK, atol=1e-6)
-    (street,) = [part for part in above.parts if part.name == "Roads below"]
+    (street,) = [part for part in above.parts if part.name == OTHER_LEVELS]
     assert street.roles == (Role.GROUND,)
     np.testing.assert_allclose(street.solid.vertices[:, 2], -DECK, atol=1e-6)
+
+
+def test_walls_that_rays_end_on_close_the_gap_beside_a_road_below(tmp_path):
+    model = built(tmp_path, (0, 40))
+    (walls,) = [part for part in model.parts if part.name == "Retaining walls"]
+    assert walls.roles == (Role.GROUND,)
+    assert walls.solid.vertices[:, 2].min() == pytest.approx(-DECK)
+    assert walls.solid.vertices[:, 2].max() == pytest.approx(0.0)
+    (street,) = [part for part in model.parts if part.name == OTHER_LEVELS]
+    faces = [street.solid.vertices[list(face), :2] for face in street.solid.faces]
+    edge = shapely.union_all([shapely.Polygon(face) for face in faces], grid_size=1e-3).boundary
+    feet = shapely.union_all(
+        [shapely.LineString(walls.solid.vertices[list(face), :2]) for face in walls.solid.faces], grid_size=1e-3
+    )
+    assert shapely.difference(edge, feet.buffer(0.01)).length < 0.1
 
 
 def test_poles_of_another_level_carry_nothing(tmp_path):
@@ -206,7 +224,7 @@ def test_where_a_street_to_the_other_level_branches_off_the_surface_is_studied(t
     model = built(tmp_path, (-60, 0), text=text, radius=170.0)
     assert any("road 6" in note and "the lower one is on another level" in note for note in model.notes)
     where = {part.name: part.solid.vertices + model.origin for part in model.parts}
-    assert where["Roads below"][:, 0].min() == pytest.approx(end[0], abs=2.0)
+    assert where[OTHER_LEVELS][:, 0].min() == pytest.approx(end[0], abs=2.0)
     assert where["Driving lanes"][:, 1].min() < end[1]
     above = where.get("Roads above", np.full((1, 3), DECK))
     assert above[:, 2].min() > 5.0  # nothing hangs at knee height over the studied road

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from random_cases import cases
 
 from seip_addon.core.geometry.plan import plane_height
-from seip_addon.core.streetscape.terrain import Terrain, cut, triangulate
+from seip_addon.core.streetscape.terrain import MAX_ROADSIDE, Embankments, Terrain, cut, triangulate
 
 SQUARE = np.array([[[0, 0, 1], [4, 0, 1], [4, 4, 3]], [[0, 0, 1], [4, 4, 3], [0, 4, 3]]], dtype=float)
 """The plane z = 1 + y / 2 over a square of side 4."""
@@ -88,3 +88,51 @@ def test_cutting_everything_leaves_nothing():
 
 def test_plane_height_extends_the_triangle():
     assert plane_height(SQUARE[:1], np.array([[-3.0, 10.0]]))[0] == pytest.approx(6.0)
+
+
+def strip(x, width, z, length=60.0):
+    """Return a road along y at a height."""
+    low = np.array([[x, -length, z], [x + width, -length, z], [x + width, length, z], [x, length, z]], dtype=float)
+    return low[[[0, 1, 2], [0, 2, 3]]]
+
+
+def level_land(xy):
+    return np.zeros(len(xy))
+
+
+def test_an_embankment_leads_from_the_road_to_the_land():
+    ground = Embankments(strip(0, 8, 5.0), level_land)
+    along = np.column_stack([np.linspace(8.0, 30.0, 221), np.zeros(221)])
+    height = ground.height(along)
+    assert height[0] == pytest.approx(5.0, abs=1e-3)
+    assert (np.diff(height) <= 1e-9).all()
+    assert np.abs(np.diff(height)).max() < 0.1 * 1.2
+    np.testing.assert_array_equal(height[along[:, 0] > 8 + MAX_ROADSIDE], 0.0)
+
+
+def test_between_roads_at_different_heights_the_ground_has_no_step():
+    ground = Embankments(np.concatenate([strip(0, 8, 5.0), strip(12, 8, 0.0)]), level_land)
+    along = np.column_stack([np.linspace(8.0, 12.0, 401), np.zeros(401)])
+    height = ground.height(along)
+    assert height[[0, -1]] == pytest.approx([5.0, 0.0], abs=1e-3)
+    assert np.abs(np.diff(height)).max() < 0.05
+
+
+def test_a_road_below_the_land_lies_in_a_cutting():
+    ground = Embankments(strip(0, 8, -4.0), level_land)
+    assert ground.height(np.array([[8.0, 0.0], [10.0, 0.0], [30.0, 0.0]])) == pytest.approx([-4, -3.6, 0], abs=0.3)
+
+
+def test_steep_ground_has_a_finer_grid_without_cracks():
+    """Each edge of a triangle within the area belongs to two triangles, corners and heights alike."""
+    ground = Embankments(strip(0, 8, 5.0), level_land)
+    area = shapely.box(8, -36, 60, 36)
+    triangles = Terrain(strip(0, 8, 5.0), ground.height, ground.steep).drape(area, spacing=12.0)
+    assert plan_area(triangles).sum() == pytest.approx(area.area)
+    assert len(triangles) < 1000
+    edges = {}
+    for corners in np.round(triangles, 6):
+        for start, stop in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            edges[tuple(start), tuple(stop)] = edges.get((tuple(start), tuple(stop)), 0) + 1
+    open_edges = [(start, stop) for start, stop in edges if (stop, start) not in edges]
+    assert sum(np.hypot(*np.subtract(stop, start)[:2]) for start, stop in open_edges) == pytest.approx(area.length)
