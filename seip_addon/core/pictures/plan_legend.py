@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 
 from ..counts import counted
 from ..placement.deployment import Deployment
-from ..site.scene_geometry import ASSUMED, FROM_MAP, SceneGeometry
+from ..site.scene_geometry import ASSUMED, FROM_MAP, OTHER_LEVELS, SceneGeometry
 from ..site.site import Site
 from .coverage_colours import of_placement
 from .drawing import MAX_LABELLED, SENSOR_MARK, markers_of, percent
@@ -20,6 +20,7 @@ from .plan_style import (
     ASSUMED_HEIGHT,
     ASSUMED_MARK,
     HEIGHT_CMAP,
+    OTHER_ROAD,
     POLE_MARK,
     SIDEWALK_MARK,
     Style,
@@ -112,6 +113,10 @@ class PlanLegend:
         self._heading("Map", LINE_HEIGHT)
         self._swatch(facecolor="none", edgecolor=INK, linewidth=1.1)
         self._line("region of interest")
+        if any(mesh.name.startswith(OTHER_LEVELS) for mesh in geometry.ground):
+            self._keep_together(LINE_HEIGHT)
+            self._swatch(**OTHER_ROAD)
+            self._line("road on another level")
         for weight in weights:
             names = [area.name for area in geometry.weighted_regions if area.weight == weight]
             words = _short(names[0], 20) if len(names) == 1 else counted(len(names), "area")

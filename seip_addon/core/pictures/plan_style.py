@@ -19,4 +19,6 @@ ASSUMED_MARK: Style = {
     "mew": 0.9,
 }
 ASSUMED_HEIGHT: Style = {"facecolor": "none", "edgecolor": "#c9cdc4", "hatch": "\\\\\\", "linewidth": 0.4}
+OTHER_ROAD: Style = {"facecolor": "#d6d9d8", "edgecolor": "#b4b9ba", "linewidth": 0.4}
+"""A road on another level than the studied one."""
 POLE_MARK: Style = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc": POLE_COLOUR, "mec": INK, "mew": 0.6}

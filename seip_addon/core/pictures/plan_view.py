@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..geometry.plan import closed, outline
 from ..placement.deployment import Deployment
-from ..site.scene_geometry import ASSUMED, Mesh, SceneGeometry
+from ..site.scene_geometry import ASSUMED, OTHER_LEVELS, Mesh, SceneGeometry
 from ..site.site import Site
 from ..site.target_squares import target_squares
 from .coverage_colours import of_placement
@@ -29,6 +29,7 @@ from .plan_style import (
     ASSUMED_HEIGHT,
     ASSUMED_MARK,
     HEIGHT_CMAP,
+    OTHER_ROAD,
     POLE_MARK,
     SIDEWALK_MARK,
     Style,
@@ -134,6 +135,9 @@ def _bounds(region: BaseGeometry) -> tuple[float, float, float, float]:
 
 
 def _draw_surfaces(plan: Axes, geometry: SceneGeometry, shown: BaseGeometry) -> None:
+    others = [_footprint(mesh, shown) for mesh in geometry.ground if mesh.name.startswith(OTHER_LEVELS)]
+    other_roads = closed(shapely.union_all(others), MAX_GAP)
+    draw_area(plan, other_roads, **OTHER_ROAD, zorder=SURFACE)
     pavement = shapely.intersection(geometry.candidate_areas, shown)
     draw_area(plan, closed(pavement, MAX_GAP), facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.4, zorder=SURFACE)
     roads = shapely.union_all([_footprint(mesh, shown) for mesh in geometry.roads])

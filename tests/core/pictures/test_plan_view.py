@@ -14,10 +14,11 @@ from matplotlib.patches import Rectangle, Wedge
 from seip_addon.core.pictures.drawing import draw_title, markers_of, percent, summary
 from seip_addon.core.pictures.palette import SEEN_COLOURS
 from seip_addon.core.pictures.plan_legend import LEGEND_WIDTH
+from seip_addon.core.pictures.plan_style import OTHER_ROAD
 from seip_addon.core.pictures.plan_view import draw_plan, save_plan_view
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.returns_summary import ReturnsSummary
-from seip_addon.core.site.scene_geometry import ASSUMED, Pole
+from seip_addon.core.site.scene_geometry import ASSUMED, OTHER_LEVELS, Mesh, Pole
 from tests.small_junction import make_example
 
 
@@ -229,6 +230,18 @@ def test_the_map_carries_the_credits_of_its_sources(example):
     )
     assert "\n".join(sources) in credited
     assert not any("OpenStreetMap" in text for text in plain)
+
+
+def test_roads_of_other_levels_are_drawn_in_a_colour_of_their_own(example):
+    corners = np.array([[-60, -34, -5], [60, -34, -5], [60, -26, -5], [-60, -26, -5]], dtype=float)
+    road = Mesh(f"{OTHER_LEVELS}.001", corners[[[0, 1, 2], [0, 2, 3]]])
+    geometry = replace(example.geometry, ground=(*example.geometry.ground, road))
+    plain, drawn = (draw_plan(one, example.site, example.deployment) for one in (example.geometry, geometry))
+    place = (13.0, -31.5)
+    assert np.abs(pixel_at(drawn, place) - to_rgb(OTHER_ROAD["facecolor"])).max() < 0.01
+    assert np.abs(pixel_at(plain, place) - pixel_at(drawn, place)).max() > 0.05
+    words = [[text.get_text() for text in figure.axes[1].texts] for figure in (plain, drawn)]
+    assert ["road on another level" in each for each in words] == [False, True]
 
 
 def test_the_summary_of_a_placement_by_returns_begins_with_them_and_fits_the_page(example):
