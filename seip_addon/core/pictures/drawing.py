@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
 from ..arrays import Boolean, Float
@@ -100,10 +101,28 @@ def draw_title(figure: Figure, site: Site, deployment: Deployment, left: float) 
     """Write the site's name and the result at the head of a page, ``left`` inches from its border."""
     width, height = figure.get_size_inches()
     style = {"x": left / width, "ha": "left", "va": "top", "parse_math": False}
-    figure.text(y=1 - 0.20 / height, s=site.name, size=17, weight="bold", color=INK, **style)
-    line = figure.text(y=1 - 0.55 / height, s=summary(deployment), size=11, color=SOFT_INK, **style)
-    share = line.get_window_extent().width / (figure.dpi * (width - 2 * left))
-    line.set_fontsize(11 / max(1.0, share))  # so that it ends on the page
+    room = width - 2 * left
+    title = figure.text(y=1 - 0.20 / height, s=site.name, weight="bold", color=INK, **style)
+    line = figure.text(y=1 - 0.55 / height, s=summary(deployment), color=SOFT_INK, **style)
+    _fit(title, room, 17.0, 12.0)
+    _fit(line, room, 11.0, 7.0)
+
+
+def _fit(text: Text, room: float, size: float, least: float) -> None:
+    """Fit a text into a width in inches: at a size in points, a smaller one down to ``least``, or cut short."""
+    words = text.get_text()
+    text.set_fontsize(size)
+    text.set_fontsize(max(size / max(1.0, _inches(text) / room), least))
+    for length in range(len(words) - 1, 0, -1):
+        if _inches(text) <= room:
+            return
+        text.set_text(f"{words[:length].rstrip()}…")
+
+
+def _inches(text: Text) -> float:
+    """Return the width of a text on its page."""
+    figure = text.get_figure(root=True)
+    return float(text.get_window_extent().width / figure.dpi) if figure is not None else 0.0
 
 
 def draw_attribution(axes: Axes, attribution: Sequence[str]) -> None:

@@ -232,6 +232,19 @@ def test_the_map_carries_the_credits_of_its_sources(example):
     assert not any("OpenStreetMap" in text for text in plain)
 
 
+@pytest.mark.parametrize("length", [10, 90, 400])
+def test_the_title_ends_on_the_page(example, length):
+    name = "Saint-Symphorien-de-Lay / " * (length // 26) + "Long Street"
+    figure = Figure((6.0, 4.0), dpi=100)
+    FigureCanvasAgg(figure)
+    draw_title(figure, replace(example.site, name=name), example.deployment, 0.3)
+    title = figure.texts[0].get_window_extent()
+    assert 29.0 <= title.x0 < title.x1 <= 571
+    words = figure.texts[0].get_text()
+    assert words == name if length < 50 else words.endswith("…")
+    assert name.startswith(words.removesuffix("…"))
+
+
 def test_roads_of_other_levels_are_drawn_in_a_colour_of_their_own(example):
     corners = np.array([[-60, -34, -5], [60, -34, -5], [60, -26, -5], [-60, -26, -5]], dtype=float)
     road = Mesh(f"{OTHER_LEVELS}.001", corners[[[0, 1, 2], [0, 2, 3]]])
