@@ -4,7 +4,7 @@ import itertools
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +28,8 @@ ALONG_STREET = math.radians(30.0)  # between a crossed street and its lanes
 LINE_STEP = 1.0  # metres between the places of a road that the nearest to a crossing is looked for at
 _OBJECTS = re.compile(r"<objects\s*/>|<objects>.*?</objects>", re.DOTALL)
 _ROAD = re.compile(r'<road [^>]*?id="([^"]*)".*?</road>', re.DOTALL)
+_GUESSED_AT = re.compile(r":(.*)_c\d+")
+"""Id of a crossing that netconvert guesses: the name of its junction, and its number there."""
 _GUESSED = re.compile(r'<object id="([^"]*)" type="crosswalk".*?</object>\s*', re.DOTALL)
 
 
@@ -47,21 +49,26 @@ def with_mapped_crossings(
     lanes: Mapping[str, Sequence[LaneSurface]],
     streets: StreetFile,
     shapes: PlanShapes,
+    joints: Collection[str] = (),
 ) -> tuple[RoadMap, str]:
     """Return a map, and its text, whose crossings are those of the extract.
 
-    A guessed crossing stays where the extract maps none nearby; its name says that it is assumed.
+    A guessed crossing stays where streets meet and the extract maps none nearby; its name says that it is assumed.
 
     Parameters
     ----------
     lanes : mapping of str to sequence of LaneSurface
         Of each road of the map.
+    joints : collection of str
+        Names of the junctions in which a street only goes on: nothing tells that it is crossed there.
     """
     driven = [lane for own in lanes.values() for lane in in_groups(own, CARRIAGEWAY) if lane.junction_id is None]
     crossed = [_on_carriageway(one, driven) for one in _crossed_places(streets, shapes)]
     own = _by_road(crossed, road_map)
     mapped = shapely.union_all(shapely.points(np.array([one.middle for one in crossed]).reshape(-1, 2)))
-    roads = tuple(replace(road, objects=(*_kept(road, mapped), *own.get(road.id, ()))) for road in road_map.roads)
+    roads = tuple(
+        replace(road, objects=(*_kept(road, mapped, joints), *own.get(road.id, ()))) for road in road_map.roads
+    )
     return replace(road_map, roads=roads), _written(text, roads)
 
 
@@ -194,11 +201,13 @@ def _object(crossed: _Laid, road: Road, s: float) -> RoadObject:
     )
 
 
-def _kept(road: Road, mapped: BaseGeometry) -> Iterator[RoadObject]:
-    """Yield the objects of a road without the guessed crossings that lie near mapped ones."""
+def _kept(road: Road, mapped: BaseGeometry, joints: Collection[str]) -> Iterator[RoadObject]:
+    """Yield the objects of a road without the guessed crossings at joints and near mapped ones."""
     for one in road.objects:
         if one.kind != CROSSING:
             yield one
+        elif (of := _GUESSED_AT.fullmatch(one.id)) is not None and of[1] in joints:
+            continue
         elif not mapped.dwithin(shapely.Point(road.place(np.array([one.s]), np.array([one.t]))[0, :2]), MAPPED_AROUND):
             yield replace(one, name=ASSUMED_CROSSING)
 

@@ -208,7 +208,6 @@ def site_of_extract(path: Path, place: ExtractPlace, map_path: Path) -> Generato
     shapes, middle = _shapes(extract, road_map, near)
     surfaces = {road.id: lane_surfaces(road) for road in road_map.roads}
     map_text = map_path.read_text(encoding="utf-8")
-    road_map, map_text = with_mapped_crossings(road_map, map_text, surfaces, streets, shapes)
     lanes = without_plain_joints(list(itertools.chain(*surfaces.values())))
     junction = nearest_junctions(road_map, lanes, float(middle[0]), float(middle[1]), 1)
     if (not junction or junction[0][1] > MAX_JUNCTION_DISTANCE) and place.radius is None:
@@ -226,6 +225,9 @@ def site_of_extract(path: Path, place: ExtractPlace, map_path: Path) -> Generato
     if junction and not names:
         meeting = _street_names(road_map, lanes, junction[0][0].id, together)
         ranked = sorted(meeting, key=_ranks(streets.ways.values()).__getitem__)
+    meeting = {lane.junction_id for lane in lanes}
+    joints = {junction.name for junction in road_map.junctions if junction.id not in meeting}
+    road_map, map_text = with_mapped_crossings(road_map, map_text, surfaces, streets, shapes, joints)
         names = _crossing_pair(ranked, _headings(road_map, lanes, together))
     seen = shapely.Point(middle).buffer(place.radius or _reach(lanes, together, middle) + place.along)
     near_streets = [way for way in streets.ways.values() if seen.intersects(_path(shapes, way))]

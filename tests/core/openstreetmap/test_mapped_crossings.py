@@ -96,3 +96,22 @@ def test_where_streets_meet_no_place_of_a_crossing_is_told(tmp_path):
     extract.way([(-200, 0), middle, (200, 0)], highway="secondary", name="East Road", lanes=2)
     extract.way([(0, -200), middle, (0, 200)], highway="secondary", name="North Road", lanes=2)
     assert all(name.endswith("(assumed)") for name in crossings(built(corner_houses(extract), tmp_path)))
+
+
+def test_no_crossing_is_assumed_where_a_street_only_goes_on(tmp_path):
+    """Its number of lanes changes where a driveway joins it, which is not a street here."""
+    extract = Extract(52.5, 15.0)
+    usual = {"highway": "secondary", "maxspeed": "30", "sidewalk": "both"}
+    extract.way([(-200, 0), (0, 0), (70, 0)], name="East Road", lanes=2, **usual)
+    extract.way([(70, 0), (200, 0)], name="East Road", lanes=4, **usual)
+    extract.way([(0, -200), (0, 0), (0, 200)], name="North Road", lanes=2, **usual)
+    extract.way([(70, 0), (70, 40)], highway="service", service="driveway")
+    site = built(corner_houses(extract), tmp_path)
+    assert len(crossings(site)) == 4
+    path = tmp_path / "again.xodr"
+    path.write_text(site.map_text, encoding="utf-8")
+    places = [
+        one.position[:2] - site.model.origin[:2] for one in placed_objects(read_map(path)) if one.kind == "crosswalk"
+    ]
+    assert len(places) == 4
+    assert max(np.hypot(*place) for place in places) < 20.0
