@@ -35,7 +35,17 @@ from .netconvert import convert
 from .plan_shapes import PlanShapes
 from .signals import SIGNAL_REACH
 from .street_objects import surroundings
-from .streets import CLASSES, StreetFile, has_lane_count, has_widths, is_street, shown_name, usual_lanes, write_streets
+from .streets import (
+    CLASSES,
+    StreetFile,
+    has_lane_count,
+    has_widths,
+    is_street,
+    is_tunnel,
+    shown_name,
+    usual_lanes,
+    write_streets,
+)
 
 EXTRACT_SUFFIXES = (".osm", ".osm.gz", ".osm.xml")
 STREET_REACH = 450.0  # metres beyond the region within which streets are laid out: traffic comes from there
@@ -65,6 +75,8 @@ class ExtractPlace:
         Whether driveways and aisles are streets.
     left_hand : bool or None
         On which side traffic keeps; None: as the extract shows.
+    level : tuple of str
+        Names of streets on the level that is studied.
     """
 
     near: tuple[float, float] | None = None
@@ -73,6 +85,7 @@ class ExtractPlace:
     approaches: float | None = None
     service: bool = False
     left_hand: bool | None = None
+    level: tuple[str, ...] = ()
 
     @property
     def reach(self) -> float:
@@ -209,6 +222,9 @@ def site_of_extract(path: Path, place: ExtractPlace, map_path: Path) -> Generato
     surfaces = {road.id: lane_surfaces(road) for road in road_map.roads}
     map_text = map_path.read_text(encoding="utf-8")
     lanes = without_plain_joints(list(itertools.chain(*surfaces.values())))
+    meeting = {lane.junction_id for lane in lanes}
+    joints = {junction.name for junction in road_map.junctions if junction.id not in meeting}
+    road_map, map_text = with_mapped_crossings(road_map, map_text, surfaces, streets, shapes, joints)
     junction = nearest_junctions(road_map, lanes, float(middle[0]), float(middle[1]), 1)
     if (not junction or junction[0][1] > MAX_JUNCTION_DISTANCE) and place.radius is None:
         raise SeipError(
@@ -221,19 +237,18 @@ def site_of_extract(path: Path, place: ExtractPlace, map_path: Path) -> Generato
     carriageway = _carriageway(lanes, middle, reach)
     area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
     beside = surroundings(shapes, area, carriageway)
-    names = [_spelt(extract, name) for name in place.streets]
-    if junction and not names:
-        meeting = _street_names(road_map, lanes, junction[0][0].id, together)
-        ranked = sorted(meeting, key=_ranks(streets.ways.values()).__getitem__)
-    meeting = {lane.junction_id for lane in lanes}
-    joints = {junction.name for junction in road_map.junctions if junction.id not in meeting}
-    road_map, map_text = with_mapped_crossings(road_map, map_text, surfaces, streets, shapes, joints)
-        names = _crossing_pair(ranked, _headings(road_map, lanes, together))
     seen = shapely.Point(middle).buffer(place.radius or _reach(lanes, together, middle) + place.along)
+    tunnels = _tunnels(extract, shapes, seen, place.level)
+    _check_level(place.level, tunnels, road_map)
+    names = [_spelt(extract, name) for name in place.streets]
+    if not names:
+        title_place = replace(place, level=()) if tunnels else place
+        names = _title(road_map, lanes, title_place, middle, roundabouts, _ranks(streets.ways.values()))
+    is_junction = bool(junction) and junction[0][1] <= (place.radius or math.inf)
     near_streets = [way for way in streets.ways.values() if seen.intersects(_path(shapes, way))]
     description = replace(
         beside,
-        name=STREETS.join(names) or f"Junction at {near[0]:.5f}, {near[1]:.5f}",
+        name=STREETS.join(names) or f"{'Junction' if is_junction else 'Street'} at {near[0]:.5f}, {near[1]:.5f}",
         near=None if place.radius is None else (float(middle[0]), float(middle[1])),
         junction=junction[0][0].id if place.radius is None else None,
         radius=place.radius,
@@ -257,6 +272,7 @@ def site_of_extract(path: Path, place: ExtractPlace, map_path: Path) -> Generato
             *extract.notes,
             *streets.notes,
             *assumed,
+            *_tunnel_notes(tunnels),
             *_assumed_crossings(guessed_crossings(road_map, seen)),
             *dropped,
             *_lone_signals(lone),
@@ -303,6 +319,39 @@ def _assumed_lanes(ways: Iterable[Way]) -> Iterator[str]:
         listed = ", ".join(known[:MAX_NAMED]) + (f" and {len(known) - MAX_NAMED} more" * (len(known) > MAX_NAMED))
         each = "one lane is" if lanes == 1 else f"{lanes} lanes are"
         yield f"{each} assumed in each direction of streets without a number of lanes in the extract: {listed}"
+
+
+def _tunnels(extract: Extract, shapes: PlanShapes, seen: BaseGeometry, level: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of streets of the level that lie in tunnels in an area, as the extract spells them."""
+    wanted = {name.strip().casefold() for name in level}
+    found = (
+        next(way.tags[key] for key in NAMES if way.tags.get(key, "").casefold() in wanted)
+        for way in extract.ways.values()
+        if is_tunnel(way.tags)
+        and wanted & {way.tags[key].casefold() for key in NAMES if key in way.tags}
+        and seen.intersects(_path(shapes, way))
+    )
+    return tuple(dict.fromkeys(found))
+
+
+def _check_level(level: Sequence[str], tunnels: Sequence[str], road_map: RoadMap) -> None:
+    """Refuse a level whose street lies in a tunnel as a whole."""
+    known = {text.casefold() for road in road_map.roads for text in (road.id, road.name)}
+    hidden = [name for name in tunnels if name.casefold() not in known]
+    if hidden and not any(name.strip().casefold() in known for name in level):
+        raise SeipError(
+            f"{hidden[0]} lies in a tunnel at this place, and scenes leave tunnels out: choose a street on the "
+            "surface by --level, or none"
+        )
+
+
+def _tunnel_notes(tunnels: Sequence[str]) -> Iterator[str]:
+    """Yield a note on streets of the level that lie in tunnels."""
+    for name in tunnels:
+        yield (
+            f"{name} lies in a tunnel at this place: scenes leave tunnels out, so that the streets above are studied, "
+            f"and {name} only where it is in the open"
+        )
 
 
 def _assumed_crossings(number: int) -> Iterator[str]:
@@ -403,6 +452,38 @@ def _reach(lanes: Sequence[LaneSurface], junctions: Collection[str], middle: Flo
     """Return how far junctions reach from a place, metres."""
     corners = [lane.left[:, :2] - middle for lane in lanes if lane.junction_id in junctions]
     return float(np.hypot(*np.concatenate([np.zeros((1, 2)), *corners]).T).max())
+
+
+def _title(
+    road_map: RoadMap,
+    lanes: Sequence[LaneSurface],
+    place: ExtractPlace,
+    middle: Float,
+    roundabouts: Sequence[frozenset[str]],
+    ranks: Mapping[str, int],
+) -> list[str]:
+    """Return the names of the streets that a place is titled by.
+
+    With a radius these are the streets of the nearest junction within it, of a level only where its streets meet; where
+    there is none, the level's streets, or the nearest street.
+    """
+    near = nearest_junctions(road_map, lanes, float(middle[0]), float(middle[1]), len(road_map.junctions))
+    on_level = {name.strip().casefold() for name in place.level}
+    level = list(dict.fromkeys(r.name for r in road_map.roads if on_level & {r.name.casefold(), r.id} and r.name))
+    for junction, away in near:
+        if place.radius is not None and away > place.radius:
+            break
+        together = intersection(lanes, junction.id, roundabouts)
+        meeting = _street_names(road_map, lanes, junction.id, together)
+        if place.radius is None or not level or set(level) & set(meeting):
+            return _crossing_pair(sorted(meeting, key=ranks.__getitem__), _headings(road_map, lanes, together))
+    if level:
+        return level[:2]
+    names = {road.id: road.name for road in road_map.roads}
+    driving = [lane for lane in road_surface.in_groups(lanes, ["driving"]) if names[lane.road_id]]
+    here = shapely.Point(middle)
+    nearest = min(driving, key=lambda lane: float(lane.polygon.distance(here)), default=None)
+    return [] if nearest is None or nearest.polygon.distance(here) > (place.radius or 0.0) else [names[nearest.road_id]]
 
 
 def _street_names(

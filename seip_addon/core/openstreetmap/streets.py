@@ -87,12 +87,21 @@ class StreetFile:
 
 def is_street(tags: Tags, *, service: bool = False) -> bool:
     """Return whether a way is a street on the surface, or a track of trams or light rail; driveways on request."""
-    if tags.get("area") == "yes" or tags.get("tunnel", "no") not in ("no", "building_passage"):
+    if tags.get("area") == "yes" or _is_underground(tags):
         return False
     if tags.get("railway") in TRACKS:
         return True
     highway = tags.get("highway")
     return highway in CLASSES or (service and highway == "service")
+
+
+def is_tunnel(tags: Tags) -> bool:
+    """Return whether a way is a street in a tunnel, which is left out."""
+    return tags.get("highway") in CLASSES and _is_underground(tags)
+
+
+def _is_underground(tags: Tags) -> bool:
+    return tags.get("tunnel", "no") not in ("no", "building_passage")
 
 
 def write_streets(

@@ -151,6 +151,7 @@ def _of_extract(source: Path, asked: AskedSite, map_path: Path | None) -> Genera
         approaches=asked.approaches,
         service=asked.service,
         left_hand=asked.left_hand,
+        level=asked.level,
     )
     with tempfile.TemporaryDirectory() as folder:
         site = yield from site_of_extract(source, place, Path(folder) / "streets.xodr")

@@ -252,6 +252,40 @@ def test_a_place_on_two_levels_is_asked_for_by_street(tmp_path):
         built(extract, tmp_path, level=("Low Road",))
 
 
+def test_a_place_without_a_junction_on_its_level_is_titled_by_its_street(tmp_path):
+    """High Road has a junction 75 m from the middle, Trunk Road none."""
+    extract = Extract()
+    bridge(extract, 20.0, 75.0)
+    extract.way([(75, 0), (300, 0)], highway="primary", name="High Road", lanes=2)
+    trunk(extract)
+    extract.way([(75, 0), (75, 150)], highway="residential", name="Side Street")
+    for level, radius, name in (
+        ("trunk road", 60.0, "Trunk Road"),
+        ("trunk road", 90.0, "Trunk Road"),
+        ("High Road", 60.0, "High Road"),
+        ("High Road", 90.0, "High Road / Side Street"),
+    ):
+        site, _ = built(extract, tmp_path, level=(level,), radius=radius)
+        assert site.model.name == name
+
+
+def test_a_level_that_is_a_tunnel_is_named_in_a_note(tmp_path):
+    extract = corner_houses(Extract())
+    extract.way([(-200, 0), (40, 0), (200, 0)], highway="primary", name="Top Road")
+    extract.way([(40, 0), (40, 150)], highway="residential", name="Side Road")
+    dip = {"highway": "secondary", "name": "Dip Road", "lanes": 2}
+    extract.way([(0, -20), (0, 20)], tunnel="yes", layer="-1", **dip)
+    with pytest.raises(SeipError, match=r"Dip Road lies in a tunnel at this place, and scenes leave tunnels out"):
+        built(extract, tmp_path, level=("dip road",), radius=60.0)
+    extract.way([(0, -200), (0, -20)], **dip)
+    extract.way([(0, 20), (0, 200)], **dip)
+    site, _ = built(extract, tmp_path, level=("dip road",), radius=60.0)
+    assert site.model.name == "Top Road / Side Road"
+    assert any(note.startswith("Dip Road lies in a tunnel at this place") for note in site.model.notes)
+    site, _ = built(extract, tmp_path, radius=60.0)
+    assert not any("tunnel" in note for note in site.model.notes)
+
+
 def random_exit(seed):
     """Return a random crossing of two roads on two levels, with a junction, side streets and slip roads."""
     random = np.random.default_rng(seed)
@@ -319,6 +353,12 @@ def test_a_bridge_is_in_the_way_of_what_lies_below(tmp_path):
     assert deck.solid.vertices[:, 2].max() + site.model.origin[2] == pytest.approx(ROAD_CLEARANCE, abs=0.01)
 
 
+def surfaces(model, *names):
+    """Return the triangles (n, 3, 3), local axes, of the parts with names."""
+    corners = [
+        part.solid.vertices[list(face)] for part in model.parts if part.name in names for face in part.solid.faces
+    ]
+    return np.array(corners).reshape(-1, 3, 3)
 
 
 @pytest.mark.parametrize("level", ["High Road", "Trunk Road"])
@@ -385,9 +425,3 @@ def test_a_street_in_an_underpass_lies_in_a_cutting(tmp_path):
 def faces_in_plan(model, name):
     part = next(part for part in model.parts if part.name == name)
     return [part.solid.vertices[list(face), :2] for face in part.solid.faces]
-def surfaces(model, *names):
-    """Return the triangles (n, 3, 3), local axes, of the parts with names."""
-    corners = [
-        part.solid.vertices[list(face)] for part in model.parts if part.name in names for face in part.solid.faces
-    ]
-    return np.array(corners).reshape(-1, 3, 3)

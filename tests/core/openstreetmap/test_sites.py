@@ -421,6 +421,15 @@ def test_the_title_is_what_was_asked_for_else_the_highest_classes(asked, name, t
     assert model.name == name
 
 
+def test_a_place_between_junctions_is_titled_by_its_street(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (90, 0), (200, 0)], highway="primary", name="Long Road")
+    extract.way([(90, 0), (90, 150)], highway="residential", name="Side Street")
+    extract = corner_houses(extract)
+    assert built(extract, tmp_path, radius=60.0).model.name == "Long Road"
+    assert built(extract, tmp_path, radius=100.0).model.name == "Long Road / Side Street"
+
+
 def test_two_sections_of_one_street_are_not_the_title(tmp_path):
     extract = Extract()
     extract.way([(-200, 0), (0, 0)], highway="primary", name="Ring Road Section 1")
