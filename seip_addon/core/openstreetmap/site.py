@@ -40,8 +40,10 @@ from .streets import (
     StreetFile,
     has_lane_count,
     has_widths,
+    implausible_lanes,
     is_street,
     is_tunnel,
+    lane_counts,
     shown_name,
     usual_lanes,
     write_streets,
@@ -57,6 +59,7 @@ RANKS = (*(kind for kind in CLASSES if not kind.endswith("_link")), "service", *
 MAX_ROUNDABOUT = 200.0  # metres across which a roundabout is one place at most
 MIN_RAMP = 0.05  # metres by which a bridge or ramp moves a street that a note names
 MAX_NAMED = 6  # streets that a note names
+MAX_SHOWN = 12  # letters of a tag's value that a note shows
 STANDS_AROUND = 20.0  # metres beyond the scene within which what stands there counts
 
 
@@ -272,6 +275,7 @@ def site_of_extract(path: Path, place: ExtractPlace, map_path: Path) -> Generato
             *extract.notes,
             *streets.notes,
             *assumed,
+            *_implausible_lanes(near_streets),
             *_tunnel_notes(tunnels),
             *_assumed_crossings(guessed_crossings(road_map, seen)),
             *dropped,
@@ -311,7 +315,7 @@ def _assumed_lanes(ways: Iterable[Way]) -> Iterator[str]:
     """Yield notes on streets whose number of lanes the extract does not give."""
     streets: dict[int, list[str]] = {}
     for way in ways:
-        if "highway" in way.tags and not has_lane_count(way.tags):
+        if "highway" in way.tags and not has_lane_count(way.tags) and not implausible_lanes(way.tags):
             name = {**way.tags, **shown_name(way.tags)}.get("name", "streets without a name")
             streets.setdefault(usual_lanes(way.tags), []).append(name)
     for lanes, names in sorted(streets.items()):
@@ -319,6 +323,22 @@ def _assumed_lanes(ways: Iterable[Way]) -> Iterator[str]:
         listed = ", ".join(known[:MAX_NAMED]) + (f" and {len(known) - MAX_NAMED} more" * (len(known) > MAX_NAMED))
         each = "one lane is" if lanes == 1 else f"{lanes} lanes are"
         yield f"{each} assumed in each direction of streets without a number of lanes in the extract: {listed}"
+
+
+def _implausible_lanes(ways: Iterable[Way]) -> Iterator[str]:
+    """Yield a note on each street whose tags give a number of lanes that cannot be."""
+    notes = []
+    for way in ways:
+        given = implausible_lanes(way.tags) if "highway" in way.tags else {}
+        if given:
+            name = {**way.tags, **shown_name(way.tags)}.get("name") or UNNAMED_ROAD
+            said = ", ".join(
+                f"{key}={value[:MAX_SHOWN]}{'…' * (len(value) > MAX_SHOWN)}" for key, value in given.items()
+            )
+            lanes = sum(lane_counts(way.tags).values())
+            are = counted(lanes, "lane in all is", "lanes in all are")
+            notes.append(f"the extract gives {name} {said}, which is not a plausible number of lanes: {are} assumed")
+    yield from dict.fromkeys(notes)
 
 
 def _tunnels(extract: Extract, shapes: PlanShapes, seen: BaseGeometry, level: Sequence[str]) -> tuple[str, ...]:

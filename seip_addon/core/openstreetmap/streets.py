@@ -346,6 +346,12 @@ def has_lane_count(tags: Tags) -> bool:
     )
 
 
+def implausible_lanes(tags: Tags) -> dict[str, str]:
+    """Return the tags that give a street's number of lanes and cannot be right."""
+    keys = ("lanes", "lanes:forward", "lanes:backward")
+    return {key: tags[key] for key in keys if key in tags and (count(tags[key], MAX_LANES) or 0.0) <= 0.0}
+
+
 def has_widths(tags: Tags) -> bool:
     """Return whether the map gives the width of a street's lanes."""
     return all(_lane_widths(tags, way, number) for way, number in lane_counts(tags).items())

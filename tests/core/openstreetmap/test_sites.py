@@ -430,6 +430,26 @@ def test_a_place_between_junctions_is_titled_by_its_street(tmp_path):
     assert built(extract, tmp_path, radius=100.0).model.name == "Long Road / Side Street"
 
 
+@pytest.mark.parametrize(
+    ("tags", "said"),
+    [
+        (
+            {"lanes": "1000000000"},
+            "East Road lanes=1000000000, which is not a plausible number of lanes: 2 lanes in all",
+        ),
+        ({"lanes": "many"}, "East Road lanes=many, which"),
+        ({"lanes": "4", "lanes:forward": "99"}, "East Road lanes:forward=99, which"),
+    ],
+)
+def test_an_implausible_number_of_lanes_is_named_in_a_note(tags, said, tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway="secondary", name="East Road", **tags)
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="secondary", name="North Road", lanes=2)
+    notes = [note for note in built(corner_houses(extract), tmp_path).model.notes if "lanes" in note]
+    (note,) = notes
+    assert said in note
+
+
 def test_two_sections_of_one_street_are_not_the_title(tmp_path):
     extract = Extract()
     extract.way([(-200, 0), (0, 0)], highway="primary", name="Ring Road Section 1")
