@@ -65,6 +65,7 @@ VERGE_SPACING = 12.0
 KERB_STEP, RELIEF_SPACING = 2.5, 6.0  # metres: as ground on which nothing is farther off than some centimetres needs
 OVERLAY_SPACING = 4.0  # as the surface of junctions: coarser veils would rise through the coverage on curved roads
 MIN_BRIDGE_HEIGHT = 1.0  # metres above the land from which a road on a bridge is in the air
+MIN_RAMP_HEIGHT = 1.0  # metres above the nearest studied road from which a ramp of another level is in the way
 MIN_WALL = 0.02  # metres of height, of both ends together, from which a gap beside a road below has a wall
 UNNAMED_STREET = "Unnamed street"
 AREA_OVERLAYS = {
@@ -146,7 +147,9 @@ class _OtherLevels:
     lanes : tuple of LaneSurface
         Of the roads on other levels.
     above, below : (n, 3, 3) float64, metres
-        Surfaces of these roads in the air, and on the ground.
+        Surfaces of these roads, all, that are in the way of the studied level, and of the others.
+    on_ground : (n, 3, 3) float64, metres
+        Those of them that lie on the ground.
     decks : shapely geometry
         Where roads of the studied level are in the air: the ground goes on below them.
     """
@@ -154,12 +157,13 @@ class _OtherLevels:
     lanes: tuple[LaneSurface, ...]
     above: Float
     below: Float
+    on_ground: Float
     decks: BaseGeometry
 
     @cached_property
     def area(self) -> BaseGeometry:
         """Area in plan of the roads on the ground."""
-        return outline(self.below, road_surface.SNAP_GRID)
+        return outline(self.on_ground, road_surface.SNAP_GRID)
 
     @cached_property
     def off_posts(self) -> BaseGeometry:
@@ -402,15 +406,16 @@ def _other_level_parts(street: _Surroundings) -> list[Part]:
     return [
         Part("Roads above", _solid(above, "asphalt"), (Role.OCCLUDERS,)),
         Part(OTHER_LEVELS, _solid(below, "asphalt"), (Role.GROUND,)),
-        Part("Retaining walls", _solid(_retaining_walls(below, street), "wall"), (Role.GROUND,)),
+        Part("Retaining walls", _solid(_retaining_walls(street), "wall"), (Role.GROUND,)),
     ]
 
 
-def _retaining_walls(below: Float, street: _Surroundings) -> Float:
-    """Return (n, 3, 3) upright triangles that close the gap between roads below (m, 3, 3) and higher ground."""
+def _retaining_walls(street: _Surroundings) -> Float:
+    """Return (n, 3, 3) upright triangles that close the gap between roads on other levels and higher ground."""
     sides = shapely.boundary(street.crossing.area)
     quads = [np.empty((0, 4, 3))]
-    roads = Terrain(below) if len(below) else street.ground
+    on_ground = street.crossing.on_ground
+    roads = Terrain(on_ground) if len(on_ground) else street.ground
     for line in shapely.get_parts(shapely.segmentize(sides, KERB_STEP)):
         plan = shapely.get_coordinates(line)
         low, high = roads.height(plan), street.ground.height(plan)
@@ -508,7 +513,8 @@ def _surroundings(
     land = description.relief or description.flat_land
     terrain, ground, crossing = _ground(levels, lanes, others, origin, land)
     beyond = shapely.box(*extent.buffer(10 * road_surface.MAX_STEP).bounds).difference(extent)
-    crossing = replace(crossing, above=cut(crossing.above, beyond), below=cut(crossing.below, beyond))
+    above, below, on_ground = (cut(part, beyond) for part in (crossing.above, crossing.below, crossing.on_ground))
+    crossing = replace(crossing, above=above, below=below, on_ground=on_ground)
     return _Surroundings(origin, lanes, region, extent, roadside, terrain, ground, relief, land, crossing)
 
 
@@ -527,9 +533,8 @@ def _ground(
     studied, away = _triangles(lanes), _triangles(others)
     if land is None:
         terrain = Terrain(studied)
-        middles = away.mean(axis=1)
-        above = middles[:, 2] > terrain.height(middles[:, :2])
-        return terrain, terrain, _OtherLevels(others, away[above], away[~above], shapely.Polygon())
+        above = _rise(away, terrain) > 0.0
+        return terrain, terrain, _OtherLevels(others, away[above], away[~above], away[~above], shapely.Polygon())
 
     def height(xy: Float) -> Float:
         local: Float = land.at(xy + origin[:2]) - origin[2]
@@ -546,11 +551,20 @@ def _ground(
     embankments = Embankments(np.concatenate([on_ground, others_on_ground]), height)
     ground = Terrain(np.concatenate([on_ground, others_on_ground]), embankments.height, embankments.steep)
     decks = without(outline(in_air, road_surface.SNAP_GRID), outline(on_ground, road_surface.SNAP_GRID))
+    high = _rise(others_on_ground, Terrain(studied)) > MIN_RAMP_HEIGHT
+    above = np.concatenate([others_in_air, others_on_ground[high]])
     return (
         Terrain(studied, embankments.height, embankments.steep),
         ground,
-        _OtherLevels(others, others_in_air, others_on_ground, decks),
+        _OtherLevels(others, above, others_on_ground[~high], others_on_ground, decks),
     )
+
+
+def _rise(triangles: Float, terrain: Terrain) -> Float:
+    """Return how far triangles (n, 3, 3) lie above a terrain, (n,) metres at their middles."""
+    middles: Float = triangles.mean(axis=1)
+    rise: Float = middles[:, 2] - terrain.height(middles[:, :2])
+    return rise
 
 
 def _triangles(lanes: Sequence[LaneSurface]) -> Float:

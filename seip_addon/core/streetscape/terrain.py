@@ -18,7 +18,7 @@ ROADSIDE, MAX_ROADSIDE = 5.0, 15.0
 """Width (metres) of the strip beside a road in which the ground changes from its height to that of the land."""
 EMBANKMENT_RUN = 2.2  # metres of that width for each metre of height between the two
 MIN_EMBANKMENT = 0.25  # metres of height from which the strip needs a finer grid than flat ground
-STEEP_DIVISIONS = 4  # parts of a cell's side where the ground is steep
+STEEP_SPACING = 2.0  # metres, about, between places where the ground is steep
 _TOUCHING = 1e-3  # metres from a road within which the ground has its height
 
 
@@ -202,7 +202,7 @@ def embankment_width(height: Float) -> Float:
 def _cells(area: BaseGeometry, spacing: float, steep: BaseGeometry | None = None) -> NDArray[np.object_]:
     """Return the polygons that a square grid through the origin divides an area into.
 
-    Cells that meet a steep area are divided into `STEEP_DIVISIONS` squares a side.
+    Cells that meet a steep area are divided into squares of about `STEEP_SPACING`.
     """
     if area.is_empty:
         return np.array([], dtype=object)
@@ -217,8 +217,9 @@ def _cells(area: BaseGeometry, spacing: float, steep: BaseGeometry | None = None
         shapely.prepare(steep)
         divided = shapely.intersects(steep, met)
         low = shapely.bounds(met[divided])[:, :2]
-        side = spacing / STEEP_DIVISIONS
-        offsets = side * np.stack(np.meshgrid(*[np.arange(STEEP_DIVISIONS)] * 2), axis=-1).reshape(-1, 2)
+        divisions = max(round(spacing / STEEP_SPACING), 1)
+        side = spacing / divisions
+        offsets = side * np.stack(np.meshgrid(*[np.arange(divisions)] * 2), axis=-1).reshape(-1, 2)
         x, y = (low[:, None] + offsets).reshape(-1, 2).T
         whole = met[~divided]
         # Cells next to them get the same corners along the common side, so that no cracks open between both.

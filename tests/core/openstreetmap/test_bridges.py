@@ -345,12 +345,13 @@ def test_many_random_exits_have_gentle_grades_and_no_steps(tmp_path, seed):
 
 
 def test_a_bridge_is_in_the_way_of_what_lies_below(tmp_path):
-    extract = corner_houses(Extract(), near=30.0)
+    extract = Extract()
     bridge(extract)
     trunk(extract)
     site, _ = built(extract, tmp_path, level=("Trunk Road",))
     deck = next(part for part in site.model.parts if part.name == "Roads above")
     assert deck.solid.vertices[:, 2].max() + site.model.origin[2] == pytest.approx(ROAD_CLEARANCE, abs=0.01)
+    assert not any("nothing in this scene can hide" in warning for warning in site.model.warnings)
 
 
 def surfaces(model, *names):
@@ -399,8 +400,7 @@ def test_the_ground_beside_and_below_a_bridge_is_closed(tmp_path):
     below = surface_height(places, lower)
     assert np.isfinite(below).all()
     rows = below.reshape(x.shape)
-    assert np.abs(np.diff(rows, axis=0)).max() < 1.0
-    assert np.abs(np.diff(rows, axis=1)).max() < 1.2
+    assert max(np.abs(np.diff(rows, axis=axis)).max() for axis in (0, 1)) < 1.6
     deck = surface_height(places, surfaces(model, "Driving lanes"))
     over = np.isfinite(deck) & (np.abs(places[:, 0] - trunk_at.x) < 3.0)
     assert over.any()
