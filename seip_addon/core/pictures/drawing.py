@@ -25,6 +25,7 @@ SENSOR_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 11.0, "mfc": I
 HIDDEN_MARK: dict[str, Any] = {"mfc": "none", "mec": INK, "mew": 2.0}
 MARK_RADIUS, LABEL_SIZE, LABEL_PADDING = 8.0, 8.5, 0.35  # points, points, share of the size
 ATTRIBUTION_ORDER = 100  # drawing order of credits: over everything
+SIZE_STEP = 0.1  # points
 MAX_LABELLED = 40  # more sensors than these get no labels on the picture
 
 
@@ -105,14 +106,16 @@ def draw_title(figure: Figure, site: Site, deployment: Deployment, left: float) 
     title = figure.text(y=1 - 0.20 / height, s=site.name, weight="bold", color=INK, **style)
     line = figure.text(y=1 - 0.55 / height, s=summary(deployment), color=SOFT_INK, **style)
     _fit(title, room, 17.0, 12.0)
-    _fit(line, room, 11.0, 7.0)
+    _fit(line, room, 11.0, 4.0)
 
 
 def _fit(text: Text, room: float, size: float, least: float) -> None:
     """Fit a text into a width in inches: at a size in points, a smaller one down to ``least``, or cut short."""
     words = text.get_text()
     text.set_fontsize(size)
-    text.set_fontsize(max(size / max(1.0, _inches(text) / room), least))
+    while _inches(text) > room and size > least:  # letters have whole pixels: widths do not quite follow the size
+        size = max(min(size - SIZE_STEP, size * room / _inches(text)), least)
+        text.set_fontsize(size)
     for length in range(len(words) - 1, 0, -1):
         if _inches(text) <= room:
             return

@@ -266,3 +266,13 @@ def test_the_summary_of_a_placement_by_returns_begins_with_them_and_fits_the_pag
     draw_title(figure, example.site, deployment, 0.3)
     line = figure.texts[-1].get_window_extent()
     assert 29.9 <= line.x0 < line.x1 <= 571
+    assert figure.texts[-1].get_text() == summary(deployment)
+
+
+@pytest.mark.parametrize("width", np.linspace(4.5, 9.0, 19))
+def test_a_line_that_a_smaller_size_fits_is_not_cut_short(example, width):
+    figure = Figure((width, 4.0), dpi=160)
+    FigureCanvasAgg(figure)
+    draw_title(figure, example.site, example.deployment, 0.2)
+    assert figure.texts[1].get_text() == summary(example.deployment)
+    assert figure.texts[1].get_window_extent().x1 <= 160 * (width - 0.2) + 0.5
