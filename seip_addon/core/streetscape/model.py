@@ -552,11 +552,11 @@ def _ground(
     ground = Terrain(np.concatenate([on_ground, others_on_ground]), embankments.height, embankments.steep)
     decks = without(outline(in_air, road_surface.SNAP_GRID), outline(on_ground, road_surface.SNAP_GRID))
     high = _rise(others_on_ground, Terrain(studied)) > MIN_RAMP_HEIGHT
-    above = np.concatenate([others_in_air, others_on_ground[high]])
+    in_way = np.concatenate([others_in_air, others_on_ground[high]])
     return (
         Terrain(studied, embankments.height, embankments.steep),
         ground,
-        _OtherLevels(others, above, others_on_ground[~high], others_on_ground, decks),
+        _OtherLevels(others, in_way, others_on_ground[~high], others_on_ground, decks),
     )
 
 

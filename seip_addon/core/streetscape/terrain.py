@@ -143,14 +143,14 @@ class Terrain:
 class Embankments:
     r"""Heights of the ground next to roads: slopes lead from these to the land.
 
-    Next to a road the ground is as high as the road; from a width :math:`b` on it is as high as the land, which lies at
-    :math:`g`. At a distance :math:`d < b` from the nearest road it is at
+    Next to a road the ground is as high as the road; from a width :math:`b` on it is as high as the land. A road at the
+    height :math:`h` above the land raises it at a distance :math:`d < b` by
 
-    .. math:: (1 - s) r + s g, \qquad s = \frac{d^2}{d^2 + (b - d)^2}.
+    .. math:: (1 - s) h, \qquad s = \frac{d^2}{d^2 + (b - d)^2}.
 
-    Several roads are near where one climbs next to another one. Their height :math:`r` is the mean over triangles
-    :math:`i` within the greatest width :math:`B`, weighted by :math:`((B - d_i) / (B d_i))^2` (Franke and Little's
-    weights): at the edge of each road it is that road's, and it has no steps in between.
+    Several roads are near where one climbs next to another one. The ground is raised by the mean over their triangles
+    within the greatest width :math:`B`, weighted by :math:`((B - d) / (B d))^2` (Franke and Little's weights): at the
+    edge of each road it has that road's height, and no steps in between.
 
     Parameters
     ----------
@@ -180,16 +180,13 @@ class Embankments:
         nearest = shapely.get_coordinates(shapely.shortest_line(self._plan[triangle], points[point]))[::2]
         away = np.hypot(*(xy[point] - nearest).T)
         weight = (np.maximum(self._reach - away, 0.0) / (self._reach * np.maximum(away, _TOUCHING))) ** 2
+        above = plane_height(self._triangles[triangle], nearest) - land[point]
+        width = embankment_width(np.abs(above))
+        away = np.minimum(away, width)
+        raised = above * (1 - away**2 / (away**2 + (width - away) ** 2))
         total = np.bincount(point, weight, minlength=len(xy))
-        known = total > 0.0
-        mean = np.bincount(point, weight * plane_height(self._triangles[triangle], nearest), minlength=len(xy))
-        roads = np.where(known, mean / np.where(known, total, 1.0), land)
-        distance = np.full(len(xy), np.inf)
-        np.minimum.at(distance, point, away)
-        width = embankment_width(np.abs(roads - land))
-        distance = np.minimum(distance, width)
-        share = distance**2 / (distance**2 + (width - distance) ** 2)
-        ground: Float = (1 - share) * roads + share * land
+        mean = np.bincount(point, weight * raised, minlength=len(xy)) / np.where(total > 0.0, total, 1.0)
+        ground: Float = land + mean
         return ground
 
 
