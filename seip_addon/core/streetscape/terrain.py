@@ -149,7 +149,7 @@ class Embankments:
     .. math:: (1 - s) h, \qquad s = \frac{d^2}{d^2 + (b - d)^2}.
 
     Several roads are near where one climbs next to another one. The ground is raised by the mean over their triangles
-    within the greatest width :math:`B`, weighted by :math:`((B - d) / (B d))^2` (Franke and Little's weights): at the
+    within the greatest width :math:`B`, weighted by :math:`((B - d) / (B d))^4` (after Franke and Little): at the
     edge of each road it has that road's height, and no steps in between.
 
     Parameters
@@ -179,7 +179,7 @@ class Embankments:
         point, triangle = self._tree.query(points, predicate="dwithin", distance=self._reach)
         nearest = shapely.get_coordinates(shapely.shortest_line(self._plan[triangle], points[point]))[::2]
         away = np.hypot(*(xy[point] - nearest).T)
-        weight = (np.maximum(self._reach - away, 0.0) / (self._reach * np.maximum(away, _TOUCHING))) ** 2
+        weight = (np.maximum(self._reach - away, 0.0) / (self._reach * np.maximum(away, _TOUCHING))) ** 4
         above = plane_height(self._triangles[triangle], nearest) - land[point]
         width = embankment_width(np.abs(above))
         away = np.minimum(away, width)
