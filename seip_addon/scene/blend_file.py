@@ -24,7 +24,7 @@ def open_blend(path: Path) -> None:
     Raises
     ------
     SeipError
-        There is no such file or it is not a .blend.
+        There is no such file, it is not a .blend, or it is damaged.
     """
     if not path.is_file():
         raise SeipError(f"there is no file {path}; build one with headless/build_scene.py or check the name")
@@ -32,6 +32,26 @@ def open_blend(path: Path) -> None:
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
     except RuntimeError as error:
         raise SeipError(f"{path} is not a .blend that Blender {bpy.app.version_string} can open") from error
+    require_readable_names()
+
+
+def require_readable_names() -> None:
+    """Check that all names of the open file can be read: Blender opens damaged files whose names are not UTF-8.
+
+    Raises
+    ------
+    SeipError
+        Some name cannot be read.
+    """
+    data = bpy.data
+    for kind in ("scenes", "collections", "objects", "meshes", "materials"):
+        try:
+            for block in getattr(data, kind):
+                _ = block.name
+        except UnicodeDecodeError as error:
+            raise SeipError(
+                f"the .blend is damaged: among its {kind} is a name that is not UTF-8; take an earlier copy of the file"
+            ) from error
 
 
 def check_name(path: Path) -> None:

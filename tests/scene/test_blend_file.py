@@ -91,3 +91,21 @@ def test_what_is_no_blend_is_refused_by_name(tmp_path, content):
         path.write_bytes(content)
     with pytest.raises(SeipError, match=r"site\.blend"):
         open_blend(path)
+
+
+@pytest.mark.parametrize("kind", ["scenes", "collections", "objects", "meshes", "materials"])
+def test_a_damaged_name_is_refused(tmp_path, kind):
+    new_file()
+    mesh = bpy.data.meshes.new("XXmeshesXX")
+    thing = bpy.data.objects.new("XXobjectsXX", mesh)
+    mesh.materials.append(bpy.data.materials.new("XXmaterialsXX"))
+    collection = bpy.data.collections.new("XXcollectionsXX")
+    collection.objects.link(thing)
+    bpy.context.scene.collection.children.link(collection)
+    bpy.context.scene.name = "XXscenesXX"
+    path = tmp_path / "damaged.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=False)
+    name = f"XX{kind}XX".encode()
+    path.write_bytes(path.read_bytes().replace(name, b"\xd0" * len(name)))
+    with pytest.raises(SeipError, match=f"damaged: among its {kind} is a name that is not UTF-8"):
+        open_blend(path)
