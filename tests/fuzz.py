@@ -19,6 +19,7 @@ import base64
 import gzip
 import io
 import json
+import os
 import re
 import resource
 import select
