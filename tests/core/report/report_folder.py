@@ -14,6 +14,7 @@ from seip_addon.core.pictures.plan_view import save_plan_view
 from seip_addon.core.placement import Placement
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.objective import Objective, Solution, placement_problem
+from seip_addon.core.placement.problem import relative_gap
 from seip_addon.core.results.placement_record import Provenance, placement_record, save_placement_record
 from seip_addon.core.results.site_file import save_site_file
 from seip_addon.core.site.scene_geometry import NamedArea
@@ -73,6 +74,7 @@ def make_solution(example: Example, goal: Objective, **found) -> Solution:
         chosen = found.pop("chosen")
         deployment = deploy(example.site, example.models, example.visible, chosen)
     value = float(np.count_nonzero(deployment.seen_by))
-    values = {"objective": value, "bound": value, "gap": 0.0, "status": "optimal", **found}
+    values = {"objective": value, "bound": value, "status": "optimal", **found}
+    values.setdefault("gap", relative_gap(values["objective"], values["bound"]))
     placement = Placement(chosen=chosen, solver="HiGHS", seconds=0.5, covered=value, price=deployment.price, **values)
     return Solution(goal, placement, None, deployment)

@@ -175,7 +175,13 @@ def test_figures_agree_with_the_grid(folder):
         (Objective(count=3), {"status": MOVED, "bound": np.nan, "gap": np.inf}, "nothing is proven of it"),
         (
             Objective(count=3),
-            {"notes": ("chosen for the worst failure",), "gap": 0.5, "status": "feasible"},
+            {
+                "notes": ("chosen for the worst failure",),
+                "objective": 500.0,
+                "bound": 750.0,
+                "gap": 0.5,
+                "status": "feasible",
+            },
             r"Within 50\.00% of the best",
         ),
     ],
