@@ -118,7 +118,7 @@ def test_mistakes_are_named(folder, tmp_path):
     far = car_and_bus(-3.5)
     far.position[:] += [5000.0, 0.0, 0.0]
     far.save(tmp_path / "far.npz")
-    with pytest.raises(SeipError, match=r"nobody of the run of traffic \(by hand, -3\.5\) is ever in the region"):
+    with pytest.raises(SeipError, match="traffic of another site: 100% of the vehicle positions of far"):
         detect.main(arguments(folder, "x", str(tmp_path / "far.npz")))
     assert not (folder / "x" / "detection.json").exists()
 

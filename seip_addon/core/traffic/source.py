@@ -109,8 +109,8 @@ def require_own_traffic(trajectories: Trajectories, geometry: SceneGeometry, nam
     share = share_on_road(trajectories, geometry)
     if share < MIN_ON_ROAD:
         raise SeipError(
-            f"traffic of another site: {1 - share:.0%} of the vehicle positions of {name} near the region are off the "
-            "road of this scene; import or simulate traffic for it"
+            f"traffic of another site: {1 - share:.0%} of the vehicle positions of {name} are off the road of this "
+            "scene; import or simulate traffic for it"
         )
 
 
