@@ -39,8 +39,10 @@ from .search_limits import Clock
 
 MIN_SENSORS = 3  # with so many sensors to come, or more, a node is bounded by Lagrangian relaxation as well
 
-MIN_CHILDREN = 20
-"""... where at least so many children are left: elsewhere branching itself tightens the bound, and sooner ...
+MIN_CHILDREN = 60
+"""... where at least so many children are left, and each sensor adds no more than the one before it ...
+
+Elsewhere branching itself tightens the bound, and sooner.
 """
 
 TRIALS, MAX_KEPT_SHARE = 4, 0.5
@@ -137,6 +139,10 @@ class Search:
         self._depth_first = depth_first
         self._clock = Clock(math.inf)
         self._matrix = instance.matrix
+        self._by_target = np.ascontiguousarray(self._matrix.T)
+        self._seen_by = np.ascontiguousarray(instance.visible.T)
+        self._weight = instance.weight.astype(self._matrix.dtype)
+        self._overlap = (self._matrix * self._weight) @ self._by_target if instance.cover.top == 1 else None
         self._excluded = instance.conflict | np.eye(len(instance), dtype=bool)
         # running sums of all gains, each at most the total, are exact below MAX_EXACT_DOUBLE and rounded beyond
         most = instance.total * (len(instance) + 1)
@@ -218,7 +224,7 @@ class Search:
             self._take_leaves(node, children)
             return []
         known = node.multipliers is not None and not node.chosen
-        if children >= MIN_CHILDREN and not known and self._relaxation_pays(left):
+        if children >= MIN_CHILDREN and self.instance.cover.concave and not known and self._relaxation_pays(left):
             before = children
             node, children = yield from self._relaxed(node, left, goal)
             self._left_over.setdefault(left, []).append(children / before)
@@ -280,7 +286,7 @@ class Search:
         spent = math.fsum(instance.price[list(node.chosen)])
         return replace(
             instance,
-            visible=instance.visible[followers][:, targets],
+            visible=self._seen_by[targets][:, followers].T,  # rows of targets are copied faster
             weight=instance.weight[targets],
             price=instance.price[followers],
             conflict=np.broadcast_to(np.False_, (len(followers), len(followers))),  # bounds know the cliques alone
@@ -335,21 +341,30 @@ class Search:
         if instance.cover.concave:  # the same however many are to come
             return node.gains
         increments = instance.increments(times, left).astype(self._matrix.dtype)
-        gains: Numbers = self._matrix[node.followers] @ increments
+        gains: Numbers = (self._matrix @ increments)[node.followers]
         return gains
 
     def _overlaps(self, times: Integer, left: int, followers: Integer, children: int) -> Numbers:
         """Return how much less each follower adds after each child, with so many to come, (children, n).
 
-        For plain coverage this is the weight that both see and no chosen one.
+        For plain coverage this is the weight that both see and no chosen one: all that both see, less what is seen
+        already, where that is shorter.
         """
         instance = self.instance
         lost = instance.increments(times, left) - instance.increments(times + 1, left)
-        changed = np.flatnonzero(instance.visible[followers[:children]].any(axis=0) & (lost != 0))
-        self._clock.spend(len(changed) * len(followers) * (children + OPERATIONS_PER_FETCH))
-        seen = instance.visible[followers][:, changed].astype(self._matrix.dtype)
-        shared: Numbers = (seen[:children] * lost[changed].astype(self._matrix.dtype)) @ seen.T
-        return shared
+        by_child = instance.visible[followers[:children]].any(axis=0)
+        kept, changed = np.flatnonzero(by_child & (lost == 0)), np.flatnonzero(by_child & (lost != 0))
+        overlap = self._overlap if len(kept) <= len(changed) else None
+        targets = changed if overlap is None else kept
+        factor = (lost if overlap is None else instance.weight)[targets].astype(self._matrix.dtype)[:, None]
+        self._clock.spend(len(targets) * len(followers) * (children + OPERATIONS_PER_FETCH))
+        rows, by_target = followers[:children], self._by_target[targets]
+        if 2 * len(followers) < len(instance):
+            by_target = by_target[:, followers]
+            shared: Numbers = (by_target[:, :children] * factor).T @ by_target
+        else:
+            shared = ((by_target[:, rows] * factor).T @ by_target)[:, followers]
+        return shared if overlap is None else overlap[rows[:, None], followers] - shared
 
     def _best_completions(self, node: _Node, gains_after: Numbers, left: int) -> tuple[float, Float]:
         """Return what so many sensors more add to each child at most, within what it leaves of the budget.
