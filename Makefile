@@ -1,6 +1,6 @@
 # make demo        set up, and place sensors at the shipped junction
 # make site        build a site from an OpenStreetMap extract, with sensors and a report (installs SUMO: 230 MB)
-# make test        set up, and run the tests (the slow ones: make test-slow)
+# make test        set up, and run the tests (the slow ones: make test-slow; those of the studies: make test-studies)
 # make lint        set up, and check style and types
 # make scenes      rebuild the shipped scenes from their sources
 # make detection   install PyTorch, for the detector; make test-detection tests it
@@ -25,7 +25,7 @@ SPREAD := -n auto --maxprocesses 4
 DEMO := scenes/junction.blend -o out/junction
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo site test test-slow lint scenes sumo test-traffic traffic detection test-detection study coverage-study detection-study detector ingredients settings stability benchmark extension lock clean distclean
+.PHONY: help environment demo site test test-slow test-studies lint scenes sumo test-traffic traffic detection test-detection study coverage-study detection-study detector ingredients settings stability benchmark extension lock clean distclean
 
 help:
 	@sed -n '/^#/!q; s/^#\( \|$$\)//p' Makefile
@@ -44,10 +44,13 @@ site: sumo
 	@echo "pictures and report: out/harbour/"; ls out/harbour/*.png out/harbour/report.*
 
 test: environment
-	$(PY) -m pytest $(SPREAD) -m "not slow"
+	$(PY) -m pytest $(SPREAD) --ignore tests/studies -m "not slow"
 
 test-slow: environment
-	$(PY) -m pytest $(SPREAD) -m "slow or hypothesis"
+	$(PY) -m pytest $(SPREAD) --ignore tests/studies -m "slow or hypothesis"
+
+test-studies: detection sumo
+	$(PY) -m pytest $(SPREAD) tests/studies
 
 lint: environment
 	$(PY) -m ruff check
@@ -63,7 +66,7 @@ sumo: environment
 
 test-traffic: sumo
 	$(PY) -m pytest tests/core/opendrive/test_shipped_maps.py tests/headless/test_traffic_simulation.py tests/headless/test_traffic.py \
-	  tests/core/openstreetmap/test_sites.py tests/headless/test_training_sites.py tests/headless/test_paper_traffic.py
+	  tests/core/openstreetmap/test_sites.py
 
 # Runs of one scene differ by their seed, and by the second of the signals' cycle of 60 s at which they begin; dense ones
 # have twice the vehicles. They are many and short, as whole runs alone are independent of each other.
@@ -90,29 +93,29 @@ test-detection: detection
 study: coverage-study detection-study
 
 coverage-study: detection
-	$(PY) -m headless.study scenes/junction.blend -o out/study/coverage
+	$(PY) -m headless study coverage scenes/junction.blend -o out/study/coverage
 
 detection-study: detection
-	$(PY) -m headless.evaluate scenes/junction.blend -o out/study/detection
+	$(PY) -m headless study detection scenes/junction.blend -o out/study/detection
 
 detector: detection sumo
-	$(PY) -m headless.generate_sites -o out/sites --sites 20 --seed 1
-	$(PY) -m headless.train_on_sites out/sites/site-*/site.blend --steps 3600 -o out/detector
+	$(PY) -m headless study random-sites -o out/sites --sites 20 --seed 1
+	$(PY) -m headless study site-training out/sites/site-*/site.blend --steps 3600 -o out/detector
 	cp out/detector/detector.pt headless/detection/shipped_detector.pt
 
 ingredients: detection sumo
-	$(PY) -m headless.generate_sites -o out/sites --sites 20 --seed 1
-	$(PY) -m headless.compare_ingredients out/sites/site-*/site.blend --unseen scenes/junction.blend scenes/corridor.blend -o out/ingredients
+	$(PY) -m headless study random-sites -o out/sites --sites 20 --seed 1
+	$(PY) -m headless study ingredients out/sites/site-*/site.blend --unseen scenes/junction.blend scenes/corridor.blend -o out/ingredients
 
 settings: detection
-	$(PY) -m headless.compare_detectors scenes/junction.blend -o out/detectors
+	$(PY) -m headless study detector-settings scenes/junction.blend -o out/detectors
 
 stability: detection
-	$(PY) -m headless.stability scenes/junction.blend --other scenes/corridor.blend -o docs
+	$(PY) -m headless study stability scenes/junction.blend --other scenes/corridor.blend -o docs
 
 benchmark: environment
 	$(PY) -m pip install -qq --group benchmark
-	$(PY) -m headless.benchmark scenes/junction.blend -o docs
+	$(PY) -m headless study benchmark scenes/junction.blend -o docs
 
 extension: environment
 	$(PY) -m headless.build_extension --platforms $(PLATFORMS)

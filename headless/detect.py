@@ -1,10 +1,10 @@
-"""Judge a placement by what a trained detector finds with its sensors on runs of traffic.
+"""Average precision of a trained detector with the sensors of a scene, on runs of traffic.
 
 python -m headless.detect out/placed.blend --traffic run-*.npz -o out/detection
 blender -b --python-exit-code 1 out/placed.blend -P headless/detect.py -- --traffic run-*.npz -o out/detection
 
-Needs torch (make detection). The sensors are those of the scene, wherever they hang and of whatever types. The
-detector that ships with the project has learnt from random placements at random sites (`headless/train_on_sites.py`).
+Needs torch (make detection). The sensors are those of the scene, of any types and at any positions. The detector that
+ships with the project was trained on random placements at random sites (`seip study site-training`).
 """
 
 import argparse
@@ -22,12 +22,11 @@ from headless.charts.detection import PrecisionRecallLine, save_parts_chart, sav
 from headless.charts.error_view import save_error_view
 from headless.detection.average_precision import precision_recall, too_few_runs
 from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
-from headless.detection.case_study import sampled_runs
 from headless.detection.chart_data import error_view, parts
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
 from headless.detection.inference import seconds_of
 from headless.detection.judgement import Judgement, figures, judge
-from headless.detection.recordings import MountedSensors, Simulator
+from headless.detection.recordings import MountedSensors, Simulator, sampled_runs
 from headless.detection.rules import MAIN_RULE
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import deterministic
@@ -148,7 +147,7 @@ def _save(folder: Path, judgement: Judgement, simulator: Simulator, sensors: lis
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("detect", "Judge a placement by what a trained detector finds with its sensors.")
+    parser = new_parser("detect", "Compute the average precision of a detector with the sensors of a scene.")
     parser.add_argument("scene", nargs="?", type=Path, help="the .blend with its sensors; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the figures")
     parser.add_argument("--traffic", nargs="+", type=Path, required=True, metavar="NPZ", help="runs to detect in")
@@ -157,7 +156,7 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         default=SHIPPED_DETECTOR,
         metavar="PT",
-        help="another than the shipped one, of `seip train` or `seip train-on-sites`",
+        help="another than the shipped one, of `seip train` or `seip study site-training`",
     )
     parser.add_argument(
         "--every", type=real_number(TIME_STEP), default=2.5, metavar="S", help="time from frame to frame"

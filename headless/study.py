@@ -1,63 +1,55 @@
-"""Coverage of sensor types × heights × numbers on any scene, vanilla against weighted.
+"""Run a study of the program's methods.
 
-python -m headless.study scenes/junction.blend -o out/study
-blender -b --python-exit-code 1 site.blend -P headless/study.py -- -o out/study
+seip study coverage scenes/junction.blend -o out/study
+blender -b --python-exit-code 1 site.blend -P headless/study.py -- coverage -o out/study
+
+`headless/studies/README.md` says what each shows and how long it takes.
 """
 
-import argparse
+import importlib
 import sys
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import runtime, survey
-from headless.claims import save_claims
-from headless.coverage_study.cells import CHARTED_WEIGHT, COUNTS, coverage_study
-from headless.coverage_study.charts import save_height_chart, save_weight_chart
-from headless.coverage_study.claims import coverage_claims
-from headless.coverage_study.tables import save_study_table
-from headless.options import new_parser
+from headless import runtime
 
-from seip_addon.core.pictures.plan_view import save_plan_view
-from seip_addon.core.placement.objective import Objective, check_objective
+from seip_addon.core.errors import SeipError
+
+STUDIES = {
+    "coverage": "coverage of sensor types × heights × numbers",
+    "detection": "average precision of sensor types × numbers",
+    "detector-settings": "precision against time of other settings of the detector",
+    "ingredients": "gain of each ingredient of the detector's training",
+    "random-sites": "random sites with traffic, to train detectors on",
+    "site-training": "training of a detector on several sites",
+    "calibration": "LiDAR models against measured sweeps",
+    "paper": "the paper's case study on its map and traffic",
+    "stability": "limits of every method",
+    "benchmark": "speed and error of every method",
+}
+"""Studies by name: a folder each in `headless/studies`."""
 
 
 def main(argv: list[str]) -> None:
-    """Run the study on one scene and write charts, tables and plans to a folder."""
-    options = _parser().parse_args(argv)
-    surveyed, watch = survey.survey(
-        options, lambda layout: check_objective(layout.site, layout.models, Objective(count=1))
+    """Run the study that the first argument names, with the arguments after it."""
+    if not argv or argv[0] in {"-h", "--help"}:
+        runtime.print_line(_usage())
+        return
+    name = argv[0]
+    if name not in STUDIES:
+        raise SeipError(f"there is no study {name!r}: seip study --help lists the studies")
+    importlib.import_module(f"headless.studies.{name.replace('-', '_')}.command").main(argv[1:])
+
+
+def _usage() -> str:
+    width = max(map(len, STUDIES))
+    studies = "\n".join(f"  {name:{width}}  {what}" for name, what in STUDIES.items())
+    return (
+        "usage: seip study NAME [options]    (seip study NAME --help lists them)\n\n"
+        f"Run a study of the program's methods.\n\n{studies}"
     )
-    site, visible, folder = surveyed.site, surveyed.grid.visible, options.output
-    steps = coverage_study(site, surveyed.models, visible, surveyed.settings.limits)
-    study = watch.run("study", steps)
-    claims = coverage_claims(study)
-
-    with runtime.incomplete_if_interrupted(folder):
-        save_study_table(folder / "coverage.csv", study)
-        save_height_chart(folder / "heights.png", study, site.name)
-        weighted = site.targets.central.any()
-        if weighted:
-            save_weight_chart(folder / "weights.png", study, site.name)
-        for sensor in study.sensors:
-            for weight in (1.0, CHARTED_WEIGHT) if weighted else (1.0,):
-                case = study.find(sensor, COUNTS[-1], weight=weight)
-                if case is not None:
-                    name = f"plan_{sensor}_{'vanilla' if weight == 1.0 else 'weighted'}.png"
-                    notes = [] if weight == 1.0 else [f"Optimised with weight {weight:g} in weighted regions."]
-                    save_plan_view(folder / name, surveyed.geometry, site, case.deployment, notes)
-        save_claims(folder / "claims.md", claims, site.name)
-    for claim in claims:
-        runtime.print_line(claim.describe())
-    runtime.print_line(f"written to {folder}/")
-
-
-def _parser() -> argparse.ArgumentParser:
-    what = "Redo the study's coverage figures on a scene; name sensor types from the simplest to the best."
-    parser = new_parser("study", what)
-    survey.add_options(parser)
-    return parser
 
 
 if __name__ == "__main__":

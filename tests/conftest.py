@@ -39,6 +39,6 @@ def pytest_unconfigure(config):
 def small_scene(tmp_path_factory):
     """A scene that every command runs on in a moment, with traffic beside it."""
     pytest.importorskip("bpy")
-    from small_scene import save_small_scene  # noqa: PLC0415 -- Blender's module need not be there
+    from tests.builders.small_scene import save_small_scene  # noqa: PLC0415 -- Blender's module need not be there
 
     return save_small_scene(tmp_path_factory.mktemp("small"))

@@ -180,7 +180,7 @@ NOT_FINITE = ("nan", "inf", "-inf", "1e999", "x", "")
 
 
 def _maps(_: Path) -> list[bytes]:
-    from street_map import street_map  # noqa: PLC0415  # each reader loads what it needs
+    from tests.builders.street_map import street_map  # noqa: PLC0415  # each reader loads what it needs
 
     furniture = (
         '<object id="1" type="building" s="30" t="20" zOffset="0" length="10" width="8" height="9" hdg="0.1"/>'
@@ -251,7 +251,7 @@ def _read_catalogue(path: Path, _: bytes) -> None:
 
 def _units(suffix: str) -> Callable[[Path], list[bytes]]:
     def samples(_: Path) -> list[bytes]:
-        from unit_text import FILES  # noqa: PLC0415
+        from tests.builders.unit_text import FILES  # noqa: PLC0415
 
         return [text.encode() for name, text in FILES.items() if name.endswith(suffix)]
 
@@ -266,7 +266,7 @@ def _read_unit(path: Path, _: bytes) -> None:
 
 
 def _measurements(_: Path) -> list[bytes]:
-    from measured_sensor import LAW, measured  # noqa: PLC0415
+    from tests.builders.measured_sensor import LAW, measured  # noqa: PLC0415
 
     return [json.dumps(measured(LAW)).encode()]
 
@@ -276,7 +276,7 @@ def _mutate_text(random: Random, content: bytes) -> Case:
 
 
 def _read_measurements(path: Path, _: bytes) -> None:
-    from headless.calibration.reference import load_reference  # noqa: PLC0415
+    from headless.studies.calibration.reference import load_reference  # noqa: PLC0415
 
     require_physical(load_reference(path))
 
@@ -285,7 +285,7 @@ def _read_measurements(path: Path, _: bytes) -> None:
 
 
 def _floating_car_data(_: Path) -> list[bytes]:
-    from sumo_text import CONVERTED_CSV, FCD, NATIVE_CSV  # noqa: PLC0415
+    from tests.builders.sumo_text import CONVERTED_CSV, FCD, NATIVE_CSV  # noqa: PLC0415
 
     return [text.encode() for text in (FCD, NATIVE_CSV, CONVERTED_CSV)] + [gzip.compress(FCD.encode(), mtime=0)]
 
@@ -316,7 +316,7 @@ def _read_floating_car_data(path: Path, content: bytes) -> None:
 
 
 def _routes(_: Path) -> list[bytes]:
-    from sumo_text import NET, ROUTES  # noqa: PLC0415
+    from tests.builders.sumo_text import NET, ROUTES  # noqa: PLC0415
 
     return [ROUTES.encode(), NET.encode()]
 
@@ -343,10 +343,9 @@ def _read_routes(path: Path, content: bytes) -> None:
 
 
 def _arrays(folder: Path) -> list[bytes]:
-    from traffic_by_hand import USERS, make_trajectories  # noqa: PLC0415
-
     from seip_addon.core.scans.frame import Frame, Labels  # noqa: PLC0415
     from seip_addon.core.visibility.grid import VisibilityGrid  # noqa: PLC0415
+    from tests.builders.traffic_by_hand import USERS, make_trajectories  # noqa: PLC0415
 
     random = np.random.default_rng(0)
     ways = [[(0.1 * step, step + 9.0 * user, 0.0, 0.0, 0.1 * step, 0.0) for step in range(4)] for user in range(2)]
@@ -670,7 +669,7 @@ def _read_run(path: Path, _: bytes) -> None:
 
 
 def _cities(folder: Path) -> list[bytes]:
-    from city_text import CityModel, origin_at  # noqa: PLC0415
+    from tests.builders.city_text import CityModel, origin_at  # noqa: PLC0415
 
     model = CityModel(origin_at(52.5, 13.4))
     model.add("a", model.gabled(0, 0, 10, 8, 6, 9)).add("b", model.block(20, 0, 10, 8, 12))
@@ -678,13 +677,12 @@ def _cities(folder: Path) -> list[bytes]:
 
 
 def _read_city(path: Path, _: bytes) -> None:
-    from city_text import origin_at  # noqa: PLC0415
-
     from seip_addon.core.citymodel.at_place import AskedBuildings, with_city_model  # noqa: PLC0415
     from seip_addon.core.citymodel.cityjson import read_city_model  # noqa: PLC0415
     from seip_addon.core.opendrive.geo_reference import GeoReference  # noqa: PLC0415
     from seip_addon.core.progress import finish  # noqa: PLC0415
     from seip_addon.core.streetscape.description import SiteDescription  # noqa: PLC0415
+    from tests.builders.city_text import origin_at  # noqa: PLC0415
 
     require_physical(read_city_model(path).vertices, "vertices", most=1e8)
     x, y, _ = origin_at(52.5, 13.4)
@@ -697,8 +695,8 @@ def _read_city(path: Path, _: bytes) -> None:
 
 
 def _elevations(folder: Path) -> list[bytes]:
-    from city_text import origin_at  # noqa: PLC0415
-    from dem_files import sampled, write_dem  # noqa: PLC0415
+    from tests.builders.city_text import origin_at  # noqa: PLC0415
+    from tests.builders.dem_files import sampled, write_dem  # noqa: PLC0415
 
     x, y, _ = origin_at(52.5, 13.4)
     slope = sampled(lambda a, b: 30 + 0.01 * (a - x), x - 100, y + 100, 40, 5.0)
@@ -732,8 +730,8 @@ def _read_elevation(path: Path, _: bytes) -> None:
 
 def _surveys(suffix: str) -> Callable[[Path], list[bytes]]:
     def samples(folder: Path) -> list[bytes]:
-        from city_text import origin_at  # noqa: PLC0415
-        from survey_files import block_points, ground_points, write_survey  # noqa: PLC0415
+        from tests.builders.city_text import origin_at  # noqa: PLC0415
+        from tests.builders.survey_files import block_points, ground_points, write_survey  # noqa: PLC0415
 
         random = np.random.default_rng(0)
         x, y, _ = origin_at(52.5, 13.4)
@@ -834,7 +832,7 @@ _mutate_flow = _with_wrong_values(0.2, r'vehsPerHour="([^"]*)"', (*NOT_FINITE, "
 
 
 def _read_flow(path: Path, _: bytes) -> None:
-    from headless.sumo.route_file import read_demand, write_run  # noqa: PLC0415
+    from headless.studies.paper.route_file import read_demand, write_run  # noqa: PLC0415
 
     from seip_addon.core.progress import finish  # noqa: PLC0415
 

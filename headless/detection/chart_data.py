@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from headless.charts.detection import BinnedFigure, PrecisionCell, PrecisionRecallLine
+from headless.charts.detection import BinnedFigure, PrecisionRecallLine
 from headless.charts.error_view import ErrorView
 
 import numpy as np
@@ -11,28 +11,13 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.estimates import SHARE, mean_interval
 
 from .average_precision import Evaluation, precision_recall
 from .breakdown import Bin
-from .claims import SeedResult
 from .frame_results import FrameResult
 from .matching import NO_MATCH, Rule, match
 
 PLAN_COLUMNS = [0, 1, 3, 4, 6]
-
-
-def cells(trials: Sequence[SeedResult]) -> tuple[PrecisionCell, ...]:
-    """Return each type and number of sensors with the average precision of all its seeds."""
-    grouped: dict[tuple[str, int], list[SeedResult]] = {}
-    for trial in trials:
-        grouped.setdefault((trial.sensor, trial.count), []).append(trial)
-    made = []
-    for (sensor, count), own in grouped.items():
-        values = tuple(trial.average_precision for trial in own)
-        interval = mean_interval(values, SHARE) if len(values) > 1 else None
-        made.append(PrecisionCell(sensor, count, own[0].price, own[0].coverage, values, interval))
-    return tuple(made)
 
 
 def curve(sensor: str, count: int, evaluation: Evaluation) -> PrecisionRecallLine:

@@ -4,6 +4,8 @@ from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from headless.detection.run_detection import AT_ONCE, detect_in_runs
+
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import Interval
 from seip_addon.core.progress import Progress, side_by_side
@@ -11,7 +13,6 @@ from seip_addon.core.scans import Frame
 
 from .average_precision import Evaluation, balanced_score, evaluate
 from .breakdown import recall_by_category
-from .case_study import AT_ONCE, detect_in_runs
 from .detector import Detector
 from .frame_results import FrameResult
 from .recordings import PlacedSensors, SampledRun, Simulator

@@ -7,15 +7,16 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-from headless.coverage_study.cells import Case
+from pathlib import Path
 
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float
-from seip_addon.core.placement.deployment import Deployment
+from seip_addon.core.errors import SeipError
+from seip_addon.core.limits import FRAMES, TIME_STEP
 from seip_addon.core.progress import finish
 from seip_addon.core.results.placement_record import versions
+from seip_addon.core.robustness.traffic_instants import WARM_UP
 from seip_addon.core.scans import Frame, MountedSensor, ScanSettings, Simulation, prepare, static_scene
 from seip_addon.core.scans.run_folder import Run
 from seip_addon.core.site.scene_geometry import SceneGeometry
@@ -93,45 +94,23 @@ class MountedSensors(PlacedSensors):
         return self.mounted
 
 
-@dataclass(frozen=True, eq=False)
-class SensorConfiguration(PlacedSensors):
-    """Sensors of a placement, however it came about.
-
-    Parameters
-    ----------
-    sensor : str
-        What charts and tables group it under: the type, or the name of a placement that was read.
-    count : int
-        N, the number of sensors asked for.
-    status : str
-        As in `Placement`.
-    gap : float
-        Infinite where nothing bounds it.
-    read : bool
-        Whether it was read from a folder; it is no number of sensors of a type then.
-    """
-
-    name: str
-    deployment: Deployment
-    sensor: str
-    count: int
-    status: str
-    gap: float
-    read: bool = False
-
-    @classmethod
-    def of_case(cls, case: Case) -> SensorConfiguration:
-        """Return a number of sensors of one type, placed where they cover most."""
-        name = f"{case.count} × {case.sensor}"
-        return cls(name, case.deployment, case.sensor, case.count, case.placement.status, case.placement.gap)
-
-    @property
-    def sensors(self) -> tuple[MountedSensor, ...]:
-        """The sensors where they hang."""
-        return tuple(
-            MountedSensor(sensor.label, sensor.model, sensor.xyz, sensor.orientation)
-            for sensor in self.deployment.sensors
-        )
+def sampled_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[SampledRun, ...]:
+    """Read runs, each looked at from `WARM_UP` on; see `read_traffic`."""
+    if not TIME_STEP.allow(every):
+        raise SeipError(f"the time between frames must be {TIME_STEP}, not {every:g} s")
+    runs = []
+    for path in paths:
+        trajectories = Trajectories.load(path).moved_to(origin)
+        begin, end = trajectories.span
+        if not FRAMES.allow(max((end - begin) / every, 1.0)):
+            raise SeipError(
+                f"{path} lasts {end - begin:g} s, too long for a frame each {every:g} s: take {FRAMES} frames"
+            )
+        times = np.arange(begin + WARM_UP, end, every)
+        if not len(times):
+            raise SeipError(f"{path} is shorter than {WARM_UP:g} s: simulate more traffic")
+        runs.append(SampledRun(path.stem, trajectories, times))
+    return tuple(runs)
 
 
 class Simulator:

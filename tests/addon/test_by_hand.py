@@ -17,7 +17,7 @@ from seip_addon.scene import result_folder
 from seip_addon.scene.result_folder import FILES
 from seip_addon.sensor_edits import sensor_edits
 from seip_addon.session import session
-from tests.json_schema import violations
+from tests.oracles.json_schema import violations
 
 ROOT = Path(__file__).resolve().parents[2]
 

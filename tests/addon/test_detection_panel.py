@@ -21,7 +21,7 @@ from seip_addon.core.workflows.detection import DetectingPython
 from seip_addon.operators.detection import SEIP_OT_detect
 from seip_addon.panels import detection as detection_panel
 from seip_addon.scene.write import write_result
-from tests.small_junction import make_example
+from tests.builders.small_junction import make_example
 
 PRECISION = {
     "bev_0.7": {"average_precision": 0.7125, "interval": [0.66, 0.775], "road_users": 1234},

@@ -11,9 +11,6 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from osm_text import crossing
-from sumo_here import needs_sumo
-
 from seip_addon import loose_pieces, scene_status
 from seip_addon.panels import front_door
 from seip_addon.scene import contract
@@ -21,8 +18,10 @@ from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.scene.views import CLIP_END
 from seip_addon.scene.write import write_result
-from tests.scene_by_hand import make_scene
-from tests.small_junction import make_example
+from tests.builders.osm_text import crossing
+from tests.builders.scene_by_hand import make_scene
+from tests.builders.small_junction import make_example
+from tests.sumo_here import needs_sumo
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 

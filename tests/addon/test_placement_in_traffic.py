@@ -13,9 +13,9 @@ from seip_addon.core.results.placement_record import comparable, load_placement_
 from seip_addon.operators.placement import SEIP_OT_solve_placement
 from seip_addon.panels.placement import SEIP_PT_placement_objective
 from seip_addon.session import session
-from tests.scene_by_hand import make_scene
-from tests.small_junction import make_example
-from tests.small_scene import make_run
+from tests.builders.scene_by_hand import make_scene
+from tests.builders.small_junction import make_example
+from tests.builders.small_scene import make_run
 
 OPTIONS = [
     *("--sensor", "vlp16", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--delta", "6", "--count", "2"),

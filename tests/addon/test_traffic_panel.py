@@ -15,8 +15,8 @@ from seip_addon.scene.write import write_result
 from seip_addon.session import session
 from seip_addon.viewport import overlays
 from seip_addon.viewport.point_cloud import NAME as CLOUD
-from tests.scene_by_hand import make_scene
-from tests.small_junction import ORIGIN, make_example
+from tests.builders.scene_by_hand import make_scene
+from tests.builders.small_junction import ORIGIN, make_example
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import math
 
-from headless.claims import verdict_above, verdict_within, worst_verdict
+from headless.studies.claims import verdict_above, verdict_within, worst_verdict
 
 import numpy as np
 import pytest

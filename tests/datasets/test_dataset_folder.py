@@ -11,7 +11,7 @@ import pytest
 from seip_addon.core.datasets import FORMATS, load_manifest, write_dataset
 from seip_addon.core.errors import SeipError
 from seip_addon.core.traffic.trajectories import CATEGORIES
-from tests.datasets.scan_frames import contents, make_frame, make_frames, make_run, make_sensors, write
+from tests.builders.scan_frames import contents, make_frame, make_frames, make_run, make_sensors, write
 
 for library in ("laspy", "lazrs"):
     pytest.importorskip(library, reason="LAZ is written by laspy and lazrs: pip install laspy lazrs")

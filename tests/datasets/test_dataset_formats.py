@@ -14,7 +14,7 @@ from seip_addon.core.datasets import kitti, mmdetection3d, openpcdet, opv2v, pcd
 from seip_addon.core.datasets.label_files import read_labels
 from seip_addon.core.datasets.opv2v import left_handed_pose
 from seip_addon.core.datasets.sample import make_sample
-from tests.datasets.scan_frames import make_frame, make_frames, make_run, make_sensors, rotation, write
+from tests.builders.scan_frames import make_frame, make_frames, make_run, make_sensors, rotation, write
 
 angles = st.floats(-math.pi, math.pi)
 places = st.tuples(*[st.floats(-500, 500)] * 3).map(np.array)

@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 from seip_addon.core.opendrive.geo_reference import GeoReference
-from tests.datasets.scan_frames import ORIGIN, make_frame, make_frames, make_run, make_sensors, rotation, write
+from tests.builders.scan_frames import ORIGIN, make_frame, make_frames, make_run, make_sensors, rotation, write
 
 HALF_A_LEVEL = 0.5 / 255 + 1e-6
 IN_FLOAT32 = 1e-5  # metres, of places within 100 m that a reader keeps in float32

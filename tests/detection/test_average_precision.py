@@ -9,7 +9,8 @@ import scipy.special
 import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from labelled_frames import SIZES, box, detected, frame, traffic, truth
+
+from tests.builders.labelled_frames import SIZES, box, detected, frame, traffic, truth
 
 pytest.importorskip("torch", reason="the detector's torch is optional")
 
@@ -23,8 +24,8 @@ from headless.detection.average_precision import (
     precision_recall,
     too_few_runs,
 )
-from headless.detection.kitti_precision import kitti
 from headless.detection.matching import NO_MATCH, VEHICLES, Rule, match
+from headless.studies.detection.kitti_precision import kitti
 
 from seip_addon.core.errors import SeipError
 

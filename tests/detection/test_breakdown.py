@@ -3,7 +3,8 @@
 import math
 
 import pytest
-from labelled_frames import box, detected, frame, traffic, truth
+
+from tests.builders.labelled_frames import box, detected, frame, traffic, truth
 
 pytest.importorskip("torch", reason="the detector's torch is optional")
 

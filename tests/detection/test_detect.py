@@ -2,11 +2,10 @@
 
 import json
 import re
-import sys
-from pathlib import Path
 
 import pytest
-from car_and_bus import car_and_bus
+
+from tests.builders.car_and_bus import car_and_bus
 
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
@@ -17,16 +16,14 @@ from headless.detection.settings import NetworkSettings
 import bpy
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from scene_by_hand import make_scene
-from small_junction import make_example
-
 from seip_addon.core.datasets.detection_files import kitti_results, openpcdet_results
 from seip_addon.core.errors import SeipError
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import open_blend, save_blend
 from seip_addon.scene.sensors import labelled_sensors
 from seip_addon.scene.write import write_result
+from tests.builders.scene_by_hand import make_scene
+from tests.builders.small_junction import make_example
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,5 @@
 """Detection from the panel, with the detector itself."""
 
-import sys
-from pathlib import Path
-
 import pytest
 
 pytest.importorskip("torch", reason="torch is not installed: make detection")
@@ -14,13 +11,11 @@ from headless.detection.settings import CLASS_CATEGORIES, NetworkSettings
 
 import bpy
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from small_junction import make_example
-
 import seip_addon
 from seip_addon.core.results.detection_record import MAIN_RULE
 from seip_addon.panels.detection import NAMES
 from seip_addon.scene.write import write_result
+from tests.builders.small_junction import make_example
 
 
 def test_the_panel_names_rules_that_there_are():

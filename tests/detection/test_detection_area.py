@@ -10,10 +10,10 @@ from headless.detection.settings import NetworkSettings
 import numpy as np
 import pytest
 import shapely
-from street_clouds import cloud_frame, street_frame
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
+from tests.builders.street_clouds import cloud_frame, street_frame
 
 NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0))
 

@@ -3,7 +3,7 @@
 import math
 from types import SimpleNamespace
 
-from headless.detection.recordings import SensorConfiguration
+from headless.studies.detection.sensor_configuration import SensorConfiguration
 
 import numpy as np
 

@@ -10,13 +10,7 @@ from hypothesis import strategies as st
 
 torch = pytest.importorskip("torch", reason="the detector's torch is optional")
 
-from headless.detection.rotated_boxes import (  # noqa: E402 - torch may be missing
-    iou_matrix,
-    iou_matrix_3d,
-    paired_iou,
-    paired_iou_3d,
-    suppress,
-)
+from headless.detection.rotated_boxes import iou_matrix, iou_matrix_3d, paired_iou, paired_iou_3d, suppress  # noqa: E402
 
 EXACT = 1e-9
 GRID = 1e-13  # lengths of the first box

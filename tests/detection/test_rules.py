@@ -5,7 +5,8 @@ import math
 from headless.detection.rules import MAIN_RULE, RULES, precision_by, precisions
 
 import pytest
-from labelled_frames import SIZES, box, detected, frame, truth
+
+from tests.builders.labelled_frames import SIZES, box, detected, frame, truth
 
 PLACES = [0.0, 30.0, 60.0, 90.0]
 

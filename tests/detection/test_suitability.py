@@ -11,9 +11,9 @@ from headless.detection.suitability import MAX_OVERFULL_SHARE, suitability_warni
 
 import numpy as np
 import pytest
-from street_clouds import cloud_frame
 
 from seip_addon.core.geometry.height_raster import HeightRaster
+from tests.builders.street_clouds import cloud_frame
 
 NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0), most_points=2)
 GRID = grid_over((0.0, 0.0, 16.0, 16.0), (0.0, 4.0), NETWORK.pillar)

@@ -3,8 +3,6 @@
 import json
 import math
 import shutil
-import sys
-from pathlib import Path
 
 import pytest
 
@@ -15,14 +13,12 @@ from headless.detection.detector import Detector
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from scene_by_hand import make_scene
-from small_junction import ORIGIN, make_example
-
 from seip_addon.core.errors import SeipError
 from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.scene.blend_file import save_blend
 from seip_addon.scene.write import write_result
+from tests.builders.scene_by_hand import make_scene
+from tests.builders.small_junction import ORIGIN, make_example
 
 SMALL = ["--steps", "4", "--batch", "2", "--width", "8", "--blocks", "1", "1", "1", "--threads", "1"]
 

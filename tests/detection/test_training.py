@@ -16,12 +16,12 @@ from headless.detection.training import LearningCurve, deterministic, result_of_
 import numpy as np
 import pytest
 import torch
-from street_clouds import street_frame
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.height_raster import HeightRaster
 from seip_addon.core.progress import finish
 from seip_addon.core.scans.frame import Frame
+from tests.builders.street_clouds import street_frame
 
 SMALL = NetworkSettings(width=16, blocks=(1, 1, 1), most_points=8)
 BRIEF = TrainingSettings(steps=6, batch=2, window=12.8, validate_every=3, threads=1)

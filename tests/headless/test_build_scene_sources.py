@@ -5,16 +5,16 @@ from headless import build_scene
 import bpy
 import numpy as np
 import pytest
-from city_text import CityModel, origin_at
-from dem_files import sampled, write_dem
-from opendrive_text import document, geometry, lane, road, section
-from osm_text import Extract
-from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import read_map
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
+from tests.builders.city_text import CityModel, origin_at
+from tests.builders.dem_files import sampled, write_dem
+from tests.builders.opendrive_text import document, geometry, lane, road, section
+from tests.builders.osm_text import Extract
+from tests.sumo_here import needs_sumo
 
 X, Y, _ = origin_at(52.5, 13.4)
 UTM33 = "+proj=utm +zone=33 +ellps=WGS84 +datum=WGS84 +units=m +no_defs"
@@ -86,9 +86,8 @@ def test_a_mistake_leaves_nothing_behind(more, complaint, street, tmp_path, monk
 def test_a_chart_shows_what_boxes_cost(street, tmp_path):
     pytest.importorskip("laspy")
     pytest.importorskip("lazrs")
-    from survey_files import block_points, ground_points, write_survey  # noqa: PLC0415
-
     from seip_addon.core.opendrive.geo_reference import projection  # noqa: PLC0415
+    from tests.builders.survey_files import block_points, ground_points, write_survey  # noqa: PLC0415
 
     rng = np.random.default_rng(7)
     points = np.concatenate([ground_points(rng, lambda x, y: 0 * x, 130), block_points(rng, 5, 12, 10, 8, 9.0)])

@@ -8,8 +8,8 @@ from unittest.mock import patch
 
 from headless import convergence
 from headless.convergence import Answer, Evaluator, coarsest_settings
-from headless.lab.stability import charts
-from headless.lab.stability.criterion import (
+from headless.studies.stability import charts
+from headless.studies.stability.criterion import (
     Draws,
     criterion_rows,
     criterion_study,
@@ -20,9 +20,6 @@ from headless.lab.stability.criterion import (
 
 import numpy as np
 import pytest
-from engines import ANY, needs_any
-from small_junction import make_geometry
-from synthetic_junction import rectangle
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
@@ -33,6 +30,9 @@ from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.visibility.ring_resolution import unresolved_from
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.workflows.survey import SurveySettings
+from tests.builders.small_junction import make_geometry
+from tests.builders.synthetic_junction import rectangle
+from tests.engines import ANY, needs_any
 
 GEOMETRY = make_geometry(24.0)
 SETTINGS = SurveySettings(candidates=CandidateSettings(sensors=("type2",), heights=(5.4,)), engine=ANY)
@@ -151,9 +151,9 @@ def test_the_study_finds_the_border_of_the_rings(tmp_path: Path) -> None:
         engine=ANY,
     )
     with (
-        patch("headless.lab.stability.criterion.DELTAS", (0.5, 2.0)),
-        patch("headless.lab.stability.criterion.GRID_SPACINGS", (2.0, 1.0)),
-        patch("headless.lab.stability.criterion.CANDIDATE_SPACINGS", (16.0, 8.0)),
+        patch("headless.studies.stability.criterion.DELTAS", (0.5, 2.0)),
+        patch("headless.studies.stability.criterion.GRID_SPACINGS", (2.0, 1.0)),
+        patch("headless.studies.stability.criterion.CANDIDATE_SPACINGS", (16.0, 8.0)),
     ):
         study = finish(criterion_study(GEOMETRY, settings, 2, tolerance=0.2, draws=8))
     (by_ratio,) = study.by_ratio

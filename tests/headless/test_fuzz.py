@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from fuzz import FORMATS, case_of, fuzz, is_fault
+from tests.fuzz import FORMATS, case_of, fuzz, is_fault
 
 
 @pytest.mark.slow

@@ -76,7 +76,7 @@ def test_help_has_a_line_for_each_option_and_names_its_default(monkeypatch):
 
 def test_help_names_the_options_of_a_survey_where_another_command_explains_them(monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")
-    parser = new_parser("study", "Study coverage.")
+    parser = new_parser("study coverage", "Study coverage.")
     add_options(parser)
     text = parser.format_help()
     assert "--heights --tilts --yaws --assumed-poles --installed-cost (see: seip place --help)\n" in text

@@ -14,22 +14,23 @@ JUNCTION = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 NONE = "missing.blend"
 COMMANDS = {
     "place": (),
-    "study": (),
+    "study coverage": (),
     "simulate": ("--dataset", "data/set"),
-    "stability": ("--work", "work"),
-    "benchmark": ("--work", "work"),
+    "study stability": ("--work", "work"),
+    "study benchmark": ("--work", "work"),
 }
 TRAINERS = {
-    "evaluate": (),
+    "study detection": (),
     "detect": ("--traffic", "run.npz"),
-    "train_on_sites": ("other.blend",),
-    "compare_detectors": (),
+    "study site-training": ("other.blend",),
+    "study detector-settings": (),
 }
 
 
 def fails(monkeypatch, command, *arguments) -> str:
     """Run a command as from a shell, and return its exit status as text; it must be one of a failure."""
-    monkeypatch.setattr(sys, "argv", [f"{command}.py", *map(str, arguments)])
+    command, *study = command.split()
+    monkeypatch.setattr(sys, "argv", [f"{command}.py", *study, *map(str, arguments)])
     monkeypatch.setattr(runtime.signal, "signal", lambda *_: None)  # those of the tests stay
     monkeypatch.delitem(sys.modules, f"headless.{command}", raising=False)  # other tests may have imported it
     with pytest.raises(SystemExit) as end:

@@ -6,12 +6,12 @@ from headless import place
 
 import numpy as np
 import pytest
-from small_junction import ORIGIN
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.report.evidence import TRAFFIC_PICTURES
 from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.scene.result_folder import FILES
+from tests.builders.small_junction import ORIGIN
 
 COARSE = ["--sensor", "vlp16", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--delta", "6", "--no-render"]
 

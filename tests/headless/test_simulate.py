@@ -15,10 +15,6 @@ import bpy
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from scene_by_hand import make_scene
-from small_junction import ORIGIN, make_example
-
 from seip_addon.core.errors import SeipError
 from seip_addon.core.scans import Frame
 from seip_addon.core.scans.run_folder import load_frames
@@ -28,6 +24,8 @@ from seip_addon.scene import contract
 from seip_addon.scene.blend_file import save_blend
 from seip_addon.scene.traffic import animate
 from seip_addon.scene.write import write_result
+from tests.builders.scene_by_hand import make_scene
+from tests.builders.small_junction import ORIGIN, make_example
 
 ROOT = Path(__file__).resolve().parents[2]
 QUICK = ["--duration", "0.4", "--engine", "bvh"]

@@ -9,11 +9,11 @@ from headless import traffic
 
 import numpy as np
 import pytest
-from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.sumo_programs import find_sumo
+from tests.sumo_here import needs_sumo
 
 ROOT = Path(__file__).resolve().parents[2]
 JUNCTION = ROOT / "scenes" / "junction.blend"

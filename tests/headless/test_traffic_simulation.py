@@ -12,7 +12,6 @@ from headless.sumo.street_network import DRIVING, PARKING, WALKING, read_network
 
 import numpy as np
 import pytest
-from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
@@ -20,6 +19,7 @@ from seip_addon.core.traffic import CATEGORIES, sumo_programs
 from seip_addon.core.traffic.floating_car_data import Extent, read_floating_car_data, read_trajectories
 from seip_addon.core.traffic.sumo_programs import find_sumo
 from seip_addon.core.traffic.vehicle_types import read_vehicle_types
+from tests.sumo_here import needs_sumo
 
 ROOT = Path(__file__).resolve().parents[2]
 MAPS = Path(os.environ.get("SEIP_MAPS", ROOT.parent / "shared" / "opendrive"))

@@ -120,18 +120,19 @@ def test_what_is_imported_is_pinned():
     }
 
     def allowed(path, name):
-        detector = {"torch"} if "detection" in path.parts or "lab/detector" in path.as_posix() else set()
+        detector = {"torch"} if {"detection", "detector_limits"} & set(path.parts) else set()
         return top(name) in everywhere | detector | by_file.get(path.name, set())
 
     assert not offenders(["seip_addon", "headless"], allowed)
 
 
-def test_the_laboratory_serves_its_own_commands_alone():
-    def allowed(path, name):
-        own = "lab" in path.parts or path.name in {"benchmark.py", "compare_ingredients.py", "stability.py"}
-        return own or not name.startswith("headless.lab")
+def test_no_product_module_imports_a_study():
+    """`headless/study.py` imports a study by the name that its user gives."""
 
-    assert not offenders(["headless"], allowed)
+    def allowed(path, name):
+        return "studies" in path.parts or not name.startswith("headless.studies")
+
+    assert not offenders(["headless", "seip_addon"], allowed)
 
 
 def test_an_import_that_points_up_is_found(tmp_path, monkeypatch):

@@ -7,6 +7,7 @@ import zipfile
 from pathlib import Path
 
 from headless.__main__ import VERBS
+from headless.study import STUDIES
 
 import pytest
 
@@ -28,11 +29,29 @@ def test_every_command_is_a_verb():
     assert {verb.replace("-", "_") for verb in VERBS} == files - OF_A_CHECKOUT - {"runtime"}
 
 
+def test_there_are_nine_verbs_at_most():
+    assert len(VERBS) <= 9
+
+
+def test_every_study_has_a_name_and_a_description():
+    folders = {path.parent.name for path in (ROOT / "headless" / "studies").glob("*/command.py")}
+    assert {name.replace("-", "_") for name in STUDIES} == folders
+    readme = (ROOT / "headless" / "studies" / "README.md").read_text(encoding="utf-8")
+    assert all(f"`{name}`" in readme for name in STUDIES)
+
+
+def test_another_study_has_its_sentence():
+    shown = seip("study", "covrage")
+    assert shown.returncode == 1
+    assert "covrage" in shown.stderr
+    assert "seip study --help" in shown.stderr
+
+
 def test_help_fits_a_screen():
-    for arguments in ([], ["--help"]):
+    for arguments, names in (([], VERBS), (["--help"], VERBS), (["study"], STUDIES), (["study", "--help"], STUDIES)):
         shown = seip(*arguments)
         assert shown.returncode == 0
-        assert all(verb in shown.stdout for verb in VERBS)
+        assert all(name in shown.stdout for name in names)
         assert len(shown.stdout.splitlines()) <= 24
         assert max(map(len, shown.stdout.splitlines())) <= 80
 

@@ -9,12 +9,12 @@ from headless import build_scene
 import bpy
 import numpy as np
 import pytest
-from city_text import origin_at
 
 from seip_addon.core.child_process import exit_status
 from seip_addon.core.errors import SeipError
 from seip_addon.scene import contract, imported
 from seip_addon.scene.read import read_scene
+from tests.builders.city_text import origin_at
 
 X, Y, _ = origin_at(52.5, 13.4)
 CORNERS = [(x, y, z) for z in (0, 6) for x, y in ((0, 0), (10, 0), (10, 4), (0, 4))]

@@ -1,18 +1,12 @@
 """Sensors read back from the scene, where a result or a hand put them."""
 
 import math
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 from mathutils import Vector
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from scene_by_hand import make_scene
-from small_junction import make_example
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation, rotated
@@ -23,6 +17,8 @@ from seip_addon.scene.materials import REFLECTIVITY, material
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import changed_beams, labelled_sensors, read_sensors
 from seip_addon.scene.write import write_result
+from tests.builders.scene_by_hand import make_scene
+from tests.builders.small_junction import make_example
 
 CATALOGUE = load_catalogue()
 

@@ -14,8 +14,8 @@ from seip_addon.scene.materials import linear
 from seip_addon.scene.render import save_rendered_view
 from seip_addon.scene.traffic import animate
 from seip_addon.scene.write import LIFT, clear_result, colour_coverage, recolour, write_result
-from tests.scene_by_hand import make_scene
-from tests.small_junction import make_example
+from tests.builders.scene_by_hand import make_scene
+from tests.builders.small_junction import make_example
 
 
 @pytest.fixture(scope="module")

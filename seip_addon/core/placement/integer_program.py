@@ -216,7 +216,7 @@ class CoverProgram:
 def root_operations(instance: Instance) -> float:
     """Return the work of the first linear relaxation of an instance's program, in multiplications.
 
-    The benchmark measures it against the entries of V (`headless.benchmark`, under “Growth”).
+    The benchmark measures it against the entries of V (`seip study benchmark`, under “Growth”).
     """
     return ROOT_OPERATIONS * float(np.count_nonzero(instance.visible)) ** 2
 

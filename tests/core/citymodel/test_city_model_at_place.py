@@ -6,8 +6,6 @@ import sys
 import numpy as np
 import pytest
 import shapely
-from city_text import CityModel, origin_at
-from opendrive_text import document, geometry, lane, read_text, road, section
 
 from seip_addon.core.citymodel.at_place import AskedBuildings, with_city_model
 from seip_addon.core.errors import SeipError
@@ -18,6 +16,8 @@ from seip_addon.core.site.scene_geometry import DESCRIBED, FROM_CITY_MODEL, FROM
 from seip_addon.core.streetscape.description import Building, SiteDescription
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.workflows.site_building import AskedSite, build_site
+from tests.builders.city_text import CityModel, origin_at
+from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 
 UTM33 = "+proj=utm +zone=33 +ellps=WGS84 +datum=WGS84 +units=m +no_defs"
 PLACE = (52.5, 13.4)

@@ -4,7 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from city_text import CityModel
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -12,6 +11,7 @@ from seip_addon.core.citymodel import cityjson
 from seip_addon.core.citymodel.cityjson import read_city_model
 from seip_addon.core.citymodel.solids import building_solid
 from seip_addon.core.errors import SeipError
+from tests.builders.city_text import CityModel
 
 
 def solids(model, tmp_path, **changed):

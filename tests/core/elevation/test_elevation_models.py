@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 import shapely
-from city_text import origin_at
-from dem_files import KEYS, SCALE, TIE_POINT, sampled, write_dem
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
@@ -17,6 +15,8 @@ from seip_addon.core.geometry.height_raster import HeightRaster
 from seip_addon.core.opendrive.geo_reference import GeoReference
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import SiteDescription
+from tests.builders.city_text import origin_at
+from tests.builders.dem_files import KEYS, SCALE, TIE_POINT, sampled, write_dem
 
 X, Y, _ = origin_at(52.5, 13.4)
 UTM33 = "+proj=utm +zone=33 +datum=WGS84 +units=m"

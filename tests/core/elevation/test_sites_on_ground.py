@@ -2,11 +2,6 @@
 
 import numpy as np
 import pytest
-from city_text import origin_at
-from dem_files import sampled, write_dem
-from opendrive_text import document, geometry, lane, road, section
-from osm_text import bridge_above, crossing
-from sumo_here import needs_sumo
 
 from seip_addon.core.elevation.at_place import AskedTerrain
 from seip_addon.core.errors import SeipError
@@ -14,6 +9,11 @@ from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.parts import Role
 from seip_addon.core.workflows.site_building import AskedSite, build_site
+from tests.builders.city_text import origin_at
+from tests.builders.dem_files import sampled, write_dem
+from tests.builders.opendrive_text import document, geometry, lane, road, section
+from tests.builders.osm_text import bridge_above, crossing
+from tests.sumo_here import needs_sumo
 
 X, Y, _ = origin_at(52.5, 13.4)
 UTM33 = "+proj=utm +zone=33 +ellps=WGS84 +datum=WGS84 +units=m +no_defs"

@@ -8,10 +8,8 @@ import time
 import numpy as np
 import pytest
 import shapely
-from city_text import CityModel, origin_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from survey_files import BUILDING, UNCLASSIFIED, VEGETATION, block_points, ground_points, write_survey
 
 from seip_addon.core.citymodel.at_place import AskedBuildings, with_city_model
 from seip_addon.core.elevation import obstacles, point_cloud
@@ -23,6 +21,8 @@ from seip_addon.core.opendrive.geo_reference import GeoReference, projection
 from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import FROM_EXTRACT, FROM_SURVEY
 from seip_addon.core.streetscape.description import Building, SiteDescription
+from tests.builders.city_text import CityModel, origin_at
+from tests.builders.survey_files import BUILDING, UNCLASSIFIED, VEGETATION, block_points, ground_points, write_survey
 
 laspy = pytest.importorskip("laspy")
 pytest.importorskip("lazrs")

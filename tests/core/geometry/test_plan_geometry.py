@@ -3,9 +3,9 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from random_cases import cases
 
 from seip_addon.core.geometry.plan import closed, outline, plane_height, signed_area, surface_height, without
+from tests.oracles.random_cases import cases
 
 corner = st.tuples(st.integers(-50, 50), st.integers(-50, 50), st.integers(-5, 5))
 triangles = st.lists(st.tuples(corner, corner, corner), min_size=1, max_size=6).map(lambda t: np.array(t, dtype=float))

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from visibility_search import behind_prisms
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import BeamPattern, LidarModel, Rosette, load_catalogue
+from tests.oracles.visibility_search import behind_prisms
 
 CATALOGUE = load_catalogue()
 WEDGE = math.radians(18)

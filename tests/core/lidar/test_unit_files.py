@@ -5,11 +5,11 @@ import math
 
 import numpy as np
 import pytest
-from unit_text import ELEVATIONS, FILES, OFFSETS, hesai, ouster, robosense, xml, yaml
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.lidar.unit_files import MAX_BYTES, read_unit_file
+from tests.builders.unit_text import ELEVATIONS, FILES, OFFSETS, hesai, ouster, robosense, xml, yaml
 
 SHIPPED = load_catalogue()
 SIXTEEN = np.linspace(15.0, -15.0, 16).tolist()

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from opendrive_text import document, geometry, lane, read_text, road, section
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import read_map
@@ -15,6 +14,7 @@ from seip_addon.core.opendrive.geo_reference import projection
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import SiteDescription
 from seip_addon.core.streetscape.model import site_model
+from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 
 AXIS, ECCENTRICITY = 6_378_137.0, math.sqrt(0.00669437999014)
 BERLIN = "+proj=tmerc +lat_0=52.5 +lon_0=13.4 +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m"

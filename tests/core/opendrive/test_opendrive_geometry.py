@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
-from random_cases import cases
 from scipy.integrate import quad, solve_ivp
 from scipy.special import fresnel
 
 from seip_addon.core.opendrive.profile import ZERO_PROFILE, profile
 from seip_addon.core.opendrive.reference_line import Clothoid, ReferenceLine, param_poly3, poly3
+from tests.oracles.random_cases import cases
 
 curvatures = st.floats(-0.2, 0.2)
 lengths = st.floats(1e-6, 300.0)

@@ -8,11 +8,11 @@ import pytest
 import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from opendrive_text import document, geometry, lane, map_lanes, read_text, road, section
-from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import junction_area
+from tests.builders.opendrive_text import document, geometry, lane, map_lanes, read_text, road, section
+from tests.oracles.random_cases import cases
 
 
 def surfaces(folder, *roads, **options):

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from opendrive_text import map_lanes
 
 from seip_addon.core.opendrive import (
     find_junction,
@@ -18,6 +17,7 @@ from seip_addon.core.opendrive import (
     placed_signals,
     read_map,
 )
+from tests.builders.opendrive_text import map_lanes
 
 FOLDER = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[4] / "shared" / "opendrive")
 NAMES = ["Town01", "Town05", "crest-curve", "parking_demo", "stationary_objects"]

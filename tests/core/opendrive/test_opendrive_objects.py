@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 import shapely
-from opendrive_text import document, geometry, read_text, road
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import placed_objects, placed_signals
+from tests.builders.opendrive_text import document, geometry, read_text, road
 
 UPHILL = '<elevation s="0" a="5" b="0.1" c="0" d="0"/>'
 TILTED = '<superelevation s="0" a="0.1" b="0" c="0" d="0"/>'

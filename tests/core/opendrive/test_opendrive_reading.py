@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from opendrive_text import document, geometry, lane, map_lanes, read_text, road, section
-from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import (
@@ -17,6 +15,8 @@ from seip_addon.core.opendrive import (
     placed_signals,
     read_map,
 )
+from tests.builders.opendrive_text import document, geometry, lane, map_lanes, read_text, road, section
+from tests.oracles.random_cases import cases
 
 
 def test_the_header_is_kept_and_not_applied(tmp_path):

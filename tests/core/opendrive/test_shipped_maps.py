@@ -13,8 +13,6 @@ import numpy as np
 import pytest
 import shapely
 from defusedxml.ElementTree import parse
-from opendrive_text import map_lanes
-from sumo_here import needs_sumo
 
 from seip_addon.core.opendrive import (
     LaneSurface,
@@ -26,6 +24,8 @@ from seip_addon.core.opendrive import (
     read_map,
 )
 from seip_addon.core.traffic.sumo_programs import find_sumo
+from tests.builders.opendrive_text import map_lanes
+from tests.sumo_here import needs_sumo
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -6,10 +6,6 @@ import re
 import numpy as np
 import pytest
 import shapely
-from city_text import origin_at
-from dem_files import sampled, write_dem
-from osm_text import Extract, corner_houses
-from sumo_here import needs_sumo
 
 from seip_addon.core.elevation.at_place import AskedTerrain
 from seip_addon.core.errors import SeipError
@@ -19,6 +15,10 @@ from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import OTHER_LEVELS
 from seip_addon.core.streetscape.terrain import MAX_ROADSIDE
 from seip_addon.core.workflows.site_building import AskedSite, build_site
+from tests.builders.city_text import origin_at
+from tests.builders.dem_files import sampled, write_dem
+from tests.builders.osm_text import Extract, corner_houses
+from tests.sumo_here import needs_sumo
 
 pytestmark = needs_sumo
 ROAD_CLEARANCE, RAIL_CLEARANCE, PATH_CLEARANCE = 5.5, 6.5, 3.5  # metres between the surfaces of both

@@ -4,13 +4,13 @@ import re
 from pathlib import Path
 
 import pytest
-from osm_text import JUNCTIONS, Extract, crossing
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.openstreetmap.crossings import named_crossings
 from seip_addon.core.openstreetmap.extract import read_extract
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.site_places import parsed_position, site_places
+from tests.builders.osm_text import JUNCTIONS, Extract, crossing
 
 SCENES = Path(__file__).resolve().parents[3] / "scenes"
 

@@ -3,12 +3,12 @@
 import gzip
 
 import pytest
-from osm_text import Extract, crossing
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.openstreetmap import extract as reading
 from seip_addon.core.openstreetmap.extract import Way, read_extract, rings, window
 from seip_addon.core.progress import finish
+from tests.builders.osm_text import Extract, crossing
 
 
 def read(path, within=None):

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 import shapely
-from osm_text import Extract
 
 from seip_addon.core.opendrive.geo_reference import projection
 from seip_addon.core.openstreetmap.extract import read_extract
 from seip_addon.core.openstreetmap.plan_shapes import PlanShapes
 from seip_addon.core.openstreetmap.street_objects import surroundings
 from seip_addon.core.progress import finish
+from tests.builders.osm_text import Extract
 
 UTM = projection("+proj=utm +zone=33 +ellps=WGS84 +datum=WGS84 +units=m +no_defs")
 ORIGIN = np.array(UTM(math.radians(52.5), math.radians(13.4)))

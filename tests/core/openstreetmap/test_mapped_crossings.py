@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 import shapely
-from osm_text import Extract, corner_houses
-from sumo_here import needs_sumo
 
 from seip_addon.core.opendrive import placed_objects, read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.site_building import AskedSite, build_site
+from tests.builders.osm_text import Extract, corner_houses
+from tests.sumo_here import needs_sumo
 
 pytestmark = needs_sumo
 ORIGIN_ROUNDING = 0.8  # metres: local origins are whole metres of the map

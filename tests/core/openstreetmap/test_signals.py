@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from osm_text import Extract, corner_houses
-from sumo_here import needs_sumo
 
 from seip_addon.core.openstreetmap.extract import read_extract, window
 from seip_addon.core.openstreetmap.streets import write_streets
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.site_building import AskedSite, build_site
+from tests.builders.osm_text import Extract, corner_houses
+from tests.sumo_here import needs_sumo
 
 
 def approached(away=10.0, arms=("east", "west", "north", "south"), far=200.0, **tags):

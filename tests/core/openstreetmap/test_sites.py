@@ -6,8 +6,6 @@ import re
 import numpy as np
 import pytest
 import shapely
-from osm_text import JUNCTIONS, Extract, corner_houses, crossing, dual_carriageway, left_hand, plaza, roundabout, slope
-from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import read_map
@@ -15,6 +13,18 @@ from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.parts import Role
 from seip_addon.core.traffic import sumo_programs
 from seip_addon.core.workflows.site_building import AskedSite, build_site
+from tests.builders.osm_text import (
+    JUNCTIONS,
+    Extract,
+    corner_houses,
+    crossing,
+    dual_carriageway,
+    left_hand,
+    plaza,
+    roundabout,
+    slope,
+)
+from tests.sumo_here import needs_sumo
 
 pytestmark = needs_sumo
 CORNER_HOUSE = 24.0 * 24.0

@@ -2,12 +2,12 @@
 
 import pytest
 from defusedxml.ElementTree import fromstring
-from osm_text import Extract, dual_carriageway, left_hand, roundabout
 
 from seip_addon.core.openstreetmap.extract import read_extract, window
 from seip_addon.core.openstreetmap.handedness import drives_on_the_left
 from seip_addon.core.openstreetmap.streets import has_lane_count, is_street, lane_counts, write_streets
 from seip_addon.core.progress import finish
+from tests.builders.osm_text import Extract, dual_carriageway, left_hand, roundabout
 
 
 def streets(extract, tmp_path, **options):

@@ -1,9 +1,9 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from random_cases import cases
 
 from seip_addon.core.pictures.callouts import place_callouts, stack_upwards
+from tests.oracles.random_cases import cases
 
 BOUNDS = (0.0, 0.0, 1000.0, 800.0)
 CLEARANCE = 8.0

@@ -19,7 +19,7 @@ from seip_addon.core.pictures.plan_view import draw_plan, save_plan_view
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.returns_summary import ReturnsSummary
 from seip_addon.core.site.scene_geometry import ASSUMED, OTHER_LEVELS, Mesh, Pole
-from tests.small_junction import make_example
+from tests.builders.small_junction import make_example
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from headless.lab.benchmark.street_visibility import street_problem
+from headless.studies.benchmark.street_visibility import street_problem
 
 import pytest
 

@@ -4,14 +4,12 @@ import math
 from dataclasses import replace
 from itertools import combinations
 
-from headless.lab.benchmark.street_visibility import street_problem
+from headless.studies.benchmark.street_visibility import street_problem
 
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from placement_oracle import small_problems
-from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import branch_and_bound
@@ -19,6 +17,8 @@ from seip_addon.core.placement.branch_and_bound import BestPlacements, FirstInOr
 from seip_addon.core.placement.reduced_problem import make_instance
 from seip_addon.core.placement.search_limits import Clock
 from seip_addon.core.progress import finish
+from tests.oracles.placement_oracle import small_problems
+from tests.oracles.random_cases import cases
 
 
 def reduced(problem):

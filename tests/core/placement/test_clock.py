@@ -3,7 +3,7 @@
 import math
 from itertools import count
 
-from headless.lab.benchmark.street_visibility import street_problem
+from headless.studies.benchmark.street_visibility import street_problem
 
 import pytest
 

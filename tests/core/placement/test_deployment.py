@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.placement.deployment import deploy, weighted_share
-from tests.small_junction import Example, make_example
+from tests.builders.small_junction import Example, make_example
 
 
 @pytest.fixture(scope="module")

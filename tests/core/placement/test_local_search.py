@@ -5,11 +5,8 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from composition_oracle import best_of_compositions, budget_problem
 from hypothesis import given
 from hypothesis import strategies as st
-from placement_oracle import small_problems
-from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import PlacementProblem, SolverLimits, solve
@@ -18,6 +15,9 @@ from seip_addon.core.placement.local_search import SwapGains, composition_search
 from seip_addon.core.placement.reduced_problem import make_instance
 from seip_addon.core.placement.search_limits import Clock
 from seip_addon.core.progress import finish
+from tests.oracles.composition_oracle import best_of_compositions, budget_problem
+from tests.oracles.placement_oracle import small_problems
+from tests.oracles.random_cases import cases
 
 NONE = np.zeros(0, np.int64)  # no candidate chosen
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from small_junction import make_example
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement.objective import Objective, check_objective, optimise, placement_problem, target_weights
 from seip_addon.core.progress import finish
+from tests.builders.small_junction import make_example
 
 
 @pytest.fixture(scope="module")

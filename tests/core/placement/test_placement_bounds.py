@@ -3,14 +3,12 @@
 import math
 from itertools import combinations
 
-from headless.lab.benchmark.street_visibility import street_problem
+from headless.studies.benchmark.street_visibility import street_problem
 
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from placement_oracle import small_problems
-from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import bounds
@@ -22,6 +20,8 @@ from seip_addon.core.placement.reduced_problem import make_instance
 from seip_addon.core.placement.search_limits import Clock
 from seip_addon.core.placement.solver import Proof, lower_by_goals
 from seip_addon.core.progress import finish
+from tests.oracles.placement_oracle import small_problems
+from tests.oracles.random_cases import cases
 
 NONE = np.zeros(0, np.int64)  # no candidate chosen
 

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from placement_oracle import all_placements, covered, merit, small_problems
-from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import (
@@ -22,6 +20,8 @@ from seip_addon.core.placement import (
     tie_breaking,
 )
 from seip_addon.core.progress import finish
+from tests.oracles.placement_oracle import all_placements, covered, merit, small_problems
+from tests.oracles.random_cases import cases
 
 thorough = cases(150)
 quick = cases(40)

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from placement_search import DUST, UNDECIDED, WEIGHTS, faults, search, sentence
 
 from seip_addon.core.placement import PlacementProblem, cheapest, cheapest_for_coverage, solve
 from seip_addon.core.progress import finish
+from tests.oracles.placement_search import DUST, UNDECIDED, WEIGHTS, faults, search, sentence
 
 QUICK = 40
 MANY = 3000

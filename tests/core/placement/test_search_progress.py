@@ -3,7 +3,7 @@
 import math
 import re
 
-from headless.lab.benchmark.street_visibility import street_problem
+from headless.studies.benchmark.street_visibility import street_problem
 
 import numpy as np
 import pytest

@@ -20,7 +20,7 @@ from seip_addon.core.results.site_file import save_site_file
 from seip_addon.core.site.scene_geometry import NamedArea
 from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.core.visibility.grid import VisibilityGrid
-from tests.small_junction import Example, make_example
+from tests.builders.small_junction import Example, make_example
 
 NAME = "Crossing <script>alert(1)</script> & “Ecke”"
 CREATED = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)

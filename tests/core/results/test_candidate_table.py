@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.results.candidate_table import COLUMNS, save_candidate_table
-from tests.small_junction import make_example
+from tests.builders.small_junction import make_example
 
 
 @pytest.fixture(scope="module")

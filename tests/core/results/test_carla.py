@@ -8,7 +8,7 @@ import pytest
 from seip_addon.core.geometry.orientation import orientations
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.results.carla import carla_spawns, save_carla_spawns
-from tests.small_junction import make_example
+from tests.builders.small_junction import make_example
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from seip_addon.core.results.kml import NAMESPACE, save_kml
 from seip_addon.core.results.located import located, missing_sentence
 from seip_addon.core.results.site_file import load_site_file, save_site_file
 from seip_addon.core.site.scene_geometry import NamedArea
-from tests.small_junction import Example, make_example
+from tests.builders.small_junction import Example, make_example
 
 OFFSET = (-4_500_000.0, 5_300_000.0, 400.0)
 NAMES = {"k": NAMESPACE}

@@ -25,9 +25,9 @@ from seip_addon.core.results.placement_record import (
     save_placement_record,
     versions,
 )
-from tests.json_schema import violations
-from tests.placement_schema import FILE, text
-from tests.small_junction import Example, make_example
+from tests.builders.small_junction import Example, make_example
+from tests.oracles.json_schema import violations
+from tests.oracles.placement_schema import FILE, text
 
 GOAL = Objective(count=3, central_weight=2.5, forbidden=("pole 1",))
 LEFT_OUT = ("roll_deg", "installation_usd")  # of sensors that have none
@@ -181,7 +181,7 @@ def test_a_record_is_written_as_it_was_read(record, tmp_path):
 
 
 def test_the_schema_is_made_from_the_types_and_limits_of_the_record():
-    assert FILE.read_text(encoding="utf-8") == text(), "run python -m tests.placement_schema"
+    assert FILE.read_text(encoding="utf-8") == text(), "run python -m tests.oracles.placement_schema"
 
 
 def test_every_number_of_the_schema_has_limits():

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from npz_by_hand import contents
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.results.site_file import FILE, load_site_file
+from tests.builders.npz_by_hand import contents
 from tests.core.report.report_folder import make_folder
 
 

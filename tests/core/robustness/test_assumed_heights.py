@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from plain_street import block, sheet
 
 from seip_addon.core.placement.objective import Objective
 from seip_addon.core.progress import finish
@@ -14,6 +13,7 @@ from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import ASSUMED, Mesh, SceneGeometry
 from seip_addon.core.workflows.placing import place
 from seip_addon.core.workflows.survey import SurveySettings, lay_out, see, surroundings
+from tests.builders.plain_street import block, sheet
 
 WALL = block((-12.0, -1.0, 0.0), (12.0, -0.8, 2.0))  # between the sensors' pavement and half of the road
 

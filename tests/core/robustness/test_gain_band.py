@@ -12,7 +12,7 @@ from seip_addon.core.robustness.gain_band import is_uncertain, with_gain_band
 from seip_addon.core.robustness.visibility_under_errors import Surroundings
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.visibility.visibility_model import visibility_model
-from tests.small_junction import make_example
+from tests.builders.small_junction import make_example
 
 CATALOGUE = load_catalogue()
 KEYS = ("os1_64_gen1", "os1_128", "vlp16")

@@ -3,15 +3,13 @@
 import math
 from dataclasses import replace
 
-from headless.lab.stability.robustness_rows import pose_rows
+from headless.studies.stability.robustness_rows import pose_rows
 
 import numpy as np
 import pytest
-from engines import ANY
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
-from synthetic_junction import junction_site, prism
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import mean_of, quantile_gain, quantile_of
@@ -26,6 +24,8 @@ from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.site.scene_geometry import Mesh
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.settings import VisibilitySettings
+from tests.builders.synthetic_junction import junction_site, prism
+from tests.engines import ANY
 
 FEET = np.array([[0.0, 0, 0], [5, -3, 0.12], [-5, 3, 0.12], [5, -3, 0.12]])
 MODELS = load_catalogue()

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from placement_oracle import all_placements, covered, small_problems
-from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import PlacementProblem, SolverLimits, solve
@@ -21,6 +19,8 @@ from seip_addon.core.progress import finish
 from seip_addon.core.robustness.robust_placement import solve_robust
 from seip_addon.core.robustness.robust_search import BestUnderRisk
 from seip_addon.core.robustness.scenario_visibility import ScenarioVisibility
+from tests.oracles.placement_oracle import all_placements, covered, small_problems
+from tests.oracles.random_cases import cases
 
 RISKS = [
     Risk(),

@@ -5,13 +5,11 @@ from dataclasses import replace
 from functools import cache
 
 from headless.charts.pose_errors import save_frontier_chart, save_loss_chart, save_spread_chart
-from headless.lab.stability.robustness_rows import robust_rows
+from headless.studies.stability.robustness_rows import robust_rows
 
 import numpy as np
 import pytest
-from engines import ANY
 from matplotlib.image import imread
-from synthetic_junction import junction_site
 
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.placement import SolverLimits, solve
@@ -24,6 +22,8 @@ from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study
 from seip_addon.core.robustness.robust_study import robust_study
 from seip_addon.core.robustness.visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+from tests.builders.synthetic_junction import junction_site
+from tests.engines import ANY
 
 MODELS = load_catalogue()
 SCENARIOS = Scenarios("pose-errors", count=4, held_out=20)

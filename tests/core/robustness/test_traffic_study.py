@@ -4,15 +4,11 @@ import math
 from dataclasses import replace
 
 from headless.charts.traffic import negative, save_time_map, save_traffic_chart
-from headless.lab.stability.robustness_rows import traffic_rows
+from headless.studies.stability.robustness_rows import traffic_rows
 
 import numpy as np
 import pytest
-from engines import ANY, needs_any
 from matplotlib.image import imread
-from small_junction import make_geometry
-from synthetic_junction import junction_site
-from traffic_by_hand import make_trajectories, parked
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import IntervalEstimate, mean_of, mean_over_time
@@ -34,6 +30,10 @@ from seip_addon.core.robustness.visibility_under_errors import Surroundings
 from seip_addon.core.traffic import RoadUser
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.settings import VisibilitySettings
+from tests.builders.small_junction import make_geometry
+from tests.builders.synthetic_junction import junction_site
+from tests.builders.traffic_by_hand import make_trajectories, parked
+from tests.engines import ANY, needs_any
 
 pytestmark = needs_any
 

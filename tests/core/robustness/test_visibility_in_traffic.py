@@ -7,12 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from engines import ANY, each_engine, needs_any
 from hypothesis import given
 from hypothesis import strategies as st
-from random_cases import cases
-from synthetic_junction import junction_site, make_candidates
-from traffic_by_hand import make_model, make_trajectories, parked
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import rotated
@@ -35,6 +31,10 @@ from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.visibility.scanning import ScanPosition
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.visibility.visibility_model import seen_by_tilted_full_scan
+from tests.builders.synthetic_junction import junction_site, make_candidates
+from tests.builders.traffic_by_hand import make_model, make_trajectories, parked
+from tests.engines import ANY, each_engine, needs_any
+from tests.oracles.random_cases import cases
 
 pytestmark = needs_any
 

@@ -5,18 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import fields, replace
 
-from headless.lab.benchmark.scans import SLACK, combined, differing, exact_hit, full_scan, grazes, passes_an_edge
+from headless.studies.benchmark.scans import SLACK, combined, differing, exact_hit, full_scan, grazes, passes_an_edge
 
 import numpy as np
 import pytest
-from engines import ANY, each_engine, needs_any
-from float64_rays import first_hits
 from hypothesis import given
 from hypothesis import strategies as st
-from random_cases import cases
-from small_junction import box_triangles
-from traffic_by_hand import box_body, ground, make_model, make_sensor, make_static, make_trajectories, parked
-from visibility_search import behind_prisms
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import CarlaDropoff, Rosette, load_catalogue
@@ -37,6 +31,20 @@ from seip_addon.core.scans.frame import STATIC_INSTANCE
 from seip_addon.core.scans.motion import rotations
 from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
 from seip_addon.core.traffic import RoadUser
+from tests.builders.small_junction import box_triangles
+from tests.builders.traffic_by_hand import (
+    box_body,
+    ground,
+    make_model,
+    make_sensor,
+    make_static,
+    make_trajectories,
+    parked,
+)
+from tests.engines import ANY, each_engine, needs_any
+from tests.oracles.float64_rays import first_hits
+from tests.oracles.random_cases import cases
+from tests.oracles.visibility_search import behind_prisms
 
 pytestmark = needs_any
 

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from plain_street import PLAIN, block, street
-from street_map import street_map
 
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
@@ -14,6 +12,8 @@ from seip_addon.core.site.scene_geometry import Mesh, Pole
 from seip_addon.core.streetscape.description import SiteDescription, Trees
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.workflows.survey import SurveySettings, lay_out
+from tests.builders.plain_street import PLAIN, block, street
+from tests.builders.street_map import street_map
 
 SETTINGS = SurveySettings(candidates=PLAIN)
 POLE = Pole("mast", np.array((0.0, 9.0, 0.1)), 6.0)

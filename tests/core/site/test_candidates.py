@@ -7,13 +7,13 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plain_street import PLAIN, block, street
-from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.site.candidates import generate_candidates
 from seip_addon.core.site.pavement_sampling import spread
 from seip_addon.core.site.scene_geometry import Mesh, NamedArea, Pole
+from tests.builders.plain_street import PLAIN, block, street
+from tests.oracles.random_cases import cases
 
 
 def test_posts_keep_the_setback_and_stand_on_the_pavement():

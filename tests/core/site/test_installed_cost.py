@@ -11,7 +11,7 @@ from seip_addon.core.placement.deployment import deploy, pose_prices
 from seip_addon.core.placement.objective import Objective, optimise, placement_problem
 from seip_addon.core.progress import finish
 from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
-from tests.small_junction import Example, make_example
+from tests.builders.small_junction import Example, make_example
 
 
 @pytest.fixture(scope="module")

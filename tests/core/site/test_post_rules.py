@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from plain_street import PLAIN, sheet, street
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.site.candidates import CandidateSettings, generate_candidates
 from seip_addon.core.site.post_rules import RULES, KeepOffArea, narrow_islands
 from seip_addon.core.site.scene_geometry import Mesh, Pole
+from tests.builders.plain_street import PLAIN, sheet, street
 
 TRACK = shapely.box(-40, 7, 0, 10)
 AREA_RULES = [rule for rule in RULES if rule not in ("islands", "power-poles")]

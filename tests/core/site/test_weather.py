@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from plain_street import street
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY
 from seip_addon.core.site.weather import WET_FACTOR, Weather, weather_of
+from tests.builders.plain_street import street
 
 
 def test_words_are_weather():

@@ -7,8 +7,6 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 import shapely
-from engines import ANY, needs_any
-from plain_street import PLAIN, block, street
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
@@ -20,6 +18,8 @@ from seip_addon.core.site.site import make_site
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.visibility.sight_lines import pose_at
+from tests.builders.plain_street import PLAIN, block, street
+from tests.engines import ANY, needs_any
 
 ROUND = load_catalogue()["type1"]
 

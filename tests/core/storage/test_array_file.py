@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from npz_by_hand import claiming, contents, write
-from traffic_by_hand import USERS, make_trajectories
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.storage import array_file
 from seip_addon.core.storage.array_file import _array
 from seip_addon.core.traffic import Trajectories
+from tests.builders.npz_by_hand import claiming, contents, write
+from tests.builders.traffic_by_hand import USERS, make_trajectories
 
 ROOT = Path(__file__).resolve().parents[3]
 SHIPPED = ROOT / "scenes" / "junction_traffic" / "run-1.npz"

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from opendrive_text import document, geometry, lane, read_text, road, section
-from street_map import street_map
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import SiteDescription, describe_place, read_site_description
 from seip_addon.core.streetscape.model import site_model
+from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
+from tests.builders.street_map import street_map
 
 MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[4] / "shared" / "opendrive")
 LANES = section(lane(1), lane(-1))

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from opendrive_text import document, geometry, lane, read_text, road, section
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import read_map
@@ -17,6 +16,7 @@ from seip_addon.core.streetscape.description import SiteDescription, read_site_d
 from seip_addon.core.streetscape.levels import Crossing
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.streetscape.parts import Role
+from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 
 MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[4] / "shared" / "opendrive")
 DECK = 6.0

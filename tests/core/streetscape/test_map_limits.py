@@ -6,14 +6,14 @@ import tracemalloc
 import numpy as np
 import pytest
 import shapely
-from opendrive_text import document, geometry, lane, read_text, road, section
-from street_map import street_map
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import SiteDescription, describe_place, read_site_description
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.streetscape.parts import Role
+from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
+from tests.builders.street_map import street_map
 
 HERE = SiteDescription(near=(50.0, 0.0))
 HOUSE = '<object id="5" type="building" name="house" s="80" t="{t}" zOffset="{z}" hdg="0" {size}>{inside}</object>'

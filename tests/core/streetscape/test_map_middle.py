@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 import shapely
-from opendrive_text import document, geometry, read_text, road
-from street_map import street_map
 
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import describe_place
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.streetscape.road_surface import _line
+from tests.builders.opendrive_text import document, geometry, read_text, road
+from tests.builders.street_map import street_map
 
 
 def test_the_middle_lies_on_a_road(tmp_path):

@@ -6,9 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from opendrive_text import document, geometry, lane, read_text, road, section
-from plain_street import PLAIN, street
-from street_map import street_map
 
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
@@ -17,6 +14,9 @@ from seip_addon.core.site.scene_geometry import ASSUMED, DESCRIBED, FROM_EXTRACT
 from seip_addon.core.streetscape.description import Poles, SiteDescription
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.streetscape.parts import Role
+from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
+from tests.builders.plain_street import PLAIN, street
+from tests.builders.street_map import street_map
 
 HERE = SiteDescription(near=(0.0, 0.0), radius=30.0)
 SIGNAL = '<signal id="1" name="{name}" s="{s}" t="{t}" zOffset="0" orientation="+" dynamic="yes" type="1000001"/>'

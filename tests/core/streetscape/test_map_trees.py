@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from street_map import street_map
 
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import SiteDescription
 from seip_addon.core.streetscape.model import site_model
+from tests.builders.street_map import street_map
 
 TREE = '<object id="1" type="{kind}" name="{name}" s="80" t="-12" zOffset="0" hdg="0" {size}/>'
 

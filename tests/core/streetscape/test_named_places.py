@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 import shapely
-from opendrive_text import read_text
-from street_map import street_map
 
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import SiteDescription
 from seip_addon.core.streetscape.model import site_model
+from tests.builders.opendrive_text import read_text
+from tests.builders.street_map import street_map
 
 CROSSWALK = '<object id="5" type="crosswalk" {name}s="80" t="0" hdg="0" length="4" width="7" orientation="none"/>'
 

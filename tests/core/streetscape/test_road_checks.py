@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from opendrive_text import document, geometry, lane, read_text, road, section
 
 from seip_addon.core.opendrive import lane_surfaces
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import SiteDescription
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.streetscape.road_checks import height_gaps, steep_places
+from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 
 
 def rising(grade, z=0.0):

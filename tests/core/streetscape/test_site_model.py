@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from street_map import street_map
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import read_map
@@ -14,6 +13,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import Area, Building, Poles, SiteDescription, Trees, WeightedRegion
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.streetscape.parts import Role
+from tests.builders.street_map import street_map
 
 MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[4] / "shared" / "opendrive")
 HERE = SiteDescription(near=(0.0, 0.0), radius=30.0)

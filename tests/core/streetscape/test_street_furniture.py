@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from random_cases import cases
 
 from seip_addon.core.streetscape import street_furniture as furniture
+from tests.oracles.random_cases import cases
 
 SIZES = st.floats(0.5, 40)
 

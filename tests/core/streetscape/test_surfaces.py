@@ -7,10 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from face_areas import coincident_areas, plan, surfaces
-from osm_text import JUNCTIONS, crossing
-from street_map import street_map
-from sumo_here import needs_sumo
 
 from seip_addon.core.opendrive import LaneSurface, read_map
 from seip_addon.core.progress import finish
@@ -20,6 +16,10 @@ from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.streetscape.parts import Role
 from seip_addon.core.streetscape.road_surface import markings, roadside, without_gaps, without_loose_ends
 from seip_addon.core.workflows.site_building import AskedSite, build_site
+from tests.builders.osm_text import JUNCTIONS, crossing
+from tests.builders.street_map import street_map
+from tests.oracles.face_areas import coincident_areas, plan, surfaces
+from tests.sumo_here import needs_sumo
 
 ROOT = Path(__file__).resolve().parents[3]
 SHARED = Path(os.environ.get("SEIP_MAPS", ROOT.parent / "shared" / "opendrive")).parent

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 import shapely
-from face_areas import plan
-from osm_text import Extract
-from sumo_here import needs_sumo
 
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.site_building import AskedSite, build_site
+from tests.builders.osm_text import Extract
+from tests.oracles.face_areas import plan
+from tests.sumo_here import needs_sumo
 
 pytestmark = needs_sumo
 STEP = 2.0

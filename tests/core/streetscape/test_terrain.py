@@ -3,10 +3,10 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from random_cases import cases
 
 from seip_addon.core.geometry.plan import plane_height
 from seip_addon.core.streetscape.terrain import MAX_ROADSIDE, Embankments, Terrain, cut, triangulate
+from tests.oracles.random_cases import cases
 
 SQUARE = np.array([[[0, 0, 1], [4, 0, 1], [4, 4, 3]], [[0, 0, 1], [4, 4, 3], [0, 4, 3]]], dtype=float)
 """The plane z = 1 + y / 2 over a square of side 4."""

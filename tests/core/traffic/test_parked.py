@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from traffic_by_hand import make_trajectories
 
 from seip_addon.core.traffic.parked import parked_users, shared_bays
+from tests.builders.traffic_by_hand import make_trajectories
 
 
 def standing(x, begin=0.0, end=40.0):

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from traffic_by_hand import make_trajectories
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.core.traffic.run_overlap import overlap_of, require_independent, vehicle_positions
+from tests.builders.traffic_by_hand import make_trajectories
 
 SHIPPED = Path(__file__).parents[3] / "scenes"
 RUN = Trajectories.load(SHIPPED / "junction_traffic" / "run-1.npz")

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sumo_text import CONVERTED_CSV, FCD, NATIVE_CSV, NET, ROUTES
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
@@ -22,6 +21,7 @@ from seip_addon.core.traffic.floating_car_data import (
 )
 from seip_addon.core.traffic.sumo_files import read_net_offset
 from seip_addon.core.traffic.vehicle_types import BUILT_IN, CAR, VehicleType, read_vehicle_types
+from tests.builders.sumo_text import CONVERTED_CSV, FCD, NATIVE_CSV, NET, ROUTES
 
 
 def written(folder, name, text):

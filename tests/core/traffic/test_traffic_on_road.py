@@ -7,7 +7,6 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
@@ -16,6 +15,7 @@ from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.core.traffic.overlaps import find_overlaps, footprints, without_overlaps
 from seip_addon.core.traffic.road_fit import ROAD_TOLERANCE, fit_to_road
 from seip_addon.core.traffic.smooth_walks import smooth_walks
+from tests.oracles.random_cases import cases
 
 GRADE = 0.05
 CAR = RoadUser("car", "car", 4.0, 1.8, 1.5)

@@ -8,7 +8,6 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from test_bodies import areas, edges, first_hit, parts, signed_volume
-from traffic_by_hand import make_trajectories, parked
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
@@ -16,6 +15,7 @@ from seip_addon.core.traffic import CATEGORIES, RoadUser, Trajectories
 from seip_addon.core.traffic.bodies import MESHES, fitted_body, read_mesh
 from seip_addon.core.traffic.trajectories import MAX_BEND, bent
 from seip_addon.core.traffic.varied_bodies import KINDS, SHAPES, draw_shape, draw_size, resized, varied
+from tests.builders.traffic_by_hand import make_trajectories, parked
 
 SCENES = Path(__file__).parents[3] / "scenes"
 RUNS = sorted(SCENES.glob("*_traffic*/run-*.npz"))

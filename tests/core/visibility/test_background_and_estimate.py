@@ -5,8 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from engines import ANY
-from synthetic_junction import junction_site
 
 from seip_addon.background import Background
 from seip_addon.core.errors import SeipError
@@ -15,6 +13,8 @@ from seip_addon.core.progress import Pace, Progress, finish
 from seip_addon.core.visibility.estimate import estimate_visibility
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.settings import VisibilitySettings
+from tests.builders.synthetic_junction import junction_site
+from tests.engines import ANY
 
 SITE = junction_site(positions=80, heights=[4.0, 6.0, 8.0], spacing=1.0)
 MODELS = load_catalogue()

@@ -11,8 +11,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from engines import ANY, needs_embree
-from synthetic_junction import junction_site
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
@@ -20,6 +18,8 @@ from seip_addon.core.progress import finish
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.visibility.store import stored_visibility
+from tests.builders.synthetic_junction import junction_site
+from tests.engines import ANY, needs_embree
 
 HAS_DASK = importlib.util.find_spec("distributed") is not None
 needs_dask = pytest.mark.skipif(not HAS_DASK, reason="Dask is not installed: the group 'cluster' of pyproject.toml")

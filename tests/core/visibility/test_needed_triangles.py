@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from engines import each_engine
 from hypothesis import given
 from hypothesis import strategies as st
-from random_cases import cases
 
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
 from seip_addon.core.visibility.triangle_culling import culling_message, needed_triangles
+from tests.engines import each_engine
+from tests.oracles.random_cases import cases
 
 
 @each_engine

@@ -6,13 +6,13 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from engines import each_engine, needs_embree
-from float64_rays import first_hits
 from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
+from tests.engines import each_engine, needs_embree
+from tests.oracles.float64_rays import first_hits
 
 SQUARE = np.array([[[-1, -1, 5], [1, -1, 5], [1, 1, 5]], [[-1, -1, 5], [1, 1, 5], [-1, 1, 5]]], dtype=np.float64)
 UP = np.array([[0.0, 0.0, 1.0]])

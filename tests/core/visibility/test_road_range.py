@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_junction import junction_site
 
 from seip_addon.core.lidar import RangeEquation, load_catalogue
 from seip_addon.core.site.candidates import CandidateSettings
@@ -13,6 +12,7 @@ from seip_addon.core.site.weather import Weather
 from seip_addon.core.visibility.road_range import range_warnings, road_range, road_reflectivity
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.workflows.survey import SurveySettings, carla_warnings
+from tests.builders.synthetic_junction import junction_site
 
 CATALOGUE = load_catalogue()
 SIGHT = VisibilitySettings()

@@ -3,14 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
-from engines import ANY
-from synthetic_junction import junction_site, rectangle
 
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.progress import finish
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.visibility.sight_lines import sight_lines
+from tests.builders.synthetic_junction import junction_site, rectangle
+from tests.engines import ANY
 
 MODELS = load_catalogue()
 DELTA = 0.5

@@ -4,17 +4,13 @@ import math
 from dataclasses import replace
 
 from headless.convergence import Evaluator
-from headless.lab.stability.criterion import in_view
+from headless.studies.stability.criterion import in_view
 
 import numpy as np
 import pytest
 import shapely
-from engines import ANY, each_engine
-from float64_rays import nearest_return
 from hypothesis import given
 from hypothesis import strategies as st
-from random_cases import cases
-from synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import angles_of, describe_turn, orientation, orientations, rotated
@@ -45,6 +41,10 @@ from seip_addon.core.visibility.ring_resolution import resolution_warnings, unre
 from seip_addon.core.visibility.sight_lines import pose_at
 from seip_addon.core.visibility.visibility_model import VisibilityModel
 from seip_addon.core.workflows.survey import SurveySettings
+from tests.builders.synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity
+from tests.engines import ANY, each_engine
+from tests.oracles.float64_rays import nearest_return
+from tests.oracles.random_cases import cases
 
 MODELS = {key: replace(model, points_per_second=model.points_per_second / 8) for key, model in load_catalogue().items()}
 PHYSICAL = {key: replace(model, law=RangeEquation.of_ranges(12.0, 30.0)) for key, model in MODELS.items()}

@@ -9,14 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from engines import ANY, each_engine, needs_any, needs_bvh, needs_embree
-from float64_rays import nearest_return
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from random_cases import cases
 from shapely import box
-from synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation
@@ -34,6 +30,10 @@ from seip_addon.core.visibility.grid import (
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
 from seip_addon.core.visibility.ring_resolution import resolution_warnings, unresolved_from
 from seip_addon.core.visibility.store import CheckpointFolder, stored_visibility
+from tests.builders.synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity
+from tests.engines import ANY, each_engine, needs_any, needs_bvh, needs_embree
+from tests.oracles.float64_rays import nearest_return
+from tests.oracles.random_cases import cases
 
 Float = NDArray[np.float64]
 

@@ -5,11 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from engines import ANY, each_engine
 from hypothesis import given
 from hypothesis import strategies as st
-from random_cases import cases
-from synthetic_junction import junction_site
 
 from seip_addon.core.lidar import beam_directions, load_catalogue
 from seip_addon.core.scans.sensor import level_orientation
@@ -18,6 +15,9 @@ from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.visibility.target_index import TargetIndex
 from seip_addon.core.visibility.visibility_model import VisibilityModel
+from tests.builders.synthetic_junction import junction_site
+from tests.engines import ANY, each_engine
+from tests.oracles.random_cases import cases
 
 MODELS = load_catalogue()
 SITE = junction_site()

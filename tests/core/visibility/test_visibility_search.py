@@ -6,11 +6,11 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from engines import each_engine
-from visibility_search import FAULTS, draw_case, judge, search, sentence
 
 from seip_addon.core.visibility.near_surfaces import near_surfaces
 from seip_addon.core.visibility.ray_casting import Engine
+from tests.engines import each_engine
+from tests.oracles.visibility_search import FAULTS, draw_case, judge, search, sentence
 
 QUICK = 12
 FIRST = 42  # faults that there were showed in scenes 42, 43, 51 and 52

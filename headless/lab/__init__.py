@@ -1,1 +1,0 @@
-"""Studies of the methods' limits and costs. Imported by no command but theirs."""

@@ -1,0 +1,72 @@
+"""Benchmark of visibility, placement and scans against alternatives: charts, a page and a JSON file.
+
+seip study benchmark scenes/junction.blend -o docs
+seip study benchmark scenes/junction.blend -o docs --sensor-models --site town.blend
+"""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from headless import runtime
+from headless.studies.benchmark.charts import save_charts
+from headless.studies.benchmark.measurements import BenchmarkScope, compare_sensor_models, measure
+from headless.studies.benchmark.report import bars, load_json, save_json, save_page
+from headless.studies.benchmark.sensor_report import save_sensor_model_chart
+
+import bpy
+
+from seip_addon.core.progress import finish
+from seip_addon.scene.read import read_scene
+
+
+def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
+    """Measure, and write the results into a folder; tests give a small ``scope``."""
+    parser = argparse.ArgumentParser(
+        prog="benchmark", description=__doc__.splitlines()[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
+    )
+    parser.add_argument("scene", type=Path, help="the .blend")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for benchmark.md and benchmark/")
+    parser.add_argument("--places", type=int, default=12, help="how many places are sampled; a full scan takes seconds")
+    parser.add_argument("--time-limit", type=float, default=60.0, help="for each answer of a solver, in seconds")
+    models = parser.add_argument_group("models of the sensor")
+    models.add_argument("--sensor-models", action="store_true", help="measure this chapter alone; keep the others")
+    models.add_argument(
+        "--site", action="append", type=Path, default=[], metavar="BLEND", help="another scene to measure; repeat it"
+    )
+    models.add_argument("--seed", type=int, default=0, help="of placements, scans and the detector's training")
+    models.add_argument("--steps", type=int, default=1800, help="of that training, where PyTorch is installed")
+    models.add_argument("--work", type=Path, default=Path("out/benchmark"), help="folder of the detector")
+    options = parser.parse_args(argv)
+    scope = scope or BenchmarkScope()
+    pictures = options.output / "benchmark"
+    runtime.check_folder(pictures)
+    runtime.check_folder(options.work)
+    figures = pictures / "benchmark.json"
+    kept = load_json(figures) if options.sensor_models or figures.exists() else None
+    if options.sensor_models and kept is not None:
+        findings, checks = kept
+    else:
+        runtime.open_scene(options.scene)
+        findings, names = measure(read_scene(bpy.context.scene).geometry, options.places, options.time_limit, scope)
+        checks = bars(findings.costs, findings.runs, names, findings.scans)
+    for bar in checks:
+        runtime.print_line(f"{bar.what}: asked {bar.asked}, measured {bar.measured}{'' if bar.met else ' – NOT MET'}")
+    steps = compare_sensor_models(
+        [options.scene, *options.site],
+        options.time_limit,
+        scope,
+        seed=options.seed,
+        steps=options.steps,
+        work=options.work,
+    )
+    with runtime.progress_bar() as report:
+        models_compared = finish(steps, report).over(kept[0].sensor_models if kept else None)
+    findings = replace(findings, sensor_models=models_compared)
+    with runtime.incomplete_if_interrupted(options.output):
+        if not options.sensor_models:
+            save_charts(pictures, findings)
+        save_sensor_model_chart(pictures, models_compared)
+        save_json(figures, findings, checks)
+        save_page(options.output / "benchmark.md", findings, checks, "benchmark")
+    runtime.print_line(f"results: {options.output / 'benchmark.md'}")

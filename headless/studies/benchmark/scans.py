@@ -1,0 +1,244 @@
+"""Frames with cached static returns against frames cast anew."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+from headless.studies.benchmark.resource_usage import Expense
+from headless.studies.benchmark.visibility import ENGINES
+
+import numpy as np
+
+from seip_addon.core.arrays import Float, Integer
+from seip_addon.core.errors import SeipError
+from seip_addon.core.lidar import LidarModel, return_chance
+from seip_addon.core.progress import finish
+from seip_addon.core.scans import (
+    Frame,
+    MountedSensor,
+    ScanSettings,
+    Simulation,
+    StaticScene,
+    level_orientation,
+    prepare,
+)
+from seip_addon.core.scans.frame import STATIC_INSTANCE
+from seip_addon.core.scans.motion import rotations
+from seip_addon.core.scans.scanner import ReflectiveSurface, Scan, Scanner
+from seip_addon.core.site.site import Site
+from seip_addon.core.traffic import RoadUser, Snapshot, Trajectories
+from seip_addon.core.traffic.bodies import Body, fitted_body
+from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
+
+SENSORS, ROAD_USERS = 4, 40
+SLACK = 1e-4
+"""Metres by which the same return may differ, and by which a ray may pass an edge to graze it."""
+
+_RAYS_AT_ONCE = 1 << 17
+_SIZES = (("car", 4.5, 1.8, 1.5), ("car", 3.9, 1.7, 1.5), ("van", 5.6, 2.0, 2.4), ("truck", 9.0, 2.5, 3.5))
+_SPEED, _SECONDS, _GAP = 8.0, 10.0, 6.0  # metres per second, seconds, metres
+
+
+@dataclass
+class ScanCost:
+    """Cost of simulated frames.
+
+    Parameters
+    ----------
+    rays : int
+        Of all sensors in all frames.
+    differing : int
+        Rays that did not end where those of the full scan do; all of them graze an edge or a surface.
+    """
+
+    expense: Expense = field(default_factory=Expense)
+    frames: int = 0
+    rays: int = 0
+    differing: int = 0
+
+    @property
+    def rate(self) -> float:
+        """Frames per second of processor time."""
+        return self.frames / self.expense.cpu
+
+
+def scan_costs(site: Site, static: StaticScene, model: LidarModel, frames: int) -> dict[str, ScanCost]:
+    """Make the same frames of four sensors and forty road users, all of which move, in both ways with each engine.
+
+    Parameters
+    ----------
+    site : Site
+        At whose candidate places, evenly spread, the sensors hang.
+
+    Returns
+    -------
+    dict of str to ScanCost
+        By ``kept bvh``, ``anew bvh``, ``kept embree``, ``anew embree``.
+
+    Raises
+    ------
+    SeipError
+        A return differs from the full scan's and grazes nothing.
+    """
+    places = site.candidates.xyz[np.linspace(0, len(site.candidates) - 1, SENSORS).astype(int)]
+    sensors = [
+        MountedSensor(f"S{number + 1}", model, place, level_orientation(0.0)) for number, place in enumerate(places)
+    ]
+    traffic = driving(site)
+    bodies = [fitted_body(user) for user in traffic.users]
+    costs = {f"{way} {engine}": ScanCost() for engine in ENGINES for way in ("kept", "anew")}
+    for engine in ENGINES:
+        simulation = finish(prepare(static, sensors, traffic, bodies, ScanSettings(engine=engine)))
+        rescan = Rescan(simulation, static, bodies, engine)
+        kept, anew = costs[f"kept {engine}"], costs[f"anew {engine}"]
+        for number in range(frames):
+            snapshot = traffic.at(number / model.rotation_rate)
+            kept.expense.time(partial(simulation.frame, number, snapshot.time))
+            anew.expense.time(partial(rescan.frame, number, snapshot))
+            kept.differing += rescan.differing(snapshot)
+        kept.frames = anew.frames = frames
+        kept.rays = anew.rays = frames * sum(len(scanner.directions) for scanner in simulation.scanners)
+    return costs
+
+
+@dataclass(frozen=True, eq=False)
+class Rescan:
+    """Makes frames by casting every ray against everything.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Whose frames are to be made otherwise.
+    bodies : sequence of Body
+        Of each road user.
+    engine : {"bvh", "embree"}
+    """
+
+    simulation: Simulation
+    static: StaticScene
+    bodies: Sequence[Body]
+    engine: Engine
+
+    def frame(self, number: int, snapshot: Snapshot) -> Frame:
+        """Return what the sensors measure at an instant."""
+        return self.simulation.measure(number, snapshot, self.scans(snapshot)[0])
+
+    def scans(self, snapshot: Snapshot) -> tuple[list[Scan], Float]:
+        """Return what the rays of each sensor end on, and all triangles (n, 3, 3)."""
+        surface, owner = combined(self.static, self.bodies, snapshot, self.engine)
+        scans = [full_scan(scanner, surface, owner, len(self.bodies)) for scanner in self.simulation.scanners]
+        return scans, surface.caster.triangles
+
+    def differing(self, snapshot: Snapshot) -> int:
+        """Return how many of the simulation's rays end elsewhere, having seen that each of them grazes something."""
+        full, triangles = self.scans(snapshot)
+        count = 0
+        for scanner, ours, theirs in zip(self.simulation.scanners, self.simulation.scans(snapshot), full, strict=True):
+            for ray in differing(ours, theirs):
+                if not grazes(scanner.sensor.xyz, scanner.directions[ray], triangles, ours.distance[ray]):
+                    raise SeipError(f"ray {ray} of {scanner.sensor.label} is not the full scan's; this is a defect")
+                count += 1
+        return count
+
+
+def driving(site: Site) -> Trajectories:
+    """Return road users of several sizes that start anywhere on the site's targets and drive straight on."""
+    random = np.random.default_rng(0)
+    start: list[Float] = []
+    for xyz in random.permutation(site.targets.xyz):
+        if len(start) < ROAD_USERS and all(math.dist(xyz[:2], other[:2]) > _GAP for other in start):
+            start.append(xyz)
+    yaw = random.uniform(-math.pi, math.pi, len(start))
+    way = _SPEED * _SECONDS * np.stack([np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))], axis=1)
+    users = [RoadUser(f"{number}", *_SIZES[number % len(_SIZES)]) for number in range(len(start))]
+    return Trajectories(
+        users=tuple(users),
+        origin=site.origin,
+        first=2 * np.arange(len(start) + 1),
+        time=np.tile([0.0, _SECONDS], len(start)),
+        position=np.stack([start, start + way], axis=1).reshape(-1, 3),
+        yaw=np.repeat(yaw, 2),
+        pitch=np.zeros(2 * len(start)),
+        speed=np.full(2 * len(start), _SPEED),
+    )
+
+
+def combined(
+    static: StaticScene, bodies: Sequence[Body], snapshot: Snapshot, engine: Engine
+) -> tuple[ReflectiveSurface, Integer]:
+    """Put the road users of an instant among what stands still; return that, and which road user each triangle is."""
+    placed = [
+        position + bodies[user].triangles @ attitude.T
+        for user, position, attitude in zip(
+            snapshot.user, snapshot.position, rotations(snapshot.yaw, snapshot.pitch), strict=True
+        )
+    ]
+    owner = [np.full(len(static.triangles), STATIC_INSTANCE)]
+    owner += [np.full(len(bodies[user].triangles), user) for user in snapshot.user]
+    reflectivity = [static.reflectivity, *(bodies[user].reflectivity for user in snapshot.user)]
+    caster = make_ray_caster(np.concatenate([static.triangles, *placed]), engine)
+    return ReflectiveSurface(caster, np.concatenate(reflectivity)), np.concatenate(owner)
+
+
+def full_scan(scanner: Scanner, surface: ReflectiveSurface, owner: Integer, users: int) -> Scan:
+    """Cast every ray of a sensor against everything."""
+    model, rays = scanner.sensor.model, len(scanner.directions)
+    distance, intensity, reflected = np.full(rays, np.inf), np.zeros(rays), np.zeros(rays)
+    instance = np.full(rays, STATIC_INSTANCE, dtype=np.int32)
+    for begin in range(0, rays, _RAYS_AT_ONCE):
+        directions = scanner.directions[begin : begin + _RAYS_AT_ONCE]
+        far, triangle = surface.caster.cast(scanner.sensor.xyz, directions, model.max_range)
+        hit = np.flatnonzero(triangle >= 0)
+        distance[begin + hit] = far[hit]
+        reflected[begin + hit] = surface.reflected(directions[hit], triangle[hit])
+        intensity[begin + hit] = model.law.intensity(far[hit], reflected[begin + hit])
+        instance[begin + hit] = owner[triangle[hit]]
+    chance = return_chance(model, distance, reflected).astype(np.float32)
+    nobody = np.zeros(users, dtype=np.int64)
+    return Scan(distance, distance, intensity, chance, instance, nobody, nobody)
+
+
+def differing(one: Scan, other: Scan) -> Integer:
+    """Return the rays that do not end at the same place on the same thing."""
+    hit, there = np.isfinite(one.distance), np.isfinite(other.distance)
+    both = hit & there
+    apart = hit != there
+    apart[both] = np.abs(one.distance[both] - other.distance[both]) > SLACK
+    return np.flatnonzero(apart | (one.instance != other.instance))
+
+
+def grazes(origin: Float, direction: Float, triangles: Float, distance: float) -> bool:
+    """Return whether a ray grazes an edge or a surface, so that two engines may disagree on it.
+
+    It passes an edge, or it meets a surface so edge-on that single precision of the
+    corners moves the full scan's return, while double precision agrees with this one.
+    """
+    return (
+        passes_an_edge(origin, direction, triangles) or abs(exact_hit(origin, direction, triangles) - distance) < SLACK
+    )
+
+
+def exact_hit(origin: Float, direction: Float, triangles: Float) -> float:
+    """Return how far a ray goes to the first triangle in double precision (Möller and Trumbore 1997), or infinity."""
+    start, first, second = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    across = np.cross(direction, second)
+    volume = (first * across).sum(axis=1)
+    facing = np.flatnonzero(volume)
+    away, share = origin - start[facing], 1.0 / volume[facing]
+    along = np.cross(away, first[facing])
+    u, v = share * (away * across[facing]).sum(axis=1), share * (along @ direction)
+    far = share * (second[facing] * along).sum(axis=1)
+    return float(far[(u >= 0) & (v >= 0) & (u + v <= 1) & (far > 0)].min(initial=np.inf))
+
+
+def passes_an_edge(origin: Float, direction: Float, triangles: Float) -> bool:
+    """Return whether a ray passes within a tenth of a millimetre of a triangle's edge."""
+    start = np.concatenate([triangles[:, corner] for corner in range(3)]) - origin
+    edge = np.concatenate([triangles[:, (corner + 1) % 3] - triangles[:, corner] for corner in range(3)])
+    aside, across = (part - np.outer(part @ direction, direction) for part in (start, edge))
+    length = np.maximum((across**2).sum(axis=1), np.finfo(float).tiny)
+    share = np.clip(-(aside * across).sum(axis=1) / length, 0, 1)
+    return bool(np.linalg.norm(aside + share[:, None] * across, axis=1).min() < SLACK)

@@ -1,0 +1,352 @@
+"""The detection study: average precision of sensor types × numbers, against price and coverage.
+
+Placements come from the integer program, clouds from simulated traffic. One detector learns from all placements at once
+(or one from each), several times with other seeds, and is evaluated with each placement on traffic that none has seen.
+"""
+
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+from pathlib import Path
+
+from headless.detection.average_precision import ADVISED_TEST_RUNS, Evaluation, balanced_score, evaluate
+from headless.detection.breakdown import false_positives
+from headless.detection.detector import Detector
+from headless.detection.frame_results import FrameResult
+from headless.detection.frames import SampledRecording
+from headless.detection.recordings import PlacedSensors, SampledRun, Simulator, sampled_runs
+from headless.detection.rules import MAIN_RULE, Precision, precisions
+from headless.detection.run_detection import AT_ONCE, detect_in_runs
+from headless.detection.settings import NetworkSettings, TrainingSettings
+from headless.detection.suitability import suitability_warnings
+from headless.detection.training import TrainedDetector, deterministic, train
+from headless.studies.coverage.cells import COUNTS, Case, Cell, solve_cell
+from headless.studies.detection.sensor_configuration import SensorConfiguration
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import Progress, side_by_side, within
+from seip_addon.core.traffic.parked import shared_bays
+from seip_addon.core.traffic.run_overlap import MATCH_RADIUS, require_independent, vehicle_positions
+from seip_addon.core.workflows.survey import Survey
+
+from .claims import SeedResult
+from .kitti_precision import Kitti, kitti
+
+MIN_RUNS = 4  # one to learn from, one for validation, two for tests
+RUNS_PER_TEST, RUNS_PER_VALIDATION = 2, 8  # of all runs one half is for tests, and one eighth for validation
+
+SPLIT = "the last half for tests, an eighth before it (one at least) for validation, the others to learn from"
+"""How runs are split, in words."""
+
+TEST_STRIDE = 2  # frames to learn from for each to test on: what is seen now is seen again soon, and only costs time
+
+
+@dataclass(frozen=True, eq=False)
+class Traffic:
+    """Runs of traffic for training, validation and tests.
+
+    Parameters
+    ----------
+    training, validation, test : tuple of SampledRun
+        To learn from, to see by when that is enough, and to evaluate with.
+
+    Raises
+    ------
+    SeipError
+        Two runs are nearly the same: their frames show the same vehicles in the same places.
+    """
+
+    training: tuple[SampledRun, ...]
+    validation: tuple[SampledRun, ...]
+    test: tuple[SampledRun, ...]
+
+    def __post_init__(self) -> None:
+        self.overlap()
+
+    def overlap(self) -> str:
+        """Return a sentence on how much the runs of each pair overlap; see `require_independent`."""
+        runs = (*self.training, *self.validation, *self.test)
+        return require_independent(combinations([vehicle_positions(run.name, run.trajectories) for run in runs], 2))
+
+    def shared_bays(self) -> str:
+        """Return a sentence on how many of the parked of a test run stand where others of another split do."""
+        others = (*self.training, *self.validation)
+        most = max(
+            shared_bays(one.trajectories, other.trajectories, MATCH_RADIUS) for one in self.test for other in others
+        )
+        return (
+            f"of the parked road users of a test run and of a run that was learnt from, at most {most:.0%} stand "
+            f"within {MATCH_RADIUS:g} m of one of the other's"
+        )
+
+
+def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
+    """Read runs, and split them: the last half (rounded down) for tests, an eighth before it for validation.
+
+    Parameters
+    ----------
+    origin : (3,) float64, metres
+    every : float, seconds
+        From frame to frame of those to learn from; in the others `TEST_STRIDE` times that.
+
+    Raises
+    ------
+    SeipError
+        There are too few, or one is too short.
+    """
+    return Traffic(*split_sampled(paths, origin, every))
+
+
+def split_sampled(paths: Sequence[Path], origin: Float, every: float) -> tuple[tuple[SampledRun, ...], ...]:
+    """Return the runs to learn from, for validation and for tests, whether they are independent or not."""
+    if len(paths) < MIN_RUNS:
+        raise SeipError(
+            f"{len(paths)} runs of traffic are too few: name {MIN_RUNS} or more with --traffic, better "
+            f"{RUNS_PER_TEST * ADVISED_TEST_RUNS}, made by headless/traffic.py with a seed each: {SPLIT}"
+        )
+    runs = sampled_runs(paths, origin, every)
+    tested = len(runs) // RUNS_PER_TEST
+    learnt = len(runs) - tested - max(1, len(runs) // RUNS_PER_VALIDATION)
+    sparse = tuple(replace(run, times=run.times[::TEST_STRIDE]) for run in runs[learnt:])
+    return runs[:learnt], sparse[:-tested], sparse[-tested:]
+
+
+@dataclass(frozen=True, eq=False)
+class ModelConfiguration:
+    """A detector to be trained: its settings, seed and sensor configurations.
+
+    Parameters
+    ----------
+    name : str
+        Also of its file.
+    configurations : tuple of SensorConfiguration
+        Whose clouds it learns from, and is evaluated with.
+    start : Detector, optional
+        Whose weights it begins with, in place of random ones.
+    """
+
+    name: str
+    configurations: tuple[SensorConfiguration, ...]
+    network: NetworkSettings
+    training: TrainingSettings
+    start: Detector | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class DetectorOutcome:
+    """Results of one detector on one configuration's test frames.
+
+    Parameters
+    ----------
+    score : float
+        From which on false positives are counted: the best balance of precision and recall on validation frames.
+    """
+
+    model: ModelConfiguration
+    configuration: SensorConfiguration
+    frames: tuple[FrameResult, ...]
+    evaluation: Evaluation
+    score: float
+
+    @property
+    def seed_result(self) -> SeedResult:
+        """Its figures, as the claims need them."""
+        configuration, false = self.configuration, false_positives(self.evaluation, self.score)
+        return SeedResult(
+            sensor=configuration.sensor,
+            count=configuration.count,
+            seed=self.model.training.seed,
+            average_precision=self.evaluation.average_precision,
+            price=configuration.deployment.price,
+            coverage=configuration.deployment.coverage,
+            false_positives=false.per_frame,
+            sparse=false.sparse,
+            padded=self.model.network.padded,
+        )
+
+    @cached_property
+    def precisions(self) -> dict[str, Precision]:
+        """Average precision by every rule."""
+        return precisions(self.frames)
+
+    @cached_property
+    def kitti(self) -> Kitti:
+        """KITTI's figures by the study's own rule."""
+        return kitti(self.frames, MAIN_RULE)
+
+
+def model_configurations(
+    configurations: Sequence[SensorConfiguration],
+    network: NetworkSettings,
+    training: TrainingSettings,
+    *,
+    seeds: int,
+    separate: bool,
+    start: Detector | None = None,
+) -> list[ModelConfiguration]:
+    """Return the models to be trained: one detector for all configurations, or one for each, with every seed."""
+    groups = (
+        {one.name.replace(" × ", "x"): (one,) for one in configurations} if separate else {"": tuple(configurations)}
+    )
+    return [
+        ModelConfiguration(f"detector{name and '-'}{name}-{seed}", group, network, replace(training, seed=seed), start)
+        for name, group in groups.items()
+        for seed in range(1, seeds + 1)
+    ]
+
+
+def padded(some: Sequence[ModelConfiguration]) -> list[ModelConfiguration]:
+    """Return the same with pillars that are padded with zeros: the ablation of claim 9."""
+    return [replace(model, name=f"{model.name}-padded", network=replace(model.network, padded=True)) for model in some]
+
+
+def place_all(survey: Survey) -> Generator[Progress, None, tuple[SensorConfiguration, ...]]:
+    """Place 1, 2 and 4 sensors of each type where they cover most.
+
+    Raises
+    ------
+    SeipError
+        There are fewer positions than sensors, or a type sees nothing.
+    """
+    site, models, visible = survey.site, survey.models, survey.grid.visible
+    cells = [Cell(sensor, None, count, 1.0) for sensor in models for count in COUNTS]
+    placed: list[Case] = []
+    for done, cell in enumerate(cells):
+        progress = Progress(done, len(cells), f"place {cell.count} × {cell.sensor}")
+        yield progress
+        steps = solve_cell(site, models, visible, cell, survey.settings.limits)
+        placed.append((yield from within(progress, steps)))
+    yield Progress(len(cells), len(cells), "placed")
+    return tuple(map(SensorConfiguration.of_case, placed))
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingSet:
+    """Training and validation recordings, by the name of their sensor configuration."""
+
+    training: dict[str, list[SampledRecording]]
+    validation: dict[str, list[SampledRecording]]
+
+
+def simulate_training_set(
+    simulator: Simulator,
+    configurations: Sequence[SensorConfiguration],
+    traffic: Traffic,
+    network: NetworkSettings,
+) -> Generator[Progress, None, TrainingSet]:
+    """Simulate what the configurations measure, and keep what a network learns from it."""
+    area = simulator.area(network.pillar)
+
+    def recordings(placed: PlacedSensors, runs: Sequence[SampledRun]) -> list[SampledRecording]:
+        return [SampledRecording(simulator.record(placed, run), area, network.most_points) for run in runs]
+
+    training_set = TrainingSet(
+        {one.name: recordings(one, traffic.training) for one in configurations},
+        {one.name: recordings(one, traffic.validation) for one in configurations},
+    )
+    each = [
+        (*training_set.training[one.name], *training_set.validation[one.name])
+        for one in most_rays_first(configurations)
+    ]
+    yield from side_by_side([simulated(some) for some in each], AT_ONCE)
+    return training_set
+
+
+def most_rays_first(configurations: Iterable[SensorConfiguration]) -> list[SensorConfiguration]:
+    """Return them in an order in which no long work is left to one core at the end."""
+
+    def rays(placed: SensorConfiguration) -> int:
+        return sum(sensor.model.channels * sensor.model.azimuth_count for sensor in placed.sensors)
+
+    return sorted(configurations, key=rays, reverse=True)
+
+
+def simulated(recordings: Sequence[SampledRecording]) -> Generator[Progress, None, None]:
+    """Simulate all frames of some recordings."""
+    total, done = sum(map(len, recordings)), 0
+    for sampled in recordings:
+        for number in range(len(sampled)):
+            yield Progress(done, total, f"simulate {sampled.recording.name}")
+            sampled.get(number)
+            done += 1
+
+
+def training(
+    model: ModelConfiguration, training_set: TrainingSet, *, device: str, store: Path | None = None
+) -> Generator[Progress, None, TrainedDetector]:
+    """Train a detector on the training set of its configurations."""
+    names = [configuration.name for configuration in model.configurations]
+    return train(
+        [recording for name in names for recording in training_set.training[name]],
+        [recording for name in names for recording in training_set.validation[name]],
+        model.network,
+        model.training,
+        device=device,
+        store=store,
+        start=model.start,
+    )
+
+
+def train_all(
+    models: Sequence[ModelConfiguration], training_set: TrainingSet, folder: Path, *, device: str
+) -> Generator[Progress, None, list[TrainedDetector]]:
+    """Train detectors, on the CPU one on each core; what was trained before an interruption is not trained again."""
+    trainings = [training(model, training_set, device=device, store=folder / f"{model.name}.pt") for model in models]
+    at_once = AT_ONCE if device == "cpu" else 1
+    with deterministic(models[0].training.threads):  # all the time, as torch keeps one such setting for all threads
+        return (yield from side_by_side(trainings, at_once))
+
+
+def evaluate_all(
+    simulator: Simulator, models: Sequence[ModelConfiguration], detectors: Sequence[Detector], traffic: Traffic
+) -> Generator[Progress, None, list[DetectorOutcome]]:
+    """Evaluate every detector with each of its configurations; a frame is simulated once for all of them."""
+    configurations = most_rays_first({one.name: one for model in models for one in model.configurations}.values())
+    runs = (*traffic.validation, *traffic.test)
+    threads = models[0].training.threads
+    asked = [
+        [number for number, model in enumerate(models) if configuration in model.configurations]
+        for configuration in configurations
+    ]
+    works = [
+        detect_in_runs(simulator, configuration, runs, [detectors[number] for number in numbers], threads)
+        for configuration, numbers in zip(configurations, asked, strict=True)
+    ]
+    with deterministic(threads):  # all the time, as torch keeps one such setting for all threads
+        found = yield from side_by_side(works, AT_ONCE)
+    aside = sum(len(run.times) for run in traffic.validation)
+    validated: dict[tuple[str, str], list[FrameResult]] = {}
+    tested: dict[tuple[str, str], list[FrameResult]] = {}
+    for configuration, numbers, results in zip(configurations, asked, found, strict=True):
+        for number, frames in zip(numbers, results, strict=True):
+            validated[models[number].name, configuration.name] = frames[:aside]
+            tested[models[number].name, configuration.name] = frames[aside:]
+    return [outcome for model in models for outcome in _outcomes(model, validated, tested)]
+
+
+def suitability_by_configuration(
+    simulator: Simulator, models: Sequence[ModelConfiguration], detectors: Sequence[Detector], traffic: Traffic
+) -> dict[str, tuple[str, ...]]:
+    """Return the warnings about using the detectors with each sensor configuration, by its name."""
+    found: dict[str, dict[str, None]] = {}
+    frames = {one.name: simulator.frame(one, traffic.test[0], 0) for model in models for one in model.configurations}
+    for model, detector in zip(models, detectors, strict=True):
+        for one in model.configurations:
+            area = simulator.area(detector.settings.pillar)
+            sentences = suitability_warnings(detector, one.types, area, frames[one.name])
+            found.setdefault(one.name, {}).update(dict.fromkeys(sentences))
+    return {name: tuple(sentences) for name, sentences in found.items()}
+
+
+def _outcomes(
+    model: ModelConfiguration,
+    validated: Mapping[tuple[str, str], list[FrameResult]],
+    tested: Mapping[tuple[str, str], list[FrameResult]],
+) -> Iterator[DetectorOutcome]:
+    names = [configuration.name for configuration in model.configurations]
+    score = balanced_score(evaluate([frame for name in names for frame in validated[model.name, name]], MAIN_RULE))
+    for configuration in model.configurations:
+        frames = tuple(tested[model.name, configuration.name])
+        yield DetectorOutcome(model, configuration, frames, evaluate(frames, MAIN_RULE), score)

@@ -1,0 +1,262 @@
+"""Verdicts on the paper's claims about detection, 5 to 9, for one site.
+
+Gains are in points of average precision. All figures are means over the seeds of the training with Student's 95 %
+interval; seeds are compared pair by pair. A claim holds where the interval lies within what is claimed, does not hold
+where it lies outside, and is undecided between the two. Where the study says "about", from half to twice its figure is
+meant. Nothing is decided, whatever the intervals say, while the detectors find next to nothing (`LEAST_PRECISION`) or
+were still learning when their training ended.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from headless.studies.claims import UNDECIDED, Claim, verdict_above, verdict_within, worst_verdict
+from headless.studies.coverage.cells import COUNTS
+
+import numpy as np
+
+from seip_addon.core.counts import counted
+from seip_addon.core.estimates import ANYTHING, CHANGE_OF_SHARE, COUNT, SHARE, Interval, mean_interval
+
+FACTOR = 2.0  # factor up to which a figure is about another
+MIN_SEEDS = 3  # seeds below which nothing is decided
+LEAST_PRECISION = 0.3  # average precision that the detectors must reach with the best of a claim's placements
+
+PUBLISHED_GAINS = ((0.20, 0.07), (0.10, 0.05))
+"""What the study gained from one to two and from two to four sensors, of the simplest type and the next."""
+
+FEW, SOME, MANY = COUNTS
+
+
+@dataclass(frozen=True)
+class SeedResult:
+    """Figures of one training with one sensor configuration.
+
+    Parameters
+    ----------
+    sensor : str
+        Catalogue key.
+    count : int
+        N, the number of sensors that were allowed.
+    average_precision : float, 0 to 1
+        Of vehicles at an intersection over union of 0.7 in plan.
+    price : float, US dollars
+    coverage : float, 0 to 1
+        Share of targets that the placement sees.
+    false_positives : float
+        Per frame, at a score that all results of a training share.
+    sparse : float, 0 to 1
+        Share of these where the cloud is sparser than around half of the hits; NaN where there are none.
+    padded : bool
+        Whether empty places in pillars were fed to the network as points, and not masked: the ablation of claim 9.
+    still_rising : bool
+        Whether the average precision on validation frames was still rising when the training ended.
+    """
+
+    sensor: str
+    count: int
+    seed: int
+    average_precision: float
+    price: float
+    coverage: float
+    false_positives: float
+    sparse: float
+    padded: bool = False
+    still_rising: bool = False
+
+
+def detection_claims(results: Sequence[SeedResult]) -> tuple[Claim, ...]:
+    """Evaluate claims 5 to 9 of the paper on the measurements.
+
+    Claims for which a type or the ablation is missing are left out.
+
+    Parameters
+    ----------
+    results : sequence of SeedResult
+        Types in the order from the simplest to the best; several seeds of each.
+    """
+    masked = [result for result in results if not result.padded]
+    sensors = list(dict.fromkeys(result.sensor for result in masked))
+    claims = [
+        _decided(_gains(number, masked, sensor, published), _of(masked, sensor))
+        for number, sensor, published in zip((5, 6), sensors, PUBLISHED_GAINS, strict=False)  # a study may have one
+    ]
+    if len(sensors) > 1:
+        claims.append(_decided(_simple_sensors_gain_more(masked, sensors), masked))
+    if sensors:
+        claims.append(_decided(_false_where_sparse(masked, sensors[0]), _of(masked, sensors[0])))
+    if len(masked) < len(results):
+        claims.append(_decided(_padding(results), results))
+    return tuple(claims)
+
+
+def _of(results: Sequence[SeedResult], sensor: str) -> list[SeedResult]:
+    return [result for result in results if result.sensor == sensor]
+
+
+def _decided(claim: Claim, results: Sequence[SeedResult]) -> Claim:
+    """Return a claim without its verdict, and with the reason, where the trainings that it goes by say nothing yet."""
+    doubts = list(_doubts(results))
+    if not doubts:
+        return claim
+    return replace(claim, verdict=UNDECIDED, evidence=f"no verdict, as {' and '.join(doubts)}; {claim.evidence}")
+
+
+def _doubts(results: Sequence[SeedResult]) -> Iterator[str]:
+    masked = [one for one in results if not one.padded]
+    cells = {(one.sensor, one.count) for one in masked}
+    reached = (_mean(_by_seed(masked, *cell, lambda one: one.average_precision)).value for cell in cells)
+    best = max(reached, default=0.0)
+    if best < LEAST_PRECISION:
+        yield (
+            f"the detectors reach an AP of {best:.1%} with the best of these placements, and below "
+            f"{LEAST_PRECISION:.0%} they say nothing about sensors"
+        )
+    trainings = {(one.seed, one.padded) for one in results}
+    rising = {(one.seed, one.padded) for one in results if one.still_rising}
+    if rising:
+        yield (
+            f"validation AP was still rising when {len(rising)} of {len(trainings)} trainings ended: train longer, "
+            "with --steps"
+        )
+
+
+def _gains(number: int, results: Sequence[SeedResult], sensor: str, published: tuple[float, float]) -> Claim:
+    steps = ((FEW, SOME), (SOME, MANY))
+    gains = [_mean(_gain(results, sensor, *step), CHANGE_OF_SHARE) for step in steps]
+    verdicts = [_about(gain, expected) for gain, expected in zip(gains, published, strict=True)]
+    figures = [f"{a} to {b}: {gain.points()}" for (a, b), gain in zip(steps, gains, strict=True)]
+    return Claim(
+        number,
+        f"{sensor}: AP rises by about {100 * published[0]:g} points from N = {FEW} to {SOME} and by about "
+        f"{100 * published[1]:g} from {SOME} to {MANY}",
+        worst_verdict(verdicts),
+        f"{'; '.join(figures)}; {_seeds(gains)}",
+    )
+
+
+def _simple_sensors_gain_more(results: Sequence[SeedResult], sensors: Sequence[str]) -> Claim:
+    simple, *better = sensors
+    gains = {sensor: _gain(results, sensor, FEW, MANY) for sensor in sensors}
+    leads = [_mean(_differences(gains[simple], gains[other])) for other in better]
+    rows = [
+        f"{sensor} {_mean(gains[sensor], CHANGE_OF_SHARE).points()}{_per_price(results, sensor)}" for sensor in sensors
+    ]
+    ahead = [f"{lead.points()} more than {other}" for other, lead in zip(better, leads, strict=True)]
+    return Claim(
+        7,
+        f"adding {simple} sensors gains more AP than adding {' or '.join(better)}",
+        worst_verdict([_above(lead) for lead in leads]),
+        f"N = {FEW} to {MANY}: {'; '.join(rows)}; {simple} gains {', '.join(ahead)}",
+    )
+
+
+def _false_where_sparse(results: Sequence[SeedResult], sensor: str) -> Claim:
+    false = {count: _by_seed(results, sensor, count, lambda result: result.false_positives) for count in COUNTS}
+    more = [_mean(_differences(false[count], false[MANY])) for count in (FEW, SOME)]
+    sparse = [_mean(_by_seed(results, sensor, count, lambda result: result.sparse), SHARE) for count in (FEW, SOME)]
+    rows = [f"N = {count} {_mean(false[count], COUNT).plain()}" for count in COUNTS]
+    shares = [f"N = {count} {share.share()}" for count, share in zip((FEW, SOME), sparse, strict=True)]
+    return Claim(
+        8,
+        f"{sensor}: N = {FEW} and {SOME} give more false positives than N = {MANY}, mostly where the cloud is sparse",
+        worst_verdict([*map(_above, more), *(_above(share, 0.5) for share in sparse)]),
+        f"per frame: {'; '.join(rows)}; of them in the sparser half: {'; '.join(shares)}",
+    )
+
+
+def _padding(results: Sequence[SeedResult]) -> Claim:
+    cells = dict.fromkeys((result.sensor, result.count) for result in results if result.padded)
+    rows, verdicts = [], []
+    for sensor, count in cells:
+        padded, masked = (
+            _by_seed([result for result in results if result.padded == which], sensor, count, _sparse_false_positives)
+            for which in (True, False)
+        )
+        more = _mean(_differences(padded, masked))
+        verdicts.append(_above(more))
+        rows.append(
+            f"{sensor}, N = {count}: {_mean(padded, COUNT).plain()} padded, {_mean(masked, COUNT).plain()} masked"
+        )
+    return Claim(
+        9,
+        "zero-padded pillars cause false positives where the cloud is sparse",
+        worst_verdict(verdicts),
+        f"false positives per frame in the sparser half: {'; '.join(rows)}",
+    )
+
+
+@dataclass(frozen=True)
+class _Mean:
+    """The mean over seeds, and its interval where they are enough."""
+
+    value: float
+    seeds: int
+    interval: Interval | None
+
+    def points(self) -> str:
+        return self._written(lambda value: f"{100 * value:+.1f}", " points")
+
+    def share(self) -> str:
+        return self._written(lambda value: f"{100 * value:.0f}", " %")
+
+    def plain(self) -> str:
+        return self._written(lambda value: f"{value:.2f}", "")
+
+    def _written(self, figure: Callable[[float], str], unit: str) -> str:
+        if not self.seeds:
+            return "not measured"
+        between = "" if self.interval is None else f" ({figure(self.interval[0])} to {figure(self.interval[1])})"
+        return f"{figure(self.value)}{unit}{between}"
+
+
+BySeed = dict[int, float]
+
+
+def _mean(of: BySeed, possible: Interval = ANYTHING) -> _Mean:
+    values = list(of.values())
+    if not values:
+        return _Mean(np.nan, 0, None)
+    interval = mean_interval(values, possible) if len(values) >= MIN_SEEDS else None
+    return _Mean(float(np.mean(values)), len(values), interval)
+
+
+def _by_seed(results: Sequence[SeedResult], sensor: str, count: int, figure: Callable[[SeedResult], float]) -> BySeed:
+    """Return a figure of one cell by seed; a seed for which it is not known is left out."""
+    cell = {result.seed: figure(result) for result in results if (result.sensor, result.count) == (sensor, count)}
+    return {seed: value for seed, value in cell.items() if not np.isnan(value)}
+
+
+def _gain(results: Sequence[SeedResult], sensor: str, few: int, more: int) -> BySeed:
+    before, after = (_by_seed(results, sensor, n, lambda result: result.average_precision) for n in (few, more))
+    return _differences(after, before)
+
+
+def _differences(more: BySeed, less: BySeed) -> BySeed:
+    return {seed: more[seed] - less[seed] for seed in more if seed in less}
+
+
+def _sparse_false_positives(result: SeedResult) -> float:
+    return result.false_positives * result.sparse if result.false_positives else 0.0
+
+
+def _per_price(results: Sequence[SeedResult], sensor: str) -> str:
+    """Return the gain for each thousand dollars that the added sensors cost, in words."""
+    price = {count: _mean(_by_seed(results, sensor, count, lambda result: result.price)).value for count in (FEW, MANY)}
+    spent = (price[MANY] - price[FEW]) / 1000
+    if not spent > 0:
+        return ""
+    return f", {100 * _mean(_gain(results, sensor, FEW, MANY)).value / spent:+.2f} for each $1,000"
+
+
+def _seeds(gains: Sequence[_Mean]) -> str:
+    fewest = min(gain.seeds for gain in gains)
+    return counted(fewest, "seed")
+
+
+def _about(mean: _Mean, expected: float) -> str:
+    return UNDECIDED if mean.interval is None else verdict_within(mean.interval, expected / FACTOR, expected * FACTOR)
+
+
+def _above(mean: _Mean, least: float = 0.0) -> str:
+    return UNDECIDED if mean.interval is None else verdict_above(mean.interval, least)

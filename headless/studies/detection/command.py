@@ -1,0 +1,259 @@
+"""Coverage, price and average precision of sensor types × numbers, on any scene.
+
+seip study detection scenes/junction.blend -o out/evaluation
+blender -b --python-exit-code 1 site.blend -P headless/study.py -- detection --traffic run-*.npz -o out/evaluation
+
+Needs torch (make detection). An evaluation that was stopped goes on where it was.
+"""
+
+import argparse
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from headless import runtime, survey
+from headless.detection.average_precision import too_few_runs
+from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
+from headless.detection.recordings import Simulator
+from headless.detection.settings import FINE_TUNING, NetworkSettings, TrainingSettings
+from headless.options import add_rolling_shutter, new_parser, real_number, whole_number
+from headless.studies.claims import save_claims
+from headless.studies.coverage.cells import COUNTS
+from headless.studies.criteria.criteria import criteria_of, weights_of_targets
+from headless.studies.criteria.drawing import PlacementsStudySettings, draw_placements
+from headless.studies.criteria.occupancy import require_vehicles
+from headless.studies.criteria.precision import detectors_of, learnt_clouds, precisions
+from headless.studies.criteria.results import PlacementsStudy, save_study
+from headless.studies.detection import case_study
+from headless.studies.detection import results as study_results
+from headless.studies.detection.claims import detection_claims
+from headless.studies.detection.read_placements import read_placements, records_in
+from headless.studies.detection.sensor_configuration import SensorConfiguration
+
+import bpy
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.limits import COUNT, SEED, SENSORS, TIME_STEP, Limits
+from seip_addon.core.placement.objective import Objective, check_objective
+from seip_addon.core.results.placement_record import versions
+from seip_addon.core.robustness.traffic_instants import check_runs
+from seip_addon.core.scans import ScanSettings
+from seip_addon.core.traffic.source import require_own_traffic
+from seip_addon.core.workflows.survey import Survey
+
+STEPS, TRAININGS = Limits(1, 10_000_000), Limits(1, 1_000)
+
+
+def main(argv: list[str]) -> None:
+    """Place, simulate, train, evaluate, and write charts and tables to a folder."""
+    options = _parser().parse_args(argv)
+    if options.trainings < 1:
+        raise SeipError(f"ask for one training or more, not {options.trainings}")
+    if options.placements is not None:
+        _evaluate_placements(options)
+        return
+    study = prepare_study(options)
+    watch, simulator, folder = study.stopwatch, study.simulator, options.output
+    network = NetworkSettings()
+    steps = case_study.simulate_training_set(simulator, study.configurations, study.traffic, network)
+    training_set = watch.run("simulation", steps)
+    training, start = _training(options)
+    models = case_study.model_configurations(
+        study.configurations, network, training, seeds=options.trainings, separate=options.separate, start=start
+    )
+    if options.ablation:
+        models += case_study.padded(models)
+    trained = watch.run("training", case_study.train_all(models, training_set, folder, device=options.device))
+    detectors = [one.detector for one in trained]
+    for name, sentences in case_study.suitability_by_configuration(simulator, models, detectors, study.traffic).items():
+        runtime.warn(f"{name}: {sentence}" for sentence in sentences)
+    outcomes = watch.run("evaluation", case_study.evaluate_all(simulator, models, detectors, study.traffic))
+    site, curves = study.surveyed.site, tuple(one.curve for one in trained)
+    results = study_results.StudyResults(site.name, simulator, study.traffic, tuple(models), tuple(outcomes), curves)
+    claims = detection_claims(results.seed_results)
+    with runtime.incomplete_if_interrupted(folder):
+        study_results.save_charts(folder, results, trained)
+        study_results.save_table(folder / "detection.csv", results)
+        settings = study.surveyed.settings.as_record() | {"seeds": options.trainings, "frames_every_s": options.every}
+        settings["from_scratch"] = options.from_scratch
+        study_results.save_record(
+            folder / "evaluation.json", results, claims, settings, versions(blender=bpy.app.version_string)
+        )
+        save_claims(folder / "claims_5_to_9.md", claims, site.name)
+    for line in study_results.in_words(results):
+        runtime.print_line(line)
+    for claim in claims:
+        runtime.print_line(claim.describe())
+    runtime.print_line(", ".join(f"{what} {seconds:.0f} s" for what, seconds in watch.seconds.items()))
+    runtime.print_line(f"written to {folder}/")
+
+
+def _training(options: argparse.Namespace) -> tuple[TrainingSettings, Detector | None]:
+    """Return how detectors are trained, and the one that they begin with."""
+    begun = TrainingSettings() if options.from_scratch else FINE_TUNING
+    steps = begun.steps if options.steps is None else options.steps
+    return replace(begun, steps=steps), None if options.from_scratch else Detector.load(SHIPPED_DETECTOR)
+
+
+def _evaluate_placements(options: argparse.Namespace) -> None:
+    """Evaluate placements of one type and number, and write how well coverage and others foretell detection."""
+    if options.placement:
+        raise SeipError("name either --placements, to draw placements, or --placement, to evaluate some of your own")
+    training, start = _training(options)
+    settings = PlacementsStudySettings(
+        placements=options.placements,
+        count=options.count,
+        learnt=options.learnt_placements,
+        trainings=options.trainings,
+        steps=training.steps,
+        seed=options.placement_seed,
+    )
+    settings.check(options.sensor)
+    site = prepare_site(options, settings.count)
+    watch, folder = site.stopwatch, options.output
+    require_vehicles(site.traffic, site.surveyed.site)
+    drawn = watch.run(
+        "placements", draw_placements(site.surveyed, settings, weights_of_targets(site.surveyed, site.traffic))
+    )
+    simulator = site.simulator
+    models = detectors_of(drawn, settings, training, start)
+    training_set = watch.run("simulation", learnt_clouds(simulator, drawn, site.traffic))
+    trained = watch.run("training", case_study.train_all(models, training_set, folder, device=options.device))
+    detectors = [one.detector for one in trained]
+    precise = watch.run("evaluation", precisions(simulator, drawn.evaluated, detectors, site.traffic, folder))
+    judged = watch.run("criteria", criteria_of(site.surveyed, simulator, drawn.evaluated, site.traffic, precise))
+    study = PlacementsStudy(site.surveyed.site.name, settings, options.sensor[0], drawn, precise, judged)
+    with runtime.incomplete_if_interrupted(folder):
+        asked = site.surveyed.settings.as_record() | {"frames_every_s": options.every}
+        asked["from_scratch"] = options.from_scratch
+        save_study(folder, study, asked, site.traffic, versions(blender=bpy.app.version_string))
+    for line in study.sentences():
+        runtime.print_line(line)
+    runtime.print_line(", ".join(f"{what} {seconds:.0f} s" for what, seconds in watch.seconds.items()))
+    runtime.print_line(f"written to {folder}/")
+
+
+@dataclass(frozen=True, eq=False)
+class DetectionSite:
+    """A scene with its traffic, ready for placements and detectors."""
+
+    surveyed: Survey
+    stopwatch: survey.Stopwatch
+    traffic: case_study.Traffic
+    simulator: Simulator
+
+
+@dataclass(frozen=True, eq=False)
+class DetectionStudy(DetectionSite):
+    """A scene with its placements and its traffic, ready for detectors.
+
+    Parameters
+    ----------
+    configurations : tuple of SensorConfiguration
+        1, 2 and 4 sensors of each type, and the placements that were named.
+    """
+
+    configurations: tuple[SensorConfiguration, ...]
+
+
+def prepare_study(options: argparse.Namespace) -> DetectionStudy:
+    """Survey the scene, read its traffic and place the sensors; the options are those of `add_options`."""
+    records = records_in(options.placement)
+    if options.only_placement and not records:
+        raise SeipError("--only-placement leaves nothing to evaluate: name folders with --placement")
+    site = prepare_site(options, 1 if options.only_placement else COUNTS[-1])
+    alike = sorted(set(records) & set(site.surveyed.models))
+    if alike:
+        raise SeipError(f"the folder {alike[0]!r} is called as a sensor type is: rename it")
+    configurations: tuple[SensorConfiguration, ...] = ()
+    if not options.only_placement:
+        configurations = site.stopwatch.run("placements", case_study.place_all(site.surveyed))
+    if records:
+        configurations += site.stopwatch.run("named placements", read_placements(site.surveyed, records))
+    return DetectionStudy(**vars(site), configurations=configurations)
+
+
+def prepare_site(options: argparse.Namespace, count: int) -> DetectionSite:
+    """Survey a scene that can carry so many sensors, and read its traffic."""
+    check_device(options.device)
+    check_every(options.every)
+    surveyed, watch = survey.survey(
+        options, lambda layout: check_objective(layout.site, layout.models, Objective(count=count))
+    )
+    paths = options.traffic or survey.runs_beside(options.scene)
+    traffic = case_study.read_traffic(paths, surveyed.geometry.origin, options.every)
+    runs = [run for runs in vars(traffic).values() for run in runs]
+    check_runs([run.trajectories for run in runs], surveyed.site.region)
+    for run in runs:
+        require_own_traffic(run.trajectories, surveyed.geometry, run.name)
+    runtime.LOG.info(traffic.overlap())
+    runtime.LOG.info(traffic.shared_bays())
+    runtime.warn(filter(None, [too_few_runs(len(traffic.test))]))
+    scans = ScanSettings(seed=options.scan_seed, rolling_shutter=options.rolling_shutter, engine=options.engine)
+    return DetectionSite(surveyed, watch, traffic, Simulator(surveyed.geometry, scans))
+
+
+def check_every(seconds: float) -> None:
+    """Raise SeipError where a time from frame to frame is not within its limits."""
+    if not TIME_STEP.allow(seconds):
+        raise SeipError(f"the time between frames must be {TIME_STEP}, not {seconds:g} s")
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of a survey and of what detectors learn from to a command."""
+    survey.add_options(parser)
+    detection = parser.add_argument_group("detection")
+    detection.add_argument(
+        "--traffic",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="NPZ",
+        help=f"runs of traffic: {case_study.SPLIT} (those in the folder SCENE_traffic beside the scene)",
+    )
+    detection.add_argument(
+        "--every",
+        type=real_number(TIME_STEP),
+        default=2.5,
+        metavar="S",
+        help="time from frame to frame; twice that in tests",
+    )
+    detection.add_argument("--steps", type=whole_number(STEPS), help="of each training")
+    detection.add_argument("--scan-seed", type=whole_number(SEED), default=0, help="of noise and lost returns")
+    add_rolling_shutter(detection)
+    detection.add_argument("--device", default="cpu", help="of torch: cpu or cuda")
+    detection.add_argument(
+        "--placement",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="FOLDER",
+        help="evaluate the placements that `seip place` wrote into these folders beside numbers and types",
+    )
+    detection.add_argument("--only-placement", action="store_true", help="evaluate those of --placement alone")
+
+
+def _parser() -> argparse.ArgumentParser:
+    what = "Find out what 1, 2 and 4 sensors of each type detect; name types from the simplest to the best."
+    parser = new_parser("study detection", what)
+    add_options(parser)
+    parser.add_argument(
+        "--trainings", type=whole_number(TRAININGS), default=3, metavar="N", help="each with a seed of its own"
+    )
+    parser.add_argument(
+        "--from-scratch",
+        action="store_true",
+        help=f"begin trainings with random weights ({TrainingSettings().steps:,} steps), not with those of the "
+        f"detector that ships ({FINE_TUNING.steps})",
+    )
+    parser.add_argument("--separate", action="store_true", help="a detector for each placement, not one for all")
+    parser.add_argument("--ablation", action="store_true", help="claim 9: also train with zero-padded pillars")
+    drawn = parser.add_argument_group("does coverage foretell detection? Placements of one type and number")
+    drawn.add_argument(
+        "--placements", type=whole_number(COUNT), metavar="N", help="evaluate the optimal one and others that are drawn"
+    )
+    drawn.add_argument("--count", type=whole_number(SENSORS), default=2, metavar="N", help="sensors of each")
+    drawn.add_argument(
+        "--learnt-placements", type=whole_number(COUNT), default=12, metavar="N", help="others, to learn from"
+    )
+    drawn.add_argument("--placement-seed", type=whole_number(SEED), default=0, metavar="SEED", help="of what is drawn")
+    return parser

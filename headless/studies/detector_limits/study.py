@@ -1,0 +1,542 @@
+"""Average precision against the size of each disturbance, and on other types, traffic and sites.
+
+Trained detectors, alike but for their seeds, are evaluated on the same test
+frames under one disturbance at a time. A disturbance begins to harm
+at the smallest size whose average precision is lower than without it by more
+than the interval of the difference, pair by pair, over traffic and trainings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from headless.detection.average_precision import Evaluation
+from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, Bin, false_by, recall_by
+from headless.detection.detector import Detector
+from headless.detection.pillars import Filling, filling
+from headless.detection.settings import NetworkSettings, TrainingSettings
+from headless.studies.detection.case_study import ModelConfiguration, model_configurations, padded
+from headless.studies.detection.sensor_configuration import SensorConfiguration
+
+import numpy as np
+
+from seip_addon.core.estimates import IntervalEstimate
+from seip_addon.core.progress import Progress, within
+
+from .disturbances import (
+    CappedPillars,
+    ClockOffset,
+    Disturbance,
+    DropOff,
+    OtherSizes,
+    PositionError,
+    Rain,
+    RangeNoise,
+    SensorFailure,
+    Thinned,
+    TiltError,
+    YawError,
+)
+from .paired_change import ResampledPrecision, change, level
+from .trials import DisturbedTrial, EvaluatedDetector, TrialSite, trials
+
+Series = tuple[Disturbance, ...]
+"""Disturbances of one kind, the mildest first."""
+
+BORDER_EDGES = (0.0, 2.0, 5.0, 10.0, 20.0, 40.0, np.inf)
+"""Metres from the border of the region of interest, between which road users are counted."""
+
+AT_HOME = "at home"
+"""Against what detectors are compared on other sites: themselves, on the frames of the site that they learnt from."""
+
+COUNTED_FRAMES = 8  # frames in which pillars are counted
+
+
+def full_series(sensor: int) -> tuple[Series, ...]:
+    """Return all disturbances, those of one sensor of the sensor with this number."""
+    return (
+        tuple(RangeNoise(size) for size in (0.02, 0.05, 0.1, 0.2, 0.4)),
+        tuple(DropOff(size) for size in (0.1, 0.25, 0.5, 0.75, 0.9)),
+        tuple(Rain(size) for size in (2.0, 5.0, 10.0, 20.0, 40.0)),
+        tuple(PositionError(size, sensor) for size in (0.02, 0.05, 0.1, 0.2, 0.5)),
+        tuple(YawError(size, sensor) for size in (0.1, 0.2, 0.5, 1.0, 2.0)),
+        tuple(TiltError(size, sensor) for size in (0.1, 0.2, 0.5, 1.0, 2.0)),
+        tuple(ClockOffset(size, sensor) for size in (0.02, 0.05, 0.1, 0.2, 0.4)),
+        tuple(Thinned(size) for size in (0.25, 0.5, 0.75)),
+        tuple(OtherSizes(size) for size in (0.05, 0.15)),
+        tuple(CappedPillars(size) for size in (8.0, 4.0, 2.0, 1.0)),
+    )
+
+
+def brief_series(sensor: int) -> tuple[Series, ...]:
+    """Return a shorter series of disturbances, for further sensor types."""
+    return (
+        tuple(RangeNoise(size) for size in (0.05, 0.1, 0.2)),
+        tuple(DropOff(size) for size in (0.25, 0.5, 0.75)),
+        tuple(Rain(size) for size in (5.0, 20.0)),
+        tuple(YawError(size, sensor) for size in (0.2, 0.5, 1.0)),
+        tuple(ClockOffset(size, sensor) for size in (0.05, 0.2)),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class DisturbanceEffect:
+    """Average precision under a disturbance of one size.
+
+    Parameters
+    ----------
+    precision, change : IntervalEstimate
+        Mean average precision over the detectors, and by how much it differs from that without the disturbance.
+    """
+
+    disturbance: Disturbance
+    precision: IntervalEstimate
+    change: IntervalEstimate
+
+
+@dataclass(frozen=True, eq=False)
+class DisturbanceCurve:
+    """Average precision against the size of one disturbance.
+
+    Parameters
+    ----------
+    points : tuple of DisturbanceEffect
+        The mildest first.
+    """
+
+    configuration: str
+    undisturbed: IntervalEstimate
+    points: tuple[DisturbanceEffect, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the disturbance."""
+        return self.points[0].disturbance.name
+
+    @property
+    def unit(self) -> str:
+        """Of its size."""
+        return self.points[0].disturbance.unit
+
+    @property
+    def begins(self) -> DisturbanceEffect | None:
+        """The smallest size that lowers average precision by more than chance, or None."""
+        return next((point for point in self.points if point.change.high < 0), None)
+
+
+@dataclass(frozen=True, eq=False)
+class SeedSpread:
+    """Spread of average precision over seeds of the training, with one placement.
+
+    Parameters
+    ----------
+    values : tuple of float
+        Average precision of each detector.
+    """
+
+    configuration: str
+    values: tuple[float, ...]
+    precision: IntervalEstimate
+
+
+@dataclass(frozen=True, eq=False)
+class TransferResult:
+    """Average precision of detectors on types, traffic or sites that they were not trained on.
+
+    Parameters
+    ----------
+    trained_on, tested_on : str
+        Sensor type or site of the training, and of the test.
+    precision : IntervalEstimate
+        On the test.
+    change : IntervalEstimate
+        Against ``against``.
+    against : str
+        Whose average precision is subtracted.
+    """
+
+    trained_on: str
+    tested_on: str
+    precision: IntervalEstimate
+    change: IntervalEstimate
+    against: str
+
+
+@dataclass(frozen=True, eq=False)
+class BorderResults:
+    """Recall by distance from the region's border, of the first detector with one placement.
+
+    Parameters
+    ----------
+    score : float
+        From which on detections count.
+    recall, false : mapping of str to tuple of Bin
+        By ``points`` from the road user, and by ``sensor`` and ``border``: metres from the nearest sensor and from
+        the border of the region; false detections per frame by the last two.
+    """
+
+    configuration: str
+    score: float
+    recall: Mapping[str, tuple[Bin, ...]]
+    false: Mapping[str, tuple[Bin, ...]]
+
+
+@dataclass(frozen=True, eq=False)
+class PillarFilling:
+    """Filling of pillars with one placement.
+
+    Parameters
+    ----------
+    filling : dict of int to Filling
+        Where so many points are kept; means over some frames.
+    """
+
+    configuration: str
+    filling: dict[int, Filling]
+
+
+@dataclass(frozen=True, eq=False)
+class OtherSite:
+    """Another site, on which detectors are evaluated that were not trained there.
+
+    Parameters
+    ----------
+    configurations : tuple of SensorConfiguration
+        With the names of some at home.
+    """
+
+    site: TrialSite
+    configurations: tuple[SensorConfiguration, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class EvaluatedDetectors:
+    """Detectors to be evaluated on the site that they were trained on.
+
+    Parameters
+    ----------
+    tested : tuple of EvaluatedDetector
+        Alike but for their seeds.
+    by_type : mapping of str to EvaluatedDetector
+        Those that have learnt from one sensor type alone.
+    shipped : tuple of EvaluatedDetector
+        That which ships, which has learnt from random sites; empty where it is not to be tried.
+    padded : tuple of EvaluatedDetector
+        With pillars padded with zeros, and ``unpadded``, trained as long, to compare them with.
+    """
+
+    tested: tuple[EvaluatedDetector, ...]
+    by_type: Mapping[str, EvaluatedDetector]
+    shipped: tuple[EvaluatedDetector, ...] = ()
+    padded: tuple[EvaluatedDetector, ...] = ()
+    unpadded: tuple[EvaluatedDetector, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingPlan:
+    """Detectors that have to be trained before the study.
+
+    Parameters
+    ----------
+    alike : tuple of ModelConfiguration
+        As an evaluation trains them: in its folder they need not be trained again.
+    by_type : dict of str to ModelConfiguration
+        Those who learn from one sensor type alone.
+    padded : tuple of ModelConfiguration
+        Those with padded pillars; none where padding is not to be tried.
+    """
+
+    alike: tuple[ModelConfiguration, ...]
+    by_type: dict[str, ModelConfiguration]
+    padded: tuple[ModelConfiguration, ...]
+
+    @property
+    def models(self) -> tuple[ModelConfiguration, ...]:
+        """All, as `case_study.train_all` takes them."""
+        return (*self.alike, *self.by_type.values(), *self.padded)
+
+    def candidates(
+        self, detectors: Sequence[Detector], shipped: tuple[EvaluatedDetector, ...] = ()
+    ) -> EvaluatedDetectors:
+        """Return what the study tries, from the detectors of all models in their order, and that which ships."""
+        trained = {
+            model.name: EvaluatedDetector(model.name, detector)
+            for model, detector in zip(self.models, detectors, strict=True)
+        }
+        return EvaluatedDetectors(
+            tested=tuple(trained[model.name] for model in self.alike),
+            by_type={sensor: trained[model.name] for sensor, model in self.by_type.items()},
+            shipped=shipped,
+            padded=tuple(trained[model.name] for model in self.padded),
+            unpadded=tuple(trained[model.name] for model in self.alike[: len(self.padded)]),
+        )
+
+
+def training_plan(
+    configurations: Sequence[SensorConfiguration],
+    network: NetworkSettings,
+    training: TrainingSettings,
+    *,
+    seeds: int,
+    padding: bool,
+) -> TrainingPlan:
+    """Return the detectors to train; from one type's clouds for as large a part of the steps as they are of all clouds.
+
+    Parameters
+    ----------
+    configurations : sequence of SensorConfiguration
+        All of an evaluation.
+    training : TrainingSettings
+        Of those who learn from all types.
+    padding : bool
+        Whether the ablation is wanted: each model again, with padded pillars.
+    """
+    alike = model_configurations(configurations, network, training, seeds=seeds, separate=False)
+    by_type = {}
+    for sensor in dict.fromkeys(one.sensor for one in configurations):
+        own = tuple(one for one in configurations if one.sensor == sensor)
+        steps = max(1, training.steps * len(own) // len(configurations))
+        by_type[sensor] = ModelConfiguration(f"detector-{sensor}", own, network, replace(training, steps=steps))
+    return TrainingPlan(tuple(alike), by_type, tuple(padded(alike)) if padding else ())
+
+
+@dataclass(frozen=True, eq=False)
+class LimitsStudy:
+    """Limits of the detector on one site.
+
+    Parameters
+    ----------
+    name : str
+        Of the site.
+    frames : int
+        Test frames of each trial at home.
+    worst : mapping of str to int
+        For each configuration the sensor, by its number from 0, whose loss costs most: it is the one to be
+        displaced, rotated and late.
+    transfers : tuple of TransferResult
+        Detectors on other types, traffic and sites.
+    padding : tuple of TransferResult
+        What padding with zeros does to each configuration; none where it was not trained.
+    """
+
+    name: str
+    frames: int
+    spreads: tuple[SeedSpread, ...]
+    curves: tuple[DisturbanceCurve, ...]
+    worst: Mapping[str, int]
+    transfers: tuple[TransferResult, ...]
+    borders: tuple[BorderResults, ...]
+    pillars: tuple[PillarFilling, ...]
+    padding: tuple[TransferResult, ...]
+
+
+def limits_study(
+    home: TrialSite,
+    configurations: Sequence[SensorConfiguration],
+    candidates: EvaluatedDetectors,
+    elsewhere: Sequence[OtherSite],
+    store: Path,
+    score: float,
+) -> Generator[Progress, None, LimitsStudy]:
+    """Evaluate detectors under growing disturbances.
+
+    Parameters
+    ----------
+    home : TrialSite
+        The site of their training, with unseen traffic.
+    configurations : sequence of SensorConfiguration
+        The first is driven through everything, the others through the brief series.
+    store : path
+        Folder in which every trial is kept: a study that was stopped goes on.
+    score : float
+        From which on detections count where they are counted: the best balance on validation frames.
+
+    Yields
+    ------
+    Progress
+        Trials done, of all.
+    """
+    runner = _TrialRunner(home, store, _length(configurations, candidates, elsewhere))
+    spreads, curves, borders, pillars, worst = [], [], [], [], {}
+    for number, configuration in enumerate(configurations):
+        tried = yield from runner.run(configuration, Disturbance(), candidates.tested)
+        own = [ResampledPrecision(trial.evaluation) for trial in tried]
+        spreads.append(SeedSpread(configuration.name, tuple(one.value for one in own), level(own)))
+        borders.append(_borders(configuration.name, tried[0], score))
+        pillars.append(_pillars(home, configuration, candidates.tested[0].detector))
+        loss = tuple(SensorFailure.each(sensor) for sensor in range(len(configuration.sensors)))
+        lost = yield from runner.curve(configuration, loss, candidates.tested, own)
+        worst[configuration.name] = int(np.argmin([point.change.value for point in lost.points]))
+        curves.append(lost)
+        series = full_series if number == 0 else brief_series
+        for one in series(worst[configuration.name]):
+            curve = yield from runner.curve(configuration, one, candidates.tested, own)
+            curves.append(curve)
+    transfers = yield from runner.transfers(configurations, candidates, elsewhere)
+    padding = yield from runner.padding(configurations, candidates)
+    yield runner.progress("tried")
+    return LimitsStudy(
+        home.simulator.site,
+        sum(len(run.times) for run in home.runs),
+        tuple(spreads),
+        tuple(curves),
+        worst,
+        tuple(transfers),
+        tuple(borders),
+        tuple(pillars),
+        tuple(padding),
+    )
+
+
+class _TrialRunner:
+    """Runs trials, and counts them for progress."""
+
+    def __init__(self, home: TrialSite, store: Path, total: int) -> None:
+        self._home, self._store, self._total, self._done = home, store, total, 0
+
+    def progress(self, what: str) -> Progress:
+        return Progress(min(self._done, self._total), self._total, what)
+
+    def run(
+        self,
+        configuration: SensorConfiguration,
+        disturbance: Disturbance,
+        tested: Sequence[EvaluatedDetector],
+        site: TrialSite | None = None,
+    ) -> Generator[Progress, None, list[DisturbedTrial]]:
+        there = self._home if site is None else site
+        steps = trials(there, configuration, disturbance, tested, self._store)
+        made = yield from within(self.progress(f"{configuration.name}, {disturbance.name} {disturbance.size:g}"), steps)
+        self._done += 1
+        return made
+
+    def curve(
+        self,
+        configuration: SensorConfiguration,
+        series: Series,
+        tested: Sequence[EvaluatedDetector],
+        undisturbed: Sequence[ResampledPrecision],
+    ) -> Generator[Progress, None, DisturbanceCurve]:
+        points = []
+        for disturbance in series:
+            tried = yield from self.run(configuration, disturbance, tested)
+            own = [ResampledPrecision(trial.evaluation) for trial in tried]
+            points.append(DisturbanceEffect(disturbance, level(own), change(own, undisturbed)))
+        return DisturbanceCurve(configuration.name, level(undisturbed), tuple(points))
+
+    def transfers(
+        self,
+        configurations: Sequence[SensorConfiguration],
+        candidates: EvaluatedDetectors,
+        elsewhere: Sequence[OtherSite],
+    ) -> Generator[Progress, None, list[TransferResult]]:
+        """Evaluate detectors of one type on the others, all of them on other sites, and there that which ships."""
+        found = []
+        for configuration in configurations:
+            tried = {}
+            for sensor, one_tested in candidates.by_type.items():
+                tried[sensor] = yield from self._undisturbed(configuration, [one_tested])
+            native = tried.pop(configuration.sensor, None)
+            for sensor, those in tried.items() if native else ():
+                against = f"learnt from {configuration.sensor}"
+                found.append(
+                    TransferResult(sensor, configuration.name, level(those), change(those, native or those), against)
+                )
+        for other in elsewhere:
+            for configuration in other.configurations:
+                tested_on = f"{configuration.name}, {other.site.name}"
+                there = yield from self._undisturbed(configuration, candidates.tested, other.site)
+                twin = next(one for one in configurations if one.name == configuration.name)
+                own = yield from self._undisturbed(twin, candidates.tested)
+                difference = change(there, own, same_traffic=False)
+                found.append(TransferResult(self._home.simulator.site, tested_on, level(there), difference, AT_HOME))
+        places = [(configuration, self._home) for configuration in configurations]
+        places += [(configuration, other.site) for other in elsewhere for configuration in other.configurations]
+        for configuration, site in places if candidates.shipped else ():
+            shipped = yield from self._undisturbed(configuration, candidates.shipped, site)
+            own = yield from self._undisturbed(configuration, candidates.tested, site)
+            difference = change(len(own) * shipped, own)
+            against = f"learnt from {self._home.simulator.site}"
+            found.append(
+                TransferResult(
+                    "random sites", f"{configuration.name}, {site.name}", level(shipped), difference, against
+                )
+            )
+        return found
+
+    def _undisturbed(
+        self, configuration: SensorConfiguration, tested: Sequence[EvaluatedDetector], site: TrialSite | None = None
+    ) -> Generator[Progress, None, list[ResampledPrecision]]:
+        made = yield from self.run(configuration, Disturbance(), tested, site)
+        return [ResampledPrecision(trial.evaluation) for trial in made]
+
+    def padding(
+        self, configurations: Sequence[SensorConfiguration], candidates: EvaluatedDetectors
+    ) -> Generator[Progress, None, list[TransferResult]]:
+        found = []
+        for configuration in configurations if candidates.padded else ():
+            made = yield from self.run(configuration, Disturbance(), (*candidates.padded, *candidates.unpadded))
+            own = [ResampledPrecision(trial.evaluation) for trial in made]
+            with_zeros, without = own[: len(candidates.padded)], own[len(candidates.padded) :]
+            found.append(
+                TransferResult(
+                    "pillars padded with zeros",
+                    configuration.name,
+                    level(with_zeros),
+                    change(with_zeros, without),
+                    "without padding",
+                )
+            )
+        return found
+
+
+def _length(
+    configurations: Sequence[SensorConfiguration], candidates: EvaluatedDetectors, elsewhere: Sequence[OtherSite]
+) -> int:
+    """Return how many trials there are."""
+    full, brief = (sum(map(len, series(0))) for series in (full_series, brief_series))
+    each = 1 + len(candidates.by_type) + bool(candidates.padded)
+    at_home = sum(each + len(one.sensors) for one in configurations) + full + brief * (len(configurations) - 1)
+    away = sum(len(other.configurations) for other in elsewhere)
+    of_shipped = 2 * (len(configurations) + away) if candidates.shipped else 0
+    return at_home + 2 * away + of_shipped
+
+
+def _borders(name: str, trial: DisturbedTrial, score: float) -> BorderResults:
+    by_sensor, by_border = trial.evaluation, trial.from_border
+
+    def recall(evaluation: Evaluation, quantity: str, edges: Sequence[float]) -> tuple[Bin, ...]:
+        return recall_by(evaluation, quantity, edges, score)
+
+    return BorderResults(
+        name,
+        score,
+        {
+            "points": recall(by_sensor, "points", POINT_EDGES),
+            "sensor": recall(by_sensor, "distance", DISTANCE_EDGES),
+            "border": recall(by_border, "distance", BORDER_EDGES),
+        },
+        {
+            "sensor": false_by(by_sensor, "distance", DISTANCE_EDGES, score),
+            "border": false_by(by_border, "distance", BORDER_EDGES, score),
+        },
+    )
+
+
+def _pillars(site: TrialSite, configuration: SensorConfiguration, detector: Detector) -> PillarFilling:
+    """Count how full pillars are in some frames, with the detector's own cap and smaller ones."""
+    caps = (detector.settings.most_points, 8, 4, 2, 1)
+    frames = [
+        site.simulator.frame(configuration, site.runs[0], number)
+        for number in range(min(COUNTED_FRAMES, len(site.runs[0].times)))
+    ]
+    area = site.simulator.area(detector.settings.pillar)
+    counted = {}
+    for cap in dict.fromkeys(caps):
+        each = [filling(area.cloud(frame), area.grid, cap) for frame in frames]
+        counted[cap] = Filling(
+            *(float(np.mean([getattr(one, part) for one in each])) for part in ("empty", "over_full", "left_out"))
+        )
+    return PillarFilling(configuration.name, counted)

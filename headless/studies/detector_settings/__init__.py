@@ -1,0 +1,1 @@
+"""Cost and gain of other settings of the detector."""

@@ -1,0 +1,207 @@
+"""Demand of a user's route file for SUMO: its flows, drawn anew for each run or as they stand in the file."""
+
+import math
+import os
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+from headless.sumo.demand import poisson_departures
+
+import numpy as np
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import Progress
+from seip_addon.core.storage.files import whole_file
+from seip_addon.core.storage.xml_stream import Attributes, quoted, read_tags
+
+DEFAULT_CLASS = "passenger"  # SUMO's vClass of a vehicle whose flow names no type
+MIN_GAP = (1.0, 4.0)  # metres to the vehicle before; SUMO's 2.5 on average
+STOP_LINE_GAP = (0.2, 4.0)  # metres to the stop line
+_DEPARTURE = ("departLane", "departPos", "departSpeed", "arrivalLane", "arrivalPos", "arrivalSpeed")
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Vehicles that go the same way.
+
+    Parameters
+    ----------
+    rate : float, vehicles per hour
+    edges : tuple of str
+        Of the network, in the order in which they are driven on.
+    type : str
+        Of its vehicles; empty where the file names none.
+    departure : tuple of (str, str)
+        Further attributes of each vehicle, for SUMO.
+    """
+
+    name: str
+    rate: float
+    edges: tuple[str, ...]
+    type: str
+    departure: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class RouteDemand:
+    """Flows of a route file, and the vehicle types that are known.
+
+    Parameters
+    ----------
+    types : dict of str to dict
+        Attributes of each vehicle type, by its id.
+    models : tuple of str
+        Types that drive where a flow names none: those of `DEFAULT_CLASS` in the files of types.
+    """
+
+    flows: tuple[Flow, ...]
+    types: dict[str, Attributes]
+    models: tuple[str, ...]
+
+    @property
+    def rate(self) -> float:
+        """Vehicles per hour of all flows."""
+        return math.fsum(flow.rate for flow in self.flows)
+
+
+def read_demand(routes: Path, types: Sequence[Path] = ()) -> Generator[Progress, None, RouteDemand]:
+    """Read the flows of a route file, and vehicle types from it and from further files.
+
+    Raises
+    ------
+    SeipError
+        A file cannot be read, or the flows cannot be drawn anew: there are none, or one has no route, no rate, a type
+        that no file knows, or its own time.
+    """
+    reader = _Reader()
+    for path in types:
+        yield from read_tags(path, reader.take, reader.leave)
+    known = reader.types
+    models = tuple(name for name, one in known.items() if one.get("vClass", DEFAULT_CLASS) == DEFAULT_CLASS)
+    if types and not models:
+        raise SeipError(
+            f"{types[0].name} has no vehicle type of class {DEFAULT_CLASS}, which flows without a type need: add one"
+        )
+    reader.flows.clear()  # those of files of types are not asked for
+    yield from read_tags(routes, reader.take, reader.leave)
+    if not reader.flows:
+        raise SeipError(f"{routes.name} has no flow: name a route file of SUMO with flows, whose departures are drawn")
+    return RouteDemand(tuple(_flow(one, reader.ways, known, routes.name) for one in reader.flows), known, models)
+
+
+class _Reader:
+    """What stands in route files: attributes of types and flows, those with their own route among them, and routes."""
+
+    def __init__(self) -> None:
+        self.types: dict[str, Attributes] = {}
+        self.ways: dict[str, tuple[str, ...]] = {}
+        self.flows: list[Attributes] = []
+        self._in_flow = False
+
+    def take(self, tag: str, attributes: Attributes) -> None:
+        if tag == "vType":
+            self.types[attributes.get("id", "")] = attributes
+        elif tag == "flow":
+            self.flows.append(dict(attributes))
+            self._in_flow = True
+        elif tag == "route" and self._in_flow:
+            self.flows[-1]["edges"] = attributes.get("edges", "")
+        elif tag == "route":
+            self.ways[attributes.get("id", "")] = tuple(attributes.get("edges", "").split())
+
+    def leave(self, tag: str) -> None:
+        self._in_flow = self._in_flow and tag != "flow"
+
+
+def _flow(given: Attributes, ways: dict[str, tuple[str, ...]], known: dict[str, Attributes], file: str) -> Flow:
+    name = given.get("id", "")
+    called = f"{file}: flow {quoted(name)}"
+    edges = tuple(given["edges"].split()) if "edges" in given else ways.get(given.get("route", ""), ())
+    if not edges:
+        raise SeipError(f"{called} has no route of edges in this file: give it one")
+    kind = given.get("type", "")
+    if kind and kind not in known:
+        raise SeipError(f"{called} is of type {quoted(kind)}, which no file describes: name its file with --types")
+    if _number(given.get("begin", "0")) != 0.0:
+        raise SeipError(f"{called} does not begin at 0: a demand that changes with time cannot be drawn anew")
+    departure = tuple((key, given[key]) for key in _DEPARTURE if key in given)
+    return Flow(name, _rate(given, called), edges, kind, departure)
+
+
+def _rate(given: Attributes, called: str) -> float:
+    """Return the vehicles per hour of a flow, in whichever of SUMO's ways they are given."""
+    period = given.get("period", "")
+    if period.startswith("exp(") and period.endswith(")"):
+        rate = 3600.0 * _number(period[4:-1])
+    elif period:
+        seconds = _number(period)
+        rate = 3600.0 / seconds if seconds else math.nan
+    elif "probability" in given:
+        rate = 3600.0 * _number(given["probability"])
+    else:
+        rate = _number(given.get("vehsPerHour", given.get("perHour", "")))
+    if not 0.0 < rate <= 10_000.0:
+        raise SeipError(
+            f"{called} says no rate above 0 and up to 10,000 vehicles per hour: give it vehsPerHour, period or "
+            "probability"
+        )
+    return rate
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def write_run(
+    path: str | os.PathLike[str], demand: RouteDemand, seed: int, duration: float, *, fixed: bool = False
+) -> None:
+    """Write a route file of single vehicles from 0 to ``duration`` seconds; the same for the same seed.
+
+    Departures are a Poisson process of the demand's rate. Each vehicle takes the way of a flow by the flows' shares
+    and, where the files leave them open, a lane, a model, and the gaps at which it stops, at random. The seed is in
+    the names of all, as paint goes by the name.
+
+    Parameters
+    ----------
+    fixed : bool
+        Whether all is as in the file instead, whatever the seed: each flow departs at even intervals from 0 on, lanes
+        and gaps are SUMO's, and the models are the same in all runs.
+    """
+    random = np.random.default_rng([0 if fixed else seed, 4])
+    drawn = _even(demand, duration) if fixed else _drawn(demand, duration, random)
+    lines = ["<routes>"]
+    for number, (depart, flow) in enumerate(drawn):
+        name = f"{flow.name}{'' if fixed else seed}.{number}"
+        model = flow.type or (str(random.choice(demand.models)) if demand.models else "")
+        gaps = {} if fixed else {"minGap": _between(random, MIN_GAP), "jmStoplineGap": _between(random, STOP_LINE_GAP)}
+        lanes = {} if fixed else {"departLane": "random"}
+        lines.append(_element("vType", gaps | demand.types.get(model, {}) | {"id": name}))
+        vehicle = {"id": name, "type": name, "depart": f"{depart:.1f}"} | lanes | dict(flow.departure)
+        route = _element("route", {"edges": " ".join(flow.edges)})
+        lines.append(f"{_element('vehicle', vehicle)[:-2]}>{route}</vehicle>")
+    with whole_file(path) as temporary:
+        temporary.write_text("\n".join([*lines, "</routes>", ""]), encoding="utf-8")
+
+
+def _between(random: np.random.Generator, span: tuple[float, float]) -> str:
+    return f"{random.uniform(*span):.2f}"
+
+
+def _drawn(demand: RouteDemand, duration: float, random: np.random.Generator) -> Iterator[tuple[float, Flow]]:
+    shares = np.array([flow.rate for flow in demand.flows]) / demand.rate
+    for depart in poisson_departures(demand.rate, random, duration):
+        yield depart, demand.flows[int(random.choice(len(shares), p=shares))]
+
+
+def _even(demand: RouteDemand, duration: float) -> list[tuple[float, Flow]]:
+    times = [(float(depart), flow) for flow in demand.flows for depart in np.arange(0.0, duration, 3600.0 / flow.rate)]
+    return sorted(times, key=lambda one: one[0])
+
+
+def _element(tag: str, attributes: Attributes) -> str:
+    return f"<{tag} {' '.join(f'{key}={quoteattr(value)}' for key, value in attributes.items())}/>"

@@ -1,0 +1,237 @@
+"""Runs of traffic after the demand of a user's route file: drawn anew for each, or with the file's fixed departures."""
+
+import json
+import math
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from itertools import combinations, pairwise
+from pathlib import Path
+
+from headless.studies.paper.route_file import RouteDemand, read_demand, write_run
+from headless.sumo.simulation import run_sumo
+from headless.sumo.street_network import DRIVING, StreetNetwork, read_network
+from headless.sumo.traffic_run import recorded_run
+
+import numpy as np
+import shapely
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import Progress, within
+from seip_addon.core.site.scene_geometry import SceneGeometry, joined
+from seip_addon.core.storage.files import digest, save_json
+from seip_addon.core.storage.source_digest import source_digest
+from seip_addon.core.traffic import Trajectories
+from seip_addon.core.traffic.run_overlap import VehiclePositions, overlap_of, vehicle_positions
+from seip_addon.core.traffic.source import TrafficFiles
+from seip_addon.core.traffic.sumo_files import read_net_offset
+from seip_addon.core.traffic.sumo_programs import find_sumo
+from seip_addon.core.workflows.traffic_runs import traffic_folder
+
+MIN_ON_ROAD = 0.8  # share of a network's lanes in the region that lie on the road of the scene, if it is of its map
+SIGNAL_CYCLE = 120  # seconds; drawn runs begin at any of as many, so that signals are at other phases
+MOST_OVERLAP = 0.16
+"""Share of the vehicles of a drawn run that may be where another's are: the most of any two at the shipped junction."""
+
+MAX_DRAWS = 40  # of a run, until one overlaps no run before it by more; then the one that overlaps least is taken
+_ROAD_TOLERANCE = 1.0  # metres from a lane's middle to the road
+_SAMPLING = 2.0  # metres from point to point of a lane
+
+
+@dataclass(frozen=True)
+class TrafficSource:
+    """The user's files of traffic: routes, vehicle types, and the network that the routes are on."""
+
+    routes: Path
+    types: tuple[Path, ...]
+    network: Path
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """Settings of the runs of traffic: how many, how long (seconds), after what warm-up, and their seed."""
+
+    runs: int = 16
+    duration: float = 40.0
+    warm_up: float = 120.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not 4 <= self.runs <= 999:
+            raise SeipError(f"ask for 4 to 999 runs of traffic, not {self.runs} (--runs)")
+        if not 3.0 <= self.duration <= 3600.0 or not 0.0 <= self.warm_up <= 3600.0:
+            raise SeipError("a run lasts 3 to 3600 s (--duration), after a warm-up of 0 to 3600 s (--warm-up)")
+        if not 0 <= self.seed < 10**4:
+            raise SeipError(f"--seed must be a whole number from 0 to 9999, not {self.seed}")
+
+
+@dataclass(frozen=True, eq=False)
+class SiteTraffic:
+    """Demand that goes through a site.
+
+    Parameters
+    ----------
+    demand : RouteDemand
+        All flows of the file.
+    through : float, vehicles per hour
+        Of the flows that cross the region from one of its streets to another.
+    """
+
+    source: TrafficSource
+    demand: RouteDemand
+    through: float
+
+
+def read_traffic_of_site(
+    source: TrafficSource, geometry: SceneGeometry, map_name: str
+) -> Generator[Progress, None, SiteTraffic]:
+    """Read the demand, and check that it is of this place.
+
+    Raises
+    ------
+    SeipError
+        A file cannot be read, the network is of another map, or no flow goes through the region.
+    """
+    demand = yield from read_demand(source.routes, source.types)
+    offset = read_net_offset(source.network) + np.array(geometry.geo_reference.header_offset[:2])
+    network = read_network(source.network)
+    shift = offset + geometry.origin[:2]
+    share = _share_on_road(network, geometry, shift)
+    if share is None or share < MIN_ON_ROAD:
+        found = "none of its streets is there" if share is None else f"{share:.0%} of its lanes there are on the road"
+        raise SeipError(
+            f"{source.network.name} is no network of the map {map_name} at this place ({found}): name the .net.xml "
+            "that was made from the map"
+        )
+    for flow in demand.flows:
+        unknown = [edge for edge in flow.edges if edge not in network.edges]
+        if unknown:
+            raise SeipError(
+                f"{source.routes.name}: flow {flow.name!r} takes the edge {unknown[0]!r}, which "
+                f"{source.network.name} has not: name the network that the routes were made for"
+            )
+    through = [flow.rate for flow in demand.flows if _crosses(flow.edges, network, geometry, shift)]
+    if not through:
+        raise SeipError(
+            f"no flow of {source.routes.name} goes through the region of {geometry.name}: name routes through its "
+            "junction, or another --junction"
+        )
+    return SiteTraffic(source, demand, sum(through))
+
+
+def _share_on_road(network: StreetNetwork, geometry: SceneGeometry, shift: Float) -> float | None:
+    """Return which share of the network's driving lanes in the region is on the road; None where there are none."""
+    lines = [lane.line - shift for edge in network.edges.values() for lane in edge.of(DRIVING)]
+    near = [one for one in map(shapely.LineString, lines) if one.intersects(geometry.region)]
+    parts = [shapely.segmentize(one, _SAMPLING) for one in near]
+    points = np.concatenate([np.empty((0, 2)), *map(shapely.get_coordinates, parts)])
+    points = points[shapely.contains_xy(geometry.region, points[:, 0], points[:, 1])]
+    if not len(points):
+        return None
+    road = shapely.union_all(shapely.polygons(joined(geometry.roads)[:, :, :2]))
+    shapely.prepare(road)
+    return float(np.mean(shapely.dwithin(road, shapely.points(points), _ROAD_TOLERANCE)))
+
+
+def _crosses(edges: Sequence[str], network: StreetNetwork, geometry: SceneGeometry, shift: Float) -> bool:
+    """Return whether a way leads from one street to the next within the region."""
+    ends = [network.edges[edge].lanes[-1].line[-1] - shift for edge, _ in pairwise(edges)]
+    return any(shapely.contains_xy(geometry.region, *end) for end in ends)
+
+
+def make_runs(
+    scene: Path, traffic: SiteTraffic, geometry: SceneGeometry, settings: RunSettings, *, fixed: bool
+) -> Generator[Progress, None, list[Path]]:
+    """Simulate runs into the folder beside a scene's file, or keep those that are there and were made alike.
+
+    Parameters
+    ----------
+    fixed : bool
+        As of `write_run`: all departures, ways and models as the file has them, and SUMO's seed alone differs.
+
+    Returns
+    -------
+    list of Path
+        ``run-N.npz``, in the order of their numbers.
+
+    Raises
+    ------
+    SeipError
+        SUMO is missing or refuses its input, or nobody is on the road.
+    """
+    folder = traffic_folder(scene, "_fixed" if fixed else "")
+    source, record = traffic.source, folder / "runs.json"
+    files = [path.read_bytes() for path in (source.routes, *source.types, source.network)]
+    key = digest(repr(settings), str(fixed), *files, geometry.origin, joined(geometry.roads), source_digest(__name__))
+    paths = [folder / f"run-{number}.npz" for number in range(1, settings.runs + 1)]
+    if _key_of(record) == key and all(path.is_file() for path in paths):
+        return paths
+    folder.mkdir(parents=True, exist_ok=True)
+    record.unlink(missing_ok=True)
+    made: list[VehiclePositions] = []
+    for number, path in enumerate(paths, start=1):
+        steps = _independent(folder, traffic, geometry, settings, number, () if fixed else made, fixed=fixed)
+        trajectories = yield from within(Progress(number - 1, settings.runs, f"run {number}"), steps)
+        trajectories.save(path)
+        made.append(vehicle_positions(path.stem, trajectories))
+    save_json(record, {"key": key})
+    return paths
+
+
+def _key_of(record: Path) -> str | None:
+    try:
+        return str(json.loads(record.read_text(encoding="utf-8"))["key"])
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
+
+
+def _independent(  # noqa: PLR0913  # what a run follows from, and those that it must not repeat
+    folder: Path,
+    traffic: SiteTraffic,
+    geometry: SceneGeometry,
+    settings: RunSettings,
+    number: int,
+    others: Sequence[VehiclePositions],
+    *,
+    fixed: bool,
+) -> Generator[Progress, None, Trajectories]:
+    """Simulate a run, again with other seeds while it overlaps others by more than `MOST_OVERLAP`."""
+    least, best = math.inf, None
+    for draw in range(MAX_DRAWS):
+        seed = MAX_DRAWS * (1000 * settings.seed + number) + draw
+        run = yield from _simulated(folder, traffic, geometry, settings, seed, fixed=fixed)
+        own = vehicle_positions(f"run {number}", run)
+        most = max((overlap_of(own, other) or 0.0 for other in others), default=0.0)
+        if best is None or most < least:
+            least, best = most, run
+        if least <= MOST_OVERLAP:
+            break
+    assert best is not None  # noqa: S101  # one was drawn at least
+    return best
+
+
+def _simulated(
+    folder: Path, traffic: SiteTraffic, geometry: SceneGeometry, settings: RunSettings, seed: int, *, fixed: bool
+) -> Generator[Progress, None, Trajectories]:
+    begin = settings.warm_up
+    if not fixed:
+        begin += float(np.random.default_rng([seed, 5]).integers(SIGNAL_CYCLE))
+    end = begin + settings.duration
+    routes, recorded = folder / "run.rou.xml", folder / "run.fcd.xml"
+    files = TrafficFiles(recorded, (routes,), traffic.source.network)
+    try:
+        write_run(routes, traffic.demand, seed, end, fixed=fixed)
+        yield from run_sumo(find_sumo(), files, seed, end)
+        said = f"SUMO, demand of {traffic.source.routes.name}, {'fixed departures, ' if fixed else ''}seed {seed}"
+        run = yield from recorded_run(files, (begin, end), geometry, said)
+    finally:
+        for path in (routes, recorded):
+            path.unlink(missing_ok=True)
+    return run.trajectories
+
+
+def overlaps(paths: Sequence[Path]) -> tuple[float, ...]:
+    """Return the overlap of each two runs, in ascending order; see `overlap_of`."""
+    positions = [vehicle_positions(path.stem, Trajectories.load(path)) for path in paths]
+    shares = (overlap_of(*pair) for pair in combinations(positions, 2))
+    return tuple(sorted(share for share in shares if share is not None))

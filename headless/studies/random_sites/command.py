@@ -1,0 +1,65 @@
+"""Generate random sites with traffic, to train detectors that carry to sites they have never seen.
+
+seip study random-sites -o out/sites --sites 8 --seed 1 --runs 4 --duration 40
+blender -b --python-exit-code 1 -P headless/study.py -- random-sites -o out/sites --sites 8
+
+Needs SUMO (make sumo). What was made before an interruption is kept.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+from headless import runtime
+from headless.options import new_parser
+from headless.studies.random_sites.production import MadeSite, SiteSettings, make_site
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.traffic.sumo_programs import find_sumo
+
+MAX_SITES = 9999
+
+
+def main(argv: list[str]) -> None:
+    """Make the sites that are not there yet."""
+    options = _parser().parse_args(argv)
+    if not 1 <= options.sites <= MAX_SITES:
+        raise SeipError(f"ask for 1 to {MAX_SITES} sites, not {options.sites} (--sites)")
+    settings = SiteSettings(options.seed, options.runs, options.duration, options.warm_up, options.approaches)
+    find_sumo()
+    runtime.check_folder(options.output)
+    for number in range(1, options.sites + 1):
+        start = time.monotonic()
+        with runtime.progress_bar() as report:
+            made = finish(make_site(options.output / f"site-{number:04d}", settings, number), report)
+        runtime.print_line(_in_words(made, time.monotonic() - start))
+
+
+def _in_words(made: MadeSite, seconds: float) -> str:
+    if made.kept:
+        return f"{made.folder}: kept"
+    plan, runs = made.record["plan"], made.record["runs"]
+    arms = plan["arms"]
+    steepest = max(abs(arm["slope"]) for arm in arms)
+    kind = "roundabout" if plan["roundabout_m"] else "signals" if plan["signals"] else "no signals"
+    side = "left" if plan["left_hand"] else "right"
+    return (
+        f"{made.folder}: {len(arms)} arms, {kind}, {side}-hand traffic, slopes up to {steepest:.1%}, {len(runs)} runs, "
+        f"{seconds:.0f} s"
+    )
+
+
+def _parser() -> argparse.ArgumentParser:
+    defaults = SiteSettings()
+    parser = new_parser("study random-sites", "Generate random sites with traffic, to train detectors on.")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the sites, one folder each")
+    parser.add_argument("--sites", type=int, default=8, metavar="N", help="how many; the first ones are kept")
+    parser.add_argument("--seed", type=int, default=defaults.seed, metavar="N", help="of everything random")
+    parser.add_argument("--runs", type=int, default=defaults.runs, metavar="N", help="of traffic on each site")
+    parser.add_argument("--duration", type=float, default=defaults.duration, metavar="S", help="of each run")
+    parser.add_argument("--warm-up", type=float, default=defaults.warm_up, metavar="S", help="before each run")
+    parser.add_argument(
+        "--approaches", type=float, default=defaults.approaches, metavar="M", help="how far the regions follow streets"
+    )
+    return parser

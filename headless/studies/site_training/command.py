@@ -1,0 +1,186 @@
+"""Train a detector on random placements at several sites, so that it works with any placement at others.
+
+seip study random-sites -o out/sites --sites 16
+seip study site-training out/sites/*/site.blend -o out/detector
+
+Each scene comes with its runs of traffic in the folder SCENE_traffic beside it. The last sites are set aside, to see
+when to stop. A training that was stopped goes on where it was.
+"""
+
+import argparse
+import math
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from headless import runtime, survey
+from headless.charts.detection import save_training_chart
+from headless.detection.detector import check_device
+from headless.detection.frames import SampledRecording
+from headless.detection.recordings import Simulator, sampled_runs
+from headless.detection.run_detection import AT_ONCE
+from headless.detection.settings import NetworkSettings, TrainingSettings
+from headless.detection.training import train
+from headless.options import add_settings, new_parser, read_settings, real_number
+from headless.studies.detection.case_study import simulated
+from headless.studies.site_training.training_site import LearntSite
+
+import bpy
+import numpy as np
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.limits import TIME_STEP
+from seip_addon.core.progress import Progress, side_by_side
+from seip_addon.core.scans import ScanSettings
+from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.site import make_site
+from seip_addon.core.traffic.source import require_own_traffic
+from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.scene.read import read_scene
+
+HEIGHTS = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)  # metres
+TILTS = (0.0, math.radians(5.0), math.radians(10.0), math.radians(15.0))
+TYPES = (
+    "type1",
+    "type2",
+    "type3",
+    "vlp16",
+    "vlp32c",
+    "hdl64e",
+    "os0_128",
+    "os1_64_rev7",
+    "os1_128",
+    "pandar64",
+    "xt32",
+    "ruby_plus",
+    "helios_5515",
+    "at128",
+)
+ASIDE = 8  # one site in so many is set aside
+MIN_SITES = 2
+
+Site = TypeVar("Site")
+
+
+def main(argv: list[str]) -> None:
+    """Simulate scans of random placements at every site, and train a detector on them."""
+    options = _parser().parse_args(argv)
+    network, training = read_settings(NetworkSettings, options), read_settings(TrainingSettings, options)
+    learning = LearningSettings(tuple(options.sensor), options.placements, options.every, training.seed)
+    check_device(options.device)
+    runtime.check_folder(options.output)
+    learnt, validation = (
+        [
+            recording
+            for number, scene in scenes
+            for recording in runtime.finish_with_bar(_sampled(read_site(scene, learning), number, network, learning))
+        ]
+        for scenes in set_aside(list(enumerate(options.scenes)))
+    )
+    store = options.output / "training.pt"
+    trained = runtime.finish_with_bar(train(learnt, validation, network, training, device=options.device, store=store))
+    best = trained.curve.best
+    trained.detector.save(options.output / "detector.pt", half=True)
+    save_training_chart(options.output / "training.png", trained.curve.loss, trained.curve.validation, "training")
+    runtime.print_line(
+        f"best after {best:,} steps: average precision {trained.curve.validation[best]:.1%} at sites set aside"
+    )
+    runtime.print_line(f"written to {options.output}/")
+
+
+@dataclass(frozen=True)
+class LearningSettings:
+    """What detectors learn from at each site.
+
+    Parameters
+    ----------
+    sensors : tuple of str
+        Catalogue keys of the types.
+    placements : int
+        Random ones for each run of traffic.
+    every : float, seconds
+        From frame to frame.
+    seed : int
+        Of random placements, and of the noise of scans.
+    """
+
+    sensors: tuple[str, ...] = TYPES
+    placements: int = 1
+    every: float = 2.5
+    seed: int = 1
+
+
+def read_site(scene: Path, learning: LearningSettings) -> LearntSite:
+    """Read a scene with the runs of traffic beside it.
+
+    Raises
+    ------
+    SeipError
+        There are none, or the scene is none.
+    """
+    runtime.open_scene(scene)
+    geometry = read_scene(bpy.context.scene).geometry
+    asked = SurveySettings(candidates=CandidateSettings(sensors=learning.sensors, heights=HEIGHTS, tilts=TILTS))
+    models = asked.models()
+    candidates = make_site(geometry, asked.candidates, asked.grid_spacing, asked.reach(), models).candidates
+    runs = sampled_runs(survey.runs_beside(scene), geometry.origin, learning.every)
+    if not runs:
+        raise SeipError(f"{scene} has no runs of traffic beside it: simulate some with headless/traffic.py")
+    for run in runs:
+        require_own_traffic(run.trajectories, geometry, run.name)
+    simulator = Simulator(geometry, ScanSettings(seed=learning.seed))
+    return LearntSite(f"{scene.parent.name}/{scene.stem}", geometry, candidates, models, runs, simulator)
+
+
+def set_aside(sites: Sequence[Site]) -> tuple[Sequence[Site], Sequence[Site]]:
+    """Return the sites to learn from, and the last ones, to see when to stop.
+
+    Raises
+    ------
+    SeipError
+        There are fewer than two.
+    """
+    if len(sites) < MIN_SITES:
+        raise SeipError("name two sites or more: the last is set aside, to see when to stop")
+    aside = max(1, len(sites) // ASIDE)
+    return sites[:-aside], sites[-aside:]
+
+
+def _sampled(
+    site: LearntSite, number: int, network: NetworkSettings, learning: LearningSettings
+) -> Generator[Progress, None, list[SampledRecording]]:
+    """Simulate scans of random placements in all runs of a site."""
+    area = site.simulator.area(network.pillar)
+    scans = site.scans(learning.placements, np.random.default_rng([learning.seed, number]))
+    recordings = [SampledRecording(one, area, network.most_points) for one in scans]
+    yield from side_by_side([simulated([one]) for one in recordings], AT_ONCE)
+    site.simulator.forget()
+    return recordings
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = new_parser("study site-training", "Train a detector on random placements at several sites.")
+    parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE", help="each with its traffic beside it")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the detector")
+    learning = parser.add_argument_group("what is learnt from")
+    default = LearningSettings()
+    learning.add_argument(
+        "--sensor", nargs="+", default=list(default.sensors), metavar="KEY", help="types in the placements"
+    )
+    learning.add_argument(
+        "--placements", type=int, default=default.placements, metavar="N", help="random ones for each run of traffic"
+    )
+    learning.add_argument(
+        "--every", type=real_number(TIME_STEP), default=default.every, metavar="S", help="time from frame to frame"
+    )
+    net = parser.add_argument_group("network")
+    add_settings(net, NetworkSettings, "head", "pillar", "most_points", "width", "blocks")
+    learning.add_argument(
+        "--seed", type=int, default=default.seed, metavar="N", help="of placements, noise, weights and order"
+    )
+    work = parser.add_argument_group("training")
+    add_settings(work, TrainingSettings, "steps", "batch")
+    work.add_argument("--device", default="cpu", help="of torch: cpu, cuda")
+    add_settings(work, TrainingSettings, "threads")
+    return parser

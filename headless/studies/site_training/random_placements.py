@@ -1,0 +1,49 @@
+"""Random placements, for detectors that are to work with any placement."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from headless.detection.recordings import MountedSensors
+
+import numpy as np
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.orientation import orientation
+from seip_addon.core.lidar import LidarModel
+from seip_addon.core.scans import MountedSensor
+from seip_addon.core.site.candidates import Candidates
+
+MAX_SENSORS = 5  # of a random placement
+
+
+def random_placement(
+    name: str, candidates: Candidates, models: Mapping[str, LidarModel], random: np.random.Generator
+) -> MountedSensors:
+    """Return 1 to `MAX_SENSORS` sensors at different positions; positions, and then their poses, are equally likely.
+
+    One in two placements has sensors of one type alone.
+
+    Raises
+    ------
+    SeipError
+        There is no candidate.
+    """
+    positions = np.unique(candidates.position_of)
+    if not len(positions):
+        raise SeipError("there is no candidate position to put a random sensor at: see the warnings of the site")
+    count = int(random.integers(1, min(MAX_SENSORS, len(positions)) + 1))
+    types = sorted(models)
+    if random.integers(2):
+        types = [types[int(random.integers(len(types)))]]
+    sensors = []
+    for number, position in enumerate(random.choice(positions, count, replace=False).tolist(), 1):
+        wanted = types[int(random.integers(len(types)))]
+        here = candidates.position_of == position
+        poses = np.flatnonzero(here & (candidates.sensor == wanted))
+        if not len(poses):
+            poses = np.flatnonzero(here)
+        pose = int(poses[int(random.integers(len(poses)))])
+        turn = orientation(float(candidates.yaw[pose]), float(candidates.tilt[pose]))
+        sensors.append(MountedSensor(f"S{number}", models[str(candidates.sensor[pose])], candidates.xyz[pose], turn))
+    return MountedSensors(name, tuple(sensors))

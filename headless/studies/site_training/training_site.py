@@ -1,0 +1,53 @@
+"""A site to learn from: its runs of traffic, and scans of them by random or given placements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from headless.detection.frames import Recording
+from headless.detection.recordings import PlacedSensors, SampledRun, Simulator
+
+import numpy as np
+
+from seip_addon.core.lidar import LidarModel
+from seip_addon.core.site.candidates import Candidates
+from seip_addon.core.site.scene_geometry import SceneGeometry
+
+from .random_placements import random_placement
+
+
+@dataclass(frozen=True, eq=False)
+class LearntSite:
+    """A site to learn from.
+
+    Parameters
+    ----------
+    name : str
+        For messages.
+    candidates : Candidates
+        That random placements are drawn from.
+    models : mapping of str to LidarModel
+        The candidates' sensor types.
+    runs : tuple of SampledRun
+    """
+
+    name: str
+    geometry: SceneGeometry
+    candidates: Candidates
+    models: Mapping[str, LidarModel]
+    runs: tuple[SampledRun, ...]
+    simulator: Simulator
+
+    def random_placement(self, number: int, random: np.random.Generator) -> PlacedSensors:
+        """Draw a placement; see `random_placements.random_placement`."""
+        name = f"{self.name}, placement {number}"
+        return random_placement(name, self.candidates, self.models, random)
+
+    def scans(self, placements: int, random: np.random.Generator) -> list[Recording]:
+        """Return the scans of each run by so many random placements of its own."""
+        return [
+            self.simulator.record(self.random_placement(number, random), run)
+            for run in self.runs
+            for number in range(1, placements + 1)
+        ]

@@ -1,0 +1,299 @@
+"""Chapters of the stability page: each finds the limits of one method."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from headless.charts import pose_errors as pose_error_charts
+from headless.charts import traffic as traffic_charts
+
+from seip_addon.core.placement import PlacementProblem, SolverLimits, solve
+from seip_addon.core.placement.deployment import deploy
+from seip_addon.core.placement.near_optimal import NearOptimalSet, near_optimal_set
+from seip_addon.core.placement.objective import DEFAULT_COUNT, Objective, placement_problem
+from seip_addon.core.placement.risk import Risk
+from seip_addon.core.placement.scenarios import Scenarios
+from seip_addon.core.progress import Progress
+from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study
+from seip_addon.core.robustness.robust_study import robust_study
+from seip_addon.core.robustness.traffic_instants import spread_instants
+from seip_addon.core.robustness.traffic_study import traffic_scenarios, traffic_study
+from seip_addon.core.scans import MountedSensor
+from seip_addon.core.traffic import Trajectories
+from seip_addon.core.workflows.survey import Survey, surroundings
+from seip_addon.core.workflows.traffic_runs import split_runs
+
+from . import charts as limits_charts
+from .arithmetic import arithmetic_rows, arithmetic_study
+from .criterion import criterion_rows, criterion_study
+from .page import Chapter, Chart
+from .robustness_rows import pose_rows, robust_rows, traffic_rows
+from .solver_limits import solver_rows, solver_study
+from .weather import untouched_types, weather_rows, weather_study
+
+RISKS = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
+"""Risks studied: the loss of a sensor, and targets that two sensors must see."""
+
+DETECTOR_RUNS = 3
+"""With more runs of traffic than these a detector can learn and be tried."""
+
+
+CHAPTERS = ("criterion", "arithmetic", "solvers", "poses", "failures", "traffic", "detector", "weather")
+"""Names of the chapters, in the order of the page."""
+
+
+@dataclass(frozen=True)
+class StabilityScope:
+    """Sizes of the studies.
+
+    Parameters
+    ----------
+    grids : int
+        Grids of targets, and azimuths, that are drawn at random.
+    rays : int
+        That are held to float64 on each scene.
+    instances : int
+        Random placement problems of each kind.
+    instants : tuple of int
+        Of traffic, to choose on and to evaluate on.
+    detector : mapping of str to int
+        See `detector_limits`: seeds and steps of trainings.
+    """
+
+    grids: int = 40
+    rays: int = 20_000
+    instances: int = 60
+    poses: PoseStudySettings = field(default_factory=PoseStudySettings)
+    robust: Scenarios = Scenarios("pose-errors")
+    instants: tuple[int, int] = (24, 120)
+    detector: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class StudiedScene:
+    """A scene to study, with its traffic and the folders of the studies.
+
+    Parameters
+    ----------
+    runs : list of Trajectories
+        Traffic; none where there is none beside the scene.
+    path : path or None
+        Its file; None for the one that is open.
+    others : sequence of path
+        Other scenes, to try on what was learnt on this one.
+    work, charts : path
+        Folders of what a rerun goes on from, and of the charts.
+    """
+
+    survey: Survey
+    runs: list[Trajectories]
+    path: Path | None
+    others: Sequence[Path]
+    work: Path
+    charts: Path
+    scope: StabilityScope
+
+    @property
+    def name(self) -> str:
+        """The scene's name, for titles."""
+        return self.survey.site.name
+
+    @property
+    def sensor(self) -> str:
+        """The middle one of the sensor types: neither its best nor its worst coverage is trivial."""
+        sensors = list(self.survey.models)
+        return sensors[len(sensors) // 2]
+
+    @property
+    def placed(self) -> str:
+        """The placement, for titles."""
+        return f"{DEFAULT_COUNT} × {self.sensor}"
+
+    def problem(self, sensor: str) -> PlacementProblem:
+        """Return the placement of the usual number of sensors of one type."""
+        site = self.survey.site
+        problem = placement_problem(site, self.survey.grid.visible, self.survey.models, Objective(count=DEFAULT_COUNT))
+        return replace(problem, forbidden=problem.forbidden | (site.candidates.sensor != sensor))
+
+
+Work = Callable[[StudiedScene], Generator[Progress, None, Chapter]]
+
+
+def chapters(scene: StudiedScene) -> Iterator[tuple[str, Work]]:
+    """Yield the chapters that a scene allows, by the names that they are kept under."""
+    yield "criterion", criterion
+    yield "arithmetic", arithmetic
+    yield "solvers", solvers
+    yield "poses", poses
+    yield "failures", failures
+    if len(scene.runs) > 1:
+        yield "traffic", traffic
+    if importlib.util.find_spec("torch") and len(scene.runs) > DETECTOR_RUNS:
+        yield "detector", detector
+    yield "weather", weather
+
+
+def criterion(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Vary δ, grid spacings and beam azimuth."""
+    survey = scene.survey
+    delta = survey.settings.visibility.delta
+    study = yield from criterion_study(survey.geometry, survey.settings, DEFAULT_COUNT, draws=scene.scope.grids)
+    limits_charts.save_ring_border_chart(scene.charts / "ring_borders.png", study, delta, f"{scene.name}: rings and δ")
+    limits_charts.save_border_check_chart(scene.charts / "beyond_border.png", study, f"{scene.name}: beyond the border")
+    limits_charts.save_delta_chart(scene.charts / "delta.png", study, delta, f"{scene.name}: coverage against δ")
+    limits_charts.save_convergence_chart(scene.charts / "convergence.png", study, f"{scene.name}: spacings")
+    return Chapter(
+        "The criterion of visibility",
+        tuple(criterion_rows(study, delta)),
+        (
+            Chart("ring_borders.png", "From which distance on rings on a level road are more than 2δ apart"),
+            Chart("beyond_border.png", "Share of the targets in view that count as seen, by distance in borders"),
+            Chart("delta.png", "Coverage of the best placement, and what its sensors have in view, against δ"),
+            Chart("convergence.png", "Coverage of the best placement against the spacings of targets and posts"),
+        ),
+    )
+
+
+def arithmetic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Compare the ray casters with float64."""
+    study = yield from arithmetic_study(scene.scope.rays)
+    limits_charts.save_rounding_chart(scene.charts / "rounding.png", study, "Hits against float64")
+    return Chapter(
+        "Arithmetic",
+        tuple(arithmetic_rows(study)),
+        (Chart("rounding.png", "How far hits are off, against distance from the origin and a stray mesh's distance"),),
+    )
+
+
+def solvers(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Find the limits of the solvers, and the size of the near-optimal set."""
+    study = yield from solver_study(scene.scope.instances)
+    tops: list[tuple[str, NearOptimalSet]] = []
+    for sensor in scene.survey.models:
+        problem = scene.problem(sensor)
+        best = yield from solve(problem, SolverLimits(scene.survey.settings.solver))
+        top = yield from near_optimal_set(problem, best.chosen)
+        if top is not None:
+            tops.append((f"{DEFAULT_COUNT} × {sensor}", top))
+    limits_charts.save_solver_chart(scene.charts / "solvers.png", study, "Solvers at their limits")
+    limits_charts.save_near_optimal_chart(scene.charts / "flat_top.png", tops, f"{scene.name}: how flat the top is")
+    return Chapter(
+        "Solvers",
+        tuple(solver_rows(study, tops)),
+        (
+            Chart("solvers.png", "What answers lose on random and adversarial instances"),
+            Chart("flat_top.png", "Placements within 1 % of the best, by how many positions they share with it"),
+        ),
+    )
+
+
+def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Study a placement under pose errors."""
+    survey, around = scene.survey, surroundings(scene.survey)
+    study = yield from robust_study(
+        around, scene.problem(scene.sensor), scene.scope.robust, limits=survey.settings.limits
+    )
+    chosen = study.nominal[0].placement.chosen
+    deployment = deploy(survey.site, survey.models, survey.grid.visible, chosen)
+    under_errors = yield from pose_study(around, deployment, scene.scope.poses)
+    pose_error_charts.save_spread_chart(scene.charts / "spread.png", study, f"{scene.placed} under pose errors")
+    pose_error_charts.save_loss_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
+    pose_error_charts.save_frontier_chart(
+        scene.charts / "frontier.png", study, f"{scene.placed}: what robustness costs and saves"
+    )
+    return Chapter(
+        f"Poses that err: {scene.placed}",
+        (*pose_rows(under_errors), *robust_rows(study)),
+        (
+            Chart(
+                "spread.png", "Distribution of coverage over unseen draws: the nominal optimum and robust placements"
+            ),
+            Chart("blame.png", "Mean loss when one sensor alone errs, and when one kind of error alone occurs"),
+            Chart("frontier.png", "What robustness costs in planned coverage, and what it saves in the 5 % quantile"),
+        ),
+    )
+
+
+def failures(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Study placements under sensor failures and multi-cover."""
+    around, problem = surroundings(scene.survey), scene.problem(scene.sensor)
+    study = yield from robust_study(around, problem, scene.scope.robust, RISKS, scene.survey.settings.limits)
+    pose_error_charts.save_spread_chart(scene.charts / "failures.png", study, f"{scene.placed}: failures")
+    caption = "Distribution over unseen draws of what is left: placements for failures beside the nominal optimum"
+    return Chapter(f"Failures: {scene.placed}", robust_rows(study), (Chart("failures.png", caption),))
+
+
+def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Study placements in traffic."""
+    survey = scene.survey
+    around, problem, settings = surroundings(survey), scene.problem(scene.sensor), survey.settings
+    runs_to_choose, runs_to_evaluate = split_runs(scene.runs)
+    to_choose, to_evaluate = scene.scope.instants
+    scenarios = yield from traffic_scenarios(around, problem, spread_instants(runs_to_choose, to_choose, seed=0))
+    evaluation = spread_instants(runs_to_evaluate, to_evaluate, seed=1)
+    steps = traffic_study(
+        around,
+        problem,
+        scenarios,
+        evaluation,
+        settings.limits,
+    )
+    study = yield from steps
+    chosen = study.traffic.placement.chosen
+    deployment = deploy(survey.site, survey.models, survey.grid.visible, chosen)
+    title = f"{scene.placed} in traffic"
+    traffic_charts.save_time_map(
+        scene.charts / "time_seen.png", survey.geometry, survey.site, deployment, study.traffic, title
+    )
+    traffic_charts.save_traffic_chart(scene.charts / "promise.png", [(scene.placed, study)], title)
+    return Chapter(
+        f"Traffic that hides things: {scene.placed}",
+        traffic_rows(study),
+        (
+            Chart("time_seen.png", "Share of time for which each target, and the point above it, is seen in traffic"),
+            Chart("promise.png", "What placements see on the empty road and, on average over time, in traffic"),
+        ),
+    )
+
+
+def detector(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Train detectors, and evaluate them under growing disturbances."""
+    from headless.studies.detector_limits import charts as limit_charts  # noqa: PLC0415 -- torch need not be installed
+    from headless.studies.detector_limits import rows as limit_rows  # noqa: PLC0415 -- as above
+    from headless.studies.detector_limits.chapter import detector_limits  # noqa: PLC0415 -- as above
+
+    study = yield from detector_limits(scene.survey, scene.path, scene.others, scene.work, **scene.scope.detector)
+    limit_charts.save_limits_chart(scene.charts / "detector.png", study)
+    charts = [Chart("detector.png", "Average precision against the size of each disturbance, with 95 % intervals")]
+    if study.transfers:
+        limit_charts.save_transfer_chart(scene.charts / "detector_away.png", study)
+        charts.append(Chart("detector_away.png", "What detectors are worth on what they have not learnt"))
+    return Chapter("The detector", limit_rows.limit_rows(study), tuple(charts))
+
+
+def weather(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Study a fleet in rain and fog, and what they change for the scene's own types."""
+    survey = scene.survey
+    study = yield from weather_study(survey.geometry, survey.settings)
+    best = yield from solve(scene.problem(scene.sensor), survey.settings.limits)
+    deployment = deploy(survey.site, survey.models, survey.grid.visible, best.chosen)
+    sensors = [MountedSensor(one.label, one.model, one.xyz, one.orientation) for one in deployment.sensors]
+    rows = weather_rows(study, untouched_types(survey, scene.placed, sensors))
+    limits_charts.save_weather_chart(scene.charts / "weather.png", study, f"{scene.name} in rain and fog")
+    caption = "Coverage by weather: placements for clear air and for the weather, and sensors that detect farther"
+    return Chapter(f"Weather: {study.count} × {study.sensor}", rows, (Chart("weather.png", caption),))
+
+
+def introduction(scene: StudiedScene) -> str:
+    """Return the introduction of the page."""
+    site = scene.survey.site
+    return (
+        "Where each method begins to fail, how that was found, and what the tool does about it. Written by "
+        f"`seip study stability`: {site.name}, {len(site.targets):,} targets, {len(site.candidates):,} poses. "
+        "Brackets hold 95 % intervals. Warnings about a scene and a placement stand in the panel, in the batch output "
+        "and in `placement.json`, what traffic leaves of one as soon as it is tried there; those about detectors come "
+        "from the commands that use them."
+    )

@@ -1,0 +1,90 @@
+"""Find where each method begins to fail, and write the stability page with its charts.
+
+seip study stability scenes/junction.blend -o docs
+seip study stability scenes/junction.blend -o docs --only weather
+blender -b --python-exit-code 1 site.blend -P headless/study.py -- stability -o docs
+
+Chapters that are done are kept in the folder of work: a run that was stopped goes on with the next.
+"""
+
+import argparse
+from pathlib import Path
+
+from headless import runtime, survey
+from headless.options import new_parser
+from headless.studies.stability.chapters import CHAPTERS, StabilityScope, StudiedScene, chapters, introduction
+from headless.studies.stability.page import load_chapter, put_chapter, save_chapter, save_page
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.placement.objective import DEFAULT_COUNT, Objective, check_objective
+from seip_addon.core.storage.files import digest
+from seip_addon.core.storage.source_digest import source_digest
+from seip_addon.core.workflows.survey import grid_key
+from seip_addon.core.workflows.traffic_runs import load_runs
+
+PAGE, CHARTS = "stability.md", "stability"
+
+
+def main(argv: list[str], scope: StabilityScope | None = None) -> None:
+    """Study what has not been studied yet, and write the page; tests give a small ``scope``."""
+    options = _parser().parse_args(argv)
+    charts = options.output / CHARTS
+    for other in options.other:
+        _check_other(other)
+    if options.only and not (options.output / PAGE).is_file():
+        raise SeipError(f"there is no page {options.output / PAGE} to put chapters into: leave out --only")
+    runtime.check_folder(charts)
+    surveyed, watch = survey.survey(
+        argparse.Namespace(**vars(options) | {"output": options.work}),
+        lambda layout: check_objective(layout.site, layout.models, Objective(count=DEFAULT_COUNT)),
+    )
+    runs = load_runs(survey.runs_beside(options.scene), surveyed.geometry.origin)
+    scene = StudiedScene(surveyed, runs, options.scene, options.other, options.work, charts, scope or StabilityScope())
+    made_from = digest(
+        grid_key(surveyed),
+        repr(surveyed.settings),
+        repr(scene.scope),
+        *(run.key for run in runs),
+        *(other.name for other in options.other),
+        source_digest("headless.studies.stability.command"),
+    )
+    done = []
+    asked = [(name, work) for name, work in chapters(scene) if name in (options.only or [name])]
+    for name, work in asked:
+        kept = load_chapter(options.work / f"{name}.json", made_from)
+        if kept is None or not all((charts / chart.file).exists() for chart in kept.charts):
+            kept = watch.run(name, work(scene))
+            save_chapter(options.work / f"{name}.json", kept, made_from)
+            runtime.LOG.info(f"{kept.title}: {len(kept.rows)} rows, {watch.seconds[name]:.0f} s")
+        done.append(kept)
+    with runtime.incomplete_if_interrupted(options.output):
+        if options.only:
+            for chapter in done:
+                put_chapter(options.output / PAGE, chapter, CHARTS)
+        else:
+            save_page(options.output / PAGE, introduction(scene), done, CHARTS)
+    runtime.print_line(f"written to {options.output / PAGE}")
+
+
+def _check_other(scene: Path) -> None:
+    """Raise SeipError, before hours of work, where detectors cannot be tried on a scene."""
+    if not scene.is_file():
+        raise SeipError(f"there is no file {scene}: --other names scenes with traffic beside them")
+    if not survey.runs_beside(scene):
+        raise SeipError(
+            f"there is no traffic beside {scene}: put runs made by headless/traffic.py into the folder "
+            f"{scene.stem}_traffic beside it"
+        )
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = new_parser("study stability", "Drive every method to where it fails, and write a page with charts.")
+    survey.add_options(parser)
+    parser.add_argument(
+        "--other", nargs="+", type=Path, default=[], metavar="BLEND", help="scenes to try detectors on that learnt here"
+    )
+    parser.add_argument(
+        "--only", nargs="+", choices=CHAPTERS, metavar="CHAPTER", help=f"put these into the page: {', '.join(CHAPTERS)}"
+    )
+    parser.add_argument("--work", type=Path, default=Path("out/stability"), help="folder for what a rerun goes on from")
+    return parser

@@ -1,0 +1,58 @@
+"""The lazy grid is the full scan's on real scenes, whatever δ."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from headless import build_scene, runtime
+from headless.studies.benchmark.visibility import visibility_costs
+
+import bpy
+import pytest
+
+from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.site import Site, make_site
+from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.scene.read import read_scene
+
+pytest.importorskip("embreex", reason="embreex is not installed")
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).resolve().parents[3]
+TOWN05 = Path(os.environ.get("SEIP_MAPS") or ROOT.parent / "shared" / "opendrive") / "Town05.xodr"
+
+
+def site_of(scene: Path, grid: float = 1.0) -> Site:
+    runtime.open_scene(scene)
+    return make_site(read_scene(bpy.context.scene).geometry, CandidateSettings(), grid)
+
+
+def lazy_is_full(site: Site, settings: VisibilitySettings, samples: int) -> None:
+    """Compare at places spread over the site, with both engines; every lazy run must be worth it as well."""
+    costs = visibility_costs(site, load_catalogue(), settings, samples)
+    for engine in ("bvh", "embree"):
+        full, lazy = costs[f"full {engine}"], costs[f"lazy {engine}"]
+        assert lazy.seen == full.seen > 0
+        assert lazy.rays < 0.05 * full.rays
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [VisibilitySettings(0.3), VisibilitySettings(1.0, 0.1), VisibilitySettings(1.0), VisibilitySettings(3.0)],
+)
+def test_on_the_shipped_junction(settings: VisibilitySettings) -> None:
+    lazy_is_full(site_of(ROOT / "scenes" / "junction.blend"), settings, samples=6)
+
+
+def test_on_the_shipped_corridor(tmp_path: Path) -> None:
+    build_scene.main([str(ROOT / "scenes" / "corridor.toml"), "-o", str(tmp_path / "corridor.blend")])
+    lazy_is_full(site_of(tmp_path / "corridor.blend", grid=2.0), VisibilitySettings(), samples=8)
+
+
+@pytest.mark.skipif(not TOWN05.is_file(), reason="Town05.xodr is not in the folder that SEIP_MAPS names")
+def test_on_a_junction_of_town05(tmp_path: Path) -> None:
+    scene = tmp_path / "town05.blend"
+    build_scene.main([str(TOWN05), "--near", "-49", "-1", "--radius", "80", "-o", str(scene)])
+    lazy_is_full(site_of(scene), VisibilitySettings(), samples=8)

@@ -1,0 +1,163 @@
+"""What agrees with average precision, how well anything could, and what is said of it, on placements that are told."""
+
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+
+from headless.studies.criteria import agreement
+from headless.studies.criteria.criteria import Criterion
+from headless.studies.criteria.drawing import BETWEEN, OPTIMAL, RANDOM, PlacementsStudySettings
+from headless.studies.criteria.results import PlacementsStudy
+
+import numpy as np
+import pytest
+import scipy.stats
+
+PLACEMENTS, RUNS, TRAININGS, RESAMPLES = 40, 8, 2, 200
+
+
+@dataclass
+class Told:
+    """Precisions of placements of known quality, with an error for each run and for each training."""
+
+    quality: np.ndarray
+    run_error: float
+    training_error: float
+    seed: int = 0
+    has_intervals: bool = True
+    trainings: int = TRAININGS
+    by_training: np.ndarray = field(init=False)
+
+    def __post_init__(self):
+        rng = np.random.default_rng(self.seed)
+        number = len(self.quality)
+        runs = self.quality + self.run_error * rng.normal(size=(RUNS, number))
+        learnt = self.training_error * rng.normal(size=(self.trainings, number))
+        self.by_training = learnt + runs.mean(axis=0)
+        self.values = self.by_training.mean(axis=0)
+        half = RUNS // 2
+        self.halves = learnt.mean(axis=0) + np.array([[runs[:half].mean(axis=0), runs[half:].mean(axis=0)]])
+        drawn = rng.integers(RUNS, size=(RESAMPLES, RUNS))
+        self.resampled = (learnt.mean(axis=0) + runs[drawn].mean(axis=1)).T
+
+    def interval(self, placement):
+        return tuple(np.quantile(self.resampled[placement], (0.025, 0.975)))
+
+
+def spread(seed=1):
+    return np.random.default_rng(seed).uniform(0.3, 0.9, PLACEMENTS)
+
+
+@pytest.mark.parametrize(("run_error", "training_error"), [(0.3, 0.05), (0.1, 0.1), (0.4, 0.0)])
+def test_the_ceiling_is_what_the_true_quality_reaches(run_error, training_error):
+    """The oracle knows the quality without error; the ceiling knows measurements alone."""
+    reached, ceilings = [], []
+    for seed in range(40):
+        told = Told(spread(seed), run_error, training_error, seed)
+        reached.append(scipy.stats.spearmanr(told.quality, told.values).statistic)
+        ceilings.append(agreement.noise_ceiling(told).ceiling.value)
+    assert np.mean(ceilings) == pytest.approx(np.mean(reached), abs=0.03)
+
+
+def test_one_training_is_taken_to_agree():
+    told = Told(spread(), 0.1, 0.0, trainings=1)
+    found = agreement.noise_ceiling(told)
+    assert found.trainings is None
+    both = 2 * found.halves.value / (1 + found.halves.value)
+    assert found.ceiling.value == pytest.approx(np.sqrt(both))
+
+
+def test_intervals_hold_what_they_should():
+    """Of a criterion whose correlation with what is measured is known from many placements."""
+    rng = np.random.default_rng(5)
+    many = rng.uniform(0.3, 0.9, 20_000)
+    true = scipy.stats.spearmanr(many + rng.normal(0, 0.1, len(many)), Told(many, 0.2, 0.03).values).statistic
+    held = []
+    for seed in range(40):
+        quality = spread(seed)
+        criterion = Criterion("one", "one", quality + np.random.default_rng(seed + 99).normal(0, 0.1, PLACEMENTS))
+        found = agreement.correlate(criterion, Told(quality, 0.2, 0.03, seed)).spearman
+        assert -1 <= found.low <= found.value <= found.high <= 1
+        held.append(found.low <= true <= found.high)
+    assert np.mean(held) >= 0.88
+
+
+def test_a_criterion_is_paired_with_coverage():
+    told = Told(spread(), 0.05, 0.0)
+    coverage = Criterion("coverage", "coverage", told.quality + np.random.default_rng(2).normal(0, 0.15, PLACEMENTS))
+    same, true = Criterion("same", "same", 2 * coverage.values), Criterion("true", "true", told.quality)
+    first, alike, better = agreement.judge((coverage, same, true), told)
+    assert (first.difference.value, first.gain.value) == (0, 0)
+    assert (alike.difference.low, alike.difference.high) == (0, 0)
+    assert 0 < better.difference.low < better.difference.value < better.difference.high
+    alone = better.correlation.spearman
+    assert better.difference.high - better.difference.low < alone.high - first.correlation.spearman.low
+    best, liked = np.argmax(told.quality), np.argmax(coverage.values)
+    assert better.gain.value == pytest.approx(told.values[best] - told.values[liked])
+    assert better.gain.low <= better.gain.value <= better.gain.high
+
+
+def test_few_placements_and_few_runs_have_no_interval():
+    told = Told(spread(), 0.05, 0.0)
+    coverage = Criterion("coverage", "coverage", told.quality)
+    three = np.arange(PLACEMENTS) < 3
+    assert agreement.correlate(coverage, told, three).spearman.low == -np.inf
+    none = agreement.correlate(coverage, told, np.zeros(PLACEMENTS, dtype=bool))
+    assert (none.placements, np.isnan(none.spearman.value)) == (0, True)
+    told.has_intervals = False
+    assert agreement.correlate(coverage, told).spearman.low == -np.inf
+    assert agreement.noise_ceiling(told).ceiling.low == -np.inf
+
+
+def test_placements_near_the_optimum():
+    coverage = Criterion("coverage", "coverage", np.array([0.80, 0.76, 0.749, 0.3]))
+    assert agreement.near_optimum(coverage).tolist() == [True, True, False, False]
+    assert agreement.upper_half(coverage).tolist() == [True, True, False, False]
+
+
+def study(told, *others):
+    coverage = Criterion("coverage", "coverage", np.where(np.arange(len(told.quality)) == 0, 1.0, told.quality))
+    kind = (OPTIMAL, *[RANDOM, BETWEEN] * (len(told.quality) // 2))[: len(told.quality)]
+    drawn = SimpleNamespace(kind=kind)
+    return PlacementsStudy("Site", PlacementsStudySettings(PLACEMENTS), "type2", drawn, told, (coverage, *others))
+
+
+def test_sentences_follow_from_the_figures():
+    told = Told(np.sort(spread())[::-1], 0.02, 0.0)
+    wrong = Criterion("wrong", "the wrong", -told.quality)
+    said = list(study(told, wrong).sentences())
+    assert any("the upper half" in line and "foretells detection there, too" in line for line in said)
+    assert said[-2].startswith("no criterion that can be had beforehand correlates better than coverage")
+    assert said[-1].startswith("no criterion that can be had beforehand gains anything")
+
+
+def test_a_gain_that_does_not_stand_is_told_with_its_interval():
+    told = Told(np.linspace(0.7, 0.71, PLACEMENTS), 0.3, 0.0)
+    best = Criterion("lucky", "the lucky", told.values)
+    assert list(study(told, best).sentences())[-1].startswith(
+        "no criterion that can be had beforehand gains a point of AP that its interval leaves standing; the most has "
+        "the lucky: +"
+    )
+
+
+def test_a_criterion_that_gains_is_named():
+    told = Told(spread(), 0.02, 0.0)
+    true = Criterion("true", "the truth", told.quality)
+    known_late = Criterion("late", "hindsight", told.quality, beforehand=False)
+    said = list(study(told, true, known_late).sentences())
+    assert said[-1].startswith("a point or more of AP that the interval leaves standing is gained by the truth (+")
+    assert "hindsight" not in said[-1]
+
+
+def test_a_detector_that_has_not_learnt_says_nothing():
+    told = Told(np.linspace(0.0, 0.05, PLACEMENTS), 0.0, 0.0)
+    said = list(study(told, Criterion("true", "the truth", told.quality)).sentences())
+    assert said[-1].startswith("nothing follows from this")
+
+
+def test_noise_hides_what_coverage_foretells_near_the_optimum():
+    quality = np.concatenate([[0.8], np.linspace(0.76, 0.8, 10), np.linspace(0.2, 0.6, 20)])
+    told = Told(quality, 0.3, 0.0)
+    coverage = Criterion("coverage", "coverage", quality)
+    near = agreement.correlate(coverage, told, agreement.near_optimum(coverage))
+    assert near.placements == 11
+    assert near.spearman.low < 0 < agreement.correlate(coverage, told).spearman.low

@@ -1,0 +1,306 @@
+"""Drawing placements, the criteria beside coverage, and what is kept of a study."""
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip("torch", reason="torch is not installed: make detection")
+
+from headless.detection.frame_results import FrameResult
+from headless.detection.recordings import SampledRun
+from headless.studies.criteria.criteria import criteria_of
+from headless.studies.criteria.drawing import (
+    BETWEEN,
+    NEAR,
+    OPTIMAL,
+    OTHERWISE,
+    RANDOM,
+    PlacementsStudySettings,
+    draw_placements,
+)
+from headless.studies.criteria.kept_frames import load_frames, save_frames
+from headless.studies.criteria.occupancy import require_vehicles, vehicle_occupancy
+from headless.studies.criteria.precision import Precisions
+from headless.studies.detection.sensor_configuration import SensorConfiguration
+
+import numpy as np
+import shapely
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.orientation import orientation
+from seip_addon.core.lidar import beam_directions, load_catalogue, return_chance
+from seip_addon.core.placement.deployment import deploy
+from seip_addon.core.placement.search_limits import DEFAULT_LIMITS
+from seip_addon.core.progress import finish
+from seip_addon.core.returns.bodies import PANELS
+from seip_addon.core.returns.expected_returns import expected_returns
+from seip_addon.core.returns.road_users import cars_at
+from seip_addon.core.scans import MountedSensor, ScanSettings
+from seip_addon.core.scans.static_scene import StaticScene
+from seip_addon.core.site.site import Targets
+from seip_addon.core.traffic import RoadUser, Trajectories
+from seip_addon.core.visibility.ray_casting import make_ray_caster
+from tests.builders.labelled_frames import box, detected, traffic, truth
+from tests.builders.small_junction import make_example
+
+SETTINGS = PlacementsStudySettings(placements=11, count=2, learnt=6)
+
+
+@pytest.fixture(scope="module")
+def survey():
+    """A survey of one type, with visibility by plain lines of sight."""
+    example = make_example(spacing=4.0, heights=(5.4,))
+    candidates = example.site.candidates
+    kept = np.flatnonzero(candidates.sensor == "type2")
+    columns = {
+        name: getattr(candidates, name)[kept] for name in ("position_of", "sensor", "height", "xyz", "yaw", "tilt")
+    }
+    return SimpleNamespace(
+        site=replace(example.site, candidates=replace(candidates, **columns)),
+        models={"type2": example.models["type2"]},
+        grid=SimpleNamespace(visible=example.visible[kept]),
+        settings=SimpleNamespace(limits=DEFAULT_LIMITS),
+    )
+
+
+def poses(configurations):
+    return [frozenset(sensor.pose for sensor in one.deployment.sensors) for one in configurations]
+
+
+def test_placements_are_feasible_different_and_spread(survey):
+    drawn = finish(draw_placements(survey, SETTINGS, {}))
+    assert drawn.kind == (OPTIMAL, *[RANDOM] * 5, *[BETWEEN] * 5)
+    everything = poses(drawn.evaluated) + poses(drawn.learnt)
+    assert len(set(everything)) == len(everything) == 17
+    position = survey.site.candidates.position_of
+    assert all(len({position[pose] for pose in some}) == 2 for some in everything)
+    coverage = np.array([one.deployment.coverage for one in drawn.evaluated])
+    visible = survey.grid.visible
+    best = max(
+        (visible[a] | visible[b]).mean() for a in range(len(visible)) for b in range(a) if position[a] != position[b]
+    )
+    assert coverage[0] == pytest.approx(best)
+    assert np.ptp(coverage[6:]) > 0.4 * np.ptp(coverage)
+    assert (coverage[6:] >= coverage[0] - NEAR).sum() >= 2
+    assert (coverage[6:] < coverage[0] - NEAR).sum() >= 2
+
+
+def test_the_optimal_placements_of_other_weights_are_evaluated_as_well(survey):
+    site, visible = survey.site, survey.grid.visible
+    central = site.targets.central.astype(float)
+    drawn = finish(draw_placements(survey, SETTINGS, {"regions": central, "alike": np.ones(len(site.targets))}))
+    assert drawn.kind[-1] == OTHERWISE
+    assert len(drawn.evaluated) == SETTINGS.placements + 1  # all alike is coverage itself
+    positions = site.candidates.position_of
+    best = max(
+        (visible[a] | visible[b]) @ central
+        for a in range(len(visible))
+        for b in range(a)
+        if positions[a] != positions[b]
+    )
+    assert (drawn.evaluated[-1].deployment.seen_by > 0) @ central == best
+
+
+def test_a_seed_draws_the_same_and_another_others(survey):
+    again = [finish(draw_placements(survey, replace(SETTINGS, seed=seed), {})) for seed in (0, 0, 1)]
+    first, same, other = [poses(one.evaluated) + poses(one.learnt) for one in again]
+    assert first == same
+    assert first[0] == other[0]
+    assert set(first[1:6]) != set(other[1:6])
+
+
+def test_random_placements_are_uniform(survey):
+    """Each pose is in as many of them as chance has it."""
+    number = len(survey.site.candidates)
+    counts = np.zeros(number)
+    for seed in range(12):
+        drawn = finish(draw_placements(survey, replace(SETTINGS, placements=60, seed=seed), {}))
+        for some in poses(drawn.evaluated[1:31]):
+            counts[list(some)] += 1
+    expected = counts.sum() / number
+    assert ((counts - expected) ** 2 / expected).sum() < number + 4 * math.sqrt(2 * number)
+
+
+@pytest.mark.parametrize(
+    ("changed", "sensors", "sentence"),
+    [
+        ({"placements": 3}, ["type2"], "3 placements say nothing of a correlation: ask for 4 or more"),
+        ({"learnt": 0}, ["type2"], "must learn from 1 placement or more, not 0"),
+        ({"seed": -1}, ["type2"], "seed of the placements must be 0 or more"),
+        ({}, ["type1", "type2"], "placements of one type are compared, not of type1 and type2"),
+    ],
+)
+def test_what_cannot_be_studied_is_refused(changed, sensors, sentence):
+    with pytest.raises(SeipError, match=sentence):
+        replace(SETTINGS, **changed).check(sensors)
+
+
+def test_more_placements_than_there_are_get_a_sentence(survey):
+    with pytest.raises(SeipError, match="ask for fewer placements"):
+        finish(draw_placements(survey, replace(SETTINGS, placements=400, count=1), {}))
+
+
+CAR = PANELS["car"]
+
+
+def rectangle(sensor, target):
+    """The car as two triangles that face the sensor."""
+    offset = target - sensor.xyz
+    across = np.array([-offset[1], offset[0], 0.0]) / np.hypot(*offset[:2]) * CAR.width / 2
+    up = np.array([0.0, 0.0, CAR.height])
+    a, b, c, d = target - across, target + across, target + across + up, target - across + up
+    return np.array([(a, b, c), (a, c, d)])
+
+
+GROUND = np.array([[(-90, -90, 0), (90, -90, 0), (90, 90, 0)], [(-90, -90, 0), (90, 90, 0), (-90, 90, 0)]], dtype=float)
+WALL = np.array([[(10, -9, 0), (10, 9, 0), (10, 9, 6)], [(10, -9, 0), (10, 9, 6), (10, -9, 6)]], dtype=float)
+
+
+@pytest.mark.parametrize("turn", [orientation(0.0, 0.0), orientation(2.0, math.radians(12))])
+def test_a_cars_returns_are_those_of_a_scan_of_it(turn):
+    """The oracle stands the car in the scene and casts every ray at both."""
+    model = load_catalogue()["type1"]
+    sensor = MountedSensor("S1", model, np.array([1.0, 2.0, 4.0]), turn)
+    targets = np.array([[2.0, 18.0, 0.0], [-14.0, 2.0, 0.0], [25.0, 2.0, 0.0], [-3.0, -30.0, 0.0], [-60.0, 0.5, 0.0]])
+    static = np.concatenate([GROUND, WALL])
+    beams = beam_directions(model).reshape(-1, 3) @ turn.T
+    expected = []
+    for target in targets:
+        car = rectangle(sensor, target)
+        reach, triangle = make_ray_caster(np.concatenate([static, car])).cast(sensor.xyz, beams, model.max_range)
+        on_car = reach[triangle >= len(static)]
+        expected.append(return_chance(model, on_car, np.full(len(on_car), CAR.reflected)).sum())
+    found, _ = expected_returns(make_ray_caster(static), sensor.xyz, turn, model, cars_at(targets, 1.0))
+    assert expected[2] == 0  # behind the wall
+    assert min(expected[:2]) > 20
+    np.testing.assert_allclose(found, expected, rtol=0.02, atol=2.0)
+
+
+def one_car(name="car", x=0.0, seconds=12.0):
+    return Trajectories(
+        users=(RoadUser("it", name, 4.0, 2.0, 1.5),),
+        origin=np.zeros(3),
+        first=np.array([0, 3]),
+        time=np.array([0.0, seconds / 2, seconds]),
+        position=np.array([[x, 0.0, 0.0], [x, 0.0, 0.0], [x + 100.0, 0.0, 0.0]]),
+        yaw=np.full(3, np.pi / 2),
+        pitch=np.zeros(3),
+        speed=np.zeros(3),
+        source=name,
+    )
+
+
+def run_of(trajectories):
+    return SampledRun("run", trajectories, np.arange(2.0, 12.0, 2.0))
+
+
+def test_occupancy_by_hand():
+    """Turned by a quarter, 4 m long: it stands over the target at y = 1.9 for 4 of 10 s, and then drives away."""
+    targets = np.array([[0.0, 1.9, 0.0], [0.0, 2.1, 0.0], [1.1, 0.0, 0.0], [-1.1, 0.0, 0.0]])
+    points = Targets(targets, np.ones(4), np.zeros(4, dtype=bool), 1e-3)
+    often = vehicle_occupancy(points, [run_of(one_car())])
+    assert often[0] == pytest.approx(0.4, abs=0.06)
+    assert often[1] == often[3] == 0
+    squares = vehicle_occupancy(replace(points, spacing=0.5), [run_of(one_car())])
+    assert (squares[1:] == often[0]).all()
+    assert not vehicle_occupancy(points, [run_of(one_car("pedestrian"))]).any()
+
+
+@pytest.mark.parametrize("far", ["training", "test"])
+def test_traffic_without_vehicles_in_the_region_is_refused(far):
+    site = SimpleNamespace(region=shapely.box(-9, -9, 9, 9))
+    runs = {what: (run_of(one_car(x=500.0 * (what == far))),) for what in ("training", "test")}
+    with pytest.raises(SeipError, match="no vehicle is ever in the region of interest in the runs"):
+        require_vehicles(SimpleNamespace(**runs), site)
+
+
+def test_criteria_by_hand():
+    """Three targets of which one is central and one holds a car: each of three placements sees one of them."""
+    models = load_catalogue()
+    example = make_example(spacing=4.0)
+    xyz = np.array([[0.0, 0.0, 0.0], [20.0, 0.0, 0.0], [0.0, 20.0, 0.0]])
+    targets = Targets(xyz, np.array([1.0, 4.0, 1.0]), np.array([False, True, False]), 1.0)
+    site = replace(example.site, targets=targets)
+    everything = np.zeros((len(site.candidates), 3), dtype=bool)
+    everything[[0, 1, 2], [0, 1, 2]] = True
+    placements = [
+        SensorConfiguration(f"{pose}", deploy(site, models, everything, [pose]), "type1", 1, "random", np.inf)
+        for pose in (0, 1, 2)
+    ]
+    simulator = SimpleNamespace(static=StaticScene(GROUND, np.full(2, 0.3), site.region), settings=ScanSettings())
+    precise = SimpleNamespace(share_with_returns=np.array([0.1, 0.2, 0.3]))
+    learnt = SimpleNamespace(training=(run_of(one_car(seconds=40.0)),))  # for 18 of 38 s, and then passing the second
+    found = {
+        one.key: one for one in finish(criteria_of(SimpleNamespace(site=site), simulator, placements, learnt, precise))
+    }
+    assert found["coverage"].values == pytest.approx([1 / 3] * 3)
+    assert found["weighted_coverage"].values == pytest.approx([1 / 6, 4 / 6, 1 / 6])
+    assert found["traffic_coverage"].values == pytest.approx([1, 0, 0], abs=0.05)
+    assert found["occupancy_entropy"].values[0] > found["occupancy_entropy"].values[1] > 0
+    assert found["occupancy_entropy"].values[2] == 0
+    assert ((found["targets_with_returns"].values >= 0) & (found["targets_with_returns"].values <= 1)).all()
+    assert (found["log_returns"].values > 0).all()
+    assert [key for key, one in found.items() if not one.beforehand] == ["test_vehicles_with_returns"]
+    flat = replace(site, targets=replace(targets, central=np.zeros(3, dtype=bool)))
+    steps = criteria_of(SimpleNamespace(site=flat), simulator, placements, learnt, precise)
+    assert "weighted_coverage" not in {one.key for one in finish(steps)}
+
+
+def test_frames_are_kept_as_they_were(tmp_path):
+    frames = [
+        FrameResult("one", 2.0, truth([box(0), box(9)], category=["car", "truck"]), detected([box(1)], [0.5])),
+        FrameResult("two", 4.5, truth([]), detected([], [])),
+    ]
+    save_frames(tmp_path / "kept.npz", frames)
+    for kept, frame in zip(load_frames(tmp_path / "kept.npz"), frames, strict=True):
+        assert (kept.run, kept.time) == (frame.run, frame.time)
+        for table in ("truth", "detected"):
+            for name, values in vars(getattr(frame, table)).items():
+                assert np.array_equal(vars(getattr(kept, table))[name], values), name
+
+
+def test_a_damaged_file_of_frames_gets_a_sentence(tmp_path):
+    path = tmp_path / "kept.npz"
+    save_frames(path, [FrameResult("one", 2.0, truth([box(0)]), detected([box(1)], [0.5]))])
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 255
+    path.write_bytes(content)
+    with pytest.raises(SeipError, match=r"is no file of detections, or is damaged.*delete it"):
+        load_frames(path)
+
+
+def test_halves_and_trainings_of_told_frames():
+    """Two trainings on four runs: halves are of whole runs, each way once, and none is both."""
+    from headless.detection.average_precision import evaluate  # noqa: PLC0415 -- beside what it is compared with
+    from headless.studies.detection.case_study import MAIN_RULE  # noqa: PLC0415
+
+    told = [
+        [frame for run in "abcd" for frame in traffic(seed + ord(run), frames=6, noise=noise, run=run)]
+        for seed, noise in ((0, 0.1), (50, 0.3))
+    ]
+    runs = np.array([frame.run for frame in told[0]])
+    precise = Precisions(runs, (tuple(evaluate(frames, MAIN_RULE) for frames in told),))
+    assert precise.by_training.shape == (2, 1)
+    assert precise.halves.shape == (3, 2, 1)
+    expected = {
+        round(
+            float(
+                np.mean(
+                    [
+                        evaluate(
+                            [frame for frame in frames if (frame.run in half) == first], MAIN_RULE
+                        ).average_precision
+                        for frames in told
+                    ]
+                )
+            ),
+            9,
+        )
+        for half in ("ab", "ac", "ad")
+        for first in (True, False)
+    }
+    assert {round(float(value), 9) for value in precise.halves.ravel()} == expected
+    low, high = np.quantile(precise.resampled[0], (0.025, 0.975))
+    assert low < precise.values[0] < high

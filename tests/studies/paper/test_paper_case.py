@@ -1,0 +1,116 @@
+"""The command on the paper's case, on a map and traffic of the tests' own."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("torch", reason="torch is not installed: make detection")
+
+from headless.studies.paper import command as paper_case
+from headless.sumo.simulation import SignalPlan, _network
+from headless.sumo.street_network import read_network
+
+from matplotlib.image import imread
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.traffic.sumo_programs import find_sumo
+from tests.sumo_here import needs_sumo
+
+MAP = Path(__file__).resolve().parents[3] / "scenes" / "junction.xodr"
+ROUTES = '<routes><route id="r" edges="{}"/><flow id="f" vehsPerHour="900" route="r"/></routes>'
+ELSEWHERE = """<net><location netOffset="0,0"/>
+<edge id="w" from="a" to="b"><lane id="w_0" index="0" length="9" shape="9000,0 9009,0"/></edge></net>"""
+
+
+@pytest.fixture(scope="module")
+def network(tmp_path_factory):
+    path = tmp_path_factory.mktemp("network") / "a.net.xml"
+    finish(_network(find_sumo(), MAP, path, SignalPlan(), None))
+    return path
+
+
+@pytest.fixture
+def run(tmp_path):
+    def run(*options, junction="100", net=ELSEWHERE, edges="w", source=MAP):
+        (tmp_path / "a.rou.xml").write_text(ROUTES.format(edges), encoding="utf-8")
+        (tmp_path / "a.net.xml").write_text(net, encoding="utf-8")
+        files = ["--routes", str(tmp_path / "a.rou.xml"), "--network", str(tmp_path / "a.net.xml")]
+        folders = ["--work", str(tmp_path / "work"), "-o", str(tmp_path / "docs")]
+        paper_case.main([str(source), "--junction", junction, *files, *folders, *options])
+
+    return run
+
+
+@needs_sumo
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"junction": "965"}, r"no junction '965' in map"),
+        ({}, r"a.net.xml is no network of the map junction.xodr at this place \(none of its streets is there\)"),
+        ({"net": "<net/>"}, r"a.net.xml is no SUMO network"),
+        ({"source": MAP.with_name("none.xodr")}, r"there is no file .*none.xodr: check its path"),
+    ],
+)
+def test_files_that_do_not_fit_are_one_sentence(run, tmp_path, changes, message):
+    with pytest.raises(SeipError, match=message):
+        run(**changes)
+    assert not (tmp_path / "docs" / "paper.md").exists()
+    assert not list(tmp_path.glob("work/*traffic*/*"))
+
+
+@needs_sumo
+def test_routes_elsewhere_are_one_sentence(run, network):
+    streets = read_network(network)
+    way = streets.arms[0].id  # one that no other follows
+    with pytest.raises(SeipError, match=r"no flow of a.rou.xml goes through the region of"):
+        run(net=network.read_text(encoding="utf-8"), edges=way)
+
+
+@needs_sumo
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--trainings", "0"], "ask for one training or more, not 0"),
+        (["--steps", "0"], "training must have 1 step or more"),
+        (["--runs", "3"], "ask for 4 to 999 runs of traffic, not 3"),
+        (["--every", "0"], r"--every must be 0\.001 to 86,400 s, not 0"),
+        (["--device", "abacus"], "abacus"),
+    ],
+)
+def test_odd_options_are_one_sentence_before_any_work(run, tmp_path, options, message):
+    with pytest.raises(SeipError, match=message):
+        run(*options)
+    assert not (tmp_path / "work").exists()
+
+
+def test_without_sumo_is_one_sentence(run, tmp_path, monkeypatch):
+    def missing():
+        raise SeipError("SUMO is not installed")
+
+    monkeypatch.setattr(paper_case, "find_sumo", missing)
+    with pytest.raises(SeipError, match="SUMO is not installed"):
+        run()
+    assert not (tmp_path / "work").exists()
+
+
+@needs_sumo
+@pytest.mark.slow
+def test_the_page_is_written_with_its_charts(run, network, tmp_path, capsys):
+    streets = read_network(network)
+    arm = streets.arms[0]
+    way = f"{arm.id} {streets.onward[arm.id][0][0]}"
+    brief = ["--runs", "4", "--duration", "12", "--warm-up", "30", "--every", "9", "--steps", "1", "--trainings", "1"]
+    few = ["--approaches", "20", "--time-limit", "2"]
+    run(*brief, *few, net=network.read_text(encoding="utf-8"), edges=way)
+    text = (tmp_path / "docs" / "paper.md").read_text(encoding="utf-8")
+    assert "--steps 1 --trainings 1 --every 9" in text
+    assert str(tmp_path) not in text
+    assert "**Validation still rose" in text
+    pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
+    assert len(pictures) == 3
+    assert all(imread(tmp_path / "docs" / picture).shape[1] > 600 for picture in pictures)
+    said = capsys.readouterr().out
+    assert "claim 8 (" in said
+    assert "undecided" in text

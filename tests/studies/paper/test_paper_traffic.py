@@ -1,0 +1,117 @@
+"""Traffic of the paper's case: whether its files are of the site, and whether its runs are independent."""
+
+from headless.studies.paper.traffic_runs import (
+    MOST_OVERLAP,
+    RunSettings,
+    TrafficSource,
+    make_runs,
+    overlaps,
+    read_traffic_of_site,
+)
+
+import pytest
+import shapely
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.traffic import Trajectories
+from seip_addon.core.traffic.sumo_programs import find_sumo, run
+from seip_addon.core.workflows.traffic_runs import runs_in
+from tests.builders.plain_street import street
+from tests.sumo_here import needs_sumo
+
+FLOWS = '<routes><route id="WE" edges="w e"/><flow id="f" vehsPerHour="{}" route="WE"/>{}</routes>'
+
+
+def network(y=0.0, joint=0.0):
+    """Two streets along x at height y, which meet at x = joint, in the coordinates of an offset of (100, 50)."""
+
+    def edge(name, begin, end):
+        shape = f"{begin + 100},{y + 50} {end + 100},{y + 50}"
+        return (
+            f'<edge id="{name}" from="a" to="b"><lane id="{name}_0" index="0" disallow="pedestrian" '
+            f'length="{end - begin}" shape="{shape}"/></edge>'
+        )
+
+    return f'<net><location netOffset="100,50"/>{edge("w", -300, joint)}{edge("e", joint, 300)}</net>'
+
+
+def files(folder, net=None, flows=None):
+    (folder / "a.net.xml").write_text(net or network(), encoding="utf-8")
+    (folder / "a.rou.xml").write_text(flows or FLOWS.format(360, ""), encoding="utf-8")
+    return TrafficSource(folder / "a.rou.xml", (), folder / "a.net.xml")
+
+
+def test_what_goes_through_is_counted(tmp_path):
+    more = '<flow id="g" vehsPerHour="90"><route edges="e"/></flow>'
+    found = finish(read_traffic_of_site(files(tmp_path, flows=FLOWS.format(360, more)), street(), "a.xodr"))
+    assert (found.demand.rate, found.through) == (450.0, 360.0)
+
+
+@pytest.mark.parametrize(
+    ("net", "flows", "message"),
+    [
+        (network(y=200.0), None, r"a.net.xml is no network of the map a.xodr at this place \(none of its streets"),
+        (network(y=-8.5).replace("200,", "300,"), None, r"is no network of the map a.xodr"),
+        (network(joint=100.0), None, r"no flow of a.rou.xml goes through the region of street"),
+        (None, FLOWS.format(9, "").replace("w e", "w x"), r"flow 'f' takes the edge 'x', which a.net.xml has not"),
+        ("<net/>", None, r"a.net.xml is no SUMO network"),
+    ],
+)
+def test_files_of_another_place_are_one_sentence(tmp_path, net, flows, message):
+    with pytest.raises(SeipError, match=message):
+        finish(read_traffic_of_site(files(tmp_path, net, flows), street(), "a.xodr"))
+
+
+def test_a_network_beside_the_road_is_told_by_its_share(tmp_path):
+    wide = street(region=shapely.box(-30, -20, 30, 7))
+    with pytest.raises(SeipError, match=r"\(0% of its lanes there are on the road\)"):
+        finish(read_traffic_of_site(files(tmp_path, network(y=-15.0)), wide, "a.xodr"))
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"runs": 3}, "4 to 999 runs"),
+        ({"duration": 1.0}, "a run lasts 3 to 3600 s"),
+        ({"duration": float("nan")}, "a run lasts 3 to 3600 s"),
+        ({"warm_up": -1.0}, "a run lasts 3 to 3600 s"),
+        ({"seed": 10_000}, "--seed must be a whole number"),
+    ],
+)
+def test_odd_settings_are_one_sentence(settings, message):
+    with pytest.raises(SeipError, match=message):
+        RunSettings(**settings)
+
+
+NODES = '<nodes><node id="a" x="-300" y="0"/><node id="b" x="0" y="0"/><node id="c" x="300" y="0"/></nodes>'
+EDGES = """<edges><edge id="w" from="a" to="b" numLanes="2" speed="14"/>
+<edge id="e" from="b" to="c" numLanes="2" speed="14"/></edges>"""
+
+STEADY = """<routes><vType id="t" speedDev="0" sigma="0"/>
+<flow id="f" vehsPerHour="700" type="t"><route edges="w e"/></flow></routes>"""
+
+
+@needs_sumo
+def test_drawn_runs_are_independent_and_those_of_the_file_copies(tmp_path):
+    programs, net = find_sumo(), tmp_path / "made.net.xml"
+    (tmp_path / "a.nod.xml").write_text(NODES, encoding="utf-8")
+    (tmp_path / "a.edg.xml").write_text(EDGES, encoding="utf-8")
+    given = ["--node-files", tmp_path / "a.nod.xml", "--edge-files", tmp_path / "a.edg.xml", "--output-file", net]
+    finish(run(programs, programs.netconvert, [*given, "--offset.disable-normalization", "true"], "test"))
+    source = files(tmp_path, net.read_text(encoding="utf-8"), STEADY)
+    traffic = finish(read_traffic_of_site(source, street(), "a.xodr"))
+    settings, scene = RunSettings(runs=4, duration=20.0, warm_up=30.0), tmp_path / "site.blend"
+    drawn, fixed = (finish(make_runs(scene, traffic, street(), settings, fixed=which)) for which in (False, True))
+    assert overlaps(drawn)[-1] <= MOST_OVERLAP < 0.5 < overlaps(fixed)[0]
+    assert len(overlaps(drawn)) == 6
+    assert drawn == runs_in(tmp_path / "site_traffic")
+    assert not list(tmp_path.glob("site_traffic*/*.xml"))
+    before = [path.read_bytes() for path in drawn]
+    assert all(Trajectories.load(path).span[1] <= 20.0 for path in drawn)
+    times = [path.stat().st_mtime_ns for path in drawn]
+    assert finish(make_runs(scene, traffic, street(), settings, fixed=False)) == drawn
+    assert [path.stat().st_mtime_ns for path in drawn] == times
+    drawn[1].unlink()
+    finish(make_runs(scene, traffic, street(), settings, fixed=False))
+    assert [path.read_bytes() for path in drawn] == before

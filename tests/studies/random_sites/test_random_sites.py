@@ -1,0 +1,219 @@
+import json
+import math
+from dataclasses import replace
+from itertools import combinations
+
+from headless.studies.random_sites import command as generate_sites
+from headless.studies.random_sites import production
+from headless.studies.random_sites.demand_draw import LEAST_SHARES, draw_demand
+from headless.studies.random_sites.extract_text import LATITUDE, LONGITUDE, write_extract, write_terrain
+from headless.studies.random_sites.production import SiteSettings, run_path
+from headless.studies.random_sites.street_plan import MAX_SLOPE, MIN_ANGLES, draw_plan
+
+import numpy as np
+import pytest
+import shapely
+
+from seip_addon.core.elevation.geotiff import read_geotiff
+from seip_addon.core.errors import SeipError
+from seip_addon.core.opendrive import read_map
+from seip_addon.core.openstreetmap.extract import read_extract
+from seip_addon.core.openstreetmap.site import place_on_map
+from seip_addon.core.progress import finish
+from seip_addon.core.traffic import Trajectories
+from seip_addon.core.traffic.run_overlap import MAX_OVERLAP, overlap_of, vehicle_positions
+from tests.sumo_here import needs_sumo
+
+PLANS = [draw_plan(np.random.default_rng([5, number])) for number in range(40)]
+
+
+def east_north(longitude, latitude):
+    """Metres from the middle on a sphere of the Earth's mean radius."""
+    east = math.radians(longitude - LONGITUDE) * 6_371_000.0 * math.cos(math.radians(LATITUDE))
+    return east, math.radians(latitude - LATITUDE) * 6_371_000.0
+
+
+def test_plans_differ_and_follow_from_their_seed(tmp_path):
+    again = draw_plan(np.random.default_rng([5, 3]))
+    for name, plan in (("a", PLANS[3]), ("b", again), ("c", PLANS[4])):
+        write_extract(tmp_path / f"{name}.osm", plan)
+        write_terrain(tmp_path / f"{name}.tif", plan)
+    for suffix in (".osm", ".tif"):
+        a, b, c = ((tmp_path / f"{name}{suffix}").read_bytes() for name in "abc")
+        assert a == b != c
+
+
+def test_plans_cover_what_is_asked_for():
+    arms = [arm for plan in PLANS for arm in plan.arms]
+    assert {len(plan.arms) for plan in PLANS} == {3, 4, 5}
+    assert {arm.lanes_in for arm in arms} == {1, 2, 3}
+    assert {plan.left_hand for plan in PLANS} == {True, False} == {plan.signals for plan in PLANS}
+    assert 0 < sum(plan.roundabout is not None for plan in PLANS) < 20
+    assert {arm.turn_lane for arm in arms} == {True, False} == {arm.cycle_lanes for arm in arms}
+    assert {arm.kerb_lane > 0 for arm in arms} == {True, False}
+    steepest = [max(abs(arm.slope) for arm in plan.arms) for plan in PLANS]
+    assert min(steepest) == 0.0
+    assert 0.05 < max(steepest) <= MAX_SLOPE
+    kinds = {key for plan in PLANS for thing in plan.things for key in thing.tags}
+    assert {"building", "natural", "barrier", "shelter", "roof:shape", "highway"} <= kinds
+
+
+@pytest.mark.parametrize("plan", PLANS[:12], ids=range(12))
+def test_arms_keep_their_distance_and_things_keep_off_the_streets(plan):
+    headings = [math.degrees(arm.angle) for arm in plan.arms]
+    apart = [abs(math.remainder(one - other, 360.0)) for one, other in combinations(headings, 2)]
+    assert min(apart) >= MIN_ANGLES[len(plan.arms)] - 1e-6
+    corridors = [shapely.LineString(arm.line).buffer(arm.half_width - 0.05) for arm in plan.arms]
+    houses = [shapely.Polygon(thing.corners) for thing in plan.things if "building" in thing.tags]
+    assert all(house.is_valid and house.area > 40.0 for house in houses)
+    assert not any(one.intersects(other) for one, other in combinations(houses, 2))
+    for thing in plan.things:
+        shape = shapely.Polygon(thing.corners) if thing.closed else shapely.MultiPoint(thing.corners)
+        assert not any(shape.intersects(corridor) for corridor in corridors)
+        if not thing.closed:
+            assert not any(shape.intersects(house) for house in houses)
+
+
+@pytest.mark.parametrize("plan", PLANS[:12], ids=range(12))
+def test_arms_have_their_slopes_and_the_middle_is_level(plan):
+    assert np.abs(plan.height(np.random.default_rng(0).uniform(-10, 10, (50, 2)))).max() == 0.0
+    for arm in plan.arms:
+        far = arm.line[-1] / np.hypot(*arm.line[-1])
+        low, high = plan.height(np.array([60.0 * far, 130.0 * far]))
+        assert (high - low) / 70.0 == pytest.approx(arm.slope, abs=1e-9)
+
+
+def test_terrain_and_extract_are_read_back_where_they_were_meant(tmp_path):
+    plan = max(PLANS, key=lambda plan: max(abs(arm.slope) for arm in plan.arms))
+    write_extract(tmp_path / "a.osm", plan)
+    write_terrain(tmp_path / "a.tif", plan)
+    model = read_geotiff(tmp_path / "a.tif")
+    places = np.random.default_rng(1).uniform(-250.0, 250.0, (200, 2))
+    degrees = np.array([(LONGITUDE, LATITUDE)]) + np.degrees(
+        places / 6_371_000.0 / np.array([math.cos(math.radians(LATITUDE)), 1.0])
+    )
+    np.testing.assert_allclose(model.at(degrees), plan.height(places), atol=0.02)
+    extract = finish(read_extract(tmp_path / "a.osm"))
+    trees = [east_north(node.longitude, node.latitude) for node in extract.nodes.values() if "natural" in node.tags]
+    wanted = [thing.corners[0] for thing in plan.things if thing.tags.get("natural") == "tree"]
+    np.testing.assert_allclose(trees, wanted, atol=0.01)
+
+
+def test_demand_has_what_is_rare_and_differs_from_run_to_run():
+    random = np.random.default_rng(2)
+    demands = [draw_demand(plan, random) for plan in PLANS]
+    for category, least in LEAST_SHARES.items():
+        shares = [demand.shares[category] for demand in demands]
+        assert min(shares) > 0.7 * least
+        assert max(shares) > 1.3 * min(shares)
+    flows = [demand.flow for demand in demands]
+    assert min(flows) < 400
+    assert max(flows) > 800
+    assert all(demand.own_sizes and sum(demand.shares.values()) == pytest.approx(1.0, abs=0.01) for demand in demands)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--sites", "0"], "ask for 1 to 9999 sites, not 0"),
+        (["--sites", "-3"], "ask for 1 to 9999 sites, not -3"),
+        (["--runs", "0"], "ask for one run of traffic or more on each site, not 0"),
+        (["--seed", "-1"], "--seed must be a whole number from 0"),
+        (["--duration", "0"], "a run lasts 3 to 3600 s"),
+        (["--duration", "nan"], "--duration must be a finite number"),
+        (["--warm-up", "-1"], "a run lasts 3 to 3600 s"),
+        (["--approaches", "5"], "the region follows the streets for 30 to 100 m, not 5"),
+    ],
+)
+def test_odd_options_are_one_sentence(tmp_path, arguments, message):
+    folder = tmp_path / "sites"
+    with pytest.raises(SeipError, match=message):
+        generate_sites.main(["-o", str(folder), *arguments])
+    assert not folder.exists()
+
+
+def test_without_sumo_is_one_sentence(tmp_path, monkeypatch):
+    def missing():
+        raise SeipError("SUMO is not installed")
+
+    monkeypatch.setattr(generate_sites, "find_sumo", missing)
+    with pytest.raises(SeipError, match="SUMO is not installed"):
+        generate_sites.main(["-o", str(tmp_path / "sites")])
+    assert not (tmp_path / "sites").exists()
+
+
+@needs_sumo
+def test_a_folder_that_is_a_file_is_one_sentence(tmp_path):
+    (tmp_path / "sites").write_text("")
+    with pytest.raises(SeipError, match=r"cannot write to .*sites"):
+        generate_sites.main(["-o", str(tmp_path / "sites")])
+
+
+@needs_sumo
+@pytest.mark.slow
+def test_a_site_is_made_kept_and_made_again(tmp_path, capsys):
+    arguments = ["--sites", "1", "--seed", "3", "--runs", "2", "--duration", "10", "--warm-up", "30"]
+    for name in ("one", "other"):
+        generate_sites.main(["-o", str(tmp_path / name), *arguments])
+    one, other = (tmp_path / name / "site-0001" for name in ("one", "other"))
+    for path in sorted(one.rglob("*")):
+        if path.is_file() and path.suffix != ".blend":
+            assert path.read_bytes() == (other / path.relative_to(one)).read_bytes(), path.name
+    record = json.loads((one / "site.json").read_text())
+    assert [run["file"] for run in record["runs"]] == ["site_traffic/run-1.npz", "site_traffic/run-2.npz"]
+    runs = [Trajectories.load(run_path(one, number)) for number in (1, 2)]
+    users = [user for run in runs for user in run.users]
+    assert len({user.shape for user in users}) == len(users)
+    assert len({user.length for user in users if user.category == "car"}) > 5
+    positions = [vehicle_positions(f"{n}", run) for n, run in enumerate(runs)]
+    assert overlap_of(*positions) < MAX_OVERLAP
+    before = (one / "site.blend").stat().st_mtime_ns
+    capsys.readouterr()
+    generate_sites.main(["-o", str(tmp_path / "one"), *arguments])
+    assert capsys.readouterr().out.endswith("site-0001: kept\n")
+    assert (one / "site.blend").stat().st_mtime_ns == before
+    run_path(one, 2).unlink()
+    generate_sites.main(["-o", str(tmp_path / "one"), *arguments])
+    assert run_path(one, 2).read_bytes() == run_path(other, 2).read_bytes()
+
+
+@needs_sumo
+@pytest.mark.slow
+def test_roads_of_a_built_site_climb_as_planned(tmp_path):
+    settings = SiteSettings(seed=11, runs=1, duration=5.0, warm_up=10.0)
+    number = 1
+    plan, geometry, _ = finish(production._built(tmp_path, settings, number))  # noqa: SLF001
+    while max(abs(arm.slope) for arm in plan.arms) < 0.04:
+        number += 1
+        plan, geometry, _ = finish(production._built(tmp_path, settings, number))  # noqa: SLF001
+    corners = np.concatenate([mesh.triangles.reshape(-1, 3) for mesh in geometry.roads])
+    middle = np.array(place_on_map(read_map(tmp_path / "site.xodr"), (LATITUDE, LONGITUDE))) - geometry.origin[:2]
+    level = corners[np.hypot(*(corners[:, :2] - middle).T) < 12.0]
+    assert np.ptp(level[:, 2]) < 0.15
+    for arm in plan.arms:
+        rises = []
+        for along in (45.0, 75.0):
+            place = shapely.get_coordinates(shapely.LineString(arm.line).interpolate(along))[0] + middle
+            near = corners[np.argsort(np.hypot(*(corners[:, :2] - place).T))[:4]]
+            rises.append(near[:, 2].mean())
+        assert (rises[1] - rises[0]) / 30.0 == pytest.approx(arm.slope, abs=0.012)
+
+
+@needs_sumo
+def test_a_plan_that_fails_the_check_is_drawn_again(tmp_path, monkeypatch):
+    calls = []
+
+    def build(folder, plan, settings):
+        calls.append(plan)
+        if len(calls) < 3:
+            raise production._UnusableError("a hole")  # noqa: SLF001
+        yield from ()
+
+    monkeypatch.setattr(production, "_build", build)
+    settings = SiteSettings(seed=1)
+    plan, _, attempt = finish(production._built(tmp_path, settings, 1))  # noqa: SLF001
+    assert (attempt, plan) == (2, calls[2])
+    monkeypatch.setattr(production, "MAX_ATTEMPTS", 2)
+    calls.clear()
+    with pytest.raises(SeipError, match="2 plans of site 1 did not pass the check of sites, the last as a hole"):
+        finish(production._built(tmp_path, replace(settings, seed=2), 1))  # noqa: SLF001

@@ -1,0 +1,92 @@
+"""Training on random placements at several sites."""
+
+from shutil import copyfile
+
+import pytest
+
+pytest.importorskip("torch", reason="torch is not installed: make detection")
+
+from headless.detection.detector import Detector
+from headless.studies.site_training import command as train_on_sites
+from headless.studies.site_training.random_placements import MAX_SENSORS, random_placement
+
+import numpy as np
+
+from seip_addon.core.errors import SeipError
+from tests.builders.small_junction import make_example
+
+BRIEF = [
+    "--steps",
+    "2",
+    "--batch",
+    "2",
+    "--width",
+    "8",
+    "--blocks",
+    "0",
+    "0",
+    "0",
+    "--every",
+    "15",
+    "--sensor",
+    "type1",
+]
+
+
+@pytest.fixture(scope="module")
+def sites(small_scene, tmp_path_factory):
+    """Two scenes, each with a run of traffic of its own."""
+    folder = tmp_path_factory.mktemp("sites")
+    runs = sorted((small_scene.parent / "small_traffic").iterdir())
+    for number in range(2):
+        copyfile(small_scene, folder / f"site-{number}.blend")
+        (folder / f"site-{number}_traffic").mkdir()
+        copyfile(runs[number], folder / f"site-{number}_traffic" / "run-1.npz")
+    return [str(path) for path in sorted(folder.glob("*.blend"))]
+
+
+def test_a_detector_is_trained_and_the_same_again(sites, tmp_path):
+    for output in ("one", "other"):
+        train_on_sites.main([*sites, *BRIEF, "type1", "-o", str(tmp_path / output)])
+    one, other = ((tmp_path / output / "detector.pt").read_bytes() for output in ("one", "other"))
+    assert one == other
+    detector = Detector.load(tmp_path / "one" / "detector.pt")
+    assert detector.training_record.sensors == ("type1",)
+    assert (tmp_path / "one" / "training.png").read_bytes().startswith(b"\x89PNG")
+    weights = detector.state_dict()["feature_map.encoder.linear.weight"]
+    assert (weights == weights.half().float()).all()
+
+
+def test_a_finished_training_is_not_done_again(sites, tmp_path, capsys):
+    train_on_sites.main([*sites, *BRIEF, "type1", "-o", str(tmp_path)])
+    written = (tmp_path / "training.pt").stat().st_mtime_ns
+    train_on_sites.main([*sites, *BRIEF, "type1", "-o", str(tmp_path)])
+    assert (tmp_path / "training.pt").stat().st_mtime_ns == written
+    assert "best after 2 steps" in capsys.readouterr().out
+
+
+def test_mistakes_are_named(sites, tmp_path):
+    with pytest.raises(SeipError, match="two sites or more"):
+        train_on_sites.main([sites[0], *BRIEF, "type1", "-o", str(tmp_path)])
+    copyfile(sites[0], tmp_path / "bare.blend")
+    with pytest.raises(SeipError, match="no runs of traffic beside it"):
+        train_on_sites.main([sites[0], str(tmp_path / "bare.blend"), *BRIEF, "type1", "-o", str(tmp_path / "x")])
+    assert not (tmp_path / "x" / "detector.pt").exists()
+
+
+def test_random_placements_are_of_different_positions_and_all_poses():
+    example = make_example()
+    candidates, models = example.site.candidates, example.models
+    random = np.random.default_rng(3)
+    drawn = [random_placement("one", candidates, models, random) for _ in range(200)]
+    counts = {len(one.sensors) for one in drawn}
+    assert counts == set(range(1, min(MAX_SENSORS, len(candidates.position)) + 1))
+    poses = {tuple(place) for place in candidates.xyz.tolist()}
+    for one in drawn:
+        places = [tuple(sensor.xyz.tolist()) for sensor in one.sensors]
+        assert len(set(places)) == len(places)
+        assert set(places) <= poses
+    assert {tuple(sensor.xyz.tolist()) for one in drawn for sensor in one.sensors} == poses
+    assert [one.key for one in drawn[:5]] == [
+        random_placement("one", candidates, models, again).key for again in [np.random.default_rng(3)] for _ in range(5)
+    ]

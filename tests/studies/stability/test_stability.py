@@ -1,0 +1,85 @@
+"""The command that drives every method to where it fails, on the shipped junction with little of everything."""
+
+import json
+from pathlib import Path
+from unittest.mock import patch
+
+from headless.studies.stability import chapters as stability_chapters
+from headless.studies.stability import command as stability
+
+import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.placement.scenarios import Scenarios
+from seip_addon.core.robustness.pose_study import PoseStudySettings
+
+SCENE = Path(__file__).resolve().parents[3] / "scenes" / "junction.blend"
+COARSE = [
+    "--sensor",
+    "type1",
+    "--heights",
+    "5.4",
+    "--grid",
+    "8",
+    "--spacing",
+    "25",
+    "--delta",
+    "6",
+    "--time-limit",
+    "2",
+]
+LITTLE = stability_chapters.StabilityScope(
+    grids=8,
+    rays=200,
+    instances=2,
+    poses=PoseStudySettings(draws=20, draws_of_kind=5),
+    robust=Scenarios("pose-errors", count=3, held_out=20),
+    instants=(2, 12),
+)
+
+
+def run(folder):
+    criterion = "headless.studies.stability.criterion"
+    spacings = {"GRID_SPACINGS": (8.0, 6.0), "CANDIDATE_SPACINGS": (30.0, 25.0)}
+    with (
+        patch.object(stability_chapters, "DETECTOR_RUNS", 99),  # test_detector_limits.py looks at that chapter
+        patch.multiple(criterion, DELTAS=(4.0, 6.0), **spacings),
+        patch.multiple("headless.convergence", COARSE_CANDIDATE_SPACING=25.0, EVALUATION_SPACING=4.0, **spacings),
+    ):
+        stability.main([str(SCENE), "-o", str(folder / "docs"), "--work", str(folder / "work"), *COARSE], LITTLE)
+    return (folder / "docs" / "stability.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_the_page_has_all_chapters_and_a_rerun_goes_on(tmp_path, capsys):
+    page = run(tmp_path)
+    charts = tmp_path / "docs" / "stability"
+    named = {part.split(")")[0] for part in page.split("](stability/")[1:]}
+    assert named == {path.name for path in charts.iterdir()}
+    chapters = sorted(path.stem for path in (tmp_path / "work").glob("*.json"))
+    assert page.count("\n## ") == len(chapters)
+    for name in chapters:
+        kept = json.loads((tmp_path / "work" / f"{name}.json").read_text(encoding="utf-8"))
+        assert kept["rows"]
+        assert all(row["begins"] in page for row in kept["rows"])
+
+    (charts / "solvers.png").unlink()
+    (tmp_path / "work" / "arithmetic.json").write_text("{", encoding="utf-8")
+    capsys.readouterr()
+    assert run(tmp_path).count("\n## ") == len(chapters)
+    said = capsys.readouterr().out
+    assert "Solvers:" in said
+    assert "Arithmetic:" in said
+    assert "Poses" not in said
+
+    with patch.object(stability, "source_digest", lambda module: f"another version of {module}"):
+        run(tmp_path)
+    assert "Poses" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("name", "sentence"), [("none.blend", "no file"), ("alone.blend", "no traffic beside")])
+def test_another_scene_that_is_of_no_use_is_named_before_any_work(tmp_path, name, sentence):
+    (tmp_path / "alone.blend").write_bytes(b"a scene")
+    with pytest.raises(SeipError, match=sentence):
+        stability.main([str(SCENE), "-o", str(tmp_path / "docs"), "--other", str(tmp_path / name)])
+    assert not (tmp_path / "docs").exists()

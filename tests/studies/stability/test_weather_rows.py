@@ -1,0 +1,175 @@
+"""Coverage in rain and fog: the study, its rows, and the chapter in a page that is there."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from unittest.mock import patch
+
+from headless.studies.stability import command as stability
+from headless.studies.stability import weather as weather_limits
+from headless.studies.stability.chapters import CHAPTERS
+from headless.studies.stability.charts import save_weather_chart
+from headless.studies.stability.page import Chapter, Chart, put_chapter, save_page
+from headless.studies.stability.rows import Row
+from headless.studies.stability.weather import (
+    UntouchedTypes,
+    WeatherAnswer,
+    WeatherStudy,
+    in_words,
+    untouched_types,
+    weather_rows,
+    weather_study,
+)
+
+import bpy
+import numpy as np
+import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.progress import finish
+from seip_addon.core.scans import MountedSensor, level_orientation
+from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.visibility.grid import compute_visibility
+from seip_addon.core.workflows.survey import SurveySettings, lay_out, with_grid
+from tests.builders.small_junction import make_geometry
+
+assert bpy.app.version  # the engine bvh needs Blender's module, which is there from here on
+
+COARSE = SurveySettings(CandidateSettings(sensors=("type1",), heights=(5.4,), spacing=12.0), grid_spacing=4.0)
+STUDY = WeatherStudy(
+    "near",
+    "far",
+    8,
+    0.8,
+    1.0,
+    (WeatherAnswer("rain=20", 0.57, 0.64, 0.99, 0.031), WeatherAnswer("visibility=100", 0.46, 0.53, 0.95, 0.0)),
+)
+UNTOUCHED = UntouchedTypes(("type1", "type2"), "4 × type2", {"clear": 0.9, "rain=20": 0.85, "visibility=100": 0.7})
+CHAPTER = Chapter(
+    "Weather", (Row("coverage", "fog", "fails", "counted", "places for it"),), (Chart("w.png", "By fog"),)
+)
+
+
+def surveyed(words=COARSE):
+    layout = lay_out(make_geometry(36.0), words)
+    return with_grid(layout, finish(compute_visibility(layout.site, layout.models, words.visibility)))
+
+
+@pytest.fixture(scope="module")
+def study():
+    geometry = make_geometry(36.0)
+    with patch.object(weather_limits, "WEATHERS", ("visibility=200", "visibility=50", "rain=50")):
+        return finish(weather_study(geometry, COARSE, count=2))
+
+
+def test_a_placement_for_the_weather_is_no_worse_in_it(study):
+    assert [one.words for one in study.answers] == ["visibility=200", "visibility=50", "rain=50"]
+    thin, thick, rain = study.answers
+    for one in (thin, thick, rain):
+        assert one.gap == pytest.approx(0.0)  # else the next line need not hold
+        assert one.kept <= one.placed <= one.longer
+        assert one.placed < study.clear
+    assert thick.placed < thin.placed
+    assert study.longer_clear >= study.clear
+
+
+def test_weather_is_what_a_survey_in_it_sees(study):
+    one = replace(COARSE.candidates, sensors=(study.sensor,))
+    settings = replace(COARSE, candidates=one, weather=weather_limits.weather_of(["visibility=50"]))
+    visible = surveyed(settings).grid.visible
+    position = surveyed(settings).site.candidates.position_of
+    pairs = [(a, b) for a in range(len(visible)) for b in range(a) if position[a] != position[b]]
+    best = max((visible[a] | visible[b]).mean() for a, b in pairs)
+    assert study.answers[1].placed == pytest.approx(best)
+
+
+def test_types_of_carla_are_untouched_and_their_scans_are_not():
+    lidar = load_catalogue()["type1"]
+    sensor = MountedSensor("S1", lidar, np.array([9.0, -9.0, 5.4]), level_orientation(2.3))
+    found = untouched_types(surveyed(), "1 × type1", [sensor])
+    assert found.sensors == ("type1",)
+    assert set(found.returned) == {"clear", *weather_limits.WEATHERS}
+    assert 0 < found.returned["visibility=50"] < found.returned["visibility=500"] < found.returned["clear"] <= 1
+    assert found.returned["wet"] < found.returned["clear"]
+    both = replace(COARSE, candidates=replace(COARSE.candidates, sensors=("type1", "os1_128")))
+    assert untouched_types(surveyed(both), "1 × type1", [sensor]).sensors == ("type1",)
+
+
+def test_rows_say_where_it_fails_and_what_helps():
+    holds, fails, untouched = weather_rows(STUDY, UNTOUCHED)
+    assert holds.regime == "rain of 20 mm/h"
+    assert holds.begins == "holds: 57.0%, 23.0 points less than in clear air"
+    assert "3.1%" in holds.how
+    assert fails.begins.startswith("fails, below 50%: 46.0%")
+    assert fails.answer == "`--weather visibility=100` places for it: 53.0%; 8 × far, placed so, cover 95.0%"
+    assert "from 90.0%" in untouched.begins
+    assert "from 70.0%" in untouched.begins
+    assert len(weather_rows(STUDY, replace(UNTOUCHED, sensors=()))) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "said"), [("wet", "wet road"), ("rain=5", "rain of 5 mm/h"), ("visibility=50", "fog, visibility 50 m")]
+)
+def test_weather_is_said_as_people_say_it(words, said):
+    assert in_words(words) == said
+
+
+def test_the_chart_is_drawn(tmp_path):
+    save_weather_chart(tmp_path / "weather.png", STUDY, "Weather")
+    assert (tmp_path / "weather.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_chapter_takes_the_place_of_its_older_self(tmp_path):
+    page = tmp_path / "stability.md"
+    first, last = replace(CHAPTER, title="First"), replace(CHAPTER, title="Last", charts=())
+    save_page(page, "The lead.", [first, CHAPTER, last], "stability")
+    whole = page.read_bytes()
+    put_chapter(page, CHAPTER, "stability")
+    assert page.read_bytes() == whole
+    put_chapter(page, replace(CHAPTER, rows=(replace(CHAPTER.rows[0], begins="holds"),)), "stability")
+    assert page.read_text(encoding="utf-8").count("| holds |") == 1
+    assert page.read_text(encoding="utf-8").count("## ") == 3
+    put_chapter(page, CHAPTER, "stability")
+    assert page.read_bytes() == whole
+
+
+def test_a_new_chapter_comes_last(tmp_path):
+    page, other = tmp_path / "stability.md", tmp_path / "other.md"
+    first = replace(CHAPTER, title="First")
+    save_page(page, "The lead.", [first], "stability")
+    put_chapter(page, CHAPTER, "stability")
+    save_page(other, "The lead.", [first, CHAPTER], "stability")
+    assert page.read_bytes() == other.read_bytes()
+    with pytest.raises(SeipError, match="there is no page"):
+        put_chapter(tmp_path / "none.md", CHAPTER, "stability")
+
+
+def test_one_chapter_is_studied_and_put_into_the_page(small_scene, tmp_path):
+    argv = [str(small_scene), "-o", str(tmp_path), "--work", str(tmp_path / "work"), "--only", "weather"]
+    argv += ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "12", "--time-limit", "2"]
+    with pytest.raises(SeipError, match="leave out --only"):
+        stability.main(argv)
+    save_page(tmp_path / "stability.md", "The lead.", [replace(CHAPTER, title="First", charts=())], "stability")
+    with patch.object(weather_limits, "WEATHERS", ("visibility=50",)):
+        stability.main(argv)
+    page = (tmp_path / "stability.md").read_text(encoding="utf-8")
+    assert page.startswith("# Stability\n\nThe lead.\n\n## First")
+    assert "## Weather: 8 × os1_128" in page
+    assert "fog, visibility 50 m" in page
+    assert "coverage, type1" in page
+    assert {path.name for path in (tmp_path / "stability").iterdir()} == {"weather.png"}
+    shutil.rmtree(tmp_path / "work")
+
+
+def test_remedies_name_what_users_have():
+    pytest.importorskip("torch", reason="make detection installs it")
+    from headless.studies.detector_limits.rows import REMEDIES  # noqa: PLC0415  # the detector's, which needs torch
+
+    assert "--weather" in REMEDIES["rain or fog"]
+    page = (Path(__file__).parents[3] / "docs" / "stability.md").read_text(encoding="utf-8")
+    assert REMEDIES["rain or fog"] in page
+    assert "attenuation_per_m" not in page
+    assert CHAPTERS[-1] == "weather"
