@@ -27,13 +27,13 @@ from headless.studies.site_training.training_site import LearntSite
 from headless.sumo.demand import MODELS
 
 import numpy as np
-from test_detection_area import hill
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.scans import ScanSettings
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.workflows.survey import SurveySettings, lay_out
+from tests.builders.sloping_road import hill
 from tests.builders.small_junction import make_geometry
 from tests.builders.small_scene import make_run
 from tests.builders.street_clouds import street_frame
