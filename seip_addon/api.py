@@ -36,12 +36,14 @@ from pathlib import Path
 from .core.placement.objective import Objective, Solution
 from .core.placement.scenarios import PoseErrors, Scenarios
 from .core.progress import finish
-from .core.scans import Frame, MountedSensor, ScanSettings
+from .core.scans.frame import Frame
+from .core.scans.sensor import MountedSensor
+from .core.scans.simulation import ScanSettings
 from .core.site.candidates import CandidateSettings
 from .core.site.scene_geometry import SceneGeometry
-from .core.traffic import Trajectories
 from .core.traffic.source import TrafficFiles
 from .core.traffic.source import load_traffic as _load_traffic
+from .core.traffic.trajectories import Trajectories
 from .core.visibility.grid import compute_visibility as _compute
 from .core.visibility.settings import VisibilitySettings
 from .core.workflows.placing import place as _place

@@ -7,7 +7,8 @@ from pathlib import Path
 import bpy
 
 from .core.errors import SeipError
-from .core.lidar import LidarModel, load_catalogue
+from .core.lidar.catalogue import load_catalogue
+from .core.lidar.model import LidarModel
 from .core.visibility.ray_casting import MAX_THREADS
 from .core.visibility.store import GridFolder
 from .core.workflows.detection import DetectingPython

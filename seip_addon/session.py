@@ -16,14 +16,16 @@ import numpy as np
 from .background import Background
 from .core.arrays import Boolean
 from .core.errors import SeipError
-from .core.lidar import LidarModel
+from .core.lidar.model import LidarModel
 from .core.placement.objective import Solution
 from .core.placement.search_limits import Acceptance
-from .core.scans import Frame, MountedSensor, Simulation
+from .core.scans.frame import Frame
 from .core.scans.run_folder import Run
+from .core.scans.sensor import MountedSensor
+from .core.scans.simulation import Simulation
 from .core.storage.files import check_folder
-from .core.traffic import Trajectories
 from .core.traffic.source import TrafficFiles
+from .core.traffic.trajectories import Trajectories
 from .core.visibility.estimate import Estimate
 from .core.visibility.visibility_model import VisibilityModel
 from .core.workflows.survey import Layout, Survey, SurveySettings

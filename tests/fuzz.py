@@ -202,7 +202,7 @@ _mutate_map = _with_wrong_values(0.15, r'<geometry [^>]*?(?:x|y|hdg|length)="([^
 
 
 def _read_map(path: Path, _: bytes) -> None:
-    from seip_addon.core.opendrive import read_map  # noqa: PLC0415
+    from seip_addon.core.opendrive.read import read_map  # noqa: PLC0415
     from seip_addon.core.progress import finish  # noqa: PLC0415
     from seip_addon.core.streetscape.description import describe_place  # noqa: PLC0415
     from seip_addon.core.streetscape.model import site_model  # noqa: PLC0415
@@ -240,7 +240,7 @@ _mutate_catalogue = _with_wrong_values(
 
 
 def _read_catalogue(path: Path, _: bytes) -> None:
-    from seip_addon.core.lidar import load_catalogue  # noqa: PLC0415
+    from seip_addon.core.lidar.catalogue import load_catalogue  # noqa: PLC0415
 
     for model in load_catalogue([path]).values():
         require_physical(replace(model, price_range=model.price_range))
@@ -300,8 +300,8 @@ def _mutate_floating_car_data(random: Random, content: bytes) -> Case:
 
 def _read_floating_car_data(path: Path, content: bytes) -> None:
     from seip_addon.core.progress import finish  # noqa: PLC0415
-    from seip_addon.core.traffic import Trajectories  # noqa: PLC0415
     from seip_addon.core.traffic.floating_car_data import read_floating_car_data, read_trajectories  # noqa: PLC0415
+    from seip_addon.core.traffic.trajectories import Trajectories  # noqa: PLC0415
     from seip_addon.core.traffic.vehicle_types import BUILT_IN  # noqa: PLC0415
 
     table = path.with_suffix(".csv")  # which form it is goes by the name
@@ -418,8 +418,8 @@ def _at_fault(random: Random, array: np.ndarray) -> np.ndarray:
 
 def _read_arrays(path: Path, content: bytes) -> None:
     from seip_addon.core.errors import SeipError  # noqa: PLC0415
-    from seip_addon.core.scans import Frame  # noqa: PLC0415
-    from seip_addon.core.traffic import Trajectories  # noqa: PLC0415
+    from seip_addon.core.scans.frame import Frame  # noqa: PLC0415
+    from seip_addon.core.traffic.trajectories import Trajectories  # noqa: PLC0415
     from seip_addon.core.visibility.grid import VisibilityGrid  # noqa: PLC0415
 
     read = 0
@@ -679,7 +679,7 @@ def _cities(folder: Path) -> list[bytes]:
 def _read_city(path: Path, _: bytes) -> None:
     from seip_addon.core.citymodel.at_place import AskedBuildings, with_city_model  # noqa: PLC0415
     from seip_addon.core.citymodel.cityjson import read_city_model  # noqa: PLC0415
-    from seip_addon.core.opendrive.geo_reference import GeoReference  # noqa: PLC0415
+    from seip_addon.core.geometry.geo_reference import GeoReference  # noqa: PLC0415
     from seip_addon.core.progress import finish  # noqa: PLC0415
     from seip_addon.core.streetscape.description import SiteDescription  # noqa: PLC0415
     from tests.builders.city_text import origin_at  # noqa: PLC0415

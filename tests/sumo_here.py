@@ -3,7 +3,7 @@
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.traffic.sumo_programs import find_sumo
+from seip_addon.core.sumo_programs import find_sumo
 
 
 def _is_installed():

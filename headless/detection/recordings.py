@@ -17,13 +17,16 @@ from seip_addon.core.limits import FRAMES, TIME_STEP
 from seip_addon.core.progress import finish
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.robustness.traffic_instants import WARM_UP
-from seip_addon.core.scans import Frame, MountedSensor, ScanSettings, Simulation, prepare, static_scene
+from seip_addon.core.scans.frame import Frame
 from seip_addon.core.scans.run_folder import Run
+from seip_addon.core.scans.sensor import MountedSensor
+from seip_addon.core.scans.simulation import ScanSettings, Simulation, prepare
+from seip_addon.core.scans.static_scene import static_scene
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import digest
-from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.bodies import fitted_body
 from seip_addon.core.traffic.parked import parked_users
+from seip_addon.core.traffic.trajectories import Trajectories
 
 from .detection_area import area_of
 from .frames import LazyFrames, Recording

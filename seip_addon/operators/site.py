@@ -13,10 +13,10 @@ from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.progress import Progress, finish
 from ..core.site.check import Problem, SiteCheck, check_site
+from ..core.site.roles import Role
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
 from ..core.streetscape.description import DESCRIPTION_SUFFIX
-from ..core.streetscape.parts import Role
 from ..core.workflows.site_building import AskedSite, BuiltSite, build_site
 from ..core.workflows.site_places import SitePlaces, site_places
 from ..core.workflows.survey import SurveySettings, lay_out

@@ -16,12 +16,11 @@ from ..core.progress import Progress, finish
 from ..core.results.placement_record import parsed_record, versions
 from ..core.robustness.traffic_instants import check_runs, spread_instants
 from ..core.robustness.traffic_study import IN_TRAFFIC, traffic_message
-from ..core.scans import MountedSensor
 from ..core.scans.run_folder import Record, Run, check_run_folder
+from ..core.scans.sensor import MountedSensor
 from ..core.site.scene_geometry import SceneGeometry
-from ..core.traffic import CATEGORIES, Trajectories
 from ..core.traffic.source import TrafficFiles, load_traffic
-from ..core.traffic.trajectories import LoadedTraffic
+from ..core.traffic.trajectories import CATEGORIES, LoadedTraffic, Trajectories
 from ..core.workflows.recording import RecordingSettings, make_run, record, simulation_of
 from ..core.workflows.survey import surroundings
 from ..properties.conversion import output_folder

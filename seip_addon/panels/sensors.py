@@ -6,7 +6,7 @@ import math
 
 import bpy
 
-from ..core.lidar import LidarModel
+from ..core.lidar.model import LidarModel
 from ..core.visibility.road_range import road_range
 from ..core.visibility.settings import VisibilitySettings
 from ..operators.sensors import (

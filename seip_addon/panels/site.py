@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .. import scene_status
-from ..core.streetscape.parts import Role
+from ..core.site.roles import Role
 from ..operators.site import (
     SEIP_OT_add_area,
     SEIP_OT_assign_role,

@@ -6,8 +6,9 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from .. import live_scan
-from ..core.datasets import FORMATS, SPLITS
-from ..core.scans import ScanSettings
+from ..core.datasets.formats import FORMATS
+from ..core.datasets.sample import SPLITS
+from ..core.scans.simulation import ScanSettings
 from ..core.traffic.source import TrafficFiles
 from ..core.workflows.recording import RecordingSettings
 from .conversion import absolute, as_typed, of_setting

@@ -10,9 +10,10 @@ import numpy as np
 import shapely
 
 from ..core.progress import Progress
+from ..core.site.roles import AREA_OVERLAYS, Role
 from ..core.storage.files import digest
-from ..core.streetscape.model import AREA_OVERLAYS, SiteModel
-from ..core.streetscape.parts import Part, Role
+from ..core.streetscape.model import SiteModel
+from ..core.streetscape.parts import Part
 from . import contract
 from .daylight import add_daylight
 from .meshes import mesh_of

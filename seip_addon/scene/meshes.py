@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..core.streetscape.street_furniture import Solid
+from ..core.geometry.solids import Solid
 from .materials import material
 
 

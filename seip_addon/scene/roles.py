@@ -9,8 +9,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import SeipError
-from ..core.streetscape.model import AREA_OVERLAYS
-from ..core.streetscape.parts import Role
+from ..core.site.roles import AREA_OVERLAYS, Role
 from . import contract
 from .build import COLLECTIONS
 from .materials import material

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..core.arrays import Float
 from ..core.errors import SeipError
-from ..core.lidar import LidarModel, find_models
+from ..core.lidar.catalogue import find_models
+from ..core.lidar.model import LidarModel
 from ..core.scans.sensor import MountedSensor
 from . import contract
 

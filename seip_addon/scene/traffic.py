@@ -12,8 +12,8 @@ import numpy as np
 
 from ..core.arrays import Float
 from ..core.errors import SeipError
+from ..core.geometry.solids import Solid
 from ..core.progress import Progress
-from ..core.streetscape.street_furniture import Solid
 from ..core.traffic.bodies import Body, colour_of, fitted_body
 from ..core.traffic.trajectories import CATEGORIES, MAX_BEND, RoadUser, Trajectories, is_shape
 from . import contract

@@ -10,12 +10,12 @@ import numpy as np
 
 from ..core.arrays import Integer
 from ..core.errors import SeipError
+from ..core.geometry.solids import Solid, join, prism, tube
 from ..core.pictures.coverage_colours import Aspect, Colouring, as_placed, colouring
 from ..core.placement.deployment import Deployment, Sensor
+from ..core.site.roles import AREA_OVERLAYS
 from ..core.site.site import Site, Targets
 from ..core.site.target_squares import target_squares
-from ..core.streetscape.model import AREA_OVERLAYS
-from ..core.streetscape.street_furniture import Solid, join, prism, tube
 from . import contract
 from .materials import linear, matt
 from .meshes import mesh_of

@@ -12,7 +12,7 @@ import pytest
 from seip_addon import preferences
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation
-from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.visibility.ray_casting import MAX_THREADS
 from seip_addon.core.visibility.ring_resolution import unresolved_from

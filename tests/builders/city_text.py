@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from seip_addon.core.opendrive.geo_reference import projection
+from seip_addon.core.geometry.geo_reference import projection
 
 MILLIMETRE = 0.001
 

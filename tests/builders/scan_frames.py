@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from seip_addon.core.datasets import FORMATS, SensorPose, TrafficRun, write_dataset
+from seip_addon.core.datasets.dataset_folder import write_dataset
+from seip_addon.core.datasets.formats import FORMATS
+from seip_addon.core.datasets.sample import SensorPose, TrafficRun
 from seip_addon.core.progress import finish
 from seip_addon.core.scans.frame import STATIC_INSTANCE, Frame, Labels
 from seip_addon.core.traffic.trajectories import CATEGORIES

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seip_addon.core.datasets import FORMATS, load_manifest, write_dataset
+from seip_addon.core.datasets.dataset_folder import load_manifest, write_dataset
+from seip_addon.core.datasets.formats import FORMATS
 from seip_addon.core.errors import SeipError
 from seip_addon.core.traffic.trajectories import CATEGORIES
 from tests.builders.scan_frames import contents, make_frame, make_frames, make_run, make_sensors, write

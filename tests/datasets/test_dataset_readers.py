@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
-from seip_addon.core.opendrive.geo_reference import GeoReference
+from seip_addon.core.geometry.geo_reference import GeoReference
 from tests.builders.scan_frames import ORIGIN, make_frame, make_frames, make_run, make_sensors, rotation, write
 
 HALF_A_LEVEL = 0.5 / 255 + 1e-6

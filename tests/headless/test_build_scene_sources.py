@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive import read_map
+from seip_addon.core.opendrive.read import read_map
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from tests.builders.city_text import CityModel, origin_at
@@ -86,7 +86,7 @@ def test_a_mistake_leaves_nothing_behind(more, complaint, street, tmp_path, monk
 def test_a_chart_shows_what_boxes_cost(street, tmp_path):
     pytest.importorskip("laspy")
     pytest.importorskip("lazrs")
-    from seip_addon.core.opendrive.geo_reference import projection  # noqa: PLC0415
+    from seip_addon.core.geometry.geo_reference import projection  # noqa: PLC0415
     from tests.builders.survey_files import block_points, ground_points, write_survey  # noqa: PLC0415
 
     rng = np.random.default_rng(7)

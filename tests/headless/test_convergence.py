@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.placement.objective import Objective
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import CandidateSettings

@@ -13,7 +13,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import Limits
 from seip_addon.core.placement.objective import Objective
 from seip_addon.core.placement.scenarios import PoseErrors, Scenarios
-from seip_addon.core.scans import ScanSettings
+from seip_addon.core.scans.simulation import ScanSettings
 from seip_addon.core.settings import settings_of
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.visibility.settings import VisibilitySettings

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from seip_addon.core.geometry.plan import plane_height, signed_area
-from seip_addon.core.streetscape.model import AREA_OVERLAYS
+from seip_addon.core.site.roles import AREA_OVERLAYS
 
 STEEP = 0.3  # cosine of the slope from which on a face is no surface to walk or drive on
 LEAST = 1e-6  # square metres

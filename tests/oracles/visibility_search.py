@@ -19,8 +19,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from seip_addon.core.lidar import CarlaDropoff, LidarModel, RangeEquation, Rosette
-from seip_addon.core.lidar.model import DetectionLaw
+from seip_addon.core.lidar.carla_dropoff import CarlaDropoff
+from seip_addon.core.lidar.model import DetectionLaw, LidarModel
+from seip_addon.core.lidar.range_equation import RangeEquation
+from seip_addon.core.lidar.rosette import Rosette
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.site import Site, Targets

@@ -7,8 +7,8 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.opendrive import read_map
+from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.site import make_site

@@ -9,7 +9,7 @@ import shapely
 from mathutils import Vector
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive.geo_reference import GeoReference
+from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.site.scene_geometry import NamedArea
 from seip_addon.scene import contract
 from seip_addon.scene.materials import REFLECTIVITY, material, set_reflectivity

@@ -4,7 +4,7 @@ import bpy
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.streetscape.parts import Role
+from seip_addon.core.site.roles import Role
 from seip_addon.scene import contract, roles
 from seip_addon.scene.read import read_scene
 

@@ -8,7 +8,7 @@ import pytest
 from seip_addon.core.errors import SeipError
 from seip_addon.core.pictures.coverage_colours import Colouring, colouring
 from seip_addon.core.placement.deployment import deploy
-from seip_addon.core.traffic import RoadUser, Trajectories
+from seip_addon.core.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.scene import contract
 from seip_addon.scene.materials import linear
 from seip_addon.scene.render import save_rendered_view

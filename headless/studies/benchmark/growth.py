@@ -17,7 +17,7 @@ import numpy as np
 import pulp
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.lidar import LidarModel
+from seip_addon.core.lidar.model import LidarModel
 from seip_addon.core.placement.integer_program import CoverProgram
 from seip_addon.core.placement.reduced_problem import make_instance
 from seip_addon.core.site.candidates import Candidates

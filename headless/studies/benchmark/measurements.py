@@ -42,10 +42,11 @@ from headless.survey import runs_beside
 import bpy
 import numpy as np
 
-from seip_addon.core.lidar import LidarModel, find_models, load_catalogue
+from seip_addon.core.lidar.catalogue import find_models, load_catalogue
+from seip_addon.core.lidar.model import LidarModel
 from seip_addon.core.placement.objective import Objective, placement_problem
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.scans import static_scene
+from seip_addon.core.scans.static_scene import static_scene
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.obstruction import bareness_warnings
 from seip_addon.core.site.scene_geometry import SceneGeometry

@@ -13,9 +13,11 @@ import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.estimates import RESAMPLES, IntervalEstimate, percentiles
-from seip_addon.core.lidar import CarlaDropoff, LidarModel
-from seip_addon.core.placement import SolverLimits, solve
+from seip_addon.core.lidar.carla_dropoff import CarlaDropoff
+from seip_addon.core.lidar.model import LidarModel
 from seip_addon.core.placement.objective import Objective, check_objective, placement_problem
+from seip_addon.core.placement.search_limits import SolverLimits
+from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.site import Site

@@ -13,9 +13,11 @@ import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import LidarModel
-from seip_addon.core.placement import Placement, SolverLimits, solve
+from seip_addon.core.lidar.model import LidarModel
 from seip_addon.core.placement.objective import Objective, placement_problem
+from seip_addon.core.placement.problem import Placement
+from seip_addon.core.placement.search_limits import SolverLimits
+from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import finish
 from seip_addon.core.site.site import Site
 from seip_addon.core.visibility.chunks import compute_rows, sharing_rays

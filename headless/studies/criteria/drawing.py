@@ -11,9 +11,10 @@ import numpy as np
 
 from seip_addon.core.arrays import Float, Integer
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import Placement, PlacementProblem, solve
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.objective import Objective, placement_problem
+from seip_addon.core.placement.problem import Placement, PlacementProblem
+from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.workflows.survey import Survey
 

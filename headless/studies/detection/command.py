@@ -36,7 +36,7 @@ from seip_addon.core.limits import COUNT, SEED, SENSORS, TIME_STEP, Limits
 from seip_addon.core.placement.objective import Objective, check_objective
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.robustness.traffic_instants import check_runs
-from seip_addon.core.scans import ScanSettings
+from seip_addon.core.scans.simulation import ScanSettings
 from seip_addon.core.traffic.source import require_own_traffic
 from seip_addon.core.workflows.survey import Survey
 

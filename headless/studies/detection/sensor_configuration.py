@@ -8,7 +8,7 @@ from headless.detection.recordings import PlacedSensors
 from headless.studies.coverage.cells import Case
 
 from seip_addon.core.placement.deployment import Deployment
-from seip_addon.core.scans import MountedSensor
+from seip_addon.core.scans.sensor import MountedSensor
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,7 +41,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import TIME_STEP
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import whole_file
-from seip_addon.core.traffic.sumo_programs import find_sumo
+from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.workflows.survey import Survey
 from seip_addon.scene.read import read_scene
 

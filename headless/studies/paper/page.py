@@ -9,7 +9,7 @@ from headless.studies.coverage.cells import CHARTED_WEIGHT, COUNTS, CoverageStud
 import numpy as np
 
 from seip_addon.core.estimates import Interval
-from seip_addon.core.lidar import LidarModel
+from seip_addon.core.lidar.model import LidarModel
 from seip_addon.core.traffic.run_overlap import MATCH_RADIUS
 
 from .figures import ENOUGH_RETURNS, PlacementFigures, Reversal, agreement, leaks, reversals, reversed_pairs

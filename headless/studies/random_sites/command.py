@@ -16,7 +16,7 @@ from headless.studies.random_sites.production import MadeSite, SiteSettings, mak
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.traffic.sumo_programs import find_sumo
+from seip_addon.core.sumo_programs import find_sumo
 
 MAX_SITES = 9999
 

@@ -22,8 +22,8 @@ from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
 from seip_addon.core.storage.files import digest, save_json
 from seip_addon.core.storage.source_digest import source_digest
+from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.traffic.source import describe_categories
-from seip_addon.core.traffic.sumo_programs import find_sumo
 from seip_addon.core.traffic.varied_bodies import shaped
 from seip_addon.core.workflows.site_building import AskedSite, build_site, save_map
 from seip_addon.core.workflows.survey import SurveySettings, lay_out

@@ -16,7 +16,8 @@ from shapely import box
 
 from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import BeamPattern, LidarModel
+from seip_addon.core.lidar.beams import BeamPattern
+from seip_addon.core.lidar.model import LidarModel
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.site.site import Candidates, Site, Targets
 from seip_addon.core.visibility.float32_precision import FLOAT32_STEP, MAX_STEP

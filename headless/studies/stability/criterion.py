@@ -26,7 +26,7 @@ import shapely
 from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.estimates import NORMAL_QUANTILE, IntervalEstimate
 from seip_addon.core.geometry.plan import surface_height
-from seip_addon.core.lidar import LidarModel
+from seip_addon.core.lidar.model import LidarModel
 from seip_addon.core.placement.deployment import Deployment
 from seip_addon.core.placement.objective import Objective, Solution
 from seip_addon.core.progress import Progress, within

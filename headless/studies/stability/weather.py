@@ -9,12 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from seip_addon.core.arrays import Integer
-from seip_addon.core.lidar import beam_directions, return_chance
-from seip_addon.core.placement import solve
+from seip_addon.core.lidar.beams import beam_directions
+from seip_addon.core.lidar.noisy_returns import return_chance
 from seip_addon.core.placement.objective import Objective, placement_problem
+from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.scans import MountedSensor, static_scene
 from seip_addon.core.scans.scanner import ReflectiveSurface
+from seip_addon.core.scans.sensor import MountedSensor
+from seip_addon.core.scans.static_scene import static_scene
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.weather import Weather, weather_of
 from seip_addon.core.visibility.grid import compute_visibility

@@ -12,10 +12,10 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..counts import counted
 from ..errors import SeipError
+from ..geometry.geo_reference import GeoReference
 from ..geometry.plan import outline
+from ..geometry.reference_systems import Transform, reprojection
 from ..limits import ELEVATION, HEIGHT, MAP_COORDINATE, SITE_RADIUS
-from ..opendrive.geo_reference import GeoReference
-from ..opendrive.reference_systems import Transform, reprojection
 from ..progress import Progress
 from ..site.scene_geometry import FROM_CITY_MODEL
 from ..streetscape.description import PlacedSolid, SiteDescription, without_covered_buildings

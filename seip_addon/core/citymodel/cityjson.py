@@ -15,8 +15,8 @@ import numpy as np
 
 from ..arrays import Float, Integer
 from ..errors import SeipError
+from ..geometry.reference_systems import epsg_code
 from ..limits import ELEVATION, MAP_COORDINATE
-from ..opendrive.reference_systems import epsg_code
 from ..site.sources import one_line
 
 VERSIONS = ("1.1", "2.0")

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 
 from ..arrays import Float, Integer
-from ..streetscape.street_furniture import Solid
+from ..geometry.solids import Solid
 from .cityjson import CityModel, ModelledBuilding, Surface
 
 MIN_AREA = 1e-4  # square metres below which a surface, or a triangle of it, shows nothing

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Boolean, Float
 from ..errors import SeipError
-from ..opendrive.geo_reference import GeoReference
+from ..geometry.geo_reference import GeoReference
 from ..scans.frame import Frame, Labels
 
 SPLITS = ("train", "val", "test")

@@ -13,14 +13,14 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Boolean, Float, Integer
 from ..counts import counted
 from ..errors import SeipError
+from ..geometry.geo_reference import GeoReference
 from ..geometry.height_raster import HeightRaster
 from ..geometry.plan import outline
-from ..opendrive.geo_reference import GeoReference
-from ..opendrive.reference_systems import reprojection
+from ..geometry.reference_systems import reprojection
+from ..geometry.solids import Solid
 from ..progress import Progress
 from ..site.scene_geometry import FROM_SURVEY
 from ..streetscape.description import PlacedSolid, SiteDescription, without_covered_buildings
-from ..streetscape.street_furniture import Solid
 from ..streetscape.terrain import Relief
 from .geotiff import GeoTiff, read_geotiff
 from .obstacles import (

@@ -12,8 +12,8 @@ from PIL import Image, UnidentifiedImageError
 from ..arrays import Float
 from ..errors import SeipError
 from ..geometry.height_raster import bilinear
+from ..geometry.reference_systems import GEOGRAPHIC
 from ..limits import GROUND, LATITUDE, LONGITUDE, MAP_COORDINATE, Limits
-from ..opendrive.reference_systems import GEOGRAPHIC
 from ..site.sources import one_line
 
 MAX_PIXELS = 150_000_000

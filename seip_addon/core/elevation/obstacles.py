@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Boolean, Float, Integer
 from ..geometry.height_raster import HeightRaster
-from ..streetscape.street_furniture import Solid, join
+from ..geometry.solids import Solid, join
 
 MIN_ABOVE = 2.0  # metres above the ground below which nothing counts: road users stand there
 UNCLASSIFIED, VEGETATION, BUILDING = (0, 1), (3, 4, 5), (6,)

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..arrays import Float, Integer
 from ..errors import SeipError
+from ..geometry.reference_systems import epsg_code
 from ..limits import ELEVATION, MAP_COORDINATE, Limits
-from ..opendrive.reference_systems import epsg_code
 from ..progress import Progress
 
 SURVEY_SUFFIXES = (".las", ".laz")

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Float
-from ..opendrive import RoadMap
 from ..opendrive.profile import profile
+from ..opendrive.road_map import RoadMap
 
 Profiles = Mapping[str, tuple[Float, Float]]
 """For each road, by its id, places (n,) along it, and the heights (n,) there, metres."""

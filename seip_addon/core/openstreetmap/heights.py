@@ -26,8 +26,8 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Boolean, Float, Integer
 from ..elevation.raised_map import Profiles
-from ..opendrive import LaneSurface, Road, RoadMap
-from ..opendrive.road_map import RoadLink
+from ..opendrive.lanes import LaneSurface
+from ..opendrive.road_map import Road, RoadLink, RoadMap
 from ..streetscape.road_surface import CARRIAGEWAY, in_groups
 from .bridges import Crossing, Structures, corridors
 from .extract import Tags, Way

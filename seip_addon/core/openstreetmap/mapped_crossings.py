@@ -12,8 +12,8 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
-from ..opendrive import LaneSurface, Road, RoadMap
-from ..opendrive.road_map import RoadObject
+from ..opendrive.lanes import LaneSurface
+from ..opendrive.road_map import Road, RoadMap, RoadObject
 from ..streetscape.named_places import ASSUMED_CROSSING, CROSSING
 from ..streetscape.road_surface import CARRIAGEWAY, MAX_SEAM, in_groups
 from .extract import Extract

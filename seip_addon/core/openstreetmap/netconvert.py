@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..errors import SeipError
 from ..progress import Progress
-from ..traffic.sumo_programs import find_sumo, run
+from ..sumo_programs import find_sumo, run
 from .connecting_roads import mended_text
 from .streets import JOIN_DISTANCE, SIDEWALK_WIDTH, StreetFile
 

@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
-from ..opendrive.geo_reference import TransverseMercator
+from ..geometry.geo_reference import TransverseMercator
 from .extract import Extract, Node, Relation, Way, rings
 
 MIN_FOOTPRINT = 0.5  # square metres below which an outline is none

@@ -16,9 +16,11 @@ from ..arrays import Float
 from ..counts import counted
 from ..elevation.raised_map import raised_map, raised_text
 from ..errors import SeipError
-from ..opendrive import LaneSurface, RoadMap, lane_surfaces, nearest_junctions, read_map
-from ..opendrive.geo_reference import TransverseMercator, projection
-from ..opendrive.junctions import STREETS, streets_of_junctions
+from ..geometry.geo_reference import TransverseMercator, projection
+from ..opendrive.junctions import STREETS, nearest_junctions, streets_of_junctions
+from ..opendrive.lanes import LaneSurface, lane_surfaces
+from ..opendrive.read import read_map
+from ..opendrive.road_map import RoadMap
 from ..progress import Progress
 from ..site.scene_geometry import FROM_EXTRACT
 from ..streetscape import road_surface

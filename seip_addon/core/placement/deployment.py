@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 from ..geometry.orientation import describe_turn, orientation
-from ..lidar import LidarModel
+from ..lidar.model import LidarModel
 from ..limits import SHARE
 from ..site.site import Candidates, Site
 from .returns_summary import ReturnsSummary

@@ -10,16 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SeipError
-from ..lidar import CarlaDropoff, LidarModel
+from ..lidar.carla_dropoff import CarlaDropoff
+from ..lidar.model import LidarModel
 from ..limits import CHOSEN_WEIGHT, DISTANCE, PRICE
 from ..progress import Progress
 from ..settings import setting
 from ..site.site import Candidates, Site
-from . import Placement, PlacementProblem, cheapest_for_coverage, solve, solve_greedy
+from .cheapest import cheapest_for_coverage
 from .deployment import BAND, UNRANKED, Deployment, deploy, pose_prices
+from .problem import Placement, PlacementProblem
 from .risk import Failure, Risk
 from .scenarios import Scenarios
 from .search_limits import DEFAULT_LIMITS, SolverLimits
+from .solver import solve, solve_greedy
 
 DEFAULT_COUNT = 4  # sensors to place where neither a number nor a budget nor a coverage is asked for: the study's four
 MOVED = "moved by hand"  # status of a placement whose sensors hang where a hand has put them

@@ -12,7 +12,7 @@ from PIL import Image
 
 from ..arrays import Boolean, Integer
 from ..errors import SeipError
-from ..opendrive.geo_reference import GeoReference
+from ..geometry.geo_reference import GeoReference
 from ..results.placement_record import PlacementRecord, RecordedSensor, load_placement_record
 from ..results.site_file import SiteFile, load_site_file
 from ..visibility.grid import VisibilityGrid

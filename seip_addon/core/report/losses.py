@@ -10,11 +10,11 @@ import numpy as np
 
 from ..arrays import Boolean, Integer
 from ..errors import SeipError
-from ..placement import Placement, PlacementProblem, solve
 from ..placement.cheapest import SAME_PRICE
 from ..placement.objective import CHOSEN_FOR, MOVED
-from ..placement.problem import TIE_TOLERANCE, assess
+from ..placement.problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
 from ..placement.search_limits import SolverLimits
+from ..placement.solver import solve
 from ..progress import Progress
 from .evidence import Evidence
 

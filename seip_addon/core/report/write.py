@@ -8,6 +8,7 @@ from pathlib import Path
 from ..errors import SeipError
 from ..limits import EFFORT as EFFORT_LIMITS
 from ..progress import Progress
+from ..results.report_files import REPORT_FILES
 from ..storage.files import whole_file
 from .evidence import load_evidence
 from .html import as_html
@@ -15,7 +16,6 @@ from .losses import front
 from .pdf import as_pdf
 from .sections import make_report
 
-FILES = ("report.html", "report.pdf")
 EFFORT = 5.0
 """Counted work (about as many seconds of one core) for each other number of sensors."""
 
@@ -45,7 +45,7 @@ def write_report(folder: Path, effort: float = EFFORT) -> Generator[Progress, No
     yield Progress(0, 0, "setting the report")
     report = make_report(evidence, points)
     contents = (as_html(report).encode("utf-8"), as_pdf(report))
-    for name, content in zip(FILES, contents, strict=True):
+    for name, content in zip(REPORT_FILES, contents, strict=True):
         with whole_file(folder / name) as temporary:
             temporary.write_bytes(content)
-    return tuple(folder / name for name in FILES)
+    return tuple(folder / name for name in REPORT_FILES)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ..lidar import LidarModel
+from ..lidar.model import LidarModel
 from ..placement.deployment import Deployment, Sensor, sensor_at, weighted_share
 from ..site.site import Site
 from ..storage.csv_table import save_csv

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..lidar import CarlaDropoff, LidarModel
+from ..lidar.carla_dropoff import CarlaDropoff
+from ..lidar.model import LidarModel
 from ..lidar.range_equation import DROPOFF_REFLECTIVITY
 from ..placement.deployment import Deployment, Sensor
 from ..storage.files import save_json

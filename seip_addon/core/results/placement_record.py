@@ -19,11 +19,11 @@ import numpy as np
 from .. import limits
 from ..arrays import Float
 from ..errors import SeipError
+from ..geometry.geo_reference import GeoReference
 from ..geometry.orientation import orientation
-from ..opendrive.geo_reference import GeoReference
-from ..placement import Placement
 from ..placement.deployment import GainBand, Sensor, TypeBand, price_text
 from ..placement.objective import Objective, Solution
+from ..placement.problem import Placement
 from ..placement.returns_summary import ReturnsSummary, share_reached
 from ..site.site import Site
 from ..site.sources import SourceCount

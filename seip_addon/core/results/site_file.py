@@ -12,8 +12,8 @@ import shapely
 
 from .. import limits
 from ..arrays import Boolean, Float
-from ..placement import PlacementProblem
 from ..placement.objective import Solution
+from ..placement.problem import PlacementProblem
 from ..site.scene_geometry import NamedArea, SceneGeometry
 from ..site.site import Site, Targets
 from ..storage.array_file import ArrayFile, ArrayRule, ContentError

@@ -26,7 +26,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Boolean, Float, Integer
-from ..lidar import BeamPattern, LidarModel
+from ..lidar.beams import BeamPattern
+from ..lidar.model import LidarModel
 from ..visibility.beam_culling import counted
 from ..visibility.scanning import Caster
 from ..visibility.visibility_model import is_upright, yaw_of

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from .. import limits
 from ..arrays import Integer
 from ..errors import SeipError
-from ..lidar import LidarModel, find_models
+from ..lidar.catalogue import find_models
+from ..lidar.model import LidarModel
 from ..progress import REPORT_INTERVAL, Progress
 from ..site.site import Site
 from ..storage.array_file import ArrayFile, ArrayRule, ContentError

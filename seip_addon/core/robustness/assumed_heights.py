@@ -8,8 +8,8 @@ import numpy as np
 from ..placement.deployment import Sensor
 from ..site.far_objects import without_far_objects
 from ..site.scene_geometry import Mesh, SceneGeometry, ordered_surfaces
+from ..visibility.surroundings import Surroundings
 from ..visibility.visibility_model import visibility_model
-from .visibility_under_errors import Surroundings
 
 CHANGES = (0.7, 1.3)
 """Factors by which assumed heights are tried."""

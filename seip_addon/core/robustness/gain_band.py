@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..lidar import LidarModel
+from ..lidar.model import LidarModel
 from ..placement.deployment import Deployment, GainBand, TypeBand
 from ..progress import Progress
+from ..visibility.surroundings import Surroundings
 from ..visibility.visibility_model import visibility_model
-from .visibility_under_errors import Surroundings
 
 
 def with_gain_band(around: Surroundings, deployment: Deployment) -> Generator[Progress, None, Deployment]:

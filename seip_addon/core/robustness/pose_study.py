@@ -16,8 +16,9 @@ from ..placement.deployment import Deployment
 from ..placement.scenarios import ERROR_KINDS, PoseErrors
 from ..progress import Progress
 from ..site.site import Site
+from ..visibility.surroundings import Surroundings
 from .scenario_visibility import ScenarioVisibility
-from .visibility_under_errors import Surroundings, draws_for, visibility_under_errors
+from .visibility_under_errors import draws_for, visibility_under_errors
 
 QUANTILES = (0.05, 0.5, 0.95)
 

@@ -32,16 +32,15 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Float, Integer
-from ..placement import Placement, PlacementProblem, solve
 from ..placement.bounds import Bound, lagrangian_bound
 from ..placement.branch_and_bound import FIRST_STEPS
 from ..placement.feasibility import starting_choice
 from ..placement.greedy import swap_search
-from ..placement.problem import TIE_TOLERANCE, assess, relative_gap
+from ..placement.problem import TIE_TOLERANCE, Placement, PlacementProblem, assess, relative_gap
 from ..placement.reduced_problem import WHOLE_SLACK, Instance, common_unit, make_instance, merge_targets
 from ..placement.risk import Risk
 from ..placement.search_limits import DEFAULT_LIMITS, Clock, SolverLimits
-from ..placement.solver import BRANCHING_SHARE, MIN_CLOSED_SHARE, Proof, lower_by_goals, solve_within
+from ..placement.solver import BRANCHING_SHARE, MIN_CLOSED_SHARE, Proof, lower_by_goals, solve, solve_within
 from ..progress import Progress, within
 from .robust_search import BestUnderRisk, swap_search_by_risk, swap_search_from_pairs
 from .scenario_visibility import ScenarioVisibility

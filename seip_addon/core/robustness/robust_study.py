@@ -7,14 +7,16 @@ import numpy as np
 
 from ..arrays import Float, Integer
 from ..estimates import IntervalEstimate, mean_of, quantile_gain, quantile_of
-from ..placement import Placement, PlacementProblem, SolverLimits, solve
+from ..placement.problem import Placement, PlacementProblem
 from ..placement.risk import Risk
 from ..placement.scenarios import Scenarios
-from ..placement.search_limits import DEFAULT_LIMITS
+from ..placement.search_limits import DEFAULT_LIMITS, SolverLimits
+from ..placement.solver import solve
 from ..progress import Progress, within
+from ..visibility.surroundings import Surroundings
 from .robust_placement import at_least, foresee, outcomes_of, solve_robust
 from .scenario_visibility import ScenarioVisibility
-from .visibility_under_errors import Surroundings, draws_for, visibility_under_errors
+from .visibility_under_errors import draws_for, visibility_under_errors
 
 LOW_QUANTILE = 0.05  # quantile of coverage by which placements are compared
 COMPARED_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))  # compared by default

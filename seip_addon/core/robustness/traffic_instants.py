@@ -12,8 +12,8 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float, Integer
 from ..errors import SeipError
 from ..scans.motion import rotations
-from ..traffic import Snapshot, Trajectories
 from ..traffic.bodies import fitted_body
+from ..traffic.trajectories import Snapshot, Trajectories
 
 WARM_UP = 2.0  # seconds from the first sample of a run to the first instant that is used
 BATCH_SECONDS = 12.0  # seconds of a run whose instants count as one draw, since the same queues block the view at them

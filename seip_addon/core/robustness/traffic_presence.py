@@ -8,7 +8,7 @@ from ..arrays import Float, Integer
 from ..errors import SeipError
 from ..progress import Progress
 from ..site.targets import Targets
-from ..traffic import Trajectories
+from ..traffic.trajectories import Trajectories
 from .traffic_instants import WARM_UP
 
 INTERVAL = 0.2  # seconds between samples: a car at 50 km/h moves 2.8 m, less than its length

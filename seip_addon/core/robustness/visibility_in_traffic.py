@@ -23,7 +23,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from ..arrays import Boolean, Float, Integer
-from ..lidar import BeamPattern
+from ..lidar.beams import BeamPattern
 from ..progress import Progress
 from ..scans.beam_culling import BeamWindows
 from ..scans.sensor import level_orientation
@@ -31,11 +31,11 @@ from ..site.scene_geometry import DEFAULT_REFLECTIVITY
 from ..visibility.near_surfaces import NearSurfaces, near_surfaces, rotated_surfaces
 from ..visibility.ray_casting import engine_name, make_ray_caster
 from ..visibility.scanning import Caster, ScanPosition
+from ..visibility.surroundings import Surroundings
 from ..visibility.target_index import TargetIndex
 from ..visibility.visibility_model import in_sensor_axes
 from .scenario_visibility import ScenarioVisibility, each_in_threads
 from .traffic_instants import TrafficObstacles
-from .visibility_under_errors import Surroundings
 
 TrafficLayer = Literal["road", "height"]
 

@@ -1,42 +1,18 @@
 """Visibility grids of poses under draws of pose errors."""
 
-from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Generator
 
 import numpy as np
 
 from ..arrays import Boolean, Integer
-from ..lidar import LidarModel
 from ..placement.scenarios import PoseErrors
 from ..progress import Progress
-from ..site.scene_geometry import Mesh
-from ..site.site import Site
 from ..visibility.chunks import sharing_rays
-from ..visibility.ray_casting import Engine, engine_name, make_ray_caster
-from ..visibility.settings import VisibilitySettings
+from ..visibility.ray_casting import engine_name, make_ray_caster
+from ..visibility.surroundings import Surroundings
 from ..visibility.visibility_model import VisibilityModel
 from .pose_errors import PoseDraws, draw_errors, out_of_objects
 from .scenario_visibility import ScenarioVisibility, each_in_threads
-
-
-@dataclass(frozen=True, eq=False)
-class Surroundings:
-    """A site with its sensor models, visibility settings and obstacles, for visibility from changed poses.
-
-    Parameters
-    ----------
-    models : mapping of str to LidarModel
-        At least those that the candidates name.
-    objects : sequence of Mesh
-        The scene's occluders: no sensor is inside one.
-    engine : {"auto", "bvh", "embree"}
-    """
-
-    site: Site
-    models: Mapping[str, LidarModel]
-    sight: VisibilitySettings
-    objects: Sequence[Mesh] = ()
-    engine: Engine = "auto"
 
 
 def draws_for(

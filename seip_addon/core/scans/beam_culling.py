@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from ..arrays import Float, Integer
-from ..lidar import LidarModel
 from ..lidar.azimuth_steps import steps_in_arcs
+from ..lidar.model import LidarModel
 
 
 class BeamWindows:

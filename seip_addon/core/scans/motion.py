@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Float
-from ..traffic import Snapshot, Trajectories
+from ..traffic.trajectories import Snapshot, Trajectories
 
 
 @dataclass(frozen=True, eq=False)

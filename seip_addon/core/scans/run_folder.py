@@ -13,13 +13,13 @@ import numpy as np
 from .. import limits
 from ..arrays import Float
 from ..errors import SeipError
-from ..lidar import LidarModel
-from ..opendrive.geo_reference import GeoReference
+from ..geometry.geo_reference import GeoReference
+from ..lidar.model import LidarModel
 from ..progress import Progress
 from ..storage.files import digest, save_json
 from ..storage.source_digest import source_digest
-from ..traffic import Trajectories
 from ..traffic.bodies import Body
+from ..traffic.trajectories import Trajectories
 from .frame import Frame, Labels
 from .sensor import MountedSensor
 from .simulation import ScanSettings, Simulation

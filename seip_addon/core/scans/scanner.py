@@ -13,7 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Boolean, Float, Integer
-from ..lidar import BeamPattern, RangeEquation, return_chance, surface_deviation
+from ..lidar.beams import BeamPattern
+from ..lidar.noisy_returns import return_chance
+from ..lidar.range_equation import RangeEquation
+from ..lidar.surface_patches import surface_deviation
 from ..visibility.ray_casting import RayCaster
 from .beam_culling import BeamWindows
 from .frame import STATIC_INSTANCE

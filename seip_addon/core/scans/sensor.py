@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Float
 from ..errors import SeipError
-from ..lidar import LidarModel
+from ..lidar.model import LidarModel
 
 _ORTHONORMAL_TOLERANCE = 1e-6
 """How far an orientation's columns may be from unit vectors at right angles."""

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from ..arrays import Float, Integer
 from ..errors import SeipError
-from ..lidar import measured_returns
+from ..lidar.noisy_returns import measured_returns
 from ..limits import FRAMES
 from ..progress import Progress
 from ..settings import setting
-from ..traffic import Snapshot, Trajectories
 from ..traffic.bodies import Body
+from ..traffic.trajectories import Snapshot, Trajectories
 from ..visibility.ray_casting import Engine, make_ray_caster
 from .frame import STATIC_INSTANCE, Frame, Labels
 from .motion import Motion, moving, rotations, still

@@ -10,7 +10,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
-from ..opendrive.geo_reference import GeoReference
+from ..geometry.geo_reference import GeoReference
 from .post_rules import KeepOffArea, RuleName
 from .sources import SourceCount, count_sources
 

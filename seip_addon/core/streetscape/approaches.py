@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
-from ..opendrive import LaneSurface
+from ..opendrive.lanes import LaneSurface
 from .road_surface import by_road, cut_along, in_groups
 
 JOINT_GAP, MIN_JOINT = 0.3, 0.5  # ends of roads within so many metres, along so many of their width, are joined

@@ -20,11 +20,11 @@ from .. import limits
 from ..arrays import Float
 from ..errors import SeipError
 from ..geometry.plan import covered_share
+from ..geometry.solids import Solid
 from ..site.post_rules import KeepOffArea, RuleName
 from ..site.scene_geometry import DEFAULT_WEIGHT, DESCRIBED, FROM_EXTRACT, FROM_MAP
 from ..storage.toml_table import Key, Reader, is_number, number, parse_toml, read_table, text
 from .roofs import FLAT, Roof
-from .street_furniture import Solid
 from .terrain import FlatLand, Relief
 
 DEFAULT_RADIUS = 80.0

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 
 from ..arrays import Float
-from ..opendrive import LaneSurface
+from ..opendrive.lanes import LaneSurface
 
 MAX_FOLD_LENGTH = 25.0  # metres of an edge in one fold: a longer loop is the shape of the road
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from ..arrays import Float
 from ..errors import SeipError
-from ..opendrive import LaneSurface, RoadMap
-from ..opendrive.geo_reference import middle_of_reference, projection
+from ..geometry.geo_reference import middle_of_reference, projection
+from ..opendrive.lanes import LaneSurface
+from ..opendrive.road_map import RoadMap
 from .description import SiteDescription
 
 MAX_ROAD_DISTANCE = 1000.0  # metres beyond the roads of a map within which a place may be meant

@@ -15,7 +15,9 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..geometry.plan import closed, united
-from ..opendrive import LaneSurface, Road, junction_area
+from ..opendrive.junctions import junction_area
+from ..opendrive.lanes import LaneSurface
+from ..opendrive.road_map import Road
 
 FOOTPATHS = {"sidewalk", "walking", "none"}
 MIN_ARMS = 3  # arms of a junction; where fewer meet, a street goes on

@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
-from ..opendrive import LaneSurface
+from ..opendrive.lanes import LaneSurface
 from .road_surface import MAX_SEAM, by_road, group, is_near
 from .terrain import Terrain
 

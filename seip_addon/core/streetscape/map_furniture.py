@@ -9,12 +9,13 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
-from ..opendrive import Outline, PlacedObject
+from ..geometry.solids import Solid, block, fence
+from ..opendrive.objects import Outline, PlacedObject
+from ..site.roles import Role
 from ..site.scene_geometry import FROM_MAP
 from . import street_furniture
 from .object_kinds import MAX_POST_THICKNESS, SIGN_WORDS, VAGUE_TYPES, Kind, Post, height_of, kind_of, post_of, size_of
-from .parts import Part, Role
-from .street_furniture import Solid
+from .parts import Part
 
 MIN_HEIGHT = 0.2  # outlines lower than this (metres) hide nothing that matters
 POLE_HEIGHT, POLE_THICKNESS = 3.0, 0.08
@@ -50,14 +51,14 @@ def building_parts(name: str, base: Float, height: Float, number: int, shape: So
 
     A ``shape`` stands in place of the block, whose windows it gets.
     """
-    walls = shape or street_furniture.block(base, height, side=facade(number), cap="roof")
-    block = Part(name, walls, (Role.OCCLUDERS,))
+    walls = shape or block(base, height, side=facade(number), cap="roof")
+    building = Part(name, walls, (Role.OCCLUDERS,))
     level = np.ptp(base[:, 2]) < 0.1 and np.ptp(height) < 0.1
     walls_area = float(np.hypot(*np.diff(base[:, :2], axis=0, append=base[:1, :2]).T).sum()) * float(height[0])
     if not level or height[0] < street_furniture.STOREY_HEIGHT or walls_area > MAX_FACADE_AREA:
-        return (block,)
+        return (building,)
     panes = street_furniture.windows(base[:, :2], float(base[0, 2]), float(height[0]))
-    return (block, Part(f"{name} windows", panes, (Role.DRESSING,), of=name)) if panes.faces else (block,)
+    return (building, Part(f"{name} windows", panes, (Role.DRESSING,), of=name)) if panes.faces else (building,)
 
 
 def facade(number: int) -> str:
@@ -160,14 +161,14 @@ def _outlined(placed: PlacedObject, outline: Outline, name: str, number: int) ->
     height = np.maximum(outline.height, 0.0)
     if outline.closed and len(outline.base) >= 3:
         return _block(placed, name, number, outline.base, height)
-    panels = street_furniture.fence(outline.base, height, placed.width or FENCE_WIDTH, side=_material(placed))
+    panels = fence(outline.base, height, placed.width or FENCE_WIDTH, side=_material(placed))
     return (Part(name, panels, (Role.OCCLUDERS,)),)
 
 
 def _block(placed: PlacedObject, name: str, number: int, base: Float, height: Float) -> tuple[Part, ...]:
     if kind_of(placed) is Kind.BUILDING:
         return building_parts(name, base, height, number)
-    return (Part(name, street_furniture.block(base, height, side=_material(placed)), (Role.OCCLUDERS,)),)
+    return (Part(name, block(base, height, side=_material(placed)), (Role.OCCLUDERS,)),)
 
 
 def _post(name: str, placed: PlacedObject, post: Post, carriageway: BaseGeometry) -> tuple[Part, ...]:

@@ -9,11 +9,12 @@ import shapely
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..geometry.geo_reference import GeoReference
 from ..geometry.plan import surface_height
-from ..opendrive.geo_reference import GeoReference
+from ..site.roles import Role
 from .geographic_position import looks_like_degrees
 from .model import SiteModel
-from .parts import Part, Role
+from .parts import Part
 
 REACH = 2000.0  # metres from the middle of a site within which a mesh is one of its own
 

@@ -13,10 +13,15 @@ from ..arrays import Float
 from ..counts import counted
 from ..errors import SeipError
 from ..geometry.plan import covered_share, outline, signed_area, united, without
-from ..opendrive import LaneSurface, PlacedObject, Road, RoadMap, lane_surfaces, placed_objects, placed_signals
+from ..geometry.solids import Solid, fence, from_faces
+from ..opendrive.lanes import LaneSurface, lane_surfaces
+from ..opendrive.objects import PlacedObject, placed_objects
+from ..opendrive.road_map import Road, RoadMap
+from ..opendrive.signals import placed_signals
 from ..progress import Progress
 from ..site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
 from ..site.post_rules import RULES
+from ..site.roles import AREA_OVERLAYS, Role
 from ..site.scene_geometry import ASSUMED, DESCRIBED, OTHER_LEVELS, NamedArea
 from ..site.sources import SourceCount, count_sources
 from . import road_surface, street_furniture
@@ -44,7 +49,7 @@ from .map_furniture import (
 )
 from .named_places import named_places, street_names
 from .object_kinds import Kind, kind_of
-from .parts import Part, Role
+from .parts import Part
 from .place import SCENE_MARGIN, Place, shifted
 from .road_checks import road_warnings
 from .road_surface import Roadside, SurfaceLayers, without_crumbs
@@ -68,14 +73,6 @@ MIN_BRIDGE_HEIGHT = 1.0  # metres above the land from which a road on a bridge i
 MIN_RAMP_HEIGHT = 1.0  # metres above the nearest studied road from which a ramp of another level is in the way
 MIN_WALL = 0.02  # metres of height, of both ends together, from which a gap beside a road below has a wall
 UNNAMED_STREET = "Unnamed street"
-AREA_OVERLAYS = {
-    Role.REGION: (0.03, "region veil"),
-    Role.WEIGHTED_REGIONS: (0.04, "weighted veil"),
-    Role.FORBIDDEN_AREAS: (0.05, "forbidden veil"),
-    Role.MANDATORY_AREAS: (0.06, "mandatory veil"),
-    Role.CANDIDATE_AREAS: (0.03, "candidate veil"),
-}
-"""Height above the ground (metres) and material of areas that are not there to be seen."""
 OVERLAY_STEP = 0.001  # metres of height between areas of one role that may overlap
 
 SURFACES = {
@@ -778,7 +775,7 @@ def _described_parts(description: SiteDescription, street: _Surroundings) -> lis
     for wall in description.walls:
         names[wall.name] += 1
         foot = _on_ground(wall.line, street) + np.array([0.0, 0.0, wall.base])
-        panels = street_furniture.fence(foot, np.full(len(foot), wall.height), wall.thickness, side=wall.material)
+        panels = fence(foot, np.full(len(foot), wall.height), wall.thickness, side=wall.material)
         parts.append(_told(Part(f"{wall.name} {names[wall.name]}", panels, (Role.OCCLUDERS,)), wall))
     for slab in description.slabs:
         names[slab.name] += 1
@@ -896,5 +893,5 @@ def _area_part(
     return Part(name, _solid(triangles, material), (role,), weight=weight)
 
 
-def _solid(faces: Float, material: str) -> street_furniture.Solid:
-    return street_furniture.from_faces(faces, material)
+def _solid(faces: Float, material: str) -> Solid:
+    return from_faces(faces, material)

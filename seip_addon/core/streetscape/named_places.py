@@ -10,7 +10,9 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..geometry.plan import without
-from ..opendrive import LaneSurface, PlacedObject, RoadMap
+from ..opendrive.lanes import LaneSurface
+from ..opendrive.objects import PlacedObject
+from ..opendrive.road_map import RoadMap
 from ..site.scene_geometry import NamedArea
 from .map_furniture import footprint
 from .road_surface import CARRIAGEWAY, in_groups, lane_outline, without_crumbs

@@ -7,7 +7,7 @@ from enum import Enum
 import numpy as np
 
 from ..arrays import Float
-from ..opendrive import PlacedObject
+from ..opendrive.objects import PlacedObject
 
 
 class Kind(Enum):

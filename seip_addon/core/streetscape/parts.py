@@ -1,26 +1,10 @@
 """The parts that a modelled site is made of."""
 
 from dataclasses import dataclass
-from enum import Enum
 
+from ..geometry.solids import Solid
 from ..site.post_rules import RuleName
-from .street_furniture import Solid
-
-
-class Role(Enum):
-    """Role of a part in the placement: its collection in the scene contract."""
-
-    REGION = "region of interest"
-    ROADS = "roads"
-    GROUND = "ground"
-    OCCLUDERS = "occluders"
-    POLES = "poles"
-    CANDIDATE_AREAS = "candidate areas"
-    WEIGHTED_REGIONS = "weighted regions"
-    FORBIDDEN_AREAS = "forbidden areas"
-    MANDATORY_AREAS = "mandatory areas"
-    DRESSING = "dressing"
-    """Looks alone: no ray ends on it."""
+from ..site.roles import Role
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,9 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..errors import SeipError
 from ..geometry.plan import closed
-from ..opendrive import Junction, LaneSurface, RoadMap, find_junction, junction_area, nearest_junctions
+from ..opendrive.junctions import find_junction, junction_area, nearest_junctions
+from ..opendrive.lanes import LaneSurface
+from ..opendrive.road_map import Junction, RoadMap
 from ..site.scene_geometry import DEFAULT_WEIGHT
 from . import road_surface
 from .approaches import approach_lanes

@@ -6,8 +6,8 @@ import numpy as np
 import shapely
 
 from ..arrays import Float
-from ..opendrive import LaneSurface, RoadMap
-from ..opendrive.road_map import RoadLink
+from ..opendrive.lanes import LaneSurface
+from ..opendrive.road_map import RoadLink, RoadMap
 from .road_surface import CARRIAGEWAY, by_road, in_groups
 
 MAX_GRADE = 0.12  # of a carriageway, above which a scene is distrusted

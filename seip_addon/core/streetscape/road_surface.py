@@ -11,7 +11,7 @@ from shapely.geometry.polygon import orient
 
 from ..arrays import Float, Integer
 from ..geometry.plan import closed, outline, signed_area, united, without
-from ..opendrive import LaneSurface
+from ..opendrive.lanes import LaneSurface
 from .intersections import filled
 from .terrain import Terrain, cut
 

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 
 from ..arrays import Float
-from .street_furniture import Solid
+from ..geometry.solids import Solid
 
 HIPPED = {"hipped", "half-hipped", "mansard", "side_hipped", "side_half-hipped"}
 RIDGED = {"gabled", "gambrel", "saltbox", "round", *HIPPED}

@@ -8,12 +8,14 @@ import numpy as np
 import shapely
 
 from ..arrays import Float
-from ..opendrive import PlacedObject, PlacedSignal
+from ..opendrive.objects import PlacedObject
+from ..opendrive.signals import PlacedSignal
+from ..site.roles import Role
 from ..site.scene_geometry import ASSUMED, FROM_MAP
 from . import street_furniture
 from .map_furniture import arm_heading, can_carry
 from .object_kinds import SIGNAL_WORDS, WORDS_OF_KIND, Kind, Post, post_of, words_of
-from .parts import Part, Role
+from .parts import Part
 from .road_surface import Roadside
 from .terrain import Terrain
 

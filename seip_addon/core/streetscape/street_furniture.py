@@ -3,89 +3,19 @@
 Every solid stands with its foot in the origin and z up; what has an arm reaches along +x. Sizes are in metres.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..arrays import Float
+from ..geometry.solids import Solid, join, prism, signed_area, tube
 
-POST_SIDES = 6
 STOREY_HEIGHT = 3.2
 WINDOW_SPACING = 3.4
 WINDOW_OFFSET = 0.03  # how far window panes stand before the wall, so that they are drawn before it
 
 
-@dataclass(frozen=True, eq=False)
-class Solid:
-    """Faces with a material each.
-
-    Parameters
-    ----------
-    vertices : (n, 3) float64, metres
-    faces : tuple of tuple of int
-        Corners of each face, counter-clockwise seen from outside.
-    materials : tuple of str
-        Material of each face, a key of `scene.materials.COLOURS`.
-    """
-
-    vertices: Float
-    faces: tuple[tuple[int, ...], ...]
-    materials: tuple[str, ...]
-
-
-def join(*solids: Solid) -> Solid:
-    """Return one solid of many."""
-    offsets = np.cumsum([0, *(len(solid.vertices) for solid in solids)])
-    faces = [
-        tuple(corner + int(offset) for corner in face)
-        for solid, offset in zip(solids, offsets, strict=False)
-        for face in solid.faces
-    ]
-    vertices = np.concatenate([solid.vertices for solid in solids]) if solids else np.empty((0, 3))
-    return Solid(vertices, tuple(faces), tuple(name for solid in solids for name in solid.materials))
-
-
-def from_faces(faces_xyz: Float, material: str) -> Solid:
-    """Return (n, k, 3) triangles or quads as one solid with shared corners."""
-    corners = faces_xyz.shape[1]
-    vertices, index = np.unique(faces_xyz.reshape(-1, 3), axis=0, return_inverse=True)
-    faces = tuple(map(tuple, index.reshape(-1, corners).tolist()))
-    return Solid(vertices, faces, (material,) * len(faces))
-
-
-def prism(outline: Float, base: float, top: float, *, side: str) -> Solid:
-    """Return the upright block of one material between two heights (metres) of an outline (k, 2) that is not closed."""
-    floor = np.column_stack([outline, np.full(len(outline), base)])
-    return block(floor, np.full(len(outline), top - base), side=side)
-
-
-def block(base: Float, height: Float, *, side: str, cap: str | None = None) -> Solid:
-    """Return the solid between an outline (k, 3) and the same outline raised by (k,) metres."""
-    turned = _signed_area(base) < 0
-    ring, tall = (base[::-1], height[::-1]) if turned else (base, height)
-    count = len(ring)
-    upper = ring + tall[:, None] * [0, 0, 1]
-    sides = [(i, (i + 1) % count, count + (i + 1) % count, count + i) for i in range(count)]
-    faces = (*sides, tuple(range(count, 2 * count)), tuple(reversed(range(count))))
-    return Solid(np.concatenate([ring, upper]), faces, (*([side] * count), cap or side, side))
-
-
-def fence(base: Float, height: Float, thickness: float, *, side: str) -> Solid:
-    """Return upright panels of a thickness along a path (k, 3), raised by (k,) metres."""
-    panels = []
-    for i in range(len(base) - 1):
-        along = base[i + 1, :2] - base[i, :2]
-        length = float(np.hypot(*along))
-        if length > 0:
-            aside = np.array([-along[1], along[0], 0.0]) / length * thickness / 2
-            corners = np.array([base[i] - aside, base[i + 1] - aside, base[i + 1] + aside, base[i] + aside])
-            panels.append(block(corners, height[[i, i + 1, i + 1, i]], side=side))
-    return join(*panels)
-
-
 def windows(outline: Float, base: float, height: float) -> Solid:
     """Return the panes of a block: one in each bay of each storey, wide ones on the ground floor."""
-    ring = outline[::-1] if _signed_area(outline) < 0 else outline
+    ring = outline[::-1] if signed_area(outline) < 0 else outline
     storeys = int(height / STOREY_HEIGHT + 0.1)  # a low top storey has windows too
     panes = [
         _panes(start, stop, base + storey * STOREY_HEIGHT, shop=storey == 0)
@@ -132,27 +62,6 @@ def post(height: float, radius: float) -> Solid:
     return tube(np.array([0, 0, 0]), np.array([0, 0, height]), (radius, radius), "steel")
 
 
-def tube(start: Float, stop: Float, radii: tuple[float, float], material: str, *, sides: int = POST_SIDES) -> Solid:
-    """Return a straight tapering tube between two points (3,), closed at the far end.
-
-    Parameters
-    ----------
-    start, stop : (3,) float64, metres
-    radii : pair of float, metres
-        At the two ends.
-    """
-    axis = (stop - start) / np.linalg.norm(stop - start)
-    aside = np.array([0.0, 1.0, 0.0]) if abs(axis[1]) < 0.9 else np.array([1.0, 0.0, 0.0])
-    across = np.cross(aside, axis) / np.linalg.norm(np.cross(aside, axis))
-    second = np.cross(axis, across)
-    angle = np.arange(sides) * (2 * np.pi / sides)
-    circle = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * second
-    vertices = np.concatenate([start + radii[0] * circle, stop + radii[1] * circle])
-    around = [(i, (i + 1) % sides, sides + (i + 1) % sides, sides + i) for i in range(sides)]
-    faces = (*around, tuple(range(sides, 2 * sides)))
-    return Solid(vertices, faces, (material,) * len(faces))
-
-
 def tree(height: float, crown_diameter: float, variant: int) -> Solid:
     """Return a tree: a trunk and an uneven crown.
 
@@ -174,11 +83,6 @@ def tree(height: float, crown_diameter: float, variant: int) -> Solid:
     shape = 2 * (shape - low) / (high - low) - 1  # the crown is as wide and as high as asked for
     crown = Solid(shape * half + [0, 0, middle], faces, ("leaves",) * len(faces))
     return join(trunk, crown)
-
-
-def _signed_area(outline: Float) -> float:
-    x, y = (outline[:, :2] - outline[0, :2]).T
-    return float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2
 
 
 def _panes(start: Float, stop: Float, floor: float, *, shop: bool) -> Float:

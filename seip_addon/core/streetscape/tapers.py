@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..geometry.plan import united
-from ..opendrive import LaneSurface
+from ..opendrive.lanes import LaneSurface
 from .road_surface import CARRIAGEWAY, by_road, group, inner_edge, outer_edge, with_rows_at
 
 RATE = 10.0  # metres along the road for each metre that it widens

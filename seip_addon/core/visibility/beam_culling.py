@@ -34,9 +34,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from ..arrays import Boolean, Float, Integer
-from ..lidar import LidarModel
 from ..lidar.azimuth_steps import steps_in_arcs
-from ..lidar.model import DetectionLaw
+from ..lidar.model import DetectionLaw, LidarModel
 from .near_surfaces import NearSurfaces
 from .settings import VisibilitySettings
 

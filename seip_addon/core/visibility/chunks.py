@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Float, Integer
-from ..lidar import LidarModel
+from ..lidar.model import LidarModel
 from ..progress import REPORT_INTERVAL, Progress
 from ..site.candidates import Candidates
 from ..site.site import Site

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Integer
-from ..lidar import LidarModel, find_models
+from ..lidar.catalogue import find_models
+from ..lidar.model import LidarModel
 from ..progress import REPORT_INTERVAL, Progress
 from ..site.site import Site
 from .chunks import Rows, sharing_rays

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
-from ..lidar import LidarModel
+from ..lidar.model import LidarModel
 from ..site.site import Site
 from .chunks import Rows, compute_rows
 from .ray_casting import Engine, RayCaster, make_ray_caster

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
-from ..lidar import LidarModel, find_models
+from ..lidar.catalogue import find_models
+from ..lidar.model import LidarModel
 from ..progress import Progress
 from ..site.site import Site
 from ..storage.array_file import ArrayFile, ArrayRule, ContentError

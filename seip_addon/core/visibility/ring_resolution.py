@@ -20,7 +20,9 @@ import numpy as np
 
 from ..arrays import Boolean, Float
 from ..geometry.orientation import orientation
-from ..lidar import BeamPattern, LidarModel, find_models
+from ..lidar.beams import BeamPattern
+from ..lidar.catalogue import find_models
+from ..lidar.model import LidarModel
 from ..site.site import Site
 from .settings import VisibilitySettings
 from .target_index import TargetIndex

@@ -12,7 +12,9 @@ import numpy as np
 import shapely
 
 from ..arrays import Float
-from ..lidar import LidarModel, RangeEquation, find_models
+from ..lidar.catalogue import find_models
+from ..lidar.model import LidarModel
+from ..lidar.range_equation import RangeEquation
 from ..site.scene_geometry import Mesh, ordered_surfaces
 from ..site.site import Site
 from .settings import VisibilitySettings

@@ -24,7 +24,8 @@ from typing import Protocol
 import numpy as np
 
 from ..arrays import Boolean, Float, Integer
-from ..lidar import BeamPattern, LidarModel
+from ..lidar.beams import BeamPattern
+from ..lidar.model import LidarModel
 from .beam_culling import Beams, NearRays, counted, disc_patches, may_return, near_rays, target_patches
 from .near_surfaces import NearSurfaces
 from .occlusion import stopped_by

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import SeipError
-from ..lidar import LidarModel
+from ..lidar.model import LidarModel
 from ..settings import setting
 
 MAX_DELTA = 100.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Boolean, Float, Integer
-from ..lidar import LidarModel
+from ..lidar.model import LidarModel
 from ..site.candidates import Candidates
 from ..site.site import Site
 from ..site.target_squares import target_squares

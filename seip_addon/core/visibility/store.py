@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import limits
 from ..errors import SeipError
-from ..lidar import LidarModel
+from ..lidar.model import LidarModel
 from ..progress import Progress
 from ..site.site import Site
 from ..storage.array_file import ArrayFile, ArrayRule

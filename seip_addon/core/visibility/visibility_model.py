@@ -16,7 +16,7 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer
 from ..geometry.orientation import orientation as orientation_of
 from ..geometry.orientation import rotated
-from ..lidar import LidarModel
+from ..lidar.model import LidarModel
 from ..site.site import Site
 from .near_surfaces import NearSurfaces, near_surfaces, rotated_surfaces
 from .ray_casting import Engine, RayCaster, engine_name, make_ray_caster

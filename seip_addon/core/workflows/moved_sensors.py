@@ -11,10 +11,10 @@ from ..arrays import Boolean, Float
 from ..errors import SeipError
 from ..geometry.orientation import angles_of
 from ..geometry.plan import surface_height
-from ..lidar import find_models, load_catalogue
-from ..placement import Placement
+from ..lidar.catalogue import find_models, load_catalogue
 from ..placement.deployment import Sensor, deployment_of, sensor_at
 from ..placement.objective import MOVED, Objective, Solution, target_weights
+from ..placement.problem import Placement
 from ..progress import Progress
 from ..results.headings import degrees, tilt_degrees
 from ..results.placement_record import PlacementRecord

@@ -11,14 +11,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ..datasets import FORMATS, SPLITS, SensorPose, TrafficRun, write_dataset
+from ..datasets.dataset_folder import write_dataset
+from ..datasets.formats import FORMATS
+from ..datasets.sample import SPLITS, SensorPose, TrafficRun
 from ..progress import Progress
-from ..scans import MountedSensor, ScanSettings, Simulation, frame_times, prepare, static_scene
 from ..scans.run_folder import Record, Run, load_frames, write_run
+from ..scans.sensor import MountedSensor
+from ..scans.simulation import ScanSettings, Simulation, frame_times, prepare
+from ..scans.static_scene import static_scene
 from ..settings import setting
 from ..site.scene_geometry import SceneGeometry
-from ..traffic import Trajectories
 from ..traffic.bodies import fitted_body
+from ..traffic.trajectories import Trajectories
 from ..visibility.ray_casting import engine_name
 
 SAME_TIME_TOLERANCE = 1e-6

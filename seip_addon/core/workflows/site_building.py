@@ -14,10 +14,11 @@ from ..citymodel.at_place import AskedBuildings, with_city_model
 from ..elevation.at_place import AskedTerrain, MapSurroundings, with_terrain
 from ..elevation.obstacles import Merging
 from ..errors import SeipError
-from ..opendrive import RoadMap, lane_surfaces, read_map
-from ..opendrive.geo_reference import GeoReference
+from ..geometry.geo_reference import GeoReference
 from ..opendrive.junctions import STREETS
-from ..opendrive.read import with_attribution
+from ..opendrive.lanes import lane_surfaces
+from ..opendrive.read import read_map, with_attribution
+from ..opendrive.road_map import RoadMap
 from ..openstreetmap.site import (
     STANDS_AROUND,
     ExtractPlace,

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import SeipError
-from ..opendrive import LaneSurface, lane_surfaces, read_map
 from ..opendrive.junctions import STREETS, streets_of_junctions
+from ..opendrive.lanes import LaneSurface, lane_surfaces
+from ..opendrive.read import read_map
 from ..openstreetmap.crossings import Crossing, named_crossings
 from ..openstreetmap.extract import MAX_LATITUDE, read_extract
 from ..openstreetmap.site import is_extract

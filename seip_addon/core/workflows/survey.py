@@ -11,17 +11,18 @@ from typing import Any
 import numpy as np
 
 from ..errors import SeipError
-from ..lidar import CarlaDropoff, LidarModel, find_models, load_catalogue
-from ..placement import Placement
+from ..lidar.carla_dropoff import CarlaDropoff
+from ..lidar.catalogue import find_models, load_catalogue
+from ..lidar.model import LidarModel
 from ..placement.deployment import deploy, pose_prices
 from ..placement.integer_program import check_solver
 from ..placement.objective import Solution, target_weights
+from ..placement.problem import Placement
 from ..placement.search_limits import DEFAULT_EFFORT, SolverLimits
 from ..progress import Progress
 from ..results.headings import tilt_degrees
 from ..results.located import LOCATED_FILES, missing_sentence
 from ..results.placement_record import PlacementRecord, Provenance, placement_record
-from ..robustness.visibility_under_errors import Surroundings
 from ..settings import setting
 from ..site.candidates import CandidateSettings, assumed_pole_warnings
 from ..site.far_objects import without_far_objects
@@ -40,6 +41,7 @@ from ..visibility.ring_resolution import resolution_warnings
 from ..visibility.road_range import range_warnings, road_reflectivity
 from ..visibility.settings import VisibilitySettings
 from ..visibility.store import stored_visibility
+from ..visibility.surroundings import Surroundings
 from .returns import stored_pedestrian_returns
 
 

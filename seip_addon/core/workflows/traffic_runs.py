@@ -14,9 +14,9 @@ from ..errors import SeipError
 from ..progress import Progress
 from ..robustness.traffic_instants import check_runs
 from ..site.site import Site
-from ..traffic import Trajectories
 from ..traffic.run_overlap import require_independent, vehicle_positions
 from ..traffic.source import load_trajectories
+from ..traffic.trajectories import Trajectories
 from .survey import Layout
 
 _Run = TypeVar("_Run")

@@ -9,8 +9,8 @@ import shapely
 
 from seip_addon.core.citymodel.at_place import AskedBuildings, with_city_model
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive.geo_reference import GeoReference, projection
-from seip_addon.core.opendrive.reference_systems import epsg_code, reprojection
+from seip_addon.core.geometry.geo_reference import GeoReference, projection
+from seip_addon.core.geometry.reference_systems import epsg_code, reprojection
 from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import DESCRIBED, FROM_CITY_MODEL, FROM_EXTRACT
 from seip_addon.core.streetscape.description import Building, SiteDescription

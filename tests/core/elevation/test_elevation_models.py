@@ -11,8 +11,8 @@ from seip_addon.core.elevation import geotiff
 from seip_addon.core.elevation.at_place import AskedTerrain, MapSurroundings, with_terrain
 from seip_addon.core.elevation.geotiff import read_geotiff
 from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.geometry.height_raster import HeightRaster
-from seip_addon.core.opendrive.geo_reference import GeoReference
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import SiteDescription
 from tests.builders.city_text import origin_at

@@ -5,9 +5,9 @@ import pytest
 
 from seip_addon.core.elevation.at_place import AskedTerrain
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive import read_map
+from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.progress import finish
-from seip_addon.core.streetscape.parts import Role
+from seip_addon.core.site.roles import Role
 from seip_addon.core.workflows.site_building import AskedSite, build_site
 from tests.builders.city_text import origin_at
 from tests.builders.dem_files import sampled, write_dem

@@ -16,8 +16,8 @@ from seip_addon.core.elevation import obstacles, point_cloud
 from seip_addon.core.elevation.at_place import AskedTerrain, MapSurroundings, with_terrain
 from seip_addon.core.elevation.obstacles import ObstacleRaster, blocked, merged, of_boxes, random_rays
 from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.geo_reference import GeoReference, projection
 from seip_addon.core.geometry.height_raster import HeightRaster
-from seip_addon.core.opendrive.geo_reference import GeoReference, projection
 from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import FROM_EXTRACT, FROM_SURVEY
 from seip_addon.core.streetscape.description import Building, SiteDescription

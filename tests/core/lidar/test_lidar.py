@@ -12,17 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import (
-    BeamPattern,
-    CarlaDropoff,
-    LidarModel,
-    RangeEquation,
-    beam_directions,
-    find_models,
-    load_catalogue,
-    measured_returns,
-    return_chance,
-)
+from seip_addon.core.lidar.beams import BeamPattern, beam_directions
+from seip_addon.core.lidar.carla_dropoff import CarlaDropoff
+from seip_addon.core.lidar.catalogue import find_models, load_catalogue
+from seip_addon.core.lidar.model import LidarModel
+from seip_addon.core.lidar.noisy_returns import measured_returns, return_chance
+from seip_addon.core.lidar.range_equation import RangeEquation
 
 CATALOGUE = load_catalogue()
 

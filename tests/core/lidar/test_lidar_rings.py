@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seip_addon.core.lidar import BeamPattern, load_catalogue
+from seip_addon.core.lidar.beams import BeamPattern
+from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.lidar.rings import RING_AZIMUTHS, beam_rings
 
 MODELS = load_catalogue()

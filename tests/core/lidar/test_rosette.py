@@ -12,7 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import BeamPattern, LidarModel, Rosette, load_catalogue
+from seip_addon.core.lidar.beams import BeamPattern
+from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.lidar.model import LidarModel
+from seip_addon.core.lidar.rosette import Rosette
 from tests.oracles.visibility_search import behind_prisms
 
 CATALOGUE = load_catalogue()

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from seip_addon.core.lidar import surface_deviation
-from seip_addon.core.lidar.surface_patches import PATCH_SIZES, PATCH_VARIANCES
+from seip_addon.core.lidar.surface_patches import PATCH_SIZES, PATCH_VARIANCES, surface_deviation
 
 STEPS = np.arange(0.0, 800.0, 1.9437)  # in step with no patches
 SQUARE = np.stack(np.meshgrid(STEPS, STEPS, [0.0]), -1).reshape(-1, 3)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.lidar.unit_files import MAX_BYTES, read_unit_file
 from tests.builders.unit_text import ELEVATIONS, FILES, OFFSETS, hesai, ouster, robosense, xml, yaml
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.opendrive.geo_reference import GeoReference, projection
+from seip_addon.core.geometry.geo_reference import GeoReference, projection
 
 TURNED_BY = 0.1
 BERLIN = "+proj=tmerc +lat_0=52.5 +lon_0=13.4 +k=1 +x_0=1000 +y_0=-500 +datum=WGS84 +units=m"

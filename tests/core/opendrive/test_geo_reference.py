@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive import read_map
-from seip_addon.core.opendrive.geo_reference import projection
+from seip_addon.core.geometry.geo_reference import projection
+from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import SiteDescription
 from seip_addon.core.streetscape.model import site_model

@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive import junction_area
+from seip_addon.core.opendrive.junctions import junction_area
 from tests.builders.opendrive_text import document, geometry, lane, map_lanes, read_text, road, section
 from tests.oracles.random_cases import cases
 

@@ -9,14 +9,10 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.opendrive import (
-    find_junction,
-    junction_area,
-    nearest_junctions,
-    placed_objects,
-    placed_signals,
-    read_map,
-)
+from seip_addon.core.opendrive.junctions import find_junction, junction_area, nearest_junctions
+from seip_addon.core.opendrive.objects import placed_objects
+from seip_addon.core.opendrive.read import read_map
+from seip_addon.core.opendrive.signals import placed_signals
 from tests.builders.opendrive_text import map_lanes
 
 FOLDER = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[4] / "shared" / "opendrive")

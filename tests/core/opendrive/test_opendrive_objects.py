@@ -7,7 +7,8 @@ import pytest
 import shapely
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive import placed_objects, placed_signals
+from seip_addon.core.opendrive.objects import placed_objects
+from seip_addon.core.opendrive.signals import placed_signals
 from tests.builders.opendrive_text import document, geometry, read_text, road
 
 UPHILL = '<elevation s="0" a="5" b="0.1" c="0" d="0"/>'

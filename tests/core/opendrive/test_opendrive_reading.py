@@ -8,13 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive import (
-    find_junction,
-    nearest_junctions,
-    placed_objects,
-    placed_signals,
-    read_map,
-)
+from seip_addon.core.opendrive.junctions import find_junction, nearest_junctions
+from seip_addon.core.opendrive.objects import placed_objects
+from seip_addon.core.opendrive.read import read_map
+from seip_addon.core.opendrive.signals import placed_signals
 from tests.builders.opendrive_text import document, geometry, lane, map_lanes, read_text, road, section
 from tests.oracles.random_cases import cases
 

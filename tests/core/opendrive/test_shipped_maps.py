@@ -14,16 +14,13 @@ import pytest
 import shapely
 from defusedxml.ElementTree import parse
 
-from seip_addon.core.opendrive import (
-    LaneSurface,
-    PlacedObject,
-    RoadMap,
-    junction_area,
-    placed_objects,
-    placed_signals,
-    read_map,
-)
-from seip_addon.core.traffic.sumo_programs import find_sumo
+from seip_addon.core.opendrive.junctions import junction_area
+from seip_addon.core.opendrive.lanes import LaneSurface
+from seip_addon.core.opendrive.objects import PlacedObject, placed_objects
+from seip_addon.core.opendrive.read import read_map
+from seip_addon.core.opendrive.road_map import RoadMap
+from seip_addon.core.opendrive.signals import placed_signals
+from seip_addon.core.sumo_programs import find_sumo
 from tests.builders.opendrive_text import map_lanes
 from tests.sumo_here import needs_sumo
 

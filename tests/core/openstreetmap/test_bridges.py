@@ -10,7 +10,8 @@ import shapely
 from seip_addon.core.elevation.at_place import AskedTerrain
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.plan import surface_height
-from seip_addon.core.opendrive import lane_surfaces, read_map
+from seip_addon.core.opendrive.lanes import lane_surfaces
+from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import OTHER_LEVELS
 from seip_addon.core.streetscape.terrain import MAX_ROADSIDE

@@ -6,7 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from seip_addon.core.opendrive import lane_surfaces, read_map
+from seip_addon.core.opendrive.lanes import lane_surfaces
+from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.openstreetmap.connecting_roads import mended_text
 
 LINE = '<geometry s="{s}" x="{x}" y="{y}" hdg="{hdg}" length="{length}"><line/></geometry>'

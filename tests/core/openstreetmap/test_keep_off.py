@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.opendrive.geo_reference import projection
+from seip_addon.core.geometry.geo_reference import projection
 from seip_addon.core.openstreetmap.extract import read_extract
 from seip_addon.core.openstreetmap.plan_shapes import PlanShapes
 from seip_addon.core.openstreetmap.street_objects import surroundings

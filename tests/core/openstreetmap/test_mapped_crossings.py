@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.opendrive import placed_objects, read_map
+from seip_addon.core.opendrive.objects import placed_objects
+from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.site_building import AskedSite, build_site
 from tests.builders.osm_text import Extract, corner_houses

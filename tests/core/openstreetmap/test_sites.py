@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import shapely
 
+from seip_addon.core import sumo_programs
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive import read_map
+from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.progress import finish
-from seip_addon.core.streetscape.parts import Role
-from seip_addon.core.traffic import sumo_programs
+from seip_addon.core.site.roles import Role
 from seip_addon.core.workflows.site_building import AskedSite, build_site
 from tests.builders.osm_text import (
     JUNCTIONS,

@@ -8,7 +8,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.opendrive.geo_reference import projection
+from seip_addon.core.geometry.geo_reference import projection
 from seip_addon.core.openstreetmap.buildings import USUAL_HEIGHT
 from seip_addon.core.openstreetmap.extract import read_extract
 from seip_addon.core.openstreetmap.plan_shapes import MENDED, PlanShapes

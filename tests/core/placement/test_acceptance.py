@@ -6,8 +6,8 @@ from headless.studies.benchmark.street_visibility import street_problem
 
 import pytest
 
-from seip_addon.core.placement import SolverLimits, solve
-from seip_addon.core.placement.search_limits import Acceptance
+from seip_addon.core.placement.search_limits import Acceptance, SolverLimits
+from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import finish
 
 

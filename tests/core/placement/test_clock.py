@@ -7,8 +7,9 @@ from headless.studies.benchmark.street_visibility import street_problem
 
 import pytest
 
-from seip_addon.core.placement import SolverLimits, search_limits, solve
-from seip_addon.core.placement.search_limits import DEFAULT_EFFORT, OPERATIONS_PER_UNIT, Clock
+from seip_addon.core.placement import search_limits
+from seip_addon.core.placement.search_limits import DEFAULT_EFFORT, OPERATIONS_PER_UNIT, Clock, SolverLimits
+from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import finish
 
 

@@ -9,11 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import PlacementProblem, SolverLimits, solve
 from seip_addon.core.placement.greedy import greedy_with_swaps
 from seip_addon.core.placement.local_search import SwapGains, composition_search, compositions, price_tiers
+from seip_addon.core.placement.problem import PlacementProblem
 from seip_addon.core.placement.reduced_problem import make_instance
-from seip_addon.core.placement.search_limits import Clock
+from seip_addon.core.placement.search_limits import Clock, SolverLimits
+from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import finish
 from tests.oracles.composition_oracle import best_of_compositions, budget_problem
 from tests.oracles.placement_oracle import small_problems

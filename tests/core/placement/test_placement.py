@@ -17,20 +17,13 @@ import pulp.apis.coin_api
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import (
-    PlacementProblem,
-    SolverLimits,
-    cheapest,
-    cheapest_for_coverage,
-    integer_program,
-    solve,
-    solve_greedy,
-    solver,
-    tie_breaking,
-)
+from seip_addon.core.placement import cheapest, integer_program, solver, tie_breaking
+from seip_addon.core.placement.cheapest import cheapest_for_coverage
 from seip_addon.core.placement.integer_program import Outcome, cover_by_cliques
+from seip_addon.core.placement.problem import PlacementProblem
 from seip_addon.core.placement.reduced_problem import common_unit, make_instance, merge_targets
-from seip_addon.core.placement.search_limits import Clock
+from seip_addon.core.placement.search_limits import Clock, SolverLimits
+from seip_addon.core.placement.solver import solve, solve_greedy
 from seip_addon.core.progress import Progress, finish
 
 if TYPE_CHECKING:

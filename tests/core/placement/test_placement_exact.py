@@ -11,14 +11,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import (
-    PlacementProblem,
-    SolverLimits,
-    cheapest_for_coverage,
-    solve,
-    solve_greedy,
-    tie_breaking,
-)
+from seip_addon.core.placement import tie_breaking
+from seip_addon.core.placement.cheapest import cheapest_for_coverage
+from seip_addon.core.placement.problem import PlacementProblem
+from seip_addon.core.placement.search_limits import SolverLimits
+from seip_addon.core.placement.solver import solve, solve_greedy
 from seip_addon.core.progress import finish
 from tests.oracles.placement_oracle import all_placements, covered, merit, small_problems
 from tests.oracles.random_cases import cases

@@ -7,7 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seip_addon.core.placement import PlacementProblem, cheapest, cheapest_for_coverage, solve
+from seip_addon.core.placement import cheapest
+from seip_addon.core.placement.cheapest import cheapest_for_coverage
+from seip_addon.core.placement.problem import PlacementProblem
+from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import finish
 from tests.oracles.placement_search import DUST, UNDECIDED, WEIGHTS, faults, search, sentence
 

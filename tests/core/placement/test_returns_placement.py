@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import PlacementProblem
-from seip_addon.core.placement.problem import relative_gap
+from seip_addon.core.placement.problem import PlacementProblem, relative_gap
 from seip_addon.core.placement.returns_solver import greedy_returns, solve_returns
 from seip_addon.core.placement.search_limits import SolverLimits
 from seip_addon.core.progress import finish

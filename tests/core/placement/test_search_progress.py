@@ -8,12 +8,12 @@ from headless.studies.benchmark.street_visibility import street_problem
 import numpy as np
 import pytest
 
-from seip_addon.core.placement import SolverLimits, solve
 from seip_addon.core.placement.decomposition import decomposition_bound
 from seip_addon.core.placement.greedy import greedy
 from seip_addon.core.placement.local_search import composition_search
 from seip_addon.core.placement.reduced_problem import make_instance
-from seip_addon.core.placement.search_limits import Clock
+from seip_addon.core.placement.search_limits import Clock, SolverLimits
+from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import Pace, finish
 
 

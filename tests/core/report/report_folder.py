@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from seip_addon.core.opendrive.geo_reference import GeoReference
+from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.pictures.plan_view import save_plan_view
-from seip_addon.core.placement import Placement
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.objective import Objective, Solution, placement_problem
-from seip_addon.core.placement.problem import relative_gap
+from seip_addon.core.placement.problem import Placement, relative_gap
 from seip_addon.core.results.placement_record import Provenance, placement_record, save_placement_record
 from seip_addon.core.results.site_file import save_site_file
 from seip_addon.core.site.scene_geometry import NamedArea

@@ -10,20 +10,21 @@ import pytest
 from report_folder import NAME, make_folder
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive.geo_reference import GeoReference
-from seip_addon.core.placement import cheapest_for_coverage, solve
-from seip_addon.core.placement.cheapest import SAME_PRICE
+from seip_addon.core.geometry.geo_reference import GeoReference
+from seip_addon.core.placement.cheapest import SAME_PRICE, cheapest_for_coverage
 from seip_addon.core.placement.objective import MOVED, Objective
 from seip_addon.core.placement.returns_summary import ReturnsSummary
 from seip_addon.core.placement.search_limits import SolverLimits
+from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import finish
 from seip_addon.core.report.blocks import Bullets, Code, Paragraph, Picture, Table
 from seip_addon.core.report.evidence import load_evidence
 from seip_addon.core.report.html import as_html
 from seip_addon.core.report.losses import front
 from seip_addon.core.report.sections import certificate_sentence, make_report
-from seip_addon.core.report.write import FILES, write_report
+from seip_addon.core.report.write import write_report
 from seip_addon.core.results.placement_record import RecordedGreedy
+from seip_addon.core.results.report_files import REPORT_FILES
 
 EFFORT = 0.2
 GOAL = 0.6  # coverage that takes several sensors
@@ -87,12 +88,12 @@ def test_nothing_comes_from_elsewhere(page):
 
 @pytest.mark.slow
 def test_the_same_folder_gives_the_same_bytes(folder, tmp_path):
-    first = [(folder / name).read_bytes() for name in FILES]
+    first = [(folder / name).read_bytes() for name in REPORT_FILES]
     finish(write_report(folder, EFFORT))
-    assert [(folder / name).read_bytes() for name in FILES] == first
+    assert [(folder / name).read_bytes() for name in REPORT_FILES] == first
     make_folder(tmp_path / "elsewhere")
     finish(write_report(tmp_path / "elsewhere", EFFORT))
-    assert [(tmp_path / "elsewhere" / name).read_bytes() for name in FILES] == first
+    assert [(tmp_path / "elsewhere" / name).read_bytes() for name in REPORT_FILES] == first
 
 
 def test_the_pdf_is_whole_and_dated_by_the_record(folder):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.geometry.orientation import orientations
-from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.results.carla import carla_spawns, save_carla_spawns
 from tests.builders.small_junction import make_example
 

@@ -10,9 +10,9 @@ import shapely
 from shapely.geometry import shape
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive.geo_reference import GeoReference
-from seip_addon.core.placement import Placement
+from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.placement.objective import Objective, Solution, placement_problem
+from seip_addon.core.placement.problem import Placement
 from seip_addon.core.results import geojson
 from seip_addon.core.results.geojson import save_geojson
 from seip_addon.core.results.kml import NAMESPACE, save_kml

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive.geo_reference import GeoReference
-from seip_addon.core.placement import Placement
+from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.placement.objective import MOVED, Objective, Solution
+from seip_addon.core.placement.problem import Placement
 from seip_addon.core.placement.returns_summary import CrossingReturns, ReturnsSummary
 from seip_addon.core.results.placement_record import (
     PlacementRecord,

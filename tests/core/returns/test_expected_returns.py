@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.lidar import LidarModel, RangeEquation, load_catalogue
+from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.lidar.model import LidarModel
+from seip_addon.core.lidar.range_equation import RangeEquation
 from seip_addon.core.returns.bodies import PANELS
 from seip_addon.core.returns.expected_returns import all_ray_returns, upright_returns
 from seip_addon.core.returns.road_users import BODIES, RoadUsers

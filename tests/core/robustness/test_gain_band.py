@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.placement.deployment import GainBand, TypeBand
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.gain_band import is_uncertain, with_gain_band
-from seip_addon.core.robustness.visibility_under_errors import Surroundings
 from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.visibility.surroundings import Surroundings
 from seip_addon.core.visibility.visibility_model import visibility_model
 from tests.builders.small_junction import make_example
 

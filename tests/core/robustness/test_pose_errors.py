@@ -13,17 +13,18 @@ from scipy import stats
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import mean_of, quantile_gain, quantile_of
-from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.scenarios import ERROR_KINDS, PoseErrors
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.pose_errors import PoseDraws, draw_errors, out_of_objects
 from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study, pose_warnings
-from seip_addon.core.robustness.visibility_under_errors import Surroundings, draws_for, visibility_under_errors
+from seip_addon.core.robustness.visibility_under_errors import draws_for, visibility_under_errors
 from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.site.scene_geometry import Mesh
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.visibility.surroundings import Surroundings
 from tests.builders.synthetic_junction import junction_site, prism
 from tests.engines import ANY
 

@@ -10,11 +10,12 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import PlacementProblem, SolverLimits, solve
 from seip_addon.core.placement.bounds import lagrangian_bound
+from seip_addon.core.placement.problem import PlacementProblem
 from seip_addon.core.placement.reduced_problem import make_instance
 from seip_addon.core.placement.risk import Risk
-from seip_addon.core.placement.search_limits import Clock
+from seip_addon.core.placement.search_limits import Clock, SolverLimits
+from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.robust_placement import solve_robust
 from seip_addon.core.robustness.robust_search import BestUnderRisk

@@ -11,17 +11,19 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.placement import SolverLimits, solve
+from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.objective import Objective, placement_problem
 from seip_addon.core.placement.risk import Risk
 from seip_addon.core.placement.scenarios import PoseErrors, Scenarios
+from seip_addon.core.placement.search_limits import SolverLimits
+from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study
 from seip_addon.core.robustness.robust_study import robust_study
-from seip_addon.core.robustness.visibility_under_errors import Surroundings, draws_for, visibility_under_errors
+from seip_addon.core.robustness.visibility_under_errors import draws_for, visibility_under_errors
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.surroundings import Surroundings
 from tests.builders.synthetic_junction import junction_site
 from tests.engines import ANY
 

@@ -12,10 +12,10 @@ from matplotlib.image import imread
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import IntervalEstimate, mean_of, mean_over_time
-from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.placement import solve
+from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.objective import Objective, placement_problem
+from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.robust_placement import at_least
 from seip_addon.core.robustness.traffic_instants import NO_TRAFFIC, WARM_UP, spread_instants
@@ -26,10 +26,10 @@ from seip_addon.core.robustness.traffic_study import (
     traffic_study,
 )
 from seip_addon.core.robustness.visibility_in_traffic import visibility_in_traffic
-from seip_addon.core.robustness.visibility_under_errors import Surroundings
-from seip_addon.core.traffic import RoadUser
+from seip_addon.core.traffic.trajectories import RoadUser
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.visibility.surroundings import Surroundings
 from tests.builders.small_junction import make_geometry
 from tests.builders.synthetic_junction import junction_site
 from tests.builders.traffic_by_hand import make_trajectories, parked

@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import rotated
-from seip_addon.core.lidar import RangeEquation, Rosette, beam_directions
+from seip_addon.core.lidar.beams import beam_directions
+from seip_addon.core.lidar.range_equation import RangeEquation
+from seip_addon.core.lidar.rosette import Rosette
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.traffic_instants import (
     BATCH_SECONDS,
@@ -23,13 +25,13 @@ from seip_addon.core.robustness.traffic_instants import (
     spread_instants,
 )
 from seip_addon.core.robustness.visibility_in_traffic import LAYER_HEIGHT, visibility_in_traffic
-from seip_addon.core.robustness.visibility_under_errors import Surroundings
-from seip_addon.core.traffic import RoadUser
+from seip_addon.core.traffic.trajectories import RoadUser
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.near_surfaces import near_surfaces
 from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.visibility.scanning import ScanPosition
 from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.visibility.surroundings import Surroundings
 from seip_addon.core.visibility.visibility_model import seen_by_tilted_full_scan
 from tests.builders.synthetic_junction import junction_site, make_candidates
 from tests.builders.traffic_by_hand import make_model, make_trajectories, parked

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import Rosette
+from seip_addon.core.lidar.rosette import Rosette
 from seip_addon.core.progress import finish
-from seip_addon.core.scans import Frame, ScanSettings, prepare
-from seip_addon.core.scans.frame import FILE
+from seip_addon.core.scans.frame import FILE, Frame
 from seip_addon.core.scans.run_folder import Run, content_hash, frame_path, load_frames, load_manifest, write_run
+from seip_addon.core.scans.simulation import ScanSettings, prepare
 from tests.builders import npz_by_hand as npz
 from tests.builders.traffic_by_hand import box_body, ground, make_sensor, make_static, parked
 from tests.engines import ANY, needs_any

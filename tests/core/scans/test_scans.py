@@ -13,24 +13,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import CarlaDropoff, Rosette, load_catalogue
+from seip_addon.core.lidar.carla_dropoff import CarlaDropoff
+from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.lidar.rosette import Rosette
 from seip_addon.core.progress import finish
-from seip_addon.core.scans import (
-    Frame,
-    Labels,
-    MountedSensor,
-    ScanSettings,
-    Simulation,
-    frame_times,
-    level_orientation,
-    prepare,
-    static_scene,
-)
 from seip_addon.core.scans.beam_culling import BeamWindows
-from seip_addon.core.scans.frame import STATIC_INSTANCE
+from seip_addon.core.scans.frame import STATIC_INSTANCE, Frame, Labels
 from seip_addon.core.scans.motion import rotations
+from seip_addon.core.scans.sensor import MountedSensor, level_orientation
+from seip_addon.core.scans.simulation import ScanSettings, Simulation, frame_times, prepare
+from seip_addon.core.scans.static_scene import static_scene
 from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
-from seip_addon.core.traffic import RoadUser
+from seip_addon.core.traffic.trajectories import RoadUser
 from tests.builders.small_junction import box_triangles
 from tests.builders.traffic_by_hand import (
     box_body,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seip_addon.core.opendrive import read_map
+from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.site.obstruction import NO_OBSTACLES_MESSAGE
 from seip_addon.core.site.scene_geometry import Mesh, Pole

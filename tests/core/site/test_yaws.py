@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.placement.objective import Objective, optimise
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import CandidateSettings, generate_candidates

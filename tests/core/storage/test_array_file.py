@@ -16,7 +16,7 @@ import pytest
 from seip_addon.core.errors import SeipError
 from seip_addon.core.storage import array_file
 from seip_addon.core.storage.array_file import _array
-from seip_addon.core.traffic import Trajectories
+from seip_addon.core.traffic.trajectories import Trajectories
 from tests.builders.npz_by_hand import claiming, contents, write
 from tests.builders.traffic_by_hand import USERS, make_trajectories
 

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive import read_map
+from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import SiteDescription, describe_place, read_site_description
 from seip_addon.core.streetscape.model import site_model

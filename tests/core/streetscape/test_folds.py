@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.opendrive import LaneSurface
+from seip_addon.core.opendrive.lanes import LaneSurface
 from seip_addon.core.streetscape.folds import without_folds
 
 

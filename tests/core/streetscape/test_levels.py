@@ -9,13 +9,13 @@ import pytest
 import shapely
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive import read_map
+from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.progress import finish
+from seip_addon.core.site.roles import Role
 from seip_addon.core.site.scene_geometry import OTHER_LEVELS
 from seip_addon.core.streetscape.description import SiteDescription, read_site_description
 from seip_addon.core.streetscape.levels import Crossing
 from seip_addon.core.streetscape.model import site_model
-from seip_addon.core.streetscape.parts import Role
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 
 MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[4] / "shared" / "opendrive")

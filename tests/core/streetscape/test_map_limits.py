@@ -9,9 +9,9 @@ import shapely
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
+from seip_addon.core.site.roles import Role
 from seip_addon.core.streetscape.description import SiteDescription, describe_place, read_site_description
 from seip_addon.core.streetscape.model import site_model
-from seip_addon.core.streetscape.parts import Role
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 from tests.builders.street_map import street_map
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.opendrive import read_map
+from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import describe_place
 from seip_addon.core.streetscape.model import site_model

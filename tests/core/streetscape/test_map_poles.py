@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.opendrive import read_map
+from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import assumed_pole_warnings, generate_candidates
+from seip_addon.core.site.roles import Role
 from seip_addon.core.site.scene_geometry import ASSUMED, DESCRIBED, FROM_EXTRACT, FROM_MAP, Pole
 from seip_addon.core.streetscape.description import Poles, SiteDescription
 from seip_addon.core.streetscape.model import site_model
-from seip_addon.core.streetscape.parts import Role
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 from tests.builders.plain_street import PLAIN, street
 from tests.builders.street_map import street_map

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seip_addon.core.opendrive import lane_surfaces
+from seip_addon.core.opendrive.lanes import lane_surfaces
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import SiteDescription
 from seip_addon.core.streetscape.model import site_model

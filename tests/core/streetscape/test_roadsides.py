@@ -7,9 +7,9 @@ import pytest
 import shapely
 
 from seip_addon.core.progress import finish
+from seip_addon.core.site.roles import Role
 from seip_addon.core.streetscape.description import SiteDescription
 from seip_addon.core.streetscape.model import site_model
-from seip_addon.core.streetscape.parts import Role
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 
 HERE = SiteDescription(near=(50.0, 0.0), radius=40.0)

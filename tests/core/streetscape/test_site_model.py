@@ -8,11 +8,11 @@ import pytest
 import shapely
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive import read_map
+from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.progress import finish
+from seip_addon.core.site.roles import Role
 from seip_addon.core.streetscape.description import Area, Building, Poles, SiteDescription, Trees, WeightedRegion
 from seip_addon.core.streetscape.model import site_model
-from seip_addon.core.streetscape.parts import Role
 from tests.builders.street_map import street_map
 
 MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[4] / "shared" / "opendrive")

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from seip_addon.core.geometry import solids
 from seip_addon.core.streetscape import street_furniture as furniture
 from tests.oracles.random_cases import cases
 
@@ -25,13 +26,13 @@ def volume(solid):
 @cases(25)
 def test_a_block_is_closed_and_faces_outwards(length, width, height, clockwise):
     base = np.array([[0, 0, 2], [length, 0, 2], [length, width, 2], [0, width, 2]])
-    block = furniture.block(base[::-1] if clockwise else base, np.full(4, height), side="wall")
+    block = solids.block(base[::-1] if clockwise else base, np.full(4, height), side="wall")
     assert volume(block) == pytest.approx(length * width * height)
 
 
 def test_a_fence_has_the_volume_of_its_panels():
     path = np.array([[0, 0, 0], [10, 0, 0], [10, 0, 0], [10, 5, 0]], dtype=float)
-    assert volume(furniture.fence(path, np.full(4, 2.0), 0.2, side="wall")) == pytest.approx(15 * 2 * 0.2)
+    assert volume(solids.fence(path, np.full(4, 2.0), 0.2, side="wall")) == pytest.approx(15 * 2 * 0.2)
 
 
 @given(st.floats(3, 20), st.floats(1, 12), st.integers(0, 5))
@@ -84,7 +85,7 @@ def test_windows_stand_just_before_each_side():
 
 
 def test_joining_keeps_every_face():
-    solids = [furniture.post(3, 0.1), furniture.tree(6, 3, 0)]
-    joined = furniture.join(*solids)
-    assert volume(joined) == pytest.approx(math.fsum(map(volume, solids)))
+    parts = [furniture.post(3, 0.1), furniture.tree(6, 3, 0)]
+    joined = solids.join(*parts)
+    assert volume(joined) == pytest.approx(math.fsum(map(volume, parts)))
     assert len(joined.materials) == len(joined.faces)

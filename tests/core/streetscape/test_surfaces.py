@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.opendrive import LaneSurface, read_map
+from seip_addon.core.opendrive.lanes import LaneSurface
+from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.progress import finish
+from seip_addon.core.site.roles import Role
 from seip_addon.core.streetscape.description import SiteDescription
 from seip_addon.core.streetscape.footways import without_doubles
 from seip_addon.core.streetscape.model import site_model
-from seip_addon.core.streetscape.parts import Role
 from seip_addon.core.streetscape.road_surface import markings, roadside, without_gaps, without_loose_ends
 from seip_addon.core.workflows.site_building import AskedSite, build_site
 from tests.builders.osm_text import JUNCTIONS, crossing

@@ -4,8 +4,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.traffic import CATEGORIES, RoadUser
 from seip_addon.core.traffic.bodies import MESHES, PAINT_COLOURS, REFLECTIVITY, colour_of, fitted_body, read_mesh
+from seip_addon.core.traffic.trajectories import CATEGORIES, RoadUser
 
 USUAL = {
     "hatchback": ("car", 3.9, 1.75, 1.48),

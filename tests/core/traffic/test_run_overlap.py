@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.core.traffic.run_overlap import overlap_of, require_independent, vehicle_positions
+from seip_addon.core.traffic.trajectories import RoadUser, Trajectories
 from tests.builders.traffic_by_hand import make_trajectories
 
 SHIPPED = Path(__file__).parents[3] / "scenes"

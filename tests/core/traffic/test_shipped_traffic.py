@@ -9,11 +9,10 @@ import pytest
 
 from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import joined
-from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.overlaps import find_overlaps
 from seip_addon.core.traffic.parked import shared_bays
 from seip_addon.core.traffic.road_fit import fit_to_road
-from seip_addon.core.traffic.trajectories import CATEGORIES
+from seip_addon.core.traffic.trajectories import CATEGORIES, Trajectories
 from seip_addon.scene.blend_file import open_blend
 from seip_addon.scene.read import read_scene
 

@@ -8,7 +8,7 @@ import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.traffic.sumo_programs import Sumo, run
+from seip_addon.core.sumo_programs import Sumo, run
 
 PYTHON = Path(sys.executable)
 PROGRAMS = Sumo(PYTHON, PYTHON, None)

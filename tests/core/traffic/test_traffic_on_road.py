@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
-from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.core.traffic.overlaps import find_overlaps, footprints, without_overlaps
 from seip_addon.core.traffic.road_fit import ROAD_TOLERANCE, fit_to_road
 from seip_addon.core.traffic.smooth_walks import smooth_walks
+from seip_addon.core.traffic.trajectories import RoadUser, Trajectories
 from tests.oracles.random_cases import cases
 
 GRADE = 0.05

@@ -11,9 +11,8 @@ from test_bodies import areas, edges, first_hit, parts, signed_volume
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.traffic import CATEGORIES, RoadUser, Trajectories
 from seip_addon.core.traffic.bodies import MESHES, fitted_body, read_mesh
-from seip_addon.core.traffic.trajectories import MAX_BEND, bent
+from seip_addon.core.traffic.trajectories import CATEGORIES, MAX_BEND, RoadUser, Trajectories, bent
 from seip_addon.core.traffic.varied_bodies import KINDS, SHAPES, draw_shape, draw_size, resized, varied
 from tests.builders.traffic_by_hand import make_trajectories, parked
 

@@ -8,7 +8,7 @@ import pytest
 
 from seip_addon.background import Background
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.progress import Pace, Progress, finish
 from seip_addon.core.visibility.estimate import estimate_visibility
 from seip_addon.core.visibility.grid import compute_visibility

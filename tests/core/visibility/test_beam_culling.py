@@ -10,7 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.lidar import LidarModel, beam_directions, load_catalogue
+from seip_addon.core.lidar.beams import beam_directions
+from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.lidar.model import LidarModel
 from seip_addon.core.visibility.beam_culling import (
     Beams,
     NearRays,

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.progress import finish
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.settings import VisibilitySettings

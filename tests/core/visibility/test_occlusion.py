@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.visibility.beam_culling import Beams, NearRays, Planes
 from seip_addon.core.visibility.occlusion import stopped_by
 from seip_addon.core.visibility.settings import VisibilitySettings

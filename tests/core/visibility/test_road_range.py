@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seip_addon.core.lidar import RangeEquation, load_catalogue
+from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.lidar.range_equation import RangeEquation
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import Mesh
 from seip_addon.core.site.weather import Weather

@@ -14,12 +14,14 @@ from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import angles_of, describe_turn, orientation, orientations, rotated
-from seip_addon.core.lidar import RangeEquation, beam_directions, load_catalogue
+from seip_addon.core.lidar.beams import beam_directions
+from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.lidar.range_equation import RangeEquation
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.objective import Objective
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.pose_errors import PoseDraws
-from seip_addon.core.robustness.visibility_under_errors import Surroundings, visibility_under_errors
+from seip_addon.core.robustness.visibility_under_errors import visibility_under_errors
 from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.site.candidates import CandidateSettings, generate_candidates, tilts_of
 from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
@@ -39,6 +41,7 @@ from seip_addon.core.visibility.grid import (
 from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.visibility.ring_resolution import resolution_warnings, unresolved_from
 from seip_addon.core.visibility.sight_lines import pose_at
+from seip_addon.core.visibility.surroundings import Surroundings
 from seip_addon.core.visibility.visibility_model import VisibilityModel
 from seip_addon.core.workflows.survey import SurveySettings
 from tests.builders.synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity

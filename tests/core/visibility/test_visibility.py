@@ -16,7 +16,10 @@ from shapely import box
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation
-from seip_addon.core.lidar import BeamPattern, LidarModel, RangeEquation, load_catalogue
+from seip_addon.core.lidar.beams import BeamPattern
+from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.lidar.model import LidarModel
+from seip_addon.core.lidar.range_equation import RangeEquation
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.site.site import Site, Targets
 from seip_addon.core.visibility.chunks import Rows

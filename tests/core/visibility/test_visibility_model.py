@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.lidar import beam_directions, load_catalogue
+from seip_addon.core.lidar.beams import beam_directions
+from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.visibility.chunks import compute_rows
 from seip_addon.core.visibility.ray_casting import make_ray_caster

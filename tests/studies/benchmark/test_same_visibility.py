@@ -11,7 +11,7 @@ from headless.studies.benchmark.visibility import visibility_costs
 import bpy
 import pytest
 
-from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.site import Site, make_site
 from seip_addon.core.visibility.settings import VisibilitySettings

@@ -28,7 +28,8 @@ import numpy as np
 import pytest
 
 from seip_addon.core.progress import finish
-from seip_addon.core.scans import ScanSettings, prepare, static_scene
+from seip_addon.core.scans.simulation import ScanSettings, prepare
+from seip_addon.core.scans.static_scene import static_scene
 from seip_addon.core.traffic.bodies import fitted_body
 from tests.builders.square_by_hand import road, sensors
 

@@ -15,7 +15,7 @@ from matplotlib.image import imread
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.traffic.sumo_programs import find_sumo
+from seip_addon.core.sumo_programs import find_sumo
 from tests.sumo_here import needs_sumo
 
 MAP = Path(__file__).resolve().parents[3] / "scenes" / "junction.xodr"

@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.scans import MountedSensor, static_scene
+from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.scans.sensor import MountedSensor
+from seip_addon.core.scans.static_scene import static_scene
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
 from seip_addon.core.visibility import ray_casting

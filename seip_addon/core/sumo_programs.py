@@ -8,8 +8,8 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import SeipError
-from ..progress import Progress, in_thread
+from .errors import SeipError
+from .progress import Progress, in_thread
 
 MISSING = (
     "SUMO is not installed, which lays out streets and simulates traffic: install Eclipse SUMO and put sumo and "
