@@ -65,8 +65,8 @@ sumo: environment
 	@$(PYTHON) -m headless.set_up "$(VENV)" traffic
 
 test-traffic: sumo
-	$(PY) -m pytest tests/core/opendrive/test_shipped_maps.py tests/headless/test_traffic_simulation.py tests/headless/test_traffic.py \
-	  tests/core/openstreetmap/test_sites.py
+	$(PY) -m pytest tests/core/world/opendrive/test_shipped_maps.py tests/headless/test_traffic_simulation.py tests/headless/test_traffic.py \
+	  tests/core/world/openstreetmap/test_sites.py
 
 # Runs of one scene differ by their seed, and by the second of the signals' cycle of 60 s at which they begin; dense ones
 # have twice the vehicles. They are many and short, as whole runs alone are independent of each other.

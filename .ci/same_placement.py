@@ -3,7 +3,7 @@
 import json
 import sys
 
-from seip_addon.core.results.placement_record import comparable, load_placement_record
+from seip_addon.core.output.results.placement_record import comparable, load_placement_record
 
 
 def lines(path: str) -> list[str]:

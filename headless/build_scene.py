@@ -19,16 +19,16 @@ from headless import runtime
 from headless.charts.survey import save_merging_chart
 from headless.options import new_parser
 
-from seip_addon.core.citymodel.at_place import AskedBuildings
 from seip_addon.core.counts import counted
-from seip_addon.core.elevation.at_place import AskedTerrain
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.site.obstruction import NO_OBSTACLES_MESSAGE
 from seip_addon.core.site.sources import count_sources, source_lines
 from seip_addon.core.storage.files import locked_file
-from seip_addon.core.streetscape.mesh_place import mesh_place
 from seip_addon.core.workflows.site_building import AskedSite, build_site, save_map
+from seip_addon.core.world.citymodel.at_place import AskedBuildings
+from seip_addon.core.world.elevation.at_place import AskedTerrain
+from seip_addon.core.world.streetscape.mesh_place import mesh_place
 from seip_addon.scene.blend_file import check_name, new_file, save_blend
 from seip_addon.scene.build import build_scene
 from seip_addon.scene.imported import UP_AXES, check_mesh, import_mesh

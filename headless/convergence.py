@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from seip_addon.core.choosing.placement.deployment import weighted_share
+from seip_addon.core.choosing.placement.objective import Objective, Solution, optimise, target_weights
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement.deployment import weighted_share
-from seip_addon.core.placement.objective import Objective, Solution, optimise, target_weights
 from seip_addon.core.progress import Progress, within
+from seip_addon.core.sensing.visibility.grid import compute_visibility
+from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel, visibility_model
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site, make_site
-from seip_addon.core.visibility.grid import compute_visibility
-from seip_addon.core.visibility.visibility_model import VisibilityModel, visibility_model
 from seip_addon.core.workflows.survey import SurveySettings
 
 GRID_SPACINGS = (4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)

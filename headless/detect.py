@@ -35,18 +35,18 @@ from headless.options import add_rolling_shutter, add_settings, new_parser, read
 import bpy
 import numpy as np
 
-from seip_addon.core.datasets.detection_files import kitti_results, openpcdet_results
-from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.choosing.robustness.traffic_instants import check_runs
 from seip_addon.core.limits import TIME_STEP
-from seip_addon.core.results.detection_record import FORMATS, SCHEMA
-from seip_addon.core.results.placement_record import versions
-from seip_addon.core.robustness.traffic_instants import check_runs
-from seip_addon.core.scans.sensor import MountedSensor
-from seip_addon.core.scans.simulation import ScanSettings
+from seip_addon.core.output.datasets.detection_files import kitti_results, openpcdet_results
+from seip_addon.core.output.results.detection_record import FORMATS, SCHEMA
+from seip_addon.core.output.results.placement_record import versions
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.scans.sensor import MountedSensor
+from seip_addon.core.sensing.scans.simulation import ScanSettings
+from seip_addon.core.sensing.traffic.run_overlap import require_independent, vehicle_positions
+from seip_addon.core.sensing.traffic.source import require_own_traffic
 from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.files import digest, save_json, whole_file
-from seip_addon.core.traffic.run_overlap import require_independent, vehicle_positions
-from seip_addon.core.traffic.source import require_own_traffic
 from seip_addon.core.workflows.survey import SurveySettings
 from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene

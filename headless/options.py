@@ -13,10 +13,10 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
+from seip_addon.core.choosing.placement.objective import Objective
+from seip_addon.core.choosing.placement.scenarios import PoseErrors, ScenarioKind, Scenarios
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import Limits
-from seip_addon.core.placement.objective import Objective
-from seip_addon.core.placement.scenarios import PoseErrors, ScenarioKind, Scenarios
 from seip_addon.core.settings import Setting, settings_of
 
 Options = TypeVar("Options")

@@ -22,10 +22,10 @@ from headless.charts.evaluation import save_evaluation_charts
 from headless.convergence import coarsest_settings
 from headless.options import add_objective, new_parser, read_objective, real_number
 
+from seip_addon.core.choosing.placement.deployment import price_text
+from seip_addon.core.choosing.placement.objective import Solution, check_objective
+from seip_addon.core.choosing.placement.returns_summary import share_reached
 from seip_addon.core.limits import SHARE
-from seip_addon.core.placement.deployment import price_text
-from seip_addon.core.placement.objective import Solution, check_objective
-from seip_addon.core.placement.returns_summary import share_reached
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.placing import place
 from seip_addon.core.workflows.survey import Layout

@@ -15,8 +15,8 @@ from headless import runtime
 from headless.options import new_parser, real_number
 
 from seip_addon.core import limits
-from seip_addon.core.report.evidence import load_evidence
-from seip_addon.core.report.write import EFFORT, write_report
+from seip_addon.core.output.report.evidence import load_evidence
+from seip_addon.core.output.report.write import EFFORT, write_report
 
 
 def main(argv: list[str]) -> None:

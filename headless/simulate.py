@@ -21,14 +21,14 @@ from headless.options import add_settings, new_parser, read_settings
 import bpy
 
 from seip_addon.core.counts import counted
-from seip_addon.core.datasets.formats import FORMATS
-from seip_addon.core.datasets.sample import SPLITS
-from seip_addon.core.lidar.catalogue import load_catalogue
-from seip_addon.core.results.placement_record import versions
-from seip_addon.core.scans.run_folder import Record, Run, check_no_placement, check_run_folder
-from seip_addon.core.scans.simulation import ScanSettings
+from seip_addon.core.output.datasets.formats import FORMATS
+from seip_addon.core.output.datasets.sample import SPLITS
+from seip_addon.core.output.results.placement_record import versions
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.scans.run_folder import Record, Run, check_no_placement, check_run_folder
+from seip_addon.core.sensing.scans.simulation import ScanSettings
+from seip_addon.core.sensing.traffic.source import load_trajectories
 from seip_addon.core.site.weather import weather_of
-from seip_addon.core.traffic.source import load_trajectories
 from seip_addon.core.workflows.recording import RecordingSettings, dataset_folder, make_run, record, simulation_of
 from seip_addon.core.workflows.survey import SurveySettings
 from seip_addon.scene.materials import set_reflectivity

@@ -18,20 +18,20 @@ from headless.options import add_settings, name_only, read_settings
 import bpy
 import numpy as np
 
+from seip_addon.core.choosing.placement.deployment import Sensor
+from seip_addon.core.choosing.placement.objective import Solution
 from seip_addon.core.counts import counted
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement.deployment import Sensor
-from seip_addon.core.placement.objective import Solution
+from seip_addon.core.output.results.placement_record import Provenance, versions
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.results.placement_record import Provenance, versions
-from seip_addon.core.scans.run_folder import MANIFEST
+from seip_addon.core.sensing.scans.run_folder import MANIFEST
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.sensing.visibility.triangle_culling import culling_message
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
 from seip_addon.core.site.weather import weather_of
-from seip_addon.core.visibility.settings import VisibilitySettings
-from seip_addon.core.visibility.triangle_culling import culling_message
 from seip_addon.core.workflows.survey import Layout, Survey, SurveySettings, lay_out, record_of, see
 from seip_addon.core.workflows.traffic_runs import runs_in, traffic_folder
 from seip_addon.scene.materials import set_reflectivity

@@ -27,11 +27,11 @@ import bpy
 
 from seip_addon.core.counts import counted
 from seip_addon.core.errors import SeipError
+from seip_addon.core.sensing.traffic.floating_car_data import listed
+from seip_addon.core.sensing.traffic.source import TrafficFiles, describe_categories, load_traffic
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import locked_file
-from seip_addon.core.traffic.floating_car_data import listed
-from seip_addon.core.traffic.source import TrafficFiles, describe_categories, load_traffic
-from seip_addon.core.traffic.trajectories import Trajectories
 from seip_addon.scene.blend_file import check_name, save_blend
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.traffic import animate

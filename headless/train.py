@@ -36,7 +36,7 @@ import bpy
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
-from seip_addon.core.scans.run_folder import load_manifest
+from seip_addon.core.sensing.scans.run_folder import load_manifest
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import save_json
 from seip_addon.scene.read import read_scene

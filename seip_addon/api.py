@@ -33,19 +33,19 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from .core.placement.objective import Objective, Solution
-from .core.placement.scenarios import PoseErrors, Scenarios
+from .core.choosing.placement.objective import Objective, Solution
+from .core.choosing.placement.scenarios import PoseErrors, Scenarios
 from .core.progress import finish
-from .core.scans.frame import Frame
-from .core.scans.sensor import MountedSensor
-from .core.scans.simulation import ScanSettings
+from .core.sensing.scans.frame import Frame
+from .core.sensing.scans.sensor import MountedSensor
+from .core.sensing.scans.simulation import ScanSettings
+from .core.sensing.traffic.source import TrafficFiles
+from .core.sensing.traffic.source import load_traffic as _load_traffic
+from .core.sensing.traffic.trajectories import Trajectories
+from .core.sensing.visibility.grid import compute_visibility as _compute
+from .core.sensing.visibility.settings import VisibilitySettings
 from .core.site.candidates import CandidateSettings
 from .core.site.scene_geometry import SceneGeometry
-from .core.traffic.source import TrafficFiles
-from .core.traffic.source import load_traffic as _load_traffic
-from .core.traffic.trajectories import Trajectories
-from .core.visibility.grid import compute_visibility as _compute
-from .core.visibility.settings import VisibilitySettings
 from .core.workflows.placing import place as _place
 from .core.workflows.recording import RecordingSettings, frame_number, make_run, simulation_of
 from .core.workflows.survey import Layout, Survey, SurveySettings, lay_out, with_grid

@@ -12,10 +12,10 @@ import numpy as np
 
 from . import preferences
 from .core.arrays import Boolean, Integer
+from .core.choosing.placement.deployment import Deployment, Sensor
 from .core.errors import SeipError
-from .core.placement.deployment import Deployment, Sensor
-from .core.scans.sensor import MountedSensor
-from .core.visibility.visibility_model import VisibilityModel
+from .core.sensing.scans.sensor import MountedSensor
+from .core.sensing.visibility.visibility_model import VisibilityModel
 from .scene import contract
 from .scene.sensors import read_sensors
 from .scene.write import show_seen_by

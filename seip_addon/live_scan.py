@@ -6,10 +6,10 @@ import bpy
 import numpy as np
 
 from .core.arrays import Float
-from .core.scans.run_folder import Run
-from .core.scans.simulation import Simulation
-from .core.traffic.source import TrafficFiles
-from .core.traffic.trajectories import Trajectories
+from .core.sensing.scans.run_folder import Run
+from .core.sensing.scans.simulation import Simulation
+from .core.sensing.traffic.source import TrafficFiles
+from .core.sensing.traffic.trajectories import Trajectories
 from .core.workflows.recording import frame_number
 from .session import LastScan, session
 from .viewport import overlays

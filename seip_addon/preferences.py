@@ -7,10 +7,10 @@ from pathlib import Path
 import bpy
 
 from .core.errors import SeipError
-from .core.lidar.catalogue import load_catalogue
-from .core.lidar.model import LidarModel
-from .core.visibility.ray_casting import MAX_THREADS
-from .core.visibility.store import GridFolder
+from .core.sensing.lidar.catalogue import load_catalogue
+from .core.sensing.lidar.model import LidarModel
+from .core.sensing.visibility.ray_casting import MAX_THREADS
+from .core.sensing.visibility.store import GridFolder
 from .core.workflows.detection import DetectingPython
 
 ADDON_ID = (__package__ or "").removesuffix(".seip_addon")

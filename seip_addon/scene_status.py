@@ -7,7 +7,7 @@ from dataclasses import replace
 import bpy
 
 from .core.errors import SeipError
-from .core.results.placement_record import PlacementRecord, parsed_record
+from .core.output.results.placement_record import PlacementRecord, parsed_record
 from .core.workflows.survey import SurveySettings
 from .scene import contract
 from .session import SceneState, session

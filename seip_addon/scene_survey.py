@@ -16,10 +16,10 @@ from pathlib import Path
 import bpy
 
 from . import preferences
+from .core.choosing.placement.objective import MOVED
 from .core.errors import SeipError
-from .core.placement.objective import MOVED
+from .core.output.results.placement_record import PlacementRecord, parsed_record
 from .core.progress import Progress
-from .core.results.placement_record import PlacementRecord, parsed_record
 from .core.workflows.moved_sensors import restored_by_hand
 from .core.workflows.survey import Survey, SurveySettings, inputs_of, lay_out, restored_solution, see
 from .scene.changes import Watch, on_update, watch

@@ -4,7 +4,7 @@ import bpy
 
 from . import preferences
 from .core.errors import SeipError
-from .core.lidar.catalogue import load_catalogue
+from .core.sensing.lidar.catalogue import load_catalogue
 from .core.site.candidates import CandidateSettings
 from .session import session
 

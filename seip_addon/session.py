@@ -15,19 +15,19 @@ import numpy as np
 
 from .background import Background
 from .core.arrays import Boolean
+from .core.choosing.placement.objective import Solution
+from .core.choosing.placement.search_limits import Acceptance
 from .core.errors import SeipError
-from .core.lidar.model import LidarModel
-from .core.placement.objective import Solution
-from .core.placement.search_limits import Acceptance
-from .core.scans.frame import Frame
-from .core.scans.run_folder import Run
-from .core.scans.sensor import MountedSensor
-from .core.scans.simulation import Simulation
+from .core.sensing.lidar.model import LidarModel
+from .core.sensing.scans.frame import Frame
+from .core.sensing.scans.run_folder import Run
+from .core.sensing.scans.sensor import MountedSensor
+from .core.sensing.scans.simulation import Simulation
+from .core.sensing.traffic.source import TrafficFiles
+from .core.sensing.traffic.trajectories import Trajectories
+from .core.sensing.visibility.estimate import Estimate
+from .core.sensing.visibility.visibility_model import VisibilityModel
 from .core.storage.files import check_folder
-from .core.traffic.source import TrafficFiles
-from .core.traffic.trajectories import Trajectories
-from .core.visibility.estimate import Estimate
-from .core.visibility.visibility_model import VisibilityModel
 from .core.workflows.survey import Layout, Survey, SurveySettings
 from .overlay import Overlay
 from .scene.changes import Watch

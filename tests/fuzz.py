@@ -202,10 +202,10 @@ _mutate_map = _with_wrong_values(0.15, r'<geometry [^>]*?(?:x|y|hdg|length)="([^
 
 
 def _read_map(path: Path, _: bytes) -> None:
-    from seip_addon.core.opendrive.read import read_map  # noqa: PLC0415
     from seip_addon.core.progress import finish  # noqa: PLC0415
-    from seip_addon.core.streetscape.description import describe_place  # noqa: PLC0415
-    from seip_addon.core.streetscape.model import site_model  # noqa: PLC0415
+    from seip_addon.core.world.opendrive.read import read_map  # noqa: PLC0415
+    from seip_addon.core.world.streetscape.description import describe_place  # noqa: PLC0415
+    from seip_addon.core.world.streetscape.model import site_model  # noqa: PLC0415
 
     _, description = describe_place(path, near=(0.0, 0.0), radius=30.0)
     model = finish(site_model(read_map(path), description))
@@ -225,7 +225,7 @@ def _mutate_description(random: Random, content: bytes) -> Case:
 
 
 def _read_description(path: Path, _: bytes) -> None:
-    from seip_addon.core.streetscape.description import read_site_description  # noqa: PLC0415
+    from seip_addon.core.world.streetscape.description import read_site_description  # noqa: PLC0415
 
     require_physical(read_site_description(path))
 
@@ -240,7 +240,7 @@ _mutate_catalogue = _with_wrong_values(
 
 
 def _read_catalogue(path: Path, _: bytes) -> None:
-    from seip_addon.core.lidar.catalogue import load_catalogue  # noqa: PLC0415
+    from seip_addon.core.sensing.lidar.catalogue import load_catalogue  # noqa: PLC0415
 
     for model in load_catalogue([path]).values():
         require_physical(replace(model, price_range=model.price_range))
@@ -259,7 +259,7 @@ def _units(suffix: str) -> Callable[[Path], list[bytes]]:
 
 
 def _read_unit(path: Path, _: bytes) -> None:
-    from seip_addon.core.lidar.unit_files import read_unit_file  # noqa: PLC0415
+    from seip_addon.core.sensing.lidar.unit_files import read_unit_file  # noqa: PLC0415
 
     beams = read_unit_file(path)
     assert np.isfinite([beams.elevations, beams.azimuth_offsets]).all(), "beams that are not finite"
@@ -300,9 +300,9 @@ def _mutate_floating_car_data(random: Random, content: bytes) -> Case:
 
 def _read_floating_car_data(path: Path, content: bytes) -> None:
     from seip_addon.core.progress import finish  # noqa: PLC0415
-    from seip_addon.core.traffic.floating_car_data import read_floating_car_data, read_trajectories  # noqa: PLC0415
-    from seip_addon.core.traffic.trajectories import Trajectories  # noqa: PLC0415
-    from seip_addon.core.traffic.vehicle_types import BUILT_IN  # noqa: PLC0415
+    from seip_addon.core.sensing.traffic.floating_car_data import read_floating_car_data, read_trajectories  # noqa: PLC0415
+    from seip_addon.core.sensing.traffic.trajectories import Trajectories  # noqa: PLC0415
+    from seip_addon.core.sensing.traffic.vehicle_types import BUILT_IN  # noqa: PLC0415
 
     table = path.with_suffix(".csv")  # which form it is goes by the name
     if not content.lstrip().startswith((b"<", b"\x1f")):
@@ -330,8 +330,8 @@ def _mutate_routes(random: Random, content: bytes) -> Case:
 
 def _read_routes(path: Path, content: bytes) -> None:
     from seip_addon.core.progress import finish  # noqa: PLC0415
-    from seip_addon.core.traffic.sumo_files import read_net_offset  # noqa: PLC0415
-    from seip_addon.core.traffic.vehicle_types import read_vehicle_types  # noqa: PLC0415
+    from seip_addon.core.sensing.traffic.sumo_files import read_net_offset  # noqa: PLC0415
+    from seip_addon.core.sensing.traffic.vehicle_types import read_vehicle_types  # noqa: PLC0415
 
     if b"netOffset" in content:
         require_physical(read_net_offset(path), most=1e8)
@@ -343,8 +343,8 @@ def _read_routes(path: Path, content: bytes) -> None:
 
 
 def _arrays(folder: Path) -> list[bytes]:
-    from seip_addon.core.scans.frame import Frame, Labels  # noqa: PLC0415
-    from seip_addon.core.visibility.grid import VisibilityGrid  # noqa: PLC0415
+    from seip_addon.core.sensing.scans.frame import Frame, Labels  # noqa: PLC0415
+    from seip_addon.core.sensing.visibility.grid import VisibilityGrid  # noqa: PLC0415
     from tests.builders.traffic_by_hand import USERS, make_trajectories  # noqa: PLC0415
 
     random = np.random.default_rng(0)
@@ -418,9 +418,9 @@ def _at_fault(random: Random, array: np.ndarray) -> np.ndarray:
 
 def _read_arrays(path: Path, content: bytes) -> None:
     from seip_addon.core.errors import SeipError  # noqa: PLC0415
-    from seip_addon.core.scans.frame import Frame  # noqa: PLC0415
-    from seip_addon.core.traffic.trajectories import Trajectories  # noqa: PLC0415
-    from seip_addon.core.visibility.grid import VisibilityGrid  # noqa: PLC0415
+    from seip_addon.core.sensing.scans.frame import Frame  # noqa: PLC0415
+    from seip_addon.core.sensing.traffic.trajectories import Trajectories  # noqa: PLC0415
+    from seip_addon.core.sensing.visibility.grid import VisibilityGrid  # noqa: PLC0415
 
     read = 0
     for kind in (Trajectories, VisibilityGrid, Frame):
@@ -464,7 +464,7 @@ _mutate_manifest = _with_wrong_values(
 
 
 def _read_manifest(path: Path, _: bytes) -> None:
-    from seip_addon.core.scans.run_folder import load_manifest  # noqa: PLC0415
+    from seip_addon.core.sensing.scans.run_folder import load_manifest  # noqa: PLC0415
 
     folder = path.parent / "run"
     folder.mkdir(exist_ok=True)
@@ -560,7 +560,7 @@ def _read_detector(path: Path, _: bytes) -> None:
 
 
 def _records(folder: Path) -> list[bytes]:
-    from core.report.report_folder import make_folder  # noqa: PLC0415
+    from core.output.report.report_folder import make_folder  # noqa: PLC0415
 
     make_folder(folder / "sample")
     return [(folder / "sample" / "placement.json").read_bytes()]
@@ -590,7 +590,7 @@ def _mutate_record(random: Random, content: bytes) -> Case:
 
 
 def _read_record(path: Path, _: bytes) -> None:
-    from seip_addon.core.results.placement_record import load_placement_record  # noqa: PLC0415
+    from seip_addon.core.output.results.placement_record import load_placement_record  # noqa: PLC0415
 
     record = load_placement_record(path)
     require_physical(record.as_json() | {"settings": None}, "placement.json")
@@ -598,7 +598,7 @@ def _read_record(path: Path, _: bytes) -> None:
 
 
 def _site_files(folder: Path) -> list[bytes]:
-    from core.report.report_folder import make_folder  # noqa: PLC0415
+    from core.output.report.report_folder import make_folder  # noqa: PLC0415
 
     make_folder(folder / "sample")
     return [(folder / "sample" / "site.npz").read_bytes()]
@@ -630,15 +630,15 @@ def _mutate_signed(random: Random, content: bytes) -> Case:
 
 
 def _read_site_file(path: Path, _: bytes) -> None:
-    from seip_addon.core.results.site_file import load_site_file  # noqa: PLC0415
+    from seip_addon.core.output.results.site_file import load_site_file  # noqa: PLC0415
 
     require_physical(load_site_file(path))
 
 
 def _runs(folder: Path) -> list[bytes]:
     """Return manifests of a run whose frames lie in the folder."""
-    from seip_addon.core.scans.frame import Frame  # noqa: PLC0415
-    from seip_addon.core.scans.run_folder import MANIFEST, _frame_record  # noqa: PLC0415
+    from seip_addon.core.sensing.scans.frame import Frame  # noqa: PLC0415
+    from seip_addon.core.sensing.scans.run_folder import MANIFEST, _frame_record  # noqa: PLC0415
 
     frames = folder / "run" / "frames"
     _arrays(folder)
@@ -659,7 +659,7 @@ _mutate_run = _with_wrong_values(0.5, r'"(?:time_s|points)": ([\d.]+)', ("-7", "
 
 
 def _read_run(path: Path, _: bytes) -> None:
-    from seip_addon.core.scans.run_folder import load_frames  # noqa: PLC0415
+    from seip_addon.core.sensing.scans.run_folder import load_frames  # noqa: PLC0415
 
     path.replace(path.parent / "run" / "manifest.json")
     require_physical([frame for _, frame in load_frames(path.parent / "run")], most=1e11)
@@ -677,11 +677,11 @@ def _cities(folder: Path) -> list[bytes]:
 
 
 def _read_city(path: Path, _: bytes) -> None:
-    from seip_addon.core.citymodel.at_place import AskedBuildings, with_city_model  # noqa: PLC0415
-    from seip_addon.core.citymodel.cityjson import read_city_model  # noqa: PLC0415
     from seip_addon.core.geometry.geo_reference import GeoReference  # noqa: PLC0415
     from seip_addon.core.progress import finish  # noqa: PLC0415
-    from seip_addon.core.streetscape.description import SiteDescription  # noqa: PLC0415
+    from seip_addon.core.world.citymodel.at_place import AskedBuildings, with_city_model  # noqa: PLC0415
+    from seip_addon.core.world.citymodel.cityjson import read_city_model  # noqa: PLC0415
+    from seip_addon.core.world.streetscape.description import SiteDescription  # noqa: PLC0415
     from tests.builders.city_text import origin_at  # noqa: PLC0415
 
     require_physical(read_city_model(path).vertices, "vertices", most=1e8)
@@ -719,7 +719,7 @@ def _mutate_elevation(random: Random, content: bytes) -> Case:
 
 
 def _read_elevation(path: Path, _: bytes) -> None:
-    from seip_addon.core.elevation.geotiff import read_geotiff  # noqa: PLC0415
+    from seip_addon.core.world.elevation.geotiff import read_geotiff  # noqa: PLC0415
 
     model = read_geotiff(path)
     require_physical(model, most=1e8)
@@ -758,8 +758,8 @@ def _mutate_survey(random: Random, content: bytes) -> Case:
 
 
 def _read_survey(path: Path, _: bytes) -> None:
-    from seip_addon.core.elevation.point_cloud import read_points, survey_system  # noqa: PLC0415
     from seip_addon.core.progress import finish  # noqa: PLC0415
+    from seip_addon.core.world.elevation.point_cloud import read_points, survey_system  # noqa: PLC0415
 
     require_physical(survey_system(path)[1], "middle", most=1e8)
     require_physical(finish(read_points(path, np.full(2, -1e8), np.full(2, 1e8))), most=1e8)
@@ -780,9 +780,9 @@ def _mutate_extract(random: Random, content: bytes) -> Case:
 
 
 def _read_extract(path: Path, _: bytes) -> None:
-    from seip_addon.core.openstreetmap.extract import read_extract  # noqa: PLC0415
-    from seip_addon.core.openstreetmap.quantities import count, metres  # noqa: PLC0415
     from seip_addon.core.progress import finish  # noqa: PLC0415
+    from seip_addon.core.world.openstreetmap.extract import read_extract  # noqa: PLC0415
+    from seip_addon.core.world.openstreetmap.quantities import count, metres  # noqa: PLC0415
 
     extract = finish(read_extract(path))
     require_physical([[node.latitude, node.longitude] for node in extract.nodes.values()], "nodes", most=540.0)
@@ -865,7 +865,7 @@ _mutate_detection = _with_wrong_values(
 
 
 def _read_detection(path: Path, _: bytes) -> None:
-    from seip_addon.core.results.detection_record import parsed_detection  # noqa: PLC0415
+    from seip_addon.core.output.results.detection_record import parsed_detection  # noqa: PLC0415
 
     require_physical(parsed_detection(path.read_bytes().decode("utf-8", "replace")), most=1e15)
 
@@ -933,7 +933,7 @@ def _read_mesh(path: Path, _: bytes) -> None:
 
     import bpy  # noqa: PLC0415
 
-    from seip_addon.core.streetscape.mesh_place import MeshPlace  # noqa: PLC0415
+    from seip_addon.core.world.streetscape.mesh_place import MeshPlace  # noqa: PLC0415
     from seip_addon.scene.blend_file import new_file  # noqa: PLC0415
     from seip_addon.scene.imported import import_mesh  # noqa: PLC0415
 

@@ -28,9 +28,9 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.pictures.callouts import place_callouts
-from seip_addon.core.pictures.drawing import save_png
-from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
+from seip_addon.core.output.pictures.callouts import place_callouts
+from seip_addon.core.output.pictures.drawing import save_png
+from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
 
 PANEL_SIZE = (6.0, 4.4)  # inches
 TYPE_SHIFT, SEED_SHIFT = 0.09, 0.035  # of the step between two numbers: from type to type, from mark to seeds

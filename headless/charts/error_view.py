@@ -17,8 +17,8 @@ from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.pictures.drawing import SENSOR_MARK, draw_attribution, draw_polygons
-from seip_addon.core.pictures.palette import INK, SOFT_INK
+from seip_addon.core.output.pictures.drawing import SENSOR_MARK, draw_attribution, draw_polygons
+from seip_addon.core.output.pictures.palette import INK, SOFT_INK
 
 TRUTH_COLOUR, DETECTED_COLOUR, IGNORED_COLOUR = "#00875a", "#d1242f", "#a9b1b8"
 TRUTH_FILL = TRUTH_COLOUR + "22"

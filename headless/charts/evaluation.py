@@ -7,11 +7,11 @@ from pathlib import Path
 from headless.charts.pose_errors import save_frontier_chart, save_loss_chart, save_spread_chart
 from headless.charts.traffic import save_time_map, save_traffic_chart
 
+from seip_addon.core.choosing.placement.objective import Solution
+from seip_addon.core.choosing.robustness.pose_error_evaluation import PoseErrorEvaluation
+from seip_addon.core.choosing.robustness.traffic_study import TrafficStudy
 from seip_addon.core.counts import counted
-from seip_addon.core.placement.objective import Solution
-from seip_addon.core.report.evidence import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
-from seip_addon.core.robustness.pose_error_evaluation import PoseErrorEvaluation
-from seip_addon.core.robustness.traffic_study import TrafficStudy
+from seip_addon.core.output.report.evidence import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
 from seip_addon.core.workflows.survey import Survey
 
 

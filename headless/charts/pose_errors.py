@@ -19,10 +19,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import PercentFormatter
 
+from seip_addon.core.choosing.robustness.pose_study import PoseStudy
+from seip_addon.core.choosing.robustness.robust_study import Contender, RobustStudy
 from seip_addon.core.estimates import IntervalEstimate
-from seip_addon.core.pictures.palette import SOFT_INK
-from seip_addon.core.robustness.pose_study import PoseStudy
-from seip_addon.core.robustness.robust_study import Contender, RobustStudy
+from seip_addon.core.output.pictures.palette import SOFT_INK
 
 FIGURE_SIZE = (7.6, 4.4)  # inches
 

@@ -10,8 +10,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from seip_addon.core.estimates import IntervalEstimate
-from seip_addon.core.pictures.drawing import save_png
-from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
+from seip_addon.core.output.pictures.drawing import save_png
+from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
 
 COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 """Colours of series, told apart by colour-blind people (Okabe and Ito 2008)."""

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 from headless.charts.style import MARKERS, colour, new_figure, save_chart, style_axes
 
-from seip_addon.core.elevation.obstacles import MAX_CHANGED, RAYS, Merging, chosen_merging
-from seip_addon.core.pictures.palette import INK, SOFT_INK
+from seip_addon.core.output.pictures.palette import INK, SOFT_INK
+from seip_addon.core.world.elevation.obstacles import MAX_CHANGED, RAYS, Merging, chosen_merging
 
 
 def save_merging_chart(path: str | os.PathLike[str], tried: Sequence[Merging]) -> None:

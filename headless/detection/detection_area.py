@@ -16,7 +16,7 @@ from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.height_raster import HeightRaster
 from seip_addon.core.geometry.plan import surface_height
-from seip_addon.core.scans.frame import Frame
+from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 
 from .pillars import PillarGrid, grid_over

@@ -8,7 +8,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Boolean, Float, Integer, Text
-from seip_addon.core.scans.frame import Frame
+from seip_addon.core.sensing.scans.frame import Frame
 
 from .cloud_in_plan import CloudInPlan
 

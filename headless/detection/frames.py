@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from seip_addon.core.arrays import Float, Integer
 from seip_addon.core.errors import SeipError
-from seip_addon.core.scans.frame import Frame
-from seip_addon.core.scans.run_folder import frame_path, load_manifest
-from seip_addon.core.traffic.run_overlap import VehiclePositions, require_independent
+from seip_addon.core.sensing.scans.frame import Frame
+from seip_addon.core.sensing.scans.run_folder import frame_path, load_manifest
+from seip_addon.core.sensing.traffic.run_overlap import VehiclePositions, require_independent
 
 from .detection_area import DetectionArea
 from .detector import TrainingRecord

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.scans.frame import Frame
+from seip_addon.core.sensing.scans.frame import Frame
 
 from .detection_area import DetectionArea
 from .detector import Detector

@@ -9,7 +9,7 @@ from headless.detection.run_detection import AT_ONCE, detect_in_runs
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import Interval
 from seip_addon.core.progress import Progress, side_by_side
-from seip_addon.core.scans.frame import Frame
+from seip_addon.core.sensing.scans.frame import Frame
 
 from .average_precision import Evaluation, balanced_score, evaluate
 from .breakdown import recall_by_category

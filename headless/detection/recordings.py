@@ -12,21 +12,21 @@ from pathlib import Path
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.choosing.robustness.traffic_instants import WARM_UP
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import FRAMES, TIME_STEP
+from seip_addon.core.output.results.placement_record import versions
 from seip_addon.core.progress import finish
-from seip_addon.core.results.placement_record import versions
-from seip_addon.core.robustness.traffic_instants import WARM_UP
-from seip_addon.core.scans.frame import Frame
-from seip_addon.core.scans.run_folder import Run
-from seip_addon.core.scans.sensor import MountedSensor
-from seip_addon.core.scans.simulation import ScanSettings, Simulation, prepare
-from seip_addon.core.scans.static_scene import static_scene
+from seip_addon.core.sensing.scans.frame import Frame
+from seip_addon.core.sensing.scans.run_folder import Run
+from seip_addon.core.sensing.scans.sensor import MountedSensor
+from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, prepare
+from seip_addon.core.sensing.scans.static_scene import static_scene
+from seip_addon.core.sensing.traffic.bodies import fitted_body
+from seip_addon.core.sensing.traffic.parked import parked_users
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import digest
-from seip_addon.core.traffic.bodies import fitted_body
-from seip_addon.core.traffic.parked import parked_users
-from seip_addon.core.traffic.trajectories import Trajectories
 
 from .detection_area import area_of
 from .frames import LazyFrames, Recording

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from seip_addon.core.scans.frame import Frame
+from seip_addon.core.sensing.scans.frame import Frame
 
 from .detection_area import DetectionArea
 from .detector import Detector

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.sensing.traffic.varied_bodies import draw_size
 from seip_addon.core.storage.files import whole_file
-from seip_addon.core.traffic.varied_bodies import draw_size
 
 from .street_network import DRIVING, PARKED_CLASS, PARKING, WALKING, NetworkEdge, NetworkLane, StreetNetwork
 

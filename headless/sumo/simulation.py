@@ -9,13 +9,13 @@ import shapely
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive.read import read_map
-from seip_addon.core.opendrive.road_map import RoadMap
 from seip_addon.core.progress import Progress
+from seip_addon.core.sensing.traffic.source import TrafficFiles
 from seip_addon.core.storage.files import whole_file
-from seip_addon.core.streetscape.road_surface import GROUPS
 from seip_addon.core.sumo_programs import Sumo, find_sumo, run
-from seip_addon.core.traffic.source import TrafficFiles
+from seip_addon.core.world.opendrive.read import read_map
+from seip_addon.core.world.opendrive.road_map import RoadMap
+from seip_addon.core.world.streetscape.road_surface import GROUPS
 
 from .demand import Demand, write_routes
 from .street_network import PARKED_CLASS, StreetNetwork, read_network

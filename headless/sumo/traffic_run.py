@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from seip_addon.core.progress import Progress
+from seip_addon.core.sensing.traffic.floating_car_data import Extent
+from seip_addon.core.sensing.traffic.overlaps import without_overlaps
+from seip_addon.core.sensing.traffic.road_fit import fit_to_road
+from seip_addon.core.sensing.traffic.smooth_walks import smooth_walks
+from seip_addon.core.sensing.traffic.source import ROAD_MARGIN, TrafficFiles, read_sumo, road_bounds
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.site.scene_geometry import SceneGeometry
-from seip_addon.core.traffic.floating_car_data import Extent
-from seip_addon.core.traffic.overlaps import without_overlaps
-from seip_addon.core.traffic.road_fit import fit_to_road
-from seip_addon.core.traffic.smooth_walks import smooth_walks
-from seip_addon.core.traffic.source import ROAD_MARGIN, TrafficFiles, read_sumo, road_bounds
-from seip_addon.core.traffic.trajectories import Trajectories
 
 from .simulation import Scenario, simulate
 

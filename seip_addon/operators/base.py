@@ -9,8 +9,8 @@ import bpy
 
 from .. import scene_status
 from ..background import Background
+from ..core.choosing.placement.search_limits import Acceptance
 from ..core.errors import SeipError
-from ..core.placement.search_limits import Acceptance
 from ..core.progress import Progress, finish
 from ..session import RunningWork, scene_of, session
 

@@ -11,8 +11,8 @@ import bpy
 
 from .. import preferences, scene_status
 from ..core.errors import SeipError
+from ..core.output.results.detection_record import MAIN_RULE, parsed_detection
 from ..core.progress import Progress
-from ..core.results.detection_record import MAIN_RULE, parsed_detection
 from ..core.storage.files import check_folder, digest, unfinished_name
 from ..core.workflows.detection import INSTALL, DetectionJob, detect_elsewhere
 from ..core.workflows.traffic_runs import found_runs

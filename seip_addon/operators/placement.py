@@ -12,11 +12,11 @@ from typing import Literal
 import bpy
 
 from .. import scene_survey, selection
+from ..core.choosing.placement.objective import Objective, check_objective
+from ..core.choosing.placement.search_limits import Acceptance
 from ..core.errors import SeipError
-from ..core.placement.objective import Objective, check_objective
-from ..core.placement.search_limits import Acceptance
+from ..core.output.results.placement_record import Provenance, versions
 from ..core.progress import Progress
-from ..core.results.placement_record import Provenance, versions
 from ..core.workflows.placing import place
 from ..core.workflows.survey import record_of
 from ..core.workflows.traffic_runs import found_runs, read_runs

@@ -12,17 +12,17 @@ import numpy as np
 from mathutils import Vector
 
 from .. import live_coverage, preferences, scene_status, scene_survey, selection
+from ..core.choosing.placement.deployment import sensor_at
+from ..core.choosing.placement.objective import Objective, target_weights
 from ..core.errors import SeipError
-from ..core.placement.deployment import sensor_at
-from ..core.placement.objective import Objective, target_weights
+from ..core.output.report.write import write_report
+from ..core.output.results.comparison import compare, packed_counts, unpacked_counts
+from ..core.output.results.placement_record import PlacementRecord, Provenance, parsed_record, versions
+from ..core.output.results.ranking import Ranked, rank_added, rank_alone
 from ..core.progress import Progress
-from ..core.report.write import write_report
-from ..core.results.comparison import compare, packed_counts, unpacked_counts
-from ..core.results.placement_record import PlacementRecord, Provenance, parsed_record, versions
-from ..core.results.ranking import Ranked, rank_added, rank_alone
-from ..core.scans.sensor import MountedSensor
+from ..core.sensing.scans.sensor import MountedSensor
+from ..core.sensing.visibility.visibility_model import VisibilityModel, visibility_model
 from ..core.storage.files import check_folder, digest
-from ..core.visibility.visibility_model import VisibilityModel, visibility_model
 from ..core.workflows.moved_sensors import evaluate_moved_sensors
 from ..core.workflows.survey import Survey, record_of
 from ..scene.blend_file import save_blend

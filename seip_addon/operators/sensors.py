@@ -10,7 +10,7 @@ from bl_operators.presets import AddPresetBase
 from .. import preferences, sensor_types
 from ..core.counts import counted
 from ..core.errors import SeipError
-from ..core.lidar.catalogue import load_catalogue
+from ..core.sensing.lidar.catalogue import load_catalogue
 from ..session import session
 from ..viewport import beam_preview
 from .base import Outcome, attempt

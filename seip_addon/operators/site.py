@@ -16,10 +16,10 @@ from ..core.site.check import Problem, SiteCheck, check_site
 from ..core.site.roles import Role
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
-from ..core.streetscape.description import DESCRIPTION_SUFFIX
 from ..core.workflows.site_building import AskedSite, BuiltSite, build_site
 from ..core.workflows.site_places import SitePlaces, site_places
 from ..core.workflows.survey import SurveySettings, lay_out
+from ..core.world.streetscape.description import DESCRIPTION_SUFFIX
 from ..properties.site import ROLE_ITEMS, SEIP_PG_site
 from ..scene import contract, roles
 from ..scene.build import build_scene

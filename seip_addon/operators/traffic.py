@@ -10,17 +10,17 @@ from pathlib import Path
 import bpy
 
 from .. import live_scan, preferences, scene_status, scene_survey
+from ..core.choosing.placement.objective import target_weights
+from ..core.choosing.robustness.traffic_instants import check_runs, spread_instants
+from ..core.choosing.robustness.traffic_study import IN_TRAFFIC, traffic_message
 from ..core.counts import counted
-from ..core.placement.objective import target_weights
+from ..core.output.results.placement_record import parsed_record, versions
 from ..core.progress import Progress, finish
-from ..core.results.placement_record import parsed_record, versions
-from ..core.robustness.traffic_instants import check_runs, spread_instants
-from ..core.robustness.traffic_study import IN_TRAFFIC, traffic_message
-from ..core.scans.run_folder import Record, Run, check_run_folder
-from ..core.scans.sensor import MountedSensor
+from ..core.sensing.scans.run_folder import Record, Run, check_run_folder
+from ..core.sensing.scans.sensor import MountedSensor
+from ..core.sensing.traffic.source import TrafficFiles, load_traffic
+from ..core.sensing.traffic.trajectories import CATEGORIES, LoadedTraffic, Trajectories
 from ..core.site.scene_geometry import SceneGeometry
-from ..core.traffic.source import TrafficFiles, load_traffic
-from ..core.traffic.trajectories import CATEGORIES, LoadedTraffic, Trajectories
 from ..core.workflows.recording import RecordingSettings, make_run, record, simulation_of
 from ..core.workflows.survey import surroundings
 from ..properties.conversion import output_folder

@@ -12,9 +12,9 @@ import bpy
 
 from .. import scene_survey
 from ..core.errors import SeipError
+from ..core.output.results.placement_record import relevant_warnings
 from ..core.progress import Progress
-from ..core.results.placement_record import relevant_warnings
-from ..core.visibility.sight_lines import pose_at, sight_lines
+from ..core.sensing.visibility.sight_lines import pose_at, sight_lines
 from ..scene import contract
 from ..scene.blend_file import save_blend
 from ..scene.sensors import placed_sensors, pose_of
@@ -219,8 +219,8 @@ def _rendered_sheet(path: Path, scene: bpy.types.Scene) -> Generator[Progress, N
 def _save_sheet(path: Path, state: SceneState, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet
     from PIL import Image  # noqa: PLC0415  # as above
 
-    from ..core.pictures.plan_view import save_plan_view  # noqa: PLC0415  # as above
-    from ..core.pictures.sheet import save_sheet  # noqa: PLC0415  # as above
+    from ..core.output.pictures.plan_view import save_plan_view  # noqa: PLC0415  # as above
+    from ..core.output.pictures.sheet import save_sheet  # noqa: PLC0415  # as above
 
     survey, solution = state.placed()
     with TemporaryDirectory(prefix="seip-") as folder:

@@ -8,7 +8,7 @@ import bpy
 
 from .. import preferences
 from ..core.errors import SeipError
-from ..core.results.detection_record import MAIN_RULE, DetectionRecord, parsed_detection
+from ..core.output.results.detection_record import MAIN_RULE, DetectionRecord, parsed_detection
 from ..core.workflows.detection import ERRORS
 from ..core.workflows.traffic_runs import traffic_folder
 from ..operators.detection import NO_PYTHON, SEIP_OT_detect, sensors_key, why_no_detection

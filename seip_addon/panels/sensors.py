@@ -6,9 +6,9 @@ import math
 
 import bpy
 
-from ..core.lidar.model import LidarModel
-from ..core.visibility.road_range import road_range
-from ..core.visibility.settings import VisibilitySettings
+from ..core.sensing.lidar.model import LidarModel
+from ..core.sensing.visibility.road_range import road_range
+from ..core.sensing.visibility.settings import VisibilitySettings
 from ..operators.sensors import (
     SEIP_MT_survey_presets,
     SEIP_OT_add_catalogue,

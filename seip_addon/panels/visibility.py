@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .. import scene_status
-from ..core.visibility.estimate import Estimate
+from ..core.sensing.visibility.estimate import Estimate
 from ..operators.visibility import SEIP_OT_compute_visibility, SEIP_OT_estimate_visibility
 from ..session import session
 from .run_button import draw_run, in_words

@@ -8,9 +8,9 @@ import bpy
 from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from .. import selection
-from ..core.placement.objective import DEFAULT_COUNT, Objective
-from ..core.placement.scenarios import DEFAULT_COUNTS, MAX_ANGLE_STD, PoseErrors, Scenarios
-from ..core.robustness.traffic_study import LAYER_NAMES
+from ..core.choosing.placement.objective import DEFAULT_COUNT, Objective
+from ..core.choosing.placement.scenarios import DEFAULT_COUNTS, MAX_ANGLE_STD, PoseErrors, Scenarios
+from ..core.choosing.robustness.traffic_study import LAYER_NAMES
 from .conversion import as_typed, of_setting
 
 

@@ -8,11 +8,11 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..core.errors import SeipError
-from ..core.openstreetmap.site import is_extract
 from ..core.site.scene_geometry import DEFAULT_WEIGHT
-from ..core.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
 from ..core.workflows.site_building import AskedSite
 from ..core.workflows.site_places import parsed_position
+from ..core.world.openstreetmap.site import is_extract
+from ..core.world.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
 from ..scene import contract, roles
 from .conversion import as_typed
 

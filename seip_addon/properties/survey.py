@@ -8,12 +8,12 @@ from collections.abc import Callable
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
+from ..core.choosing.placement.search_limits import DEFAULT_EFFORT
 from ..core.errors import SeipError
-from ..core.placement.search_limits import DEFAULT_EFFORT
+from ..core.sensing.visibility.settings import VisibilitySettings
 from ..core.site.candidates import MAX_SENSOR_HEIGHT, CandidateSettings, heights_of, tilts_of
 from ..core.site.post_rules import RULES
 from ..core.site.weather import Weather
-from ..core.visibility.settings import VisibilitySettings
 from ..core.workflows.survey import SurveySettings
 from ..preferences import catalogue_files
 from .conversion import as_typed, of_setting

@@ -6,10 +6,10 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from .. import live_scan
-from ..core.datasets.formats import FORMATS
-from ..core.datasets.sample import SPLITS
-from ..core.scans.simulation import ScanSettings
-from ..core.traffic.source import TrafficFiles
+from ..core.output.datasets.formats import FORMATS
+from ..core.output.datasets.sample import SPLITS
+from ..core.sensing.scans.simulation import ScanSettings
+from ..core.sensing.traffic.source import TrafficFiles
 from ..core.workflows.recording import RecordingSettings
 from .conversion import absolute, as_typed, of_setting
 

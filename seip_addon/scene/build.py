@@ -12,8 +12,8 @@ import shapely
 from ..core.progress import Progress
 from ..core.site.roles import AREA_OVERLAYS, Role
 from ..core.storage.files import digest
-from ..core.streetscape.model import SiteModel
-from ..core.streetscape.parts import Part
+from ..core.world.streetscape.model import SiteModel
+from ..core.world.streetscape.parts import Part
 from . import contract
 from .daylight import add_daylight
 from .meshes import mesh_of

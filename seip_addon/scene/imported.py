@@ -19,8 +19,8 @@ from ..core.child_process import exit_status
 from ..core.errors import SeipError
 from ..core.limits import MODEL_COORDINATE
 from ..core.site.scene_geometry import FROM_MESH
-from ..core.streetscape.mesh_header import check_mesh_header
-from ..core.streetscape.mesh_place import MeshPlace
+from ..core.world.streetscape.mesh_header import check_mesh_header
+from ..core.world.streetscape.mesh_place import MeshPlace
 from . import contract
 from .read import shown_parts
 

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import SeipError
-from ..core.pictures.palette import (
+from ..core.output.pictures.palette import (
     FORBIDDEN_VEIL,
     INK,
     MANDATORY_VEIL,
@@ -62,7 +62,7 @@ COLOURS = {
     "leaves": (0.105, 0.210, 0.065),
     "candidate veil": (0.650, 0.650, 0.600),
 }
-"""Linear RGB of each material that `core.streetscape.street_furniture` and `core.traffic.bodies` name."""
+"""Linear RGB of each material that `core.world.streetscape.street_furniture` and `core.sensing.traffic.bodies` name."""
 
 PAINT_COLOURS = {
     "black": (0.020, 0.021, 0.024),
@@ -74,7 +74,7 @@ PAINT_COLOURS = {
     "white": (0.700, 0.700, 0.685),
 }
 COLOURS |= {f"{what} {name}": colour for what in ("paint", "cloth") for name, colour in PAINT_COLOURS.items()}
-"""Of the colours that `core.traffic.bodies` names, on vehicles and on people."""
+"""Of the colours that `core.sensing.traffic.bodies` names, on vehicles and on people."""
 
 REFLECTIVITY = {
     "asphalt": 0.17,

@@ -20,10 +20,10 @@ from mathutils import Matrix, Vector
 
 from ..core.arrays import Boolean, Float
 from ..core.child_process import run_logged
+from ..core.choosing.placement.deployment import Deployment
 from ..core.errors import SeipError
-from ..core.pictures.labelled_view import Sight, save_labelled_view
-from ..core.pictures.viewpoint import Viewpoint, frame
-from ..core.placement.deployment import Deployment
+from ..core.output.pictures.labelled_view import Sight, save_labelled_view
+from ..core.output.pictures.viewpoint import Viewpoint, frame
 from ..core.progress import Progress
 from ..core.site.site import Site
 from . import contract

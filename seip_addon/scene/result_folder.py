@@ -9,19 +9,19 @@ from pathlib import Path
 import bpy
 
 from ..core.arrays import Boolean
+from ..core.choosing.placement.objective import Solution, placement_problem
 from ..core.errors import SeipError
-from ..core.lidar.model import LidarModel
-from ..core.pictures.plan_view import save_plan_view
-from ..core.placement.objective import Solution, placement_problem
+from ..core.output.pictures.plan_view import save_plan_view
+from ..core.output.results.candidate_table import save_candidate_table
+from ..core.output.results.carla import save_carla_spawns
+from ..core.output.results.geojson import save_geojson
+from ..core.output.results.kml import save_kml
+from ..core.output.results.located import LOCATED_FILES, located
+from ..core.output.results.placement_record import PlacementRecord, relevant_warnings, save_placement_record
+from ..core.output.results.report_files import REPORT_FILES
+from ..core.output.results.site_file import save_site_file
 from ..core.progress import Progress, finish
-from ..core.results.candidate_table import save_candidate_table
-from ..core.results.carla import save_carla_spawns
-from ..core.results.geojson import save_geojson
-from ..core.results.kml import save_kml
-from ..core.results.located import LOCATED_FILES, located
-from ..core.results.placement_record import PlacementRecord, relevant_warnings, save_placement_record
-from ..core.results.report_files import REPORT_FILES
-from ..core.results.site_file import save_site_file
+from ..core.sensing.lidar.model import LidarModel
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
 from ..core.storage.files import unfinished_name

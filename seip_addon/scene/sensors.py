@@ -10,9 +10,9 @@ import numpy as np
 
 from ..core.arrays import Float
 from ..core.errors import SeipError
-from ..core.lidar.catalogue import find_models
-from ..core.lidar.model import LidarModel
-from ..core.scans.sensor import MountedSensor
+from ..core.sensing.lidar.catalogue import find_models
+from ..core.sensing.lidar.model import LidarModel
+from ..core.sensing.scans.sensor import MountedSensor
 from . import contract
 
 

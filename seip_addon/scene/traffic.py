@@ -14,8 +14,8 @@ from ..core.arrays import Float
 from ..core.errors import SeipError
 from ..core.geometry.solids import Solid
 from ..core.progress import Progress
-from ..core.traffic.bodies import Body, colour_of, fitted_body
-from ..core.traffic.trajectories import CATEGORIES, MAX_BEND, RoadUser, Trajectories, is_shape
+from ..core.sensing.traffic.bodies import Body, colour_of, fitted_body
+from ..core.sensing.traffic.trajectories import CATEGORIES, MAX_BEND, RoadUser, Trajectories, is_shape
 from . import contract
 from .meshes import mesh_of
 from .read import origin_of

@@ -9,10 +9,10 @@ import bpy
 import numpy as np
 
 from ..core.arrays import Integer
+from ..core.choosing.placement.deployment import Deployment, Sensor
 from ..core.errors import SeipError
 from ..core.geometry.solids import Solid, join, prism, tube
-from ..core.pictures.coverage_colours import Aspect, Colouring, as_placed, colouring
-from ..core.placement.deployment import Deployment, Sensor
+from ..core.output.pictures.coverage_colours import Aspect, Colouring, as_placed, colouring
 from ..core.site.roles import AREA_OVERLAYS
 from ..core.site.site import Site, Targets
 from ..core.site.target_squares import target_squares

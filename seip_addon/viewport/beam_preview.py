@@ -9,10 +9,10 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ..core.arrays import Float
-from ..core.lidar.model import LidarModel
-from ..core.lidar.rings import BeamRings, beam_rings
-from ..core.pictures.palette import DENSE_BEAMS, PAPER, WIDE_BEAMS, rgb
-from ..core.visibility.ring_resolution import unresolved_from
+from ..core.output.pictures.palette import DENSE_BEAMS, PAPER, WIDE_BEAMS, rgb
+from ..core.sensing.lidar.model import LidarModel
+from ..core.sensing.lidar.rings import BeamRings, beam_rings
+from ..core.sensing.visibility.ring_resolution import unresolved_from
 from ..scene import contract
 from ..session import session
 from .overlays import redraw

@@ -2,7 +2,7 @@
 
 import bpy
 
-from ..core.pictures.palette import rgb
+from ..core.output.pictures.palette import rgb
 from ..overlay import Block, Entry, Overlay
 from ..scene.write import CLASS_COLOURS, CLASS_WORDS, SHARES, coverage_of
 from . import overlays

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ..core.pictures.callouts import stack_upwards
+from ..core.output.pictures.callouts import stack_upwards
 from ..overlay import Label
 from ..scene import contract
 from ..scene.sensors import placed_sensors

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..core.pictures.cloud_colours import By, cloud_colours, sensor_colour, strength_ramp
-from ..core.pictures.palette import MAX_INTENSITY, STATIC_COLOUR, rgb
-from ..core.scans.frame import Frame
-from ..core.scans.sensor import MountedSensor
+from ..core.output.pictures.cloud_colours import By, cloud_colours, sensor_colour, strength_ramp
+from ..core.output.pictures.palette import MAX_INTENSITY, STATIC_COLOUR, rgb
+from ..core.sensing.scans.frame import Frame
+from ..core.sensing.scans.sensor import MountedSensor
 from ..overlay import Block, Colour, Entry, Layer, Overlay
 
 NAME = "point cloud"

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.arrays import Float
-from ..core.pictures.palette import HIDDEN_COLOUR, MISSED_COLOUR, SIGHT_LINE, rgb
-from ..core.visibility.sight_lines import SightLines
+from ..core.output.pictures.palette import HIDDEN_COLOUR, MISSED_COLOUR, SIGHT_LINE, rgb
+from ..core.sensing.visibility.sight_lines import SightLines
 from ..overlay import Block, Colour, Entry, Layer, Overlay
 from ..scene.write import LIFT
 

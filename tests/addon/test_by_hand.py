@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from seip_addon import live_coverage, selection
-from seip_addon.core.placement.objective import MOVED, MOVED_MESSAGE
-from seip_addon.core.results.comparison import unpacked_counts
-from seip_addon.core.results.placement_record import comparable, load_placement_record, parsed_record
+from seip_addon.core.choosing.placement.objective import MOVED, MOVED_MESSAGE
+from seip_addon.core.output.results.comparison import unpacked_counts
+from seip_addon.core.output.results.placement_record import comparable, load_placement_record, parsed_record
 from seip_addon.scene import result_folder
 from seip_addon.scene.result_folder import FILES
 from seip_addon.sensor_edits import sensor_edits

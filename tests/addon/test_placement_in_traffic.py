@@ -9,7 +9,7 @@ from headless import place
 import bpy
 import pytest
 
-from seip_addon.core.results.placement_record import comparable, load_placement_record, parsed_record
+from seip_addon.core.output.results.placement_record import comparable, load_placement_record, parsed_record
 from seip_addon.operators.placement import SEIP_OT_solve_placement
 from seip_addon.panels.placement import SEIP_PT_placement_objective
 from seip_addon.session import session

@@ -14,10 +14,10 @@ import pytest
 
 from seip_addon import scene_status, selection
 from seip_addon import session as session_data
+from seip_addon.core.output.results.placement_record import comparable, load_placement_record, parsed_record
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.results.placement_record import comparable, load_placement_record, parsed_record
-from seip_addon.core.visibility.grid import VisibilityGrid
-from seip_addon.core.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
+from seip_addon.core.sensing.visibility.grid import VisibilityGrid
+from seip_addon.core.sensing.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
 from seip_addon.scene.write import MARK
 from seip_addon.session import session
 
@@ -110,7 +110,7 @@ def test_a_saved_placement_goes_on_without_computing(junction, tmp_path, monkeyp
     assert session.state_of(scene) is None
     assert scene.seip.result.record == before
     for forbidden in ("compute_visibility", "optimise"):
-        monkeypatch.setattr(f"seip_addon.core.visibility.store.{forbidden}", None, raising=False)
+        monkeypatch.setattr(f"seip_addon.core.sensing.visibility.store.{forbidden}", None, raising=False)
         monkeypatch.setattr(f"seip_addon.core.workflows.survey.{forbidden}", None, raising=False)
     assert bpy.ops.seip.rank_candidates() == {"FINISHED"}
     assert len(scene.seip.result.ranking) > 0

@@ -12,10 +12,10 @@ import pytest
 from seip_addon import preferences
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation
-from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.visibility.ray_casting import MAX_THREADS
+from seip_addon.core.sensing.visibility.ring_resolution import unresolved_from
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.visibility.ray_casting import MAX_THREADS
-from seip_addon.core.visibility.ring_resolution import unresolved_from
 from seip_addon.session import session
 from seip_addon.viewport import beam_preview
 

@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon.core.results.placement_record import load_placement_record
-from seip_addon.core.scans.frame import Frame
+from seip_addon.core.output.results.placement_record import load_placement_record
+from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.scene.write import write_result
 from seip_addon.session import session
 from seip_addon.viewport import overlays

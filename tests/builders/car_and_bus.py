@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from seip_addon.core.traffic.trajectories import RoadUser, Trajectories
+from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from tests.builders.small_junction import ORIGIN
 
 

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 from scipy.stats import norm
 
-from seip_addon.core.lidar.range_equation import RangeEquation
+from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 
 LAW = RangeEquation(-11.6, 0.7, 0.96)
 HEIGHT = 3.0

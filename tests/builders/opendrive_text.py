@@ -1,7 +1,7 @@
 """Small OpenDRIVE files as text, for the tests of the reader."""
 
-from seip_addon.core.opendrive.lanes import lane_surfaces
-from seip_addon.core.opendrive.read import read_map
+from seip_addon.core.world.opendrive.lanes import lane_surfaces
+from seip_addon.core.world.opendrive.read import read_map
 
 
 def lane(number, width=3.5, kind="driving", inside="", level="false"):

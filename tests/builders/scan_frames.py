@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from seip_addon.core.datasets.dataset_folder import write_dataset
-from seip_addon.core.datasets.formats import FORMATS
-from seip_addon.core.datasets.sample import SensorPose, TrafficRun
+from seip_addon.core.output.datasets.dataset_folder import write_dataset
+from seip_addon.core.output.datasets.formats import FORMATS
+from seip_addon.core.output.datasets.sample import SensorPose, TrafficRun
 from seip_addon.core.progress import finish
-from seip_addon.core.scans.frame import STATIC_INSTANCE, Frame, Labels
-from seip_addon.core.traffic.trajectories import CATEGORIES
+from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame, Labels
+from seip_addon.core.sensing.traffic.trajectories import CATEGORIES
 
 ORIGIN = np.array([389_123.456, 5_712_345.678, 87.25])
 SIZES = {

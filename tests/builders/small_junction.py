@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from seip_addon.core.lidar.catalogue import load_catalogue
-from seip_addon.core.lidar.model import LidarModel
-from seip_addon.core.placement.deployment import Deployment, deploy
+from seip_addon.core.choosing.placement.deployment import Deployment, deploy
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.site.scene_geometry import Mesh, NamedArea, Pole, SceneGeometry
 from seip_addon.core.site.site import Candidates, Site, Targets
 

@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 import shapely
 
+from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
-from seip_addon.core.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import save_blend
 from tests.builders.scene_by_hand import make_scene

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from seip_addon.core.lidar.carla_dropoff import CarlaDropoff
-from seip_addon.core.lidar.catalogue import load_catalogue
-from seip_addon.core.scans.sensor import MountedSensor, level_orientation
+from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
+from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
-from seip_addon.core.traffic.trajectories import RoadUser, Trajectories
 
 
 def road():

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from seip_addon.core.scans.frame import STATIC_INSTANCE, Frame, Labels
+from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame, Labels
 
 SIZES = {"car": (4.4, 1.8, 1.5), "truck": (9.0, 2.5, 3.4), "bicycle": (1.8, 0.6, 1.7), "pedestrian": (0.5, 0.6, 1.75)}
 SENSORS = np.array([[16.0, 16.0, 5.0], [-16.0, -16.0, 5.0]])

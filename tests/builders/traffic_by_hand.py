@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from seip_addon.core.lidar.carla_dropoff import CarlaDropoff
-from seip_addon.core.lidar.model import LidarModel
-from seip_addon.core.scans.sensor import MountedSensor, level_orientation
-from seip_addon.core.scans.static_scene import StaticScene
-from seip_addon.core.traffic.trajectories import RoadUser, Trajectories
+from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
+from seip_addon.core.sensing.scans.static_scene import StaticScene
+from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from tests.builders.small_junction import box_triangles, flat_triangles
 
 REGION = shapely.box(-40, -40, 40, 40)

@@ -13,10 +13,10 @@ from seip_addon.core.storage.array_file import ArrayRule
 
 ALL = {name: value for name, value in vars(limits).items() if isinstance(value, Limits)}
 FILES = (
-    "seip_addon.core.scans.frame",
-    "seip_addon.core.traffic.trajectories",
-    "seip_addon.core.visibility.grid",
-    "seip_addon.core.results.site_file",
+    "seip_addon.core.sensing.scans.frame",
+    "seip_addon.core.sensing.traffic.trajectories",
+    "seip_addon.core.sensing.visibility.grid",
+    "seip_addon.core.output.results.site_file",
 )
 
 

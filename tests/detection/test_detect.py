@@ -16,8 +16,8 @@ from headless.detection.settings import NetworkSettings
 import bpy
 import numpy as np
 
-from seip_addon.core.datasets.detection_files import kitti_results, openpcdet_results
 from seip_addon.core.errors import SeipError
+from seip_addon.core.output.datasets.detection_files import kitti_results, openpcdet_results
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import open_blend, save_blend
 from seip_addon.scene.sensors import labelled_sensors

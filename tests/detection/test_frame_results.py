@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.scans.frame import Frame, Labels
+from seip_addon.core.sensing.scans.frame import Frame, Labels
 
 CLASSES = (("car", "van"), ("truck", "bus"))
 REGION = shapely.box(-20, -20, 20, 20)

@@ -8,7 +8,7 @@ from headless.studies.detection.sensor_configuration import SensorConfiguration
 import numpy as np
 
 from seip_addon.core.geometry.orientation import orientation
-from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 
 
 def test_a_tilted_sensor_records_tilted():

@@ -20,7 +20,7 @@ import torch
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.height_raster import HeightRaster
 from seip_addon.core.progress import finish
-from seip_addon.core.scans.frame import Frame
+from seip_addon.core.sensing.scans.frame import Frame
 from tests.builders.street_clouds import street_frame
 
 SMALL = NetworkSettings(width=16, blocks=(1, 1, 1), most_points=8)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive.read import read_map
+from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from tests.builders.city_text import CityModel, origin_at

@@ -21,14 +21,14 @@ from headless.studies.stability.criterion import (
 import numpy as np
 import pytest
 
+from seip_addon.core.choosing.placement.objective import Objective
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar.catalogue import load_catalogue
-from seip_addon.core.placement.objective import Objective
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+from seip_addon.core.sensing.visibility.ring_resolution import unresolved_from
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.visibility.ray_casting import make_ray_caster
-from seip_addon.core.visibility.ring_resolution import unresolved_from
-from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.workflows.survey import SurveySettings
 from tests.builders.small_junction import make_geometry
 from tests.builders.synthetic_junction import rectangle

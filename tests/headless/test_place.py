@@ -17,10 +17,10 @@ from headless import place, runtime
 import bpy
 import pytest
 
+from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement.scenarios import Scenarios
-from seip_addon.core.results.placement_record import comparable, load_placement_record
-from seip_addon.core.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
+from seip_addon.core.output.results.placement_record import comparable, load_placement_record
+from seip_addon.core.sensing.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
 from seip_addon.core.workflows.placing import ACCEPTED_MESSAGE
 
 ROOT = Path(__file__).resolve().parents[2]

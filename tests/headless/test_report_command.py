@@ -12,8 +12,8 @@ import bpy
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.report.repeat import repeating_command
-from seip_addon.core.results.placement_record import comparable, load_placement_record
+from seip_addon.core.output.report.repeat import repeating_command
+from seip_addon.core.output.results.placement_record import comparable, load_placement_record
 from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import open_blend, save_blend

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.scans.frame import Frame
-from seip_addon.core.scans.run_folder import load_frames
+from seip_addon.core.sensing.scans.frame import Frame
+from seip_addon.core.sensing.scans.run_folder import load_frames
+from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.core.storage.files import lock_folder
-from seip_addon.core.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import save_blend
 from seip_addon.scene.traffic import animate

@@ -16,10 +16,10 @@ import pytest
 from seip_addon.core import sumo_programs
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.traffic.floating_car_data import Extent, read_floating_car_data, read_trajectories
+from seip_addon.core.sensing.traffic.trajectories import CATEGORIES
+from seip_addon.core.sensing.traffic.vehicle_types import read_vehicle_types
 from seip_addon.core.sumo_programs import find_sumo
-from seip_addon.core.traffic.floating_car_data import Extent, read_floating_car_data, read_trajectories
-from seip_addon.core.traffic.trajectories import CATEGORIES
-from seip_addon.core.traffic.vehicle_types import read_vehicle_types
 from tests.sumo_here import needs_sumo
 
 ROOT = Path(__file__).resolve().parents[2]

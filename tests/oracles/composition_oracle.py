@@ -9,7 +9,7 @@ from headless.studies.benchmark.street_visibility import street_problem
 import numpy as np
 from numpy.typing import NDArray
 
-from seip_addon.core.placement.problem import PlacementProblem
+from seip_addon.core.choosing.placement.problem import PlacementProblem
 
 PRICES = [[6.0, 15.0], [5.0, 8.0, 13.0], [6.0, 10.0, 25.0], [4.0, 7.0]]
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from seip_addon.core.lidar.model import LidarModel
+from seip_addon.core.sensing.lidar.model import LidarModel
 
 Float = NDArray[np.float64]
 

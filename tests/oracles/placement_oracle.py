@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 from hypothesis import strategies as st
 
-from seip_addon.core.placement.problem import PlacementProblem
+from seip_addon.core.choosing.placement.problem import PlacementProblem
 
 WEIGHTS = [[1.0], [1.0, 2.0], [0.0, 0.5, 3.0], [1e-3, 1.0, 7.0], [2.0**21 - 1, 2.0**21 + 1]]
 """Weights to draw from. The last ones have sums that single precision holds, while sums of their sums are rounded."""

@@ -14,9 +14,9 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
+from seip_addon.core.choosing.placement.objective import MOVED
 from seip_addon.core.limits import EFFORT, SIZE, WEIGHT, Limits
-from seip_addon.core.placement.objective import MOVED
-from seip_addon.core.results.placement_record import SCHEMA, PlacementRecord
+from seip_addon.core.output.results.placement_record import SCHEMA, PlacementRecord
 
 FILE = Path(__file__).resolve().parents[2] / "docs" / "placement.schema.json"
 WIDTH = 118  # letters of a line

@@ -20,12 +20,12 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from seip_addon.core.choosing.placement.cheapest import cheapest_for_coverage
+from seip_addon.core.choosing.placement.near_optimal import near_optimal_set
+from seip_addon.core.choosing.placement.problem import Placement, PlacementProblem
+from seip_addon.core.choosing.placement.search_limits import SolverLimits
+from seip_addon.core.choosing.placement.solver import solve, solve_greedy
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement.cheapest import cheapest_for_coverage
-from seip_addon.core.placement.near_optimal import near_optimal_set
-from seip_addon.core.placement.problem import Placement, PlacementProblem
-from seip_addon.core.placement.search_limits import SolverLimits
-from seip_addon.core.placement.solver import solve, solve_greedy
 from seip_addon.core.progress import finish
 
 Integer = NDArray[np.int64]

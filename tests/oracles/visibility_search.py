@@ -19,17 +19,17 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from seip_addon.core.lidar.carla_dropoff import CarlaDropoff
-from seip_addon.core.lidar.model import DetectionLaw, LidarModel
-from seip_addon.core.lidar.range_equation import RangeEquation
-from seip_addon.core.lidar.rosette import Rosette
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
+from seip_addon.core.sensing.lidar.model import DetectionLaw, LidarModel
+from seip_addon.core.sensing.lidar.range_equation import RangeEquation
+from seip_addon.core.sensing.lidar.rosette import Rosette
+from seip_addon.core.sensing.visibility.grid import compute_visibility, full_scan_visibility
+from seip_addon.core.sensing.visibility.near_surfaces import caster_tolerance
+from seip_addon.core.sensing.visibility.ray_casting import Engine, make_ray_caster
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.site import Site, Targets
-from seip_addon.core.visibility.grid import compute_visibility, full_scan_visibility
-from seip_addon.core.visibility.near_surfaces import caster_tolerance
-from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
-from seip_addon.core.visibility.settings import VisibilitySettings
 
 Float = NDArray[np.float64]
 Boolean = NDArray[np.bool_]

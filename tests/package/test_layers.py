@@ -89,15 +89,36 @@ def test_the_bridge_imports_neither_commands_nor_operators():
     assert not offenders(["seip_addon/scene"], lambda _, name: not name.startswith(above))
 
 
+LAYERS = ("storage", "geometry", "site", "sensing", "world", "choosing", "output", "workflows")
+"""Groups of packages of the core: each imports only those before it, but for the sensor models that a site names."""
+
+
+def package_of(parts):
+    """Name of the package that a module of the core is in: the second level of a group of packages, else the first."""
+    groups = {"world", "sensing", "choosing", "output"}
+    return ".".join(parts[: 2 if parts[0] in groups else 1]).removesuffix(".py")
+
+
 def test_packages_of_the_core_import_each_other_in_no_circle():
     uses: dict[str, set[str]] = {}
     for path in modules("seip_addon/core"):
-        package = path.relative_to(ROOT / "seip_addon" / "core").parts[0]
-        parts = {name.split(".")[2] for name in imported(path) if name.startswith("seip_addon.core.")}
-        uses.setdefault(package, set()).update(parts - {package})
+        package = package_of(path.relative_to(ROOT / "seip_addon" / "core").parts)
+        names = [name.split(".")[2:] for name in imported(path) if name.startswith("seip_addon.core.")]
+        uses.setdefault(package, set()).update({package_of(parts) for parts in names} - {package})
     while free := {package for package, used in uses.items() if not used & set(uses)}:
         uses = {package: used for package, used in uses.items() if package not in free}
     assert not uses
+
+
+def test_groups_of_the_core_import_only_lower_ones():
+    def allowed(path, name):
+        own, used = path.relative_to(ROOT / "seip_addon" / "core").parts[0], name.split(".")[2:]
+        if not name.startswith("seip_addon.core.") or own not in LAYERS or used[0] not in LAYERS:
+            return True
+        models = own == "site" and used[:2] == ["sensing", "lidar"]
+        return models or LAYERS.index(used[0]) <= LAYERS.index(own)
+
+    assert not offenders(["seip_addon/core"], allowed)
 
 
 def test_the_add_on_never_names_itself():

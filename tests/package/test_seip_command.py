@@ -92,7 +92,7 @@ def test_the_wheel_holds_the_program_and_its_data(tmp_path):
     subprocess.run(command, cwd=tmp_path, check=True)  # noqa: S603
     (wheel,) = (tmp_path / "out").glob("*.whl")
     names = zipfile.ZipFile(wheel).namelist()
-    assert "seip_addon/core/lidar/catalogue.toml" in names
-    assert "seip_addon/core/traffic/body_meshes/pedestrian.obj" in names
+    assert "seip_addon/core/sensing/lidar/catalogue.toml" in names
+    assert "seip_addon/core/sensing/traffic/body_meshes/pedestrian.obj" in names
     assert "headless/__main__.py" in names
     assert not [name for name in names if name.startswith(("tests", "scenes"))]

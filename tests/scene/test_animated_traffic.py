@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.traffic.bodies import PAINT_COLOURS, fitted_body
-from seip_addon.core.traffic.trajectories import CATEGORIES, RoadUser, Trajectories
+from seip_addon.core.sensing.traffic.bodies import PAINT_COLOURS, fitted_body
+from seip_addon.core.sensing.traffic.trajectories import CATEGORIES, RoadUser, Trajectories
 from seip_addon.scene import contract, materials
 from seip_addon.scene.traffic import LAST_FRAME, animate, clear_traffic, read_traffic
 

@@ -13,9 +13,9 @@ from seip_addon.core.geometry.solids import block
 from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.site.scene_geometry import ASSUMED, NamedArea
-from seip_addon.core.streetscape.model import SiteModel
-from seip_addon.core.streetscape.parts import Part
-from seip_addon.core.streetscape.street_furniture import tree
+from seip_addon.core.world.streetscape.model import SiteModel
+from seip_addon.core.world.streetscape.parts import Part
+from seip_addon.core.world.streetscape.street_furniture import tree
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import new_file
 from seip_addon.scene.build import COLLECTIONS, build_scene

@@ -7,15 +7,15 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon.core.lidar.catalogue import load_catalogue
-from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.visibility.grid import compute_visibility
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.site import make_site
-from seip_addon.core.streetscape.description import SiteDescription
-from seip_addon.core.streetscape.model import site_model
-from seip_addon.core.visibility.grid import compute_visibility
-from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.world.opendrive.read import read_map
+from seip_addon.core.world.streetscape.description import SiteDescription
+from seip_addon.core.world.streetscape.model import site_model
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import new_file
 from seip_addon.scene.build import build_scene

@@ -10,8 +10,8 @@ from mathutils import Vector
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation, rotated
-from seip_addon.core.lidar.beams import beam_directions
-from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.beams import beam_directions
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY
 from seip_addon.scene import contract
 from seip_addon.scene.materials import REFLECTIVITY, material

@@ -5,10 +5,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.errors import SeipError
-from seip_addon.core.pictures.coverage_colours import Colouring, colouring
-from seip_addon.core.placement.deployment import deploy
-from seip_addon.core.traffic.trajectories import RoadUser, Trajectories
+from seip_addon.core.output.pictures.coverage_colours import Colouring, colouring
+from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.scene import contract
 from seip_addon.scene.materials import linear
 from seip_addon.scene.render import save_rendered_view

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer
-from seip_addon.core.lidar.model import LidarModel
+from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY, Mesh, SceneGeometry
 from seip_addon.core.site.site import Site, make_site

@@ -17,9 +17,9 @@ import pulp
 from pulp.apis.coin_api import pulp_cbc_path
 
 from seip_addon.core.arrays import Boolean, Integer
-from seip_addon.core.placement.problem import PlacementProblem
-from seip_addon.core.placement.search_limits import SolverLimits
-from seip_addon.core.placement.solver import solve, solve_greedy
+from seip_addon.core.choosing.placement.problem import PlacementProblem
+from seip_addon.core.choosing.placement.search_limits import SolverLimits
+from seip_addon.core.choosing.placement.solver import solve, solve_greedy
 from seip_addon.core.progress import finish
 
 

@@ -17,16 +17,16 @@ import numpy as np
 import pulp
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.lidar.model import LidarModel
-from seip_addon.core.placement.integer_program import CoverProgram
-from seip_addon.core.placement.reduced_problem import make_instance
+from seip_addon.core.choosing.placement.integer_program import CoverProgram
+from seip_addon.core.choosing.placement.reduced_problem import make_instance
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.visibility.chunks import compute_rows, sharing_rays
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.sensing.visibility.triangle_culling import needed_triangles
+from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.site import Site
-from seip_addon.core.visibility.chunks import compute_rows, sharing_rays
-from seip_addon.core.visibility.ray_casting import make_ray_caster
-from seip_addon.core.visibility.settings import VisibilitySettings
-from seip_addon.core.visibility.triangle_culling import needed_triangles
-from seip_addon.core.visibility.visibility_model import VisibilityModel
 
 STREET_SENSORS = 4
 

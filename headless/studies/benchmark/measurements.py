@@ -42,18 +42,18 @@ from headless.survey import runs_beside
 import bpy
 import numpy as np
 
-from seip_addon.core.lidar.catalogue import find_models, load_catalogue
-from seip_addon.core.lidar.model import LidarModel
-from seip_addon.core.placement.objective import Objective, placement_problem
+from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.scans.static_scene import static_scene
+from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.scans.static_scene import static_scene
+from seip_addon.core.sensing.visibility.grid import compute_visibility
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.obstruction import bareness_warnings
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site, make_site
-from seip_addon.core.visibility.grid import compute_visibility
-from seip_addon.core.visibility.ray_casting import make_ray_caster
-from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.workflows.survey import SurveySettings, lay_out, with_grid
 from seip_addon.scene.read import read_scene
 

@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogFormatter
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.pictures.callouts import place_callouts
-from seip_addon.core.pictures.drawing import save_png
-from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
+from seip_addon.core.output.pictures.callouts import place_callouts
+from seip_addon.core.output.pictures.drawing import save_png
+from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
 
 from .pareto_front import Method, front, growth_exponent
 

@@ -10,7 +10,7 @@ from functools import partial
 from headless.studies.benchmark.baselines import BASELINES
 from headless.studies.benchmark.resource_usage import Expense, peak_memory
 
-from seip_addon.core.placement.problem import PlacementProblem
+from seip_addon.core.choosing.placement.problem import PlacementProblem
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,19 +14,19 @@ import numpy as np
 
 from seip_addon.core.arrays import Float, Integer
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar.model import LidarModel
-from seip_addon.core.lidar.noisy_returns import return_chance
 from seip_addon.core.progress import finish
-from seip_addon.core.scans.frame import STATIC_INSTANCE, Frame
-from seip_addon.core.scans.motion import rotations
-from seip_addon.core.scans.scanner import ReflectiveSurface, Scan, Scanner
-from seip_addon.core.scans.sensor import MountedSensor, level_orientation
-from seip_addon.core.scans.simulation import ScanSettings, Simulation, prepare
-from seip_addon.core.scans.static_scene import StaticScene
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.lidar.noisy_returns import return_chance
+from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame
+from seip_addon.core.sensing.scans.motion import rotations
+from seip_addon.core.sensing.scans.scanner import ReflectiveSurface, Scan, Scanner
+from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
+from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, prepare
+from seip_addon.core.sensing.scans.static_scene import StaticScene
+from seip_addon.core.sensing.traffic.bodies import Body, fitted_body
+from seip_addon.core.sensing.traffic.trajectories import RoadUser, Snapshot, Trajectories
+from seip_addon.core.sensing.visibility.ray_casting import Engine, make_ray_caster
 from seip_addon.core.site.site import Site
-from seip_addon.core.traffic.bodies import Body, fitted_body
-from seip_addon.core.traffic.trajectories import RoadUser, Snapshot, Trajectories
-from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
 
 SENSORS, ROAD_USERS = 4, 40
 SLACK = 1e-4

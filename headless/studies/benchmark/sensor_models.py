@@ -12,21 +12,21 @@ from headless.studies.benchmark.visibility import Cost, sampled_places
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer
+from seip_addon.core.choosing.placement.objective import Objective, check_objective, placement_problem
+from seip_addon.core.choosing.placement.search_limits import SolverLimits
+from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.estimates import RESAMPLES, IntervalEstimate, percentiles
-from seip_addon.core.lidar.carla_dropoff import CarlaDropoff
-from seip_addon.core.lidar.model import LidarModel
-from seip_addon.core.placement.objective import Objective, check_objective, placement_problem
-from seip_addon.core.placement.search_limits import SolverLimits
-from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.visibility.chunks import compute_rows, sharing_rays
+from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
+from seip_addon.core.sensing.visibility.ray_casting import RayCaster, make_ray_caster
+from seip_addon.core.sensing.visibility.scanning import ScanPosition, seen_by_all_rays
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.site import Site
-from seip_addon.core.visibility.chunks import compute_rows, sharing_rays
-from seip_addon.core.visibility.near_surfaces import near_surfaces
-from seip_addon.core.visibility.ray_casting import RayCaster, make_ray_caster
-from seip_addon.core.visibility.scanning import ScanPosition, seen_by_all_rays
-from seip_addon.core.visibility.settings import VisibilitySettings
-from seip_addon.core.visibility.visibility_model import VisibilityModel
 
 PLAIN, SHIPPED, FINEST = "plain range", "range equation", "diverging beams"
 """Names of the models, from the coarsest to the finest."""

@@ -24,13 +24,13 @@ from headless.studies.detection.sensor_configuration import SensorConfiguration
 from headless.studies.detector_limits.paired_change import ResampledPrecision, change, level
 
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.scans.frame import Frame
-from seip_addon.core.scans.scanner import BodySurface, ReflectiveSurface, Scanner
-from seip_addon.core.scans.sensor import MountedSensor
-from seip_addon.core.scans.simulation import ScanSettings, Simulation
-from seip_addon.core.scans.static_scene import StaticScene, static_scene
-from seip_addon.core.traffic.bodies import fitted_body
-from seip_addon.core.traffic.trajectories import Trajectories
+from seip_addon.core.sensing.scans.frame import Frame
+from seip_addon.core.sensing.scans.scanner import BodySurface, ReflectiveSurface, Scanner
+from seip_addon.core.sensing.scans.sensor import MountedSensor
+from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation
+from seip_addon.core.sensing.scans.static_scene import StaticScene, static_scene
+from seip_addon.core.sensing.traffic.bodies import fitted_body
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.workflows.survey import Survey
 
 FRAME_INTERVAL = 2.5  # seconds

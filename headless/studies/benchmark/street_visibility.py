@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seip_addon.core.placement.problem import PlacementProblem
+from seip_addon.core.choosing.placement.problem import PlacementProblem
 
 MAX_RANGE = 110.0
 """Metres beyond which no sensor of these streets sees."""

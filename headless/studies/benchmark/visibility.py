@@ -12,21 +12,21 @@ from headless.studies.benchmark.resource_usage import Expense
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer
+from seip_addon.core.choosing.placement.objective import Objective, placement_problem
+from seip_addon.core.choosing.placement.problem import Placement
+from seip_addon.core.choosing.placement.search_limits import SolverLimits
+from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar.model import LidarModel
-from seip_addon.core.placement.objective import Objective, placement_problem
-from seip_addon.core.placement.problem import Placement
-from seip_addon.core.placement.search_limits import SolverLimits
-from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.visibility.chunks import compute_rows, sharing_rays
+from seip_addon.core.sensing.visibility.grid import compute_visibility
+from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
+from seip_addon.core.sensing.visibility.ray_casting import Engine, RayCaster, make_ray_caster
+from seip_addon.core.sensing.visibility.scanning import ScanPosition
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel, seen_by_tilted_full_scan
 from seip_addon.core.site.site import Site
-from seip_addon.core.visibility.chunks import compute_rows, sharing_rays
-from seip_addon.core.visibility.grid import compute_visibility
-from seip_addon.core.visibility.near_surfaces import near_surfaces
-from seip_addon.core.visibility.ray_casting import Engine, RayCaster, make_ray_caster
-from seip_addon.core.visibility.scanning import ScanPosition
-from seip_addon.core.visibility.settings import VisibilitySettings
-from seip_addon.core.visibility.visibility_model import VisibilityModel, seen_by_tilted_full_scan
 
 ENGINES: tuple[Engine, ...] = ("bvh", "embree")
 

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator, PercentFormatter
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.pictures.palette import INK
+from seip_addon.core.output.pictures.palette import INK
 
 PANEL, HEIGHT, NARROWEST = 3.4, 3.9, 6.0  # inches
 FARTHEST = 100.0  # metres

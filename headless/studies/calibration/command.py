@@ -21,7 +21,7 @@ from headless.studies.calibration.comparison import compare, pair
 from headless.studies.calibration.reference import load_reference
 from headless.studies.calibration.report import describe, save_calibration
 
-from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.workflows.survey import SurveySettings
 
 CHARTS = {

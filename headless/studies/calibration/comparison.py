@@ -9,9 +9,9 @@ import numpy as np
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar.catalogue import find_models
-from seip_addon.core.lidar.model import LidarModel
-from seip_addon.core.lidar.range_equation import RangeEquation
+from seip_addon.core.sensing.lidar.catalogue import find_models
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 
 from .fate import FateCorrelation, simulate_fates
 from .reference import MeasuredSensor, NoiseBin

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.lidar.range_equation import RangeEquation
-from seip_addon.core.lidar.surface_patches import surface_deviation
+from seip_addon.core.sensing.lidar.range_equation import RangeEquation
+from seip_addon.core.sensing.lidar.surface_patches import surface_deviation
 
 from .reference import MeasuredSensor, ShareBin
 from .share_fit import ground_reflected

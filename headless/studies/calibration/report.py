@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from seip_addon.core.lidar.range_equation import RangeEquation
+from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.storage.files import save_json
 
 from .comparison import Comparison, NoiseRatio

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.lidar.range_equation import RangeEquation
+from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 
 from .reference import MeasuredSensor, ShareBin
 

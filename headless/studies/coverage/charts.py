@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
+from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
 
 from .cells import CENTRAL_WEIGHTS, COUNTS, CoverageStudy
 

@@ -14,8 +14,8 @@ from headless.studies.coverage.charts import save_height_chart, save_weight_char
 from headless.studies.coverage.claims import coverage_claims
 from headless.studies.coverage.tables import save_study_table
 
-from seip_addon.core.pictures.plan_view import save_plan_view
-from seip_addon.core.placement.objective import Objective, check_objective
+from seip_addon.core.choosing.placement.objective import Objective, check_objective
+from seip_addon.core.output.pictures.plan_view import save_plan_view
 
 
 def main(argv: list[str]) -> None:

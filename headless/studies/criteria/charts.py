@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import Interval, IntervalEstimate
-from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
+from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
 
 PANEL_SIZE = (6.4, 4.6)  # inches
 BAR_HEIGHT = 0.5  # inches that a criterion takes

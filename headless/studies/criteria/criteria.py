@@ -10,11 +10,11 @@ from headless.studies.detection.sensor_configuration import SensorConfiguration
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.placement.deployment import weighted_share
+from seip_addon.core.choosing.placement.deployment import weighted_share
 from seip_addon.core.progress import Progress
-from seip_addon.core.returns.expected_returns import expected_returns
-from seip_addon.core.returns.road_users import RoadUsers, cars_at
-from seip_addon.core.visibility.ray_casting import make_ray_caster
+from seip_addon.core.sensing.returns.expected_returns import expected_returns
+from seip_addon.core.sensing.returns.road_users import RoadUsers, cars_at
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.workflows.survey import Survey
 
 from .occupancy import vehicle_occupancy

@@ -10,11 +10,11 @@ from headless.studies.detection.sensor_configuration import SensorConfiguration
 import numpy as np
 
 from seip_addon.core.arrays import Float, Integer
+from seip_addon.core.choosing.placement.deployment import deploy
+from seip_addon.core.choosing.placement.objective import Objective, placement_problem
+from seip_addon.core.choosing.placement.problem import Placement, PlacementProblem
+from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement.deployment import deploy
-from seip_addon.core.placement.objective import Objective, placement_problem
-from seip_addon.core.placement.problem import Placement, PlacementProblem
-from seip_addon.core.placement.solver import solve
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.workflows.survey import Survey
 

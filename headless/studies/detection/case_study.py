@@ -27,8 +27,8 @@ from headless.studies.detection.sensor_configuration import SensorConfiguration
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, side_by_side, within
-from seip_addon.core.traffic.parked import shared_bays
-from seip_addon.core.traffic.run_overlap import MATCH_RADIUS, require_independent, vehicle_positions
+from seip_addon.core.sensing.traffic.parked import shared_bays
+from seip_addon.core.sensing.traffic.run_overlap import MATCH_RADIUS, require_independent, vehicle_positions
 from seip_addon.core.workflows.survey import Survey
 
 from .claims import SeedResult

@@ -31,13 +31,13 @@ from headless.studies.detection.sensor_configuration import SensorConfiguration
 
 import bpy
 
+from seip_addon.core.choosing.placement.objective import Objective, check_objective
+from seip_addon.core.choosing.robustness.traffic_instants import check_runs
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import COUNT, SEED, SENSORS, TIME_STEP, Limits
-from seip_addon.core.placement.objective import Objective, check_objective
-from seip_addon.core.results.placement_record import versions
-from seip_addon.core.robustness.traffic_instants import check_runs
-from seip_addon.core.scans.simulation import ScanSettings
-from seip_addon.core.traffic.source import require_own_traffic
+from seip_addon.core.output.results.placement_record import versions
+from seip_addon.core.sensing.scans.simulation import ScanSettings
+from seip_addon.core.sensing.traffic.source import require_own_traffic
 from seip_addon.core.workflows.survey import Survey
 
 STEPS, TRAININGS = Limits(1, 10_000_000), Limits(1, 1_000)

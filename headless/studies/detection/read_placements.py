@@ -7,12 +7,12 @@ from headless.studies.detection.sensor_configuration import SensorConfiguration
 
 import numpy as np
 
+from seip_addon.core.choosing.placement.objective import Objective
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar.catalogue import find_models, load_catalogue
-from seip_addon.core.placement.objective import Objective
+from seip_addon.core.output.results.placement_record import PlacementRecord, load_placement_record
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.results.placement_record import PlacementRecord, load_placement_record
-from seip_addon.core.scans.sensor import MountedSensor
+from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
+from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.site.site import Site
 from seip_addon.core.workflows.moved_sensors import evaluate_moved_sensors
 from seip_addon.core.workflows.survey import Survey

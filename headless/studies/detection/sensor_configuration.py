@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from headless.detection.recordings import PlacedSensors
 from headless.studies.coverage.cells import Case
 
-from seip_addon.core.placement.deployment import Deployment
-from seip_addon.core.scans.sensor import MountedSensor
+from seip_addon.core.choosing.placement.deployment import Deployment
+from seip_addon.core.sensing.scans.sensor import MountedSensor
 
 
 @dataclass(frozen=True, eq=False)

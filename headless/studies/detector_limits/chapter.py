@@ -21,7 +21,7 @@ from headless.studies.detector_limits.trials import EvaluatedDetector, TrialSite
 import bpy
 
 from seip_addon.core.progress import Progress
-from seip_addon.core.scans.simulation import ScanSettings
+from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.workflows.survey import Layout, Survey, lay_out, see
 from seip_addon.scene.read import read_scene
 

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
+from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
 
 from .disturbances import CappedPillars, SensorFailure
 from .study import DisturbanceCurve, LimitsStudy, TransferResult

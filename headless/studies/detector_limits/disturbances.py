@@ -19,13 +19,13 @@ from headless.detection.detector import Detector, keeping_at_most
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float
-from seip_addon.core.lidar.model import LidarModel
 from seip_addon.core.progress import finish
-from seip_addon.core.scans.frame import STATIC_INSTANCE, Frame
-from seip_addon.core.scans.sensor import MountedSensor
-from seip_addon.core.scans.simulation import Simulation
-from seip_addon.core.traffic.trajectories import Trajectories
-from seip_addon.core.traffic.varied_bodies import resized
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame
+from seip_addon.core.sensing.scans.sensor import MountedSensor
+from seip_addon.core.sensing.scans.simulation import Simulation
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
+from seip_addon.core.sensing.traffic.varied_bodies import resized
 
 ERROR_AXIS = np.array([1.0, 1.0, 0.0]) / math.sqrt(2)
 """Unit vector of position and tilt errors, along no street."""

@@ -54,7 +54,7 @@ REMEDIES: Mapping[str, str] = {
     TiltError.name: _CALIBRATION,
     ClockOffset.name: "one cloud does not tell: synchronise the sensors' clocks to better than that",
     SensorFailure.name: "`seip place --failures mean` optimises for the loss of any one sensor",
-    OtherSizes.name: "bodies of training that vary: seip_addon.core.traffic.varied_bodies",
+    OtherSizes.name: "bodies of training that vary: seip_addon.core.sensing.traffic.varied_bodies",
     Thinned.name: "nothing: thinner traffic hides less",
     CappedPillars.name: f"a warning where more than {MAX_OVERFULL_SHARE:.0%} of the pillars with points are over-full",
 }

@@ -27,12 +27,12 @@ from shapely.geometry.base import BaseGeometry
 from seip_addon.core import limits
 from seip_addon.core.arrays import Float
 from seip_addon.core.progress import Progress, finish, side_by_side
-from seip_addon.core.scans.frame import Frame
-from seip_addon.core.scans.simulation import prepare
+from seip_addon.core.sensing.scans.frame import Frame
+from seip_addon.core.sensing.scans.simulation import prepare
+from seip_addon.core.sensing.traffic.bodies import fitted_body
 from seip_addon.core.storage.array_file import ArrayFile, ArrayRule, ContentError
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
-from seip_addon.core.traffic.bodies import fitted_body
 
 from .disturbances import Disturbance
 

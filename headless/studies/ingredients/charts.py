@@ -8,7 +8,7 @@ from headless.charts.style import COLOURS, DASHED, MARKERS, interval_ends, new_f
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import IntervalEstimate
-from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
+from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
 
 PANEL_WIDTH, ROW_HEIGHT = 2.7, 0.42  # inches
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.progress import Progress, finish, side_by_side
-from seip_addon.core.traffic.varied_bodies import resized
+from seip_addon.core.sensing.traffic.varied_bodies import resized
 
 from .variants import ALL, SIZE_CHANGE, Ingredients
 

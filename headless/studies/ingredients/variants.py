@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from seip_addon.core.geometry.height_raster import HeightRaster
 from seip_addon.core.progress import Progress
-from seip_addon.core.scans.frame import Frame
-from seip_addon.core.traffic.trajectories import RoadUser, Trajectories
-from seip_addon.core.traffic.varied_bodies import resized, with_sizes
+from seip_addon.core.sensing.scans.frame import Frame
+from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
+from seip_addon.core.sensing.traffic.varied_bodies import resized, with_sizes
 
 SIZE_CHANGE = 0.15  # share by which dimensions of road users are changed at most, in a training and in a test
 FEW_SITES = 2  # to learn from, where many sites are left out

@@ -9,8 +9,8 @@ from headless.studies.coverage.cells import CHARTED_WEIGHT, COUNTS, CoverageStud
 import numpy as np
 
 from seip_addon.core.estimates import Interval
-from seip_addon.core.lidar.model import LidarModel
-from seip_addon.core.traffic.run_overlap import MATCH_RADIUS
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.traffic.run_overlap import MATCH_RADIUS
 
 from .figures import ENOUGH_RETURNS, PlacementFigures, Reversal, agreement, leaks, reversals, reversed_pairs
 from .published import DIFFERENCES, PUBLISHED_CLAIMS, PUBLISHED_GAINS, PUBLISHED_SENSORS

@@ -18,14 +18,14 @@ import shapely
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, within
+from seip_addon.core.sensing.traffic.run_overlap import VehiclePositions, overlap_of, vehicle_positions
+from seip_addon.core.sensing.traffic.source import TrafficFiles
+from seip_addon.core.sensing.traffic.sumo_files import read_net_offset
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.storage.files import digest, save_json
 from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.sumo_programs import find_sumo
-from seip_addon.core.traffic.run_overlap import VehiclePositions, overlap_of, vehicle_positions
-from seip_addon.core.traffic.source import TrafficFiles
-from seip_addon.core.traffic.sumo_files import read_net_offset
-from seip_addon.core.traffic.trajectories import Trajectories
 from seip_addon.core.workflows.traffic_runs import traffic_folder
 
 MIN_ON_ROAD = 0.8  # share of a network's lanes in the region that lie on the road of the scene, if it is of its map

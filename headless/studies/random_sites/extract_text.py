@@ -8,8 +8,8 @@ import numpy as np
 from PIL import Image, TiffImagePlugin
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.openstreetmap.crossings import EARTH_RADIUS
 from seip_addon.core.storage.files import whole_file
+from seip_addon.core.world.openstreetmap.crossings import EARTH_RADIUS
 
 from .street_plan import TURN_LANE_LENGTH, Arm, StreetPlan, Tags
 

@@ -13,21 +13,21 @@ from headless.sumo.traffic_run import simulate_run
 import bpy
 import numpy as np
 
-from seip_addon.core.elevation.at_place import AskedTerrain
 from seip_addon.core.errors import SeipError
+from seip_addon.core.output.results.placement_record import versions
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.results.placement_record import versions
+from seip_addon.core.sensing.traffic.source import describe_categories
+from seip_addon.core.sensing.traffic.varied_bodies import shaped
 from seip_addon.core.site.check import check_site
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
 from seip_addon.core.storage.files import digest, save_json
 from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.sumo_programs import find_sumo
-from seip_addon.core.traffic.source import describe_categories
-from seip_addon.core.traffic.varied_bodies import shaped
 from seip_addon.core.workflows.site_building import AskedSite, build_site, save_map
 from seip_addon.core.workflows.survey import SurveySettings, lay_out
 from seip_addon.core.workflows.traffic_runs import traffic_folder
+from seip_addon.core.world.elevation.at_place import AskedTerrain
 from seip_addon.scene.blend_file import new_file, save_blend
 from seip_addon.scene.build import build_scene
 from seip_addon.scene.check import contents_of

@@ -32,10 +32,10 @@ import numpy as np
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import TIME_STEP
 from seip_addon.core.progress import Progress, side_by_side
-from seip_addon.core.scans.simulation import ScanSettings
+from seip_addon.core.sensing.scans.simulation import ScanSettings
+from seip_addon.core.sensing.traffic.source import require_own_traffic
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.site import make_site
-from seip_addon.core.traffic.source import require_own_traffic
 from seip_addon.core.workflows.survey import SurveySettings
 from seip_addon.scene.read import read_scene
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation
-from seip_addon.core.lidar.model import LidarModel
-from seip_addon.core.scans.sensor import MountedSensor
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.site.candidates import Candidates
 
 MAX_SENSORS = 5  # of a random placement

@@ -10,7 +10,7 @@ from headless.detection.recordings import PlacedSensors, SampledRun, Simulator
 
 import numpy as np
 
-from seip_addon.core.lidar.model import LidarModel
+from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.scene_geometry import SceneGeometry
 

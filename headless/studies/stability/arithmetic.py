@@ -16,14 +16,14 @@ from shapely import box
 
 from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar.beams import BeamPattern
-from seip_addon.core.lidar.model import LidarModel
 from seip_addon.core.progress import Progress, finish
+from seip_addon.core.sensing.lidar.beams import BeamPattern
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.visibility.float32_precision import FLOAT32_STEP, MAX_STEP
+from seip_addon.core.sensing.visibility.grid import compute_visibility
+from seip_addon.core.sensing.visibility.ray_casting import Engine, make_ray_caster
+from seip_addon.core.sensing.visibility.settings import MAX_DELTA, VisibilitySettings
 from seip_addon.core.site.site import Candidates, Site, Targets
-from seip_addon.core.visibility.float32_precision import FLOAT32_STEP, MAX_STEP
-from seip_addon.core.visibility.grid import compute_visibility
-from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
-from seip_addon.core.visibility.settings import MAX_DELTA, VisibilitySettings
 
 from .float64_rays import FirstHits, first_hits
 from .hard_scenes import HardScene, far_away, hard_scenes, ordinary_scene, stored_far_away, with_stray

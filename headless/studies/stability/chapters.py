@@ -10,21 +10,21 @@ from pathlib import Path
 from headless.charts import pose_errors as pose_error_charts
 from headless.charts import traffic as traffic_charts
 
-from seip_addon.core.placement.deployment import deploy
-from seip_addon.core.placement.near_optimal import NearOptimalSet, near_optimal_set
-from seip_addon.core.placement.objective import DEFAULT_COUNT, Objective, placement_problem
-from seip_addon.core.placement.problem import PlacementProblem
-from seip_addon.core.placement.risk import Risk
-from seip_addon.core.placement.scenarios import Scenarios
-from seip_addon.core.placement.search_limits import SolverLimits
-from seip_addon.core.placement.solver import solve
+from seip_addon.core.choosing.placement.deployment import deploy
+from seip_addon.core.choosing.placement.near_optimal import NearOptimalSet, near_optimal_set
+from seip_addon.core.choosing.placement.objective import DEFAULT_COUNT, Objective, placement_problem
+from seip_addon.core.choosing.placement.problem import PlacementProblem
+from seip_addon.core.choosing.placement.risk import Risk
+from seip_addon.core.choosing.placement.scenarios import Scenarios
+from seip_addon.core.choosing.placement.search_limits import SolverLimits
+from seip_addon.core.choosing.placement.solver import solve
+from seip_addon.core.choosing.robustness.pose_study import PoseStudySettings, pose_study
+from seip_addon.core.choosing.robustness.robust_study import robust_study
+from seip_addon.core.choosing.robustness.traffic_instants import spread_instants
+from seip_addon.core.choosing.robustness.traffic_study import traffic_scenarios, traffic_study
 from seip_addon.core.progress import Progress
-from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study
-from seip_addon.core.robustness.robust_study import robust_study
-from seip_addon.core.robustness.traffic_instants import spread_instants
-from seip_addon.core.robustness.traffic_study import traffic_scenarios, traffic_study
-from seip_addon.core.scans.sensor import MountedSensor
-from seip_addon.core.traffic.trajectories import Trajectories
+from seip_addon.core.sensing.scans.sensor import MountedSensor
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.workflows.survey import Survey, surroundings
 from seip_addon.core.workflows.traffic_runs import split_runs
 

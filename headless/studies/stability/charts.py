@@ -13,10 +13,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from seip_addon.core.pictures.palette import INK, SOFT_INK
-from seip_addon.core.placement.near_optimal import NearOptimalSet
-from seip_addon.core.placement.problem import TIE_TOLERANCE
-from seip_addon.core.visibility.float32_precision import FLOAT32_STEP, MAX_STEP
+from seip_addon.core.choosing.placement.near_optimal import NearOptimalSet
+from seip_addon.core.choosing.placement.problem import TIE_TOLERANCE
+from seip_addon.core.output.pictures.palette import INK, SOFT_INK
+from seip_addon.core.sensing.visibility.float32_precision import FLOAT32_STEP, MAX_STEP
 
 from .arithmetic import ArithmeticStudy
 from .criterion import CriterionStudy

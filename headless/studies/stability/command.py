@@ -15,8 +15,8 @@ from headless.options import new_parser
 from headless.studies.stability.chapters import CHAPTERS, StabilityScope, StudiedScene, chapters, introduction
 from headless.studies.stability.page import load_chapter, put_chapter, save_chapter, save_page
 
+from seip_addon.core.choosing.placement.objective import DEFAULT_COUNT, Objective, check_objective
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement.objective import DEFAULT_COUNT, Objective, check_objective
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.workflows.survey import grid_key

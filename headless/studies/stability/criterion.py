@@ -24,19 +24,19 @@ import numpy as np
 import shapely
 
 from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.choosing.placement.deployment import Deployment
+from seip_addon.core.choosing.placement.objective import Objective, Solution
 from seip_addon.core.estimates import NORMAL_QUANTILE, IntervalEstimate
 from seip_addon.core.geometry.plan import surface_height
-from seip_addon.core.lidar.model import LidarModel
-from seip_addon.core.placement.deployment import Deployment
-from seip_addon.core.placement.objective import Objective, Solution
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.scans.sensor import level_orientation
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.scans.sensor import level_orientation
+from seip_addon.core.sensing.visibility.ray_casting import RayCaster, make_ray_caster
+from seip_addon.core.sensing.visibility.ring_resolution import unresolved_from
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.sensing.visibility.visibility_model import visibility_model
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.site.site import Site, Targets, make_site
-from seip_addon.core.visibility.ray_casting import RayCaster, make_ray_caster
-from seip_addon.core.visibility.ring_resolution import unresolved_from
-from seip_addon.core.visibility.settings import VisibilitySettings
-from seip_addon.core.visibility.visibility_model import visibility_model
 from seip_addon.core.workflows.survey import SurveySettings
 
 from .rows import Row

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from seip_addon.core.choosing.robustness.pose_study import PoseStudy
+from seip_addon.core.choosing.robustness.robust_study import RobustStudy
+from seip_addon.core.choosing.robustness.traffic_study import LAYER_NAMES, MOSTLY_SEEN_SHARE, NOTABLE_LOSS, TrafficStudy
 from seip_addon.core.estimates import mean_of
-from seip_addon.core.robustness.pose_study import PoseStudy
-from seip_addon.core.robustness.robust_study import RobustStudy
-from seip_addon.core.robustness.traffic_study import LAYER_NAMES, MOSTLY_SEEN_SHARE, NOTABLE_LOSS, TrafficStudy
 
 from .rows import Row
 

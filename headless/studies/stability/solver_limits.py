@@ -10,12 +10,12 @@ from itertools import combinations
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer
-from seip_addon.core.placement.integer_program import is_available, reaching
-from seip_addon.core.placement.near_optimal import NearOptimalSet
-from seip_addon.core.placement.problem import TIE_TOLERANCE, Placement, PlacementProblem
-from seip_addon.core.placement.reduced_problem import make_instance
-from seip_addon.core.placement.search_limits import Clock, SolverLimits
-from seip_addon.core.placement.solver import solve, solve_greedy
+from seip_addon.core.choosing.placement.integer_program import is_available, reaching
+from seip_addon.core.choosing.placement.near_optimal import NearOptimalSet
+from seip_addon.core.choosing.placement.problem import TIE_TOLERANCE, Placement, PlacementProblem
+from seip_addon.core.choosing.placement.reduced_problem import make_instance
+from seip_addon.core.choosing.placement.search_limits import Clock, SolverLimits
+from seip_addon.core.choosing.placement.solver import solve, solve_greedy
 from seip_addon.core.progress import Progress, finish
 
 from .rows import Row

@@ -9,18 +9,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from seip_addon.core.arrays import Integer
-from seip_addon.core.lidar.beams import beam_directions
-from seip_addon.core.lidar.noisy_returns import return_chance
-from seip_addon.core.placement.objective import Objective, placement_problem
-from seip_addon.core.placement.solver import solve
+from seip_addon.core.choosing.placement.objective import Objective, placement_problem
+from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.scans.scanner import ReflectiveSurface
-from seip_addon.core.scans.sensor import MountedSensor
-from seip_addon.core.scans.static_scene import static_scene
+from seip_addon.core.sensing.lidar.beams import beam_directions
+from seip_addon.core.sensing.lidar.noisy_returns import return_chance
+from seip_addon.core.sensing.scans.scanner import ReflectiveSurface
+from seip_addon.core.sensing.scans.sensor import MountedSensor
+from seip_addon.core.sensing.scans.static_scene import static_scene
+from seip_addon.core.sensing.visibility.grid import compute_visibility
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.weather import Weather, weather_of
-from seip_addon.core.visibility.grid import compute_visibility
-from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.workflows.survey import Layout, Survey, SurveySettings, grid_key, lay_out, with_grid
 
 from .rows import Row

@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..errors import SeipError
 from ..geometry.geo_reference import GeoReference
-from ..lidar.model import LidarModel
+from ..sensing.lidar.model import LidarModel
 from .candidates import Candidates, CandidateSettings, generate_candidates
 from .far_objects import without_far_objects
 from .scene_geometry import SceneGeometry, joined, ordered_surfaces

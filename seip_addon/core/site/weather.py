@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SeipError
-from ..lidar.model import LidarModel
+from ..sensing.lidar.model import LidarModel
 from ..settings import setting
 from .scene_geometry import DEFAULT_REFLECTIVITY, Mesh, SceneGeometry
 

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Boolean, Float
 from ..errors import SeipError
-from ..lidar.model import LidarModel
+from ..sensing.lidar.model import LidarModel
 from .candidates import Candidates, headings
 
 NOTHING_BEFORE = "looking past all targets"

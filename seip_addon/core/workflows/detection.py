@@ -8,8 +8,8 @@ from pathlib import Path
 
 from ..child_process import run_logged
 from ..errors import SeipError
+from ..output.results.detection_record import FORMATS, parsed_detection
 from ..progress import Progress
-from ..results.detection_record import FORMATS, parsed_detection
 from ..site.weather import Weather
 
 RECORD, ERRORS = "detection.json", "errors.png"

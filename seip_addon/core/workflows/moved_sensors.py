@@ -8,21 +8,21 @@ from collections.abc import Generator, Mapping, Sequence
 import numpy as np
 
 from ..arrays import Boolean, Float
+from ..choosing.placement.deployment import Sensor, deployment_of, sensor_at
+from ..choosing.placement.objective import MOVED, Objective, Solution, target_weights
+from ..choosing.placement.problem import Placement
+from ..choosing.robustness.gain_band import with_gain_band
 from ..errors import SeipError
 from ..geometry.orientation import angles_of
 from ..geometry.plan import surface_height
-from ..lidar.catalogue import find_models, load_catalogue
-from ..placement.deployment import Sensor, deployment_of, sensor_at
-from ..placement.objective import MOVED, Objective, Solution, target_weights
-from ..placement.problem import Placement
+from ..output.results.headings import degrees, tilt_degrees
+from ..output.results.placement_record import PlacementRecord
 from ..progress import Progress
-from ..results.headings import degrees, tilt_degrees
-from ..results.placement_record import PlacementRecord
-from ..robustness.gain_band import with_gain_band
-from ..scans.sensor import MountedSensor
+from ..sensing.lidar.catalogue import find_models, load_catalogue
+from ..sensing.scans.sensor import MountedSensor
+from ..sensing.visibility.sight_lines import pose_at
+from ..sensing.visibility.visibility_model import VisibilityModel, visibility_model
 from ..site.scene_geometry import joined
-from ..visibility.sight_lines import pose_at
-from ..visibility.visibility_model import VisibilityModel, visibility_model
 from .survey import Layout, Survey, surroundings
 
 BY_HAND = "by hand"

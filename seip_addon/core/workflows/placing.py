@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..errors import SeipError
-from ..placement.deployment import deploy
-from ..placement.near_optimal import near_optimal_set
-from ..placement.objective import (
+from ..choosing.placement.deployment import deploy
+from ..choosing.placement.near_optimal import near_optimal_set
+from ..choosing.placement.objective import (
     CHOSEN_FOR,
     Objective,
     Solution,
@@ -20,18 +19,19 @@ from ..placement.objective import (
     target_weights,
     with_count,
 )
-from ..placement.risk import Risk
-from ..placement.search_limits import Acceptance, SolverLimits
+from ..choosing.placement.risk import Risk
+from ..choosing.placement.search_limits import Acceptance, SolverLimits
+from ..choosing.robustness.assumed_heights import height_notes
+from ..choosing.robustness.gain_band import with_gain_band
+from ..choosing.robustness.pose_error_evaluation import PoseErrorEvaluation
+from ..choosing.robustness.pose_study import PoseStudySettings, pose_message, pose_study
+from ..choosing.robustness.robust_study import robust_study
+from ..choosing.robustness.traffic_instants import spread_instants
+from ..choosing.robustness.traffic_presence import road_user_seconds
+from ..choosing.robustness.traffic_study import LAYER_NAMES, traffic_message, traffic_scenarios, traffic_study
+from ..choosing.robustness.visibility_in_traffic import TrafficLayer
+from ..errors import SeipError
 from ..progress import Progress
-from ..robustness.assumed_heights import height_notes
-from ..robustness.gain_band import with_gain_band
-from ..robustness.pose_error_evaluation import PoseErrorEvaluation
-from ..robustness.pose_study import PoseStudySettings, pose_message, pose_study
-from ..robustness.robust_study import robust_study
-from ..robustness.traffic_instants import spread_instants
-from ..robustness.traffic_presence import road_user_seconds
-from ..robustness.traffic_study import LAYER_NAMES, traffic_message, traffic_scenarios, traffic_study
-from ..robustness.visibility_in_traffic import TrafficLayer
 from .returns import place_by_returns
 from .survey import Survey, surroundings
 from .traffic_runs import TrafficRuns

@@ -11,19 +11,19 @@ from pathlib import Path
 
 import numpy as np
 
-from ..datasets.dataset_folder import write_dataset
-from ..datasets.formats import FORMATS
-from ..datasets.sample import SPLITS, SensorPose, TrafficRun
+from ..output.datasets.dataset_folder import write_dataset
+from ..output.datasets.formats import FORMATS
+from ..output.datasets.sample import SPLITS, SensorPose, TrafficRun
 from ..progress import Progress
-from ..scans.run_folder import Record, Run, load_frames, write_run
-from ..scans.sensor import MountedSensor
-from ..scans.simulation import ScanSettings, Simulation, frame_times, prepare
-from ..scans.static_scene import static_scene
+from ..sensing.scans.run_folder import Record, Run, load_frames, write_run
+from ..sensing.scans.sensor import MountedSensor
+from ..sensing.scans.simulation import ScanSettings, Simulation, frame_times, prepare
+from ..sensing.scans.static_scene import static_scene
+from ..sensing.traffic.bodies import fitted_body
+from ..sensing.traffic.trajectories import Trajectories
+from ..sensing.visibility.ray_casting import engine_name
 from ..settings import setting
 from ..site.scene_geometry import SceneGeometry
-from ..traffic.bodies import fitted_body
-from ..traffic.trajectories import Trajectories
-from ..visibility.ray_casting import engine_name
 
 SAME_TIME_TOLERANCE = 1e-6
 """Seconds between two times that are one: of frames of Blender's timeline, and of a run."""
@@ -125,7 +125,7 @@ def record(
     SeipError
         As for `write_run` and `write_dataset`.
     """
-    from ..pictures.scan_view import save_scan_view  # noqa: PLC0415  # matplotlib takes half a second to come
+    from ..output.pictures.scan_view import save_scan_view  # noqa: PLC0415  # matplotlib takes half a second to come
 
     manifest = yield from write_run(folder, run, simulation)
     save_scan_view(

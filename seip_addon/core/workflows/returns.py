@@ -10,17 +10,24 @@ import numpy as np
 import shapely
 
 from ..arrays import Float, Integer
+from ..choosing.placement.deployment import deploy
+from ..choosing.placement.objective import (
+    CHOSEN_FOR,
+    Objective,
+    Solution,
+    placement_problem,
+    weights_in_regions,
+    with_count,
+)
+from ..choosing.placement.returns_solver import greedy_returns, solve_returns
+from ..choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
+from ..choosing.placement.search_limits import SolverLimits
 from ..errors import SeipError
-from ..placement.deployment import deploy
-from ..placement.objective import CHOSEN_FOR, Objective, Solution, placement_problem, weights_in_regions, with_count
-from ..placement.returns_solver import greedy_returns, solve_returns
-from ..placement.returns_summary import CrossingReturns, ReturnsSummary
-from ..placement.search_limits import SolverLimits
 from ..progress import Progress
-from ..returns.returns_grid import ReturnsGrid, returns_key, stored_returns
-from ..returns.road_users import BODIES, RoadUsers, road_users
+from ..sensing.returns.returns_grid import ReturnsGrid, returns_key, stored_returns
+from ..sensing.returns.road_users import BODIES, RoadUsers, road_users
+from ..sensing.visibility.ray_casting import engine_name
 from ..site.targets import Targets
-from ..visibility.ray_casting import engine_name
 
 if TYPE_CHECKING:
     from .survey import Survey

@@ -10,16 +10,18 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
-from ..citymodel.at_place import AskedBuildings, with_city_model
-from ..elevation.at_place import AskedTerrain, MapSurroundings, with_terrain
-from ..elevation.obstacles import Merging
 from ..errors import SeipError
 from ..geometry.geo_reference import GeoReference
-from ..opendrive.junctions import STREETS
-from ..opendrive.lanes import lane_surfaces
-from ..opendrive.read import read_map, with_attribution
-from ..opendrive.road_map import RoadMap
-from ..openstreetmap.site import (
+from ..progress import Progress
+from ..storage.files import whole_file
+from ..world.citymodel.at_place import AskedBuildings, with_city_model
+from ..world.elevation.at_place import AskedTerrain, MapSurroundings, with_terrain
+from ..world.elevation.obstacles import Merging
+from ..world.opendrive.junctions import STREETS
+from ..world.opendrive.lanes import lane_surfaces
+from ..world.opendrive.read import read_map, with_attribution
+from ..world.opendrive.road_map import RoadMap
+from ..world.openstreetmap.site import (
     STANDS_AROUND,
     ExtractPlace,
     is_extract,
@@ -27,15 +29,13 @@ from ..openstreetmap.site import (
     site_of_extract,
     surroundings_of_map,
 )
-from ..progress import Progress
-from ..storage.files import whole_file
-from ..streetscape import road_surface
-from ..streetscape.description import DEFAULT_RADIUS, SiteDescription, describe_place
-from ..streetscape.geographic_position import in_metres
-from ..streetscape.intersections import without_plain_joints
-from ..streetscape.levels import UnclearLevelError
-from ..streetscape.model import SiteModel, site_model
-from ..streetscape.place import SCENE_MARGIN, Place
+from ..world.streetscape import road_surface
+from ..world.streetscape.description import DEFAULT_RADIUS, SiteDescription, describe_place
+from ..world.streetscape.geographic_position import in_metres
+from ..world.streetscape.intersections import without_plain_joints
+from ..world.streetscape.levels import UnclearLevelError
+from ..world.streetscape.model import SiteModel, site_model
+from ..world.streetscape.place import SCENE_MARGIN, Place
 
 
 @dataclass(frozen=True)

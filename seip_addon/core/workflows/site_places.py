@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import SeipError
-from ..opendrive.junctions import STREETS, streets_of_junctions
-from ..opendrive.lanes import LaneSurface, lane_surfaces
-from ..opendrive.read import read_map
-from ..openstreetmap.crossings import Crossing, named_crossings
-from ..openstreetmap.extract import MAX_LATITUDE, read_extract
-from ..openstreetmap.site import is_extract
 from ..progress import Progress
-from ..streetscape.description import DEFAULT_RADIUS, describe_place
+from ..world.opendrive.junctions import STREETS, streets_of_junctions
+from ..world.opendrive.lanes import LaneSurface, lane_surfaces
+from ..world.opendrive.read import read_map
+from ..world.openstreetmap.crossings import Crossing, named_crossings
+from ..world.openstreetmap.extract import MAX_LATITUDE, read_extract
+from ..world.openstreetmap.site import is_extract
+from ..world.streetscape.description import DEFAULT_RADIUS, describe_place
 
 ROADS_PER_STEP = 20
 _NUMBER = r"[+-]?\d+(?:\.\d*)?"

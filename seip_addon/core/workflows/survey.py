@@ -10,19 +10,28 @@ from typing import Any
 
 import numpy as np
 
+from ..choosing.placement.deployment import deploy, pose_prices
+from ..choosing.placement.integer_program import check_solver
+from ..choosing.placement.objective import Solution, target_weights
+from ..choosing.placement.problem import Placement
+from ..choosing.placement.search_limits import DEFAULT_EFFORT, SolverLimits
 from ..errors import SeipError
-from ..lidar.carla_dropoff import CarlaDropoff
-from ..lidar.catalogue import find_models, load_catalogue
-from ..lidar.model import LidarModel
-from ..placement.deployment import deploy, pose_prices
-from ..placement.integer_program import check_solver
-from ..placement.objective import Solution, target_weights
-from ..placement.problem import Placement
-from ..placement.search_limits import DEFAULT_EFFORT, SolverLimits
+from ..output.results.headings import tilt_degrees
+from ..output.results.located import LOCATED_FILES, missing_sentence
+from ..output.results.placement_record import PlacementRecord, Provenance, placement_record
 from ..progress import Progress
-from ..results.headings import tilt_degrees
-from ..results.located import LOCATED_FILES, missing_sentence
-from ..results.placement_record import PlacementRecord, Provenance, placement_record
+from ..sensing.lidar.carla_dropoff import CarlaDropoff
+from ..sensing.lidar.catalogue import find_models, load_catalogue
+from ..sensing.lidar.model import LidarModel
+from ..sensing.visibility.estimate import Estimate, estimate_visibility
+from ..sensing.visibility.float32_precision import rounding_warnings
+from ..sensing.visibility.grid import VisibilityGrid, visibility_key
+from ..sensing.visibility.ray_casting import Engine, engine_name
+from ..sensing.visibility.ring_resolution import resolution_warnings
+from ..sensing.visibility.road_range import range_warnings, road_reflectivity
+from ..sensing.visibility.settings import VisibilitySettings
+from ..sensing.visibility.store import stored_visibility
+from ..sensing.visibility.surroundings import Surroundings
 from ..settings import setting
 from ..site.candidates import CandidateSettings, assumed_pole_warnings
 from ..site.far_objects import without_far_objects
@@ -33,15 +42,6 @@ from ..site.site import Site, make_site
 from ..site.weather import Weather
 from ..storage.files import digest
 from ..storage.json_dataclass import as_json
-from ..visibility.estimate import Estimate, estimate_visibility
-from ..visibility.float32_precision import rounding_warnings
-from ..visibility.grid import VisibilityGrid, visibility_key
-from ..visibility.ray_casting import Engine, engine_name
-from ..visibility.ring_resolution import resolution_warnings
-from ..visibility.road_range import range_warnings, road_reflectivity
-from ..visibility.settings import VisibilitySettings
-from ..visibility.store import stored_visibility
-from ..visibility.surroundings import Surroundings
 from .returns import stored_pedestrian_returns
 
 

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import TypeVar
 
 from ..arrays import Float
+from ..choosing.robustness.traffic_instants import check_runs
 from ..errors import SeipError
 from ..progress import Progress
-from ..robustness.traffic_instants import check_runs
+from ..sensing.traffic.run_overlap import require_independent, vehicle_positions
+from ..sensing.traffic.source import load_trajectories
+from ..sensing.traffic.trajectories import Trajectories
 from ..site.site import Site
-from ..traffic.run_overlap import require_independent, vehicle_positions
-from ..traffic.source import load_trajectories
-from ..traffic.trajectories import Trajectories
 from .survey import Layout
 
 _Run = TypeVar("_Run")

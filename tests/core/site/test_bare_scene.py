@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seip_addon.core.opendrive.read import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.site.obstruction import NO_OBSTACLES_MESSAGE
 from seip_addon.core.site.scene_geometry import Mesh, Pole
-from seip_addon.core.streetscape.description import SiteDescription, Trees
-from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.workflows.survey import SurveySettings, lay_out
+from seip_addon.core.world.opendrive.read import read_map
+from seip_addon.core.world.streetscape.description import SiteDescription, Trees
+from seip_addon.core.world.streetscape.model import site_model
 from tests.builders.plain_street import PLAIN, block, street
 from tests.builders.street_map import street_map
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 import shapely
 
+from seip_addon.core.choosing.placement.objective import Objective, optimise
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar.catalogue import load_catalogue
-from seip_addon.core.placement.objective import Objective, optimise
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.visibility.grid import compute_visibility
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.sensing.visibility.sight_lines import pose_at
 from seip_addon.core.site.candidates import CandidateSettings, generate_candidates
 from seip_addon.core.site.scene_geometry import Mesh, NamedArea, Pole
 from seip_addon.core.site.site import make_site
-from seip_addon.core.visibility.grid import compute_visibility
-from seip_addon.core.visibility.settings import VisibilitySettings
-from seip_addon.core.visibility.sight_lines import pose_at
 from tests.builders.plain_street import PLAIN, block, street
 from tests.engines import ANY, needs_any
 

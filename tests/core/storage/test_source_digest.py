@@ -11,7 +11,7 @@ import pytest
 from seip_addon.core.storage.source_digest import CORE, _sources
 
 ROOT = Path(__file__).resolve().parents[3]
-ENTRIES = ["seip_addon.core.visibility.grid", "seip_addon.core.scans.run_folder"]
+ENTRIES = ["seip_addon.core.sensing.visibility.grid", "seip_addon.core.sensing.scans.run_folder"]
 DIGEST = """
 import sys
 from {0}.core.storage.source_digest import source_digest

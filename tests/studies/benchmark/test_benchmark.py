@@ -23,9 +23,9 @@ import bpy
 import numpy as np
 import pytest
 
+from seip_addon.core.choosing.placement.reduced_problem import make_instance
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar.catalogue import load_catalogue
-from seip_addon.core.placement.reduced_problem import make_instance
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import Mesh
 from tests.builders.small_junction import box_triangles, make_example

@@ -11,10 +11,10 @@ from headless.studies.benchmark.visibility import visibility_costs
 import bpy
 import pytest
 
-from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.site import Site, make_site
-from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.scene.read import read_scene
 
 pytest.importorskip("embreex", reason="embreex is not installed")

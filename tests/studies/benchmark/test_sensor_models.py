@@ -32,13 +32,13 @@ import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import IntervalEstimate
-from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.progress import finish
-from seip_addon.core.scans.sensor import MountedSensor, level_orientation
-from seip_addon.core.scans.simulation import ScanSettings, prepare
-from seip_addon.core.scans.static_scene import static_scene
-from seip_addon.core.traffic.bodies import fitted_body
-from seip_addon.core.visibility.ray_casting import make_ray_caster
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
+from seip_addon.core.sensing.scans.simulation import ScanSettings, prepare
+from seip_addon.core.sensing.scans.static_scene import static_scene
+from seip_addon.core.sensing.traffic.bodies import fitted_body
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from tests.builders.small_junction import ORIGIN, box_triangles, make_example
 from tests.builders.small_scene import make_run
 

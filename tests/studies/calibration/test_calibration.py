@@ -16,9 +16,9 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar.catalogue import load_catalogue
-from seip_addon.core.lidar.range_equation import RangeEquation
-from seip_addon.core.lidar.surface_patches import surface_deviation
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.range_equation import RangeEquation
+from seip_addon.core.sensing.lidar.surface_patches import surface_deviation
 from tests.builders.measured_sensor import EDGES, ELEVATIONS, HEIGHT, LAW, OFFSETS, measured, share
 
 

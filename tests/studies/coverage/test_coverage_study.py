@@ -12,8 +12,8 @@ from headless.studies.coverage.tables import save_study_table
 import numpy as np
 import pytest
 
+from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement.search_limits import SolverLimits
 from seip_addon.core.progress import finish
 from seip_addon.core.site.site import Site
 from tests.builders.small_junction import make_example

@@ -14,7 +14,7 @@ from headless.studies.detection import command as evaluate
 from matplotlib.image import imread
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.results.placement_record import save_placement_record
+from seip_addon.core.output.results.placement_record import save_placement_record
 
 COARSE = ["--heights", "5.4", "--grid", "8", "--spacing", "20"]
 BRIEF = ["--every", "14", "--steps", "2", "--from-scratch"]

@@ -28,23 +28,23 @@ from headless.studies.detection.sensor_configuration import SensorConfiguration
 import numpy as np
 import shapely
 
+from seip_addon.core.choosing.placement.deployment import deploy
+from seip_addon.core.choosing.placement.search_limits import DEFAULT_LIMITS
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation
-from seip_addon.core.lidar.beams import beam_directions
-from seip_addon.core.lidar.catalogue import load_catalogue
-from seip_addon.core.lidar.noisy_returns import return_chance
-from seip_addon.core.placement.deployment import deploy
-from seip_addon.core.placement.search_limits import DEFAULT_LIMITS
 from seip_addon.core.progress import finish
-from seip_addon.core.returns.bodies import PANELS
-from seip_addon.core.returns.expected_returns import expected_returns
-from seip_addon.core.returns.road_users import cars_at
-from seip_addon.core.scans.sensor import MountedSensor
-from seip_addon.core.scans.simulation import ScanSettings
-from seip_addon.core.scans.static_scene import StaticScene
+from seip_addon.core.sensing.lidar.beams import beam_directions
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.noisy_returns import return_chance
+from seip_addon.core.sensing.returns.bodies import PANELS
+from seip_addon.core.sensing.returns.expected_returns import expected_returns
+from seip_addon.core.sensing.returns.road_users import cars_at
+from seip_addon.core.sensing.scans.sensor import MountedSensor
+from seip_addon.core.sensing.scans.simulation import ScanSettings
+from seip_addon.core.sensing.scans.static_scene import StaticScene
+from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.site.site import Targets
-from seip_addon.core.traffic.trajectories import RoadUser, Trajectories
-from seip_addon.core.visibility.ray_casting import make_ray_caster
 from tests.builders.labelled_frames import box, detected, traffic, truth
 from tests.builders.small_junction import make_example
 

@@ -19,7 +19,7 @@ import numpy as np
 from matplotlib.image import imread
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.traffic.trajectories import Trajectories
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.workflows.traffic_runs import runs_in
 from tests.builders.small_scene import make_run
 

@@ -28,9 +28,9 @@ import numpy as np
 import pytest
 
 from seip_addon.core.progress import finish
-from seip_addon.core.scans.simulation import ScanSettings, prepare
-from seip_addon.core.scans.static_scene import static_scene
-from seip_addon.core.traffic.bodies import fitted_body
+from seip_addon.core.sensing.scans.simulation import ScanSettings, prepare
+from seip_addon.core.sensing.scans.static_scene import static_scene
+from seip_addon.core.sensing.traffic.bodies import fitted_body
 from tests.builders.square_by_hand import road, sensors
 
 ALL = (RangeNoise, DropOff, Rain, PositionError, YawError, TiltError, ClockOffset, Thinned, OtherSizes)

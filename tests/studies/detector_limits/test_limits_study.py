@@ -27,7 +27,7 @@ from matplotlib.image import imread
 
 from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.progress import finish
-from seip_addon.core.scans.simulation import ScanSettings
+from seip_addon.core.sensing.scans.simulation import ScanSettings
 from tests.builders.square_by_hand import road, sensors
 
 NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0))

@@ -30,7 +30,7 @@ import numpy as np
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.scans.simulation import ScanSettings
+from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.workflows.survey import SurveySettings, lay_out
 from tests.builders.sloping_road import hill

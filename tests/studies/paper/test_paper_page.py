@@ -12,7 +12,7 @@ from headless.studies.paper.published import PUBLISHED_CLAIMS, PUBLISHED_SENSORS
 import numpy as np
 import pytest
 
-from seip_addon.core.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 
 TYPES, HEIGHTS, TARGETS = ("type1", "type2", "type3"), (3.5, 5.4, 8.0), 1000
 FACTS = CaseFacts(

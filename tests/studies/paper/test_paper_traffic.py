@@ -14,8 +14,8 @@ import shapely
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.sumo_programs import find_sumo, run
-from seip_addon.core.traffic.trajectories import Trajectories
 from seip_addon.core.workflows.traffic_runs import runs_in
 from tests.builders.plain_street import street
 from tests.sumo_here import needs_sumo

@@ -11,7 +11,7 @@ import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.traffic.vehicle_types import read_vehicle_types
+from seip_addon.core.sensing.traffic.vehicle_types import read_vehicle_types
 
 TYPES = """<routes>
  <vType id="small" length="3.6" width="1.6" height="1.5" vClass="passenger"/>

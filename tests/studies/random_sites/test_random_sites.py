@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.elevation.geotiff import read_geotiff
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive.read import read_map
-from seip_addon.core.openstreetmap.extract import read_extract
-from seip_addon.core.openstreetmap.site import place_on_map
 from seip_addon.core.progress import finish
-from seip_addon.core.traffic.run_overlap import MAX_OVERLAP, overlap_of, vehicle_positions
-from seip_addon.core.traffic.trajectories import Trajectories
+from seip_addon.core.sensing.traffic.run_overlap import MAX_OVERLAP, overlap_of, vehicle_positions
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
+from seip_addon.core.world.elevation.geotiff import read_geotiff
+from seip_addon.core.world.opendrive.read import read_map
+from seip_addon.core.world.openstreetmap.extract import read_extract
+from seip_addon.core.world.openstreetmap.site import place_on_map
 from tests.sumo_here import needs_sumo
 
 PLANS = [draw_plan(np.random.default_rng([5, number])) for number in range(40)]

@@ -16,14 +16,14 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.lidar.catalogue import load_catalogue
-from seip_addon.core.scans.sensor import MountedSensor
-from seip_addon.core.scans.static_scene import static_scene
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.scans.sensor import MountedSensor
+from seip_addon.core.sensing.scans.static_scene import static_scene
+from seip_addon.core.sensing.visibility import ray_casting
+from seip_addon.core.sensing.visibility.float32_precision import rounding_warnings
+from seip_addon.core.sensing.visibility.ray_casting import Engine
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
-from seip_addon.core.visibility import ray_casting
-from seip_addon.core.visibility.float32_precision import rounding_warnings
-from seip_addon.core.visibility.ray_casting import Engine
 from seip_addon.core.workflows.survey import SurveySettings, grid_key, lay_out
 from tests.engines import each_engine, needs_embree
 from tests.oracles.float64_rays import first_hits as plain_first_hits

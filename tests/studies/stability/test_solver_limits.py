@@ -27,13 +27,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from seip_addon.core.choosing.placement import near_optimal
+from seip_addon.core.choosing.placement.cheapest import cheapest_for_coverage
+from seip_addon.core.choosing.placement.near_optimal import near_optimal_set
+from seip_addon.core.choosing.placement.problem import TIE_TOLERANCE
+from seip_addon.core.choosing.placement.search_limits import SolverLimits
+from seip_addon.core.choosing.placement.solver import scale_notes, solve, solve_greedy
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import near_optimal
-from seip_addon.core.placement.cheapest import cheapest_for_coverage
-from seip_addon.core.placement.near_optimal import near_optimal_set
-from seip_addon.core.placement.problem import TIE_TOLERANCE
-from seip_addon.core.placement.search_limits import SolverLimits
-from seip_addon.core.placement.solver import scale_notes, solve, solve_greedy
 from seip_addon.core.progress import finish
 from tests.oracles.random_cases import cases
 

@@ -9,9 +9,9 @@ from headless.studies.stability import command as stability
 
 import pytest
 
+from seip_addon.core.choosing.placement.scenarios import Scenarios
+from seip_addon.core.choosing.robustness.pose_study import PoseStudySettings
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement.scenarios import Scenarios
-from seip_addon.core.robustness.pose_study import PoseStudySettings
 
 SCENE = Path(__file__).resolve().parents[3] / "scenes" / "junction.blend"
 COARSE = [

@@ -28,11 +28,11 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar.catalogue import load_catalogue
 from seip_addon.core.progress import finish
-from seip_addon.core.scans.sensor import MountedSensor, level_orientation
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
+from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.workflows.survey import SurveySettings, lay_out, with_grid
 from tests.builders.small_junction import make_geometry
 

@@ -1,0 +1,504 @@
+r"""Best-first branch and bound on the marginal gains of sensors, for coverage and multi-cover.
+
+A placement is built in greedy order: each sensor adds no more than the one before it, because coverage is submodular.
+At a node with k sensors still to come the best completion adds at most the sum of the k largest gains; these sums fall
+along the sorted candidates, so all children below the first that falls short are cut at once (cf. Nemhauser and Wolsey
+1981 on maximising submodular set functions). The gains on top of all children come from one matrix product, and cut
+most of them before they become nodes. Where rings of beams overlap a little everywhere the relaxed integer program is
+weak and this bound is strong.
+
+The value φ of a target by the number of sensors that see it (`multi_cover`) need not be concave: where two sensors must
+see it, one is worth nothing. With S chosen and l sensors still to come, a target seen n times is worth φ(n), and what
+follows adds to it no more than the least concave function :math:`φ_{n,l}` above :math:`φ(n), …, φ(n + l)`,
+
+.. math::
+    F(S \cup R) \le F(S) + \sum_j w_j\, φ_{n_j(S),\,l}(n_j(R)), \quad |R| \le l,
+
+which is submodular in R, and tighter in every branch than above it: who has been seen once counts in full or not at
+all, who cannot be seen often enough any more counts no longer, and for the last sensor it is exact.
+
+The largest bound among the open nodes holds for every placement that the search has not seen: it falls as the search
+goes on, and a search that is stopped can be continued.
+
+Weights are whole numbers, so a search meets the same placements in the same order on every machine.
+"""
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+from heapq import heappop, heappush
+
+import numpy as np
+
+from ...arrays import Boolean, Float, Integer
+from ...progress import Progress
+from .bounds import Bound, lagrangian_bound, select
+from .problem import TIE_TOLERANCE
+from .reduced_problem import MAX_EXACT_DOUBLE, WHOLE_SLACK, Instance, Numbers
+from .search_limits import Clock
+
+MIN_SENSORS = 3  # with so many sensors to come, or more, a node is bounded by Lagrangian relaxation as well
+
+MIN_CHILDREN = 60
+"""... where at least so many children are left, and each sensor adds no more than the one before it ...
+
+Elsewhere branching itself tightens the bound, and sooner.
+"""
+
+TRIALS, MAX_KEPT_SHARE = 4, 0.5
+"""... and, after so many trials with as many sensors to come, where it leaves no more than such a share of them."""
+
+FIRST_STEPS, LATER_STEPS = 300, 30  # of the multipliers of the first node, and of later ones from their parent's
+MAX_ENTRIES = 30_000_000  # entries of V that the search keeps as numbers at most: 240 MB, or twice that
+OPERATIONS_PER_FETCH = 8  # multiplications that take as long as fetching an entry of V
+
+MAX_WAITING_FOLLOWERS = 16_000_000
+"""Followers of nodes that wait to be taken by their bounds: 200 MB. With so many, new nodes are searched first."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Node:
+    """Sensors chosen so far and who may follow, largest gain first.
+
+    Parameters
+    ----------
+    bound : float
+        No placement below this node has a larger objective value.
+    chosen : tuple of int
+        In the order in which they were chosen.
+    value : float
+        Their objective value.
+    goal : float
+        Objective value that a placement below this node must have to be wanted.
+    followers : (n,) int64
+    gains : (n,) float
+        What each follower would add at most, with those that follow it.
+    multipliers : (t,) float64, optional
+        Lagrangian multipliers of the targets to begin from.
+    multiplier : float
+        Multiplier of the budget to begin from.
+    """
+
+    bound: float
+    chosen: tuple[int, ...]
+    value: float
+    goal: float
+    followers: Integer
+    gains: Numbers
+    multipliers: Float | None = None
+    multiplier: float = 0.0
+
+
+def is_worthwhile(instance: Instance, candidates: Integer) -> bool:
+    """Return whether a search among some candidates of an instance fits into useful memory."""
+    return len(candidates) * max(len(instance.weight), len(candidates)) <= MAX_ENTRIES
+
+
+def merit(instance: Instance, chosen: Integer) -> tuple[int, float, float, list[int]]:
+    """Return number, price, double coverage and order as a key, smallest first, rounded to what counts as equal."""
+    doubly = instance.doubly(chosen)
+    return (
+        len(chosen),
+        relative_price(instance, math.fsum(instance.price[chosen])),
+        -(doubly if instance.step == 1 else round(doubly / instance.slack)),
+        chosen.tolist(),
+    )
+
+
+def relative_price(instance: Instance, price: float) -> float:
+    """Return a price in units of the dearest sensor's, rounded to what counts as equal."""
+    return round(price / (float(instance.price.max(initial=0.0)) or 1.0), 8)
+
+
+class Search:
+    """A walk over all placements in greedy order; what is wanted of them is up to `_take` and `_is_hopeless`.
+
+    Parameters
+    ----------
+    goal : float
+        Objective value to be reached at least.
+    depth_first : bool
+        Whether to follow each branch to its end before the next one, instead of taking the largest bound first.
+    root : (n,) int64 and Bound, optional
+        Candidates to search among, and a bound on what placements of these reach, where known.
+
+    Attributes
+    ----------
+    goal : float
+        A placement of a smaller value is not wanted. It rises as placements are found.
+    satisfied : bool
+        Whether enough was found.
+    """
+
+    def __init__(
+        self, instance: Instance, goal: float, *, depth_first: bool = False, root: tuple[Integer, Bound] | None = None
+    ) -> None:
+        self.instance = instance
+        self.goal = instance.attainable(goal) - instance.slack
+        self.satisfied = False
+        self._depth_first = depth_first
+        self._clock = Clock(math.inf)
+        self._matrix = instance.matrix
+        self._by_target = np.ascontiguousarray(self._matrix.T)
+        self._seen_by = np.ascontiguousarray(instance.visible.T)
+        self._weight = instance.weight.astype(self._matrix.dtype)
+        self._overlap = (self._matrix * self._weight) @ self._by_target if instance.cover.top == 1 else None
+        self._excluded = instance.conflict | np.eye(len(instance), dtype=bool)
+        # running sums of all gains, each at most the total, are exact below MAX_EXACT_DOUBLE and rounded beyond
+        most = instance.total * (len(instance) + 1)
+        self._rounding = 0.0 if most < MAX_EXACT_DOUBLE else most * len(instance) / MAX_EXACT_DOUBLE
+        self._queue: list[tuple[tuple[float, int, int], _Node]] = []
+        self._stack: list[_Node] = []
+        self._serial = self._waiting = self._met = 0
+        self._left_over: dict[int, list[float]] = {}
+        gains = self._matrix @ instance.unseen_layers[0].astype(self._matrix.dtype)
+        first = np.argsort(-gains, kind="stable")
+        bound, multipliers = math.inf, None
+        if root is not None:
+            first, bound, multipliers = first[np.isin(first, root[0])], root[1].value, root[1].targets
+        self._push([_Node(bound, (), 0.0, -math.inf, first, gains[first], multipliers)])
+
+    @property
+    def bound(self) -> float:
+        """No placement not seen yet has a larger objective value; -inf where all is seen that can be wanted."""
+        bounds = [node.bound for node in self._stack] + [node.bound for _, node in self._queue[:1]]
+        bound = max(bounds, default=-math.inf)
+        return bound if bound >= self.goal - self._rounding else -math.inf
+
+    def run(self, clock: Clock, seconds: float, most: float = math.inf) -> Generator[Progress, None, bool]:
+        """Search on; return whether all was seen, or enough, before the time was up, in ``most`` branches."""
+        end, last = clock.elapsed + min(seconds, clock.left), self._met + most
+        self._clock = clock
+        while self._is_open() and not self.satisfied:
+            if clock.elapsed > end or clock.left <= 0 or self._met >= last:
+                return False
+            yield Progress(0, 0, f"searching placements, {self._met:,} branches so far")
+            self._met += 1
+            clock.spend(len(self.instance))
+            self._push((yield from self._expand(self._pop())))
+        return True
+
+    def _take(self, placement: Integer) -> float:
+        """Take a placement that may reach the goal; return the goal that placements with more sensors must reach."""
+        raise NotImplementedError
+
+    def _is_hopeless(self, chosen: tuple[int, ...], followers: Integer) -> bool:  # noqa: ARG002 -- for subclasses
+        """Whether nothing below is wanted for another reason than its objective value."""
+        return False
+
+    def offer(self, chosen: Integer) -> float:
+        """Take a placement found elsewhere; return the goal that placements with more sensors must reach."""
+        return self._take(np.sort(np.array(chosen, dtype=np.int64)))
+
+    def _is_open(self) -> bool:
+        if not self._stack and self._queue and self._queue[0][1].bound < self.goal - self._rounding:
+            self._queue.clear()
+        return bool(self._stack or self._queue)
+
+    def _pop(self) -> _Node:
+        if self._stack:
+            return self._stack.pop()
+        node = heappop(self._queue)[1]
+        self._waiting -= len(node.followers)
+        return node
+
+    def _push(self, children: list[_Node]) -> None:
+        for child in reversed(children):
+            if self._depth_first or self._waiting > MAX_WAITING_FOLLOWERS:
+                self._stack.append(child)
+            else:
+                self._serial += 1
+                heappush(self._queue, ((-child.bound, -len(child.chosen), self._serial), child))
+                self._waiting += len(child.followers)
+
+    def _expand(self, node: _Node) -> Generator[Progress, None, list[_Node]]:
+        """Return the children of a node that can still reach the goal; take those that do."""
+        goal = self._wanted(node)
+        left = 0 if node.bound < goal else self._left(node)
+        if left == 0:
+            return []
+        node, children = _within_reach(node, left, goal)
+        if children == 0 or self._is_hopeless(node.chosen, node.followers):
+            return []
+        if left == 1:
+            self._take_leaves(node, children)
+            return []
+        known = node.multipliers is not None and not node.chosen
+        if children >= MIN_CHILDREN and self.instance.cover.concave and not known and self._relaxation_pays(left):
+            before = children
+            node, children = yield from self._relaxed(node, left, goal)
+            self._left_over.setdefault(left, []).append(children / before)
+            if children == 0:
+                return []
+        kept = self._children(node, children, left, goal)
+        if left > 2:
+            return kept
+        for child in kept:
+            self._met += 1
+            self._take_leaves(child, len(child.followers))
+        return []
+
+    def _children(self, node: _Node, children: int, left: int, goal: float) -> list[_Node]:
+        """Return the children of a node whose bounds reach the goal, after offering those that reach it themselves."""
+        times = self.instance.times(node.chosen)
+        later = self._may_follow(node, children)
+        gains_after = self._gains(node, times, left - 1) - self._overlaps(times, left - 1, node.followers, children)
+        multiplier, best = self._best_completions(node, np.where(later, gains_after, 0.0), left - 1)
+        values = node.value + self._gains(node, times, 1)[:children].astype(np.float64)
+        kept = []
+        for row in np.flatnonzero(values + best >= goal):
+            chosen, value, wanted = (*node.chosen, int(node.followers[row])), float(values[row]), self._wanted(node)
+            if value >= wanted:
+                wanted = self.offer(np.array(chosen))
+            if value + best[row] < wanted:
+                continue
+            after, bound = later[row], min(node.bound, value + float(best[row]))
+            order = np.flatnonzero(after)[np.argsort(-gains_after[row, after], kind="stable")]
+            followers, gains = node.followers[order], gains_after[row, order]
+            kept.append(_Node(bound, chosen, value, wanted, followers, gains, node.multipliers, multiplier))
+        return kept
+
+    def _wanted(self, node: _Node) -> float:
+        """Return the objective value that a placement below a node must have, but for rounding."""
+        return max(node.goal, self.goal) - self._rounding
+
+    def _left(self, node: _Node) -> int:
+        """Return how many sensors can follow at most."""
+        left = self.instance.count - len(node.chosen)
+        if not math.isfinite(self.instance.budget):
+            return left
+        prices = np.sort(self.instance.price[node.followers])[:left]
+        spent = math.fsum(self.instance.price[list(node.chosen)])
+        return int(np.count_nonzero(self.instance.affordable(spent + np.cumsum(prices))))
+
+    def _take_leaves(self, node: _Node, children: int) -> None:
+        """Take the placements of one sensor more."""
+        if self._left(node) == 0:
+            return
+        for candidate, gain in zip(node.followers[:children].tolist(), node.gains[:children].tolist(), strict=True):
+            if self.satisfied or node.value + gain < self._wanted(node):
+                return
+            self.offer(np.array((*node.chosen, candidate)))
+
+    def _rest(self, node: _Node, left: int, targets: Integer) -> Instance:
+        """Return the followers of a node, some targets, and what the sensors chosen leave of the limits."""
+        instance, followers = self.instance, node.followers
+        spent = math.fsum(instance.price[list(node.chosen)])
+        return replace(
+            instance,
+            visible=self._seen_by[targets][:, followers].T,  # rows of targets are copied faster
+            weight=instance.weight[targets],
+            price=instance.price[followers],
+            conflict=np.broadcast_to(np.False_, (len(followers), len(followers))),  # bounds know the cliques alone
+            clique=instance.clique[followers],
+            mandatory=np.zeros((0, len(followers)), bool),
+            original=instance.original[followers],
+            count=left,
+            budget=max(instance.budget * (1 + TIE_TOLERANCE) - spent, 0.0),
+        )
+
+    def _relaxation_pays(self, left: int) -> bool:
+        """Whether enough children were cut where nodes with so many sensors to come were relaxed before."""
+        shares = self._left_over.get(left, [])
+        return left >= MIN_SENSORS and (len(shares) < TRIALS or sum(shares) <= MAX_KEPT_SHARE * len(shares))
+
+    def _relaxed(self, node: _Node, left: int, goal: float) -> Generator[Progress, None, tuple[_Node, int]]:
+        """Drop the followers that a Lagrangian bound rules out; return also how many are children."""
+        instance = self.instance
+        layers = instance.layers(instance.times(node.chosen), left)
+        open_targets = np.flatnonzero(layers[0] > 0)
+        rest = self._rest(node, left, open_targets)
+        start = None if node.multipliers is None else node.multipliers[open_targets]
+        steps = FIRST_STEPS if start is None else LATER_STEPS
+        keep, bound = yield from lagrangian_bound(
+            rest, goal - node.value, self._clock, start, steps, layers[:, open_targets]
+        )
+        multipliers = np.zeros(len(instance.weight))
+        multipliers[open_targets] = bound.targets
+        node = replace(
+            node,
+            bound=min(node.bound, node.value + bound.value),
+            followers=node.followers[keep],
+            gains=node.gains[keep],
+            multipliers=multipliers,
+        )
+        return _within_reach(node, left, goal)
+
+    def _may_follow(self, node: _Node, children: int) -> Boolean:
+        """Return who may follow each child, (children, n)."""
+        instance, followers = self.instance, node.followers
+        first = followers[:children]
+        later: Boolean = np.arange(len(followers)) > np.arange(children)[:, None]
+        later &= ~self._excluded[first[:, None], followers]
+        if math.isfinite(instance.budget):
+            spent = math.fsum(instance.price[list(node.chosen)])
+            later &= instance.affordable(spent + instance.price[first, None] + instance.price[followers])
+        return later
+
+    def _gains(self, node: _Node, times: Integer, left: int) -> Numbers:
+        """Return what each follower adds at most to targets seen so many times, with so many to come, (n,)."""
+        instance = self.instance
+        if instance.cover.concave:  # the same however many are to come
+            return node.gains
+        increments = instance.increments(times, left).astype(self._matrix.dtype)
+        gains: Numbers = (self._matrix @ increments)[node.followers]
+        return gains
+
+    def _overlaps(self, times: Integer, left: int, followers: Integer, children: int) -> Numbers:
+        """Return how much less each follower adds after each child, with so many to come, (children, n).
+
+        For plain coverage this is the weight that both see and no chosen one: all that both see, less what is seen
+        already, where that is shorter.
+        """
+        instance = self.instance
+        lost = instance.increments(times, left) - instance.increments(times + 1, left)
+        by_child = instance.visible[followers[:children]].any(axis=0)
+        kept, changed = np.flatnonzero(by_child & (lost == 0)), np.flatnonzero(by_child & (lost != 0))
+        overlap = self._overlap if len(kept) <= len(changed) else None
+        targets = changed if overlap is None else kept
+        factor = (lost if overlap is None else instance.weight)[targets].astype(self._matrix.dtype)[:, None]
+        self._clock.spend(len(targets) * len(followers) * (children + OPERATIONS_PER_FETCH))
+        rows, by_target = followers[:children], self._by_target[targets]
+        if 2 * len(followers) < len(instance):
+            by_target = by_target[:, followers]
+            shared: Numbers = (by_target[:, :children] * factor).T @ by_target
+        else:
+            shared = ((by_target[:, rows] * factor).T @ by_target)[:, followers]
+        return shared if overlap is None else overlap[rows[:, None], followers] - shared
+
+    def _best_completions(self, node: _Node, gains_after: Numbers, left: int) -> tuple[float, Float]:
+        """Return what so many sensors more add to each child at most, within what it leaves of the budget.
+
+        Returns
+        -------
+        float
+            Multiplier of the budget.
+        (children,) float64
+        """
+        best: Float = _largest(gains_after, left).sum(axis=1, dtype=np.float64)
+        if not math.isfinite(self.instance.budget):
+            return 0.0, best
+        rest = self._rest(node, left + 1, np.zeros(0, dtype=np.int64))
+        multiplier = select(rest, node.gains.astype(np.float64), node.multiplier).multiplier
+        if multiplier > 0:
+            net = np.maximum(gains_after - multiplier * rest.price, 0.0)
+            spent = multiplier * (rest.budget - rest.price[: len(net)])
+            best = np.minimum(best, _largest(net, left).sum(axis=1, dtype=np.float64) + spent)
+        return multiplier, best
+
+
+class BestPlacements(Search):
+    """Lists the placements of largest coverage among those that cover at least a goal.
+
+    Each one that covers more raises the goal, and those that fall short of it by then leave the list.
+
+    Parameters
+    ----------
+    goal : float
+        Weight to be covered at least.
+    most : int
+        Longest list; of more placements these are the first that the search meets.
+    bound : float
+        No placement covers more: the search ends when the list is full of such.
+
+    Attributes
+    ----------
+    overflowed : bool
+        Whether there are more. Otherwise, once the search has come to its end, all that cover as much are listed, but
+        for those with idle sensors.
+    """
+
+    def __init__(self, instance: Instance, goal: float, most: int, bound: float) -> None:
+        super().__init__(instance, goal)
+        self.overflowed = False
+        self._listed: dict[bytes, tuple[float, Integer]] = {}
+        self._most = most
+        self._bound = bound
+        self._value = -math.inf
+
+    @property
+    def found(self) -> list[Integer]:
+        """Sorted candidates of the placements that cover most, in the order in which they were met."""
+        return [placement for _, placement in self._listed.values()]
+
+    def _take(self, placement: Integer) -> float:
+        instance, value = self.instance, self.instance.value(placement)
+        if value < self.goal or not instance.feasible(placement):
+            return self.goal
+        # with more sensors only those are wanted that cover more: weights are whole numbers
+        more = value + 1 - WHOLE_SLACK
+        if value > self._value:
+            self.overflowed &= value <= self._value + instance.slack
+            self._value, self.goal = value, value - instance.slack
+            self._listed = {key: tie for key, tie in self._listed.items() if tie[0] >= self.goal}
+        if placement.tobytes() in self._listed:
+            return more
+        if len(self._listed) < self._most:
+            self._listed[placement.tobytes()] = value, placement
+        else:
+            # one more than can be listed: from here on only a better one is of interest
+            self.overflowed = True
+            self.goal = max(self.goal, more)
+        self.satisfied = self.overflowed and self._bound < more
+        return more
+
+
+class FirstInOrder(Search):
+    """Keeps the first by `merit` of the placements that cover a goal with as many sensors as are allowed.
+
+    What is dearer or doubly covers less is cut. What is covered once and what is covered twice are together a
+    submodular function too: the largest gains bound it in the same way.
+
+    Parameters
+    ----------
+    instance : Instance
+        No placement with fewer sensors than its ``count`` reaches the goal.
+
+    Attributes
+    ----------
+    best : (k,) int64 or None
+    """
+
+    def __init__(self, instance: Instance, goal: float) -> None:
+        super().__init__(instance, goal, depth_first=True)
+        self.best: Integer | None = None
+        self._key: tuple[int, float, float, list[int]] | None = None
+
+    def _take(self, placement: Integer) -> float:
+        if self.instance.value(placement) >= self.goal and self.instance.feasible(placement):
+            key = merit(self.instance, placement)
+            if self._key is None or key < self._key:
+                self.best, self._key = placement, key
+        return self.goal
+
+    def _is_hopeless(self, chosen: tuple[int, ...], followers: Integer) -> bool:
+        if self._key is None:
+            return False
+        instance, left = self.instance, self.instance.count - len(chosen)
+        prices = np.sort(instance.price[followers])[:left]
+        price = relative_price(instance, math.fsum(instance.price[list(chosen)]) + math.fsum(prices))
+        if price != self._key[1]:
+            return price > self._key[1]
+        twice = np.minimum(instance.times(chosen), 2)
+        below_two = instance.gains(instance.weight * (twice < 2))
+        reach = float(instance.weight @ twice) + float(_largest(below_two[followers], left).sum())
+        doubly = reach - self.goal + self._rounding
+        return (doubly if instance.step == 1 else doubly / instance.slack + 1) < -self._key[2]
+
+
+def _within_reach(node: _Node, left: int, goal: float) -> tuple[_Node, int]:
+    """Drop the followers whose gains are too small, and return how many can come next."""
+    gains = node.gains.astype(np.float64)
+    sums = np.concatenate(([0.0], np.cumsum(gains), np.full(left, gains.sum())))
+    reach = node.value + sums[left : left + len(gains)] - sums[: len(gains)]
+    # A follower matters only where it reaches the goal together with the largest gains.
+    useful = int(np.count_nonzero(node.value + sums[left - 1] + gains >= goal))
+    node = replace(node, followers=node.followers[:useful], gains=node.gains[:useful])
+    return node, int(np.count_nonzero(reach >= goal))
+
+
+def _largest(values: Numbers, number: int) -> Numbers:
+    """Return the largest numbers of each row, in any order."""
+    if values.shape[-1] <= number:
+        return values
+    return np.partition(values, values.shape[-1] - number, axis=-1)[..., -number:]

@@ -1,0 +1,158 @@
+"""The cheapest placement that reaches a coverage: partial set covering."""
+
+import math
+from collections.abc import Generator
+from dataclasses import replace
+
+import numpy as np
+
+from ...arrays import Float, Integer
+from ...errors import SeipError
+from ...progress import Progress
+from .bounds import bound_from, can_reach, lagrangian_bound, least_price
+from .feasibility import starting_choice
+from .greedy import drop_redundant, greedy, greedy_with_swaps
+from .integer_program import check_solver, reaching
+from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
+from .reduced_problem import Instance, common_unit, make_instance
+from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
+from .solver import prove, scale_notes, solve_within
+from .tie_breaking import fewest
+
+SAME_PRICE = "among equally cheap placements "  # how the note begins that bounds what another one may cover
+MIN_TIE_BREAKING_LIMIT = 1.0  # seconds, or units of work, that choosing among equally cheap placements may always take
+
+
+def cheapest_for_coverage(
+    problem: PlacementProblem, coverage: float, limits: SolverLimits = DEFAULT_LIMITS
+) -> Generator[Progress, None, Placement]:
+    """Choose the cheapest placement that covers a share of all weight.
+
+    Among the cheapest the one that covers most is returned, and among those the one that `solve` prefers. Where all
+    prices are equal, zero included, the number of sensors stands for the price: the placement has the fewest that
+    suffice. The result's objective, bound and gap are prices.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Its number of sensors and budget limit the placement where they are given.
+    coverage : float
+        Share of the weight of all targets, above 0 and at most 1.
+
+    Raises
+    ------
+    SeipError
+        The coverage cannot be reached, with the highest one that can; or as for `solve`.
+    """
+    if not 0 < coverage <= 1:
+        raise SeipError(f"the coverage to reach is {coverage:g}; give a share above 0 and at most 1")
+    solver, clock = limits.solver, limits.clock()
+    check_solver(solver)
+    instance, factor = make_instance(problem)
+    whole = math.fsum(problem.weights) * factor
+    goal = instance.attainable(coverage * whole)
+    chosen = yield from _reaching(problem, instance, goal, whole, solver, clock)
+    chosen = drop_redundant(instance, chosen, goal)
+    if problem.prices.any():
+        cheapest, bound = yield from _cheapest(instance, chosen, goal, solver, clock)
+    else:
+        cheapest, proven = yield from fewest(instance, chosen, goal, solver, clock)
+        bound = 0.0 if proven else -math.inf
+    finishing = clock.part(clock.elapsed, MIN_TIE_BREAKING_LIMIT)  # no longer than it took to find the price
+    best = yield from solve_within(_no_dearer(problem, instance, cheapest), solver, finishing)
+    reached = best.covered * factor >= goal - instance.slack
+    chosen = best.chosen if reached else instance.original[cheapest]
+    return _record(problem, chosen, bound, best, clock)
+
+
+def _reaching(
+    problem: PlacementProblem, instance: Instance, goal: float, whole: float, solver: str, clock: Clock
+) -> Generator[Progress, None, Integer]:
+    """Return some placement that reaches the goal."""
+    start = yield from starting_choice(problem, instance, solver)
+    chosen = greedy(instance, start, per_price=bool(instance.price.any()), enough=goal - instance.slack)
+    if instance.value(chosen) >= goal - instance.slack:
+        return chosen
+    first = yield from greedy_with_swaps(instance, start)
+    proof = yield from prove(instance, first, solver, clock)
+    covered = instance.value(proof.chosen)
+    if covered >= goal - instance.slack:
+        return proof.chosen
+    wanted = f"a coverage of {goal / whole:.2%}"
+    if instance.attained(proof.bound) < goal - instance.slack:
+        raise SeipError(
+            f"{wanted} cannot be reached: no placement covers more than {proof.bound / whole:.2%}; "
+            "ask for less, or allow more or better sensors"
+        )
+    raise SeipError(
+        f"no placement with {wanted} was found in {clock.seconds:.0f} s: the best one covers {covered / whole:.2%}; "
+        "ask for less or raise the time limit"
+    )
+
+
+def _cheapest(
+    instance: Instance, chosen: Integer, goal: float, solver: str, clock: Clock
+) -> Generator[Progress, None, tuple[Integer, float]]:
+    """Return the cheapest placement that reaches the goal and a lower bound on the price of any."""
+    price = math.fsum(instance.price[chosen])
+    if price == 0:
+        return chosen, price
+    no_dearer = replace(instance, budget=min(price, instance.budget))
+    keep, bound = yield from lagrangian_bound(no_dearer, goal, clock)
+    least = min(price, max(least_price(instance.of(keep), bound, goal), float(instance.price.min())))
+    if np.ptp(instance.price) == 0:
+        chosen, proven = yield from fewest(instance, chosen, goal, solver, clock)
+        price = math.fsum(instance.price[chosen])
+        single = float(instance.price[0])
+        return chosen, price if proven else min(price, math.ceil(least / single * (1 - TIE_TOLERANCE)) * single)
+    cheaper = replace(instance, budget=_below(price, instance.price)).of(keep)
+    within = can_reach(cheaper, bound_from(cheaper, bound.targets, bound.groups), goal)
+    keep, cheaper = keep[within], cheaper.part(within)
+    if len(keep) == 0:
+        return chosen, price
+    yield Progress(0, 0, f"looking for a cheaper placement among {len(keep)} candidates")
+    program = reaching(cheaper, goal)
+    outcome = yield from program.maximise(-1 * program.price, solver, clock)
+    if outcome.chosen is not None:
+        chosen, price = keep[outcome.chosen], math.fsum(instance.price[keep[outcome.chosen]])
+    if outcome.finished:
+        return chosen, price
+    return chosen, min(price, max(least, -outcome.bound / program.price_scale))
+
+
+def _below(price: float, prices: Float) -> float:
+    """Return a budget that any lower total price meets, and that is as far below the price as it can be."""
+    unit, whole = common_unit(prices[prices > 0])
+    return price - unit / 2 if whole else price * (1 - 3 * TIE_TOLERANCE)
+
+
+def _no_dearer(problem: PlacementProblem, instance: Instance, cheapest: Integer) -> PlacementProblem:
+    """Return the problem of covering most for the price of the cheapest placement."""
+    if np.ptp(instance.price) == 0 and (instance.price.any() or not problem.prices.any()):
+        return replace(problem, count=len(cheapest))
+    return replace(problem, budget=math.fsum(instance.price[cheapest]))
+
+
+def _record(problem: PlacementProblem, chosen: Integer, bound: float, best: Placement, clock: Clock) -> Placement:
+    price = math.fsum(problem.prices[chosen])
+    optimal = bound >= price * (1 - 3 * TIE_TOLERANCE)
+    notes = [*scale_notes(problem)]
+    if not optimal:
+        notes.append(
+            "the search ended before this placement was proven the cheapest: the gap is the share of its price that "
+            "another one may save"
+        )
+    if best.status != "optimal":
+        more = max(0.0, best.bound - problem.covered(chosen)) / math.fsum(problem.weights)
+        points = math.ceil(more * 1000 - 1e-9) / 10
+        notes.append(f"{SAME_PRICE}another one may cover up to {points:.1f} percentage points more")
+    return assess(
+        problem,
+        chosen,
+        max(bound, 0.0),
+        optimal=optimal,
+        solver=best.solver,
+        seconds=clock.seconds,
+        notes=tuple(notes),
+        objective=price,
+    )

@@ -1,0 +1,283 @@
+"""A deployment: the chosen sensors with their coverage and price."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Annotated
+
+import numpy as np
+
+from ...arrays import Boolean, Float, Integer
+from ...geometry.orientation import describe_turn, orientation
+from ...limits import SHARE
+from ...sensing.lidar.model import LidarModel
+from ...site.site import Candidates, Site
+from .returns_summary import ReturnsSummary
+
+BAND, UNRANKED = "over plausible gains", "not ranked"
+"""How the messages of a `GainBand` begin."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """One chosen sensor.
+
+    Parameters
+    ----------
+    label : str
+        ``S1``, ``S2``, … in the order in which each adds the most to those before it.
+    pose : int or None
+        Index among the site's candidates; None where a hand has put it elsewhere.
+    position_name : str
+        Name of the pole, or of the sampled place on the sidewalk.
+    on_pole : bool
+        Whether it is mounted on an existing pole.
+    foot : (3,) float64, metres
+        Ground point of the position, local site axes.
+    xyz : (3,) float64, metres
+        Optical centre, local site axes.
+    height : float, metres
+        Height above the ground point.
+    yaw : float, radians
+        Direction of azimuth zero, counter-clockwise from +x.
+    tilt : float, radians
+        How far azimuth zero is turned down.
+    alone : float
+        Share of the targets that it sees.
+    added : float
+        Share of the targets that it sees and no sensor before it does; they add up to the whole coverage.
+    marginal : float
+        Share of the targets that it alone sees: what is lost without it.
+    roll : float, radians
+        How far it is rolled about its azimuth zero; only a hand does that.
+    installation : float, dollars, optional
+        What it costs to install it there; None where prices are those of sensors alone.
+    """
+
+    label: str
+    pose: int | None
+    model: LidarModel
+    position_name: str
+    on_pole: bool
+    foot: Float
+    xyz: Float
+    height: float
+    yaw: float
+    tilt: float
+    alone: float = 0.0
+    added: float = 0.0
+    marginal: float = 0.0
+    roll: float = 0.0
+    installation: float | None = None
+
+    @property
+    def price(self) -> float:
+        """Its price in dollars: installed where that is counted."""
+        return self.model.price + (self.installation or 0.0)
+
+    @property
+    def orientation(self) -> Float:
+        """Rotation from the sensor's axes to the site's, (3, 3) float64."""
+        return orientation(self.yaw, self.tilt, self.roll)
+
+    @property
+    def turned(self) -> str:
+        """How it is turned, as words to be put after its height."""
+        return describe_turn(self.tilt, None if self.model.all_round else self.yaw)
+
+
+@dataclass(frozen=True)
+class TypeBand:
+    """Coverage of a placement if all of its sensors were of one type, at that type's plausible gains."""
+
+    sensor: str
+    low: Annotated[float, SHARE]
+    high: Annotated[float, SHARE]
+
+
+@dataclass(frozen=True)
+class GainBand:
+    """Coverage of a placement over the plausible gains of its sensors.
+
+    Parameters
+    ----------
+    low, high : float
+        Share of the targets that is seen at the lowest and at the highest gains.
+    sheets : tuple of str
+        Sensor types of the placement whose law of detection comes from a data sheet, by catalogue key.
+    types : tuple of TypeBand
+        For each type that there was to choose from; empty where there was only one.
+    """
+
+    low: Annotated[float, SHARE]
+    high: Annotated[float, SHARE]
+    sheets: tuple[str, ...]
+    types: tuple[TypeBand, ...] = ()
+
+    @property
+    def unranked(self) -> tuple[tuple[TypeBand, TypeBand], ...]:
+        """Pairs of types whose bands overlap, so that neither is better by what is known of them."""
+        pairs = combinations(self.types, 2)
+        return tuple((one, other) for one, other in pairs if one.low <= other.high and other.low <= one.high)
+
+    def messages(self) -> tuple[str, ...]:
+        """Describe the band, and name the types that it does not rank."""
+        messages = []
+        if self.sheets:
+            sheets = ", ".join(self.sheets)
+            messages.append(
+                f"{BAND} coverage is {self.low:.1%} to {self.high:.1%}: detection by {sheets} is derived from data "
+                "sheets, not calibrated on a sweep"
+            )
+        types = dict.fromkeys(one for pair in self.unranked for one in pair)
+        if types:
+            bands = ", ".join(f"{one.sensor} {one.low:.0%} to {one.high:.0%}" for one in types)
+            messages.append(f"{UNRANKED}, as their bands overlap where the sensors are mounted: {bands}")
+        return tuple(messages)
+
+
+@dataclass(frozen=True, eq=False)
+class Deployment:
+    """The chosen sensors and what they see together.
+
+    Parameters
+    ----------
+    sensors : tuple of Sensor
+        In the order of their labels.
+    seen_by : (t,) int64
+        How many of the sensors see each target.
+    coverage : float
+        Share of the targets that some sensor sees.
+    seen_twice : float
+        Share of the targets that two sensors or more see.
+    central : float or None
+        Coverage of the targets in weighted regions; None where there are none.
+    weighted : float
+        Share of the targets' weight that is seen.
+    price : float, dollars
+    rows : (k, t) bool
+        What each of them sees.
+    gain_band : GainBand, optional
+        Coverage over the plausible gains, where some type is not calibrated on a sweep.
+    returns : ReturnsSummary, optional
+        Returns from road users, where the sensors were chosen for them.
+    pedestrian_returns : (t,) float64, optional
+        Expected returns from a pedestrian near each target, likewise.
+    """
+
+    sensors: tuple[Sensor, ...]
+    seen_by: Integer
+    coverage: float
+    seen_twice: float
+    central: float | None
+    weighted: float
+    price: float
+    rows: Boolean
+    gain_band: GainBand | None = None
+    returns: ReturnsSummary | None = None
+    pedestrian_returns: Float | None = None
+
+    @property
+    def installed(self) -> bool:
+        """Whether its price counts posts, mounting, power and backhaul."""
+        return any(sensor.installation is not None for sensor in self.sensors)
+
+
+def price_text(price: float, *, installed: bool) -> str:
+    """Return a price in whole dollars, with the word that it is of installed sensors where it is."""
+    return f"${price:,.0f}{' installed' if installed else ''}"
+
+
+def pose_prices(candidates: Candidates, models: Mapping[str, LidarModel]) -> Float:
+    """Return what a sensor at each candidate pose costs (c,), in dollars: installed where that is counted."""
+    prices = np.array([models[key].price for key in candidates.sensor])
+    installation = candidates.installation
+    return prices if installation is None else prices + installation[candidates.position_of]
+
+
+def deploy(
+    site: Site, models: Mapping[str, LidarModel], visible: Boolean, chosen: Sequence[int] | Integer
+) -> Deployment:
+    """Return the chosen poses as sensors, with what they see.
+
+    Parameters
+    ----------
+    visible : (c, t) bool
+    chosen : (k,) int
+        Indices of the chosen poses; their order breaks ties between labels.
+    """
+    order = _by_added_coverage(visible, chosen)
+    mounted = [sensor_at(site, models, f"S{rank + 1}", int(pose)) for rank, pose in enumerate(order)]
+    return deployment_of(site, mounted, visible[order])
+
+
+def deployment_of(site: Site, mounted: Sequence[Sensor], rows: Boolean) -> Deployment:
+    """Return sensors with what they see, each and together.
+
+    Parameters
+    ----------
+    mounted : sequence of Sensor
+        In the order in which each adds to those before it; their own shares are ignored.
+    rows : (k, t) bool
+        What each of them sees.
+    """
+    seen_by = rows.sum(axis=0, dtype=np.int64)
+    seen = seen_by > 0
+    before: Integer = np.cumsum(rows, axis=0) - rows
+    targets = site.targets
+    sensors = tuple(
+        replace(sensor, alone=_share(row), added=_share(row & (earlier == 0)), marginal=_share(row & (seen_by == 1)))
+        for sensor, row, earlier in zip(mounted, rows, before, strict=True)
+    )
+    return Deployment(
+        sensors=sensors,
+        seen_by=seen_by,
+        coverage=_share(seen),
+        seen_twice=_share(seen_by > 1),
+        central=_share(seen[targets.central]) if targets.central.any() else None,
+        weighted=weighted_share(seen, targets.weight),
+        price=float(sum(sensor.price for sensor in sensors)),
+        rows=rows,
+    )
+
+
+def weighted_share(seen: Boolean, weight: Float) -> float:
+    """Return the share of the weight that is seen; zero where all weights are zero."""
+    total = float(weight.sum())
+    return float(weight[seen].sum()) / total if total > 0.0 else 0.0
+
+
+def _by_added_coverage(visible: Boolean, chosen: Sequence[int] | Integer) -> Integer:
+    """Order the chosen poses so that each adds the most targets to those before it."""
+    left = [int(pose) for pose in chosen]
+    unseen = np.ones(visible.shape[1], dtype=bool)
+    order: list[int] = []
+    while left:
+        best = max(left, key=lambda pose: int((visible[pose] & unseen).sum()))
+        left.remove(best)
+        order.append(best)
+        unseen &= ~visible[best]
+    return np.array(order, dtype=np.int64)
+
+
+def sensor_at(site: Site, models: Mapping[str, LidarModel], label: str, pose: int) -> Sensor:
+    """Return the sensor at a candidate pose, without what it sees."""
+    candidates = site.candidates
+    position = int(candidates.position_of[pose])
+    return Sensor(
+        label=label,
+        pose=pose,
+        model=models[str(candidates.sensor[pose])],
+        position_name=str(candidates.position_name[position]),
+        on_pole=bool(candidates.on_pole[position]),
+        foot=candidates.position[position],
+        xyz=candidates.xyz[pose],
+        height=float(candidates.height[pose]),
+        yaw=float(candidates.yaw[pose]),
+        tilt=float(candidates.tilt[pose]),
+        installation=None if candidates.installation is None else float(candidates.installation[position]),
+    )
+
+
+def _share(these: Boolean) -> float:
+    return float(np.count_nonzero(these)) / len(these)

@@ -1,0 +1,390 @@
+"""The integer program in PuLP, and the solvers it can be given to by name."""
+
+import importlib.metadata
+import math
+import os
+import shutil
+import stat
+import tempfile
+import threading
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pulp
+from pulp.apis.coin_api import pulp_cbc_path
+
+from ...arrays import Boolean, Float, Integer
+from ...errors import SeipError
+from ...progress import Progress, in_thread
+from .problem import TIE_TOLERANCE
+from .reduced_problem import Instance
+from .search_limits import OPERATIONS_PER_UNIT, Clock
+
+Expression = Any  # of PuLP, which has no types
+TOTAL_WEIGHT = 1e4  # total weight in a program: far above the solvers' absolute tolerances of 1e-6
+TOLERANCE = 2e-6  # share of all weight that a solver's tolerance of 1e-6 on every variable may add up to, doubled
+SOLVERS = ("highs", "cbc", "gurobi")  # what `solver_name` knows beside ``auto``
+MAX_ENTRIES = 1_000_000  # entries of V up to which a program is built: PuLP takes 0.5 kB for each
+MAX_REJECTED = 100  # choices in a row that a solver's tolerance admits and exact arithmetic does not, before giving up
+MIN_SECONDS = 0.01  # seconds that a solver is given where none are left
+OPERATIONS_PER_ENTRY = 1e4  # multiplications per entry of a program that count as the work of one branch of a solver
+CALL_OPERATIONS = 1e8  # multiplications that take as long as handing the smallest program to a solver
+ROOT_OPERATIONS = 5.0  # multiplications per squared entry that count as the work of the first linear relaxation
+UNLIMITED_SECONDS = 1e7  # seconds that solvers are given where there is no limit: not all of them take infinity
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Outcome of a solver: choice, bound and status.
+
+    Parameters
+    ----------
+    chosen : (k,) int64 or None
+        The best placement found, none where the time was too short or none exists.
+    bound : float
+        No placement has a larger objective; infinite where the solver does not say.
+    finished : bool
+        Whether the solver ran to its end: ``chosen`` is optimal, or nothing is feasible.
+    nodes : int
+        Branches that the solver took.
+    """
+
+    chosen: Integer | None
+    bound: float
+    finished: bool
+    nodes: int = 0
+
+
+class CoverProgram:
+    """The integer program of an instance, to which requirements are added stage by stage.
+
+    ``x`` are binary, the covered share ``y`` and the doubly covered share ``z`` of each target are continuous: at an
+    optimum they are integral by themselves. ``z`` is right wherever the covered weight is required to be the largest
+    possible.
+    """
+
+    def __init__(self, instance: Instance) -> None:
+        self.instance = instance
+        self.model = pulp.LpProblem("placement", pulp.LpMaximize)
+        self.x = [self.model.add_variable(f"x{i}", cat=pulp.LpBinary) for i in range(len(instance))]
+        self._checks: list[Callable[[Integer], bool]] = [instance.feasible]
+        self.model.setObjective(self.number)
+        if instance.count < len(instance):
+            self.model += self.number <= instance.count
+        if math.isfinite(instance.budget):
+            self.model += self.price <= instance.budget * self.price_scale * (1 + TIE_TOLERANCE)
+        for group in instance.mandatory:
+            self.model += self.number_among(np.flatnonzero(group)) >= 1
+        for clique in cover_by_cliques(instance.conflict):
+            self.model += self.number_among(clique) <= 1
+
+    @cached_property
+    def covered(self) -> Expression:
+        """The covered weight, scaled as `weight_scale` says."""
+        for y, seen in zip(self._y, self._seen, strict=True):
+            self.model += y <= seen
+        return _linear(self._y, self.instance.weight * self.weight_scale)
+
+    @cached_property
+    def doubly_covered(self) -> Expression:
+        """The weight covered twice or more, scaled alike; `covered` must be required to be at its maximum."""
+        z = [self.model.add_variable(f"z{j}", 0, 1) for j in range(len(self.instance.weight))]
+        for z_j, y, seen in zip(z, self._y, self._seen, strict=True):
+            self.model += z_j + y <= seen
+        return _linear(z, self.instance.weight * self.weight_scale)
+
+    @property
+    def weight_scale(self) -> float:
+        """Factor that brings the total weight to `TOTAL_WEIGHT`."""
+        return TOTAL_WEIGHT / self.instance.total if self.instance.total > 0 else 1.0
+
+    @property
+    def number(self) -> Expression:
+        """The number of sensors."""
+        return _linear(self.x, np.ones(len(self.x)))
+
+    @property
+    def price(self) -> Expression:
+        """The total price, scaled as `price_scale` says."""
+        return _linear(self.x, self.instance.price * self.price_scale)
+
+    @property
+    def price_scale(self) -> float:
+        """Factor that brings the dearest sensor to 10,000, away from the solvers' absolute tolerances."""
+        dearest = float(self.instance.price.max(initial=0.0))
+        return 1e4 / dearest if dearest > 0 else 1.0
+
+    def number_among(self, candidates: Integer, factors: Float | None = None) -> Expression:
+        """Return the (weighted) number of sensors among some candidates."""
+        return _linear([self.x[i] for i in candidates], np.ones(len(candidates)) if factors is None else factors)
+
+    def require(self, constraint: Expression, check: Callable[[Integer], bool] | None = None) -> None:
+        """Add a constraint for this and all later solves, and what it means in exact arithmetic."""
+        self.model += constraint
+        if check is not None:
+            self._checks.append(check)
+
+    def require_coverage(self, goal: float) -> None:
+        """Require a covered weight, but for the instance's slack."""
+        instance = self.instance
+        self.require(self._at_least(self.covered, goal), lambda c: instance.value(c) >= goal - instance.slack)
+
+    def require_better(self, than: float) -> None:
+        """Require a covered weight that is larger than ``than`` by at least the instance's step."""
+        instance, goal = self.instance, than + self.instance.step
+        self.require(self._at_least(self.covered, goal), lambda c: instance.value(c) >= goal)
+
+    def require_double_coverage(self, goal: float) -> None:
+        """Require a doubly covered weight, but for the instance's slack."""
+        instance = self.instance
+        self.require(self._at_least(self.doubly_covered, goal), lambda c: instance.doubly(c) >= goal - instance.slack)
+
+    def require_price(self, price: float) -> None:
+        """Require a total price of at most ``price``, but for `TIE_TOLERANCE`."""
+        limit = price * (1 + TIE_TOLERANCE)
+        prices = self.instance.price
+        self.require(self.price <= limit * self.price_scale, lambda c: math.fsum(prices[c]) <= limit)
+
+    def maximise(
+        self, objective: Expression, solver: str, clock: Clock, share: float = 1.0
+    ) -> Generator[Progress, None, Outcome]:
+        """Solve for the largest objective within a share of what is left of the limits.
+
+        The solver works in a thread of its own; when the generator is closed it is told to stop.
+        """
+        if clock.left <= 0:
+            return Outcome(None, math.inf, finished=False)
+        self.model.setObjective(objective)
+        ends = clock.elapsed + share * clock.left
+        size = np.count_nonzero(self.instance.visible) + len(self.x)
+        for _ in range(MAX_REJECTED):
+            left = max(ends - clock.elapsed, MIN_SECONDS)
+            seconds = max(clock.seconds_left, MIN_SECONDS) if clock.counts_work else left
+            nodes = math.ceil(left * OPERATIONS_PER_UNIT / (size * OPERATIONS_PER_ENTRY)) if clock.counts_work else None
+            outcome = yield from in_thread(
+                lambda stop, limits=(seconds, nodes): self._solve(solver, limits, stop),  # type: ignore[misc]
+                f"solving an integer program of {len(self.x)} candidates",
+            )
+            branching = outcome.nodes * size * OPERATIONS_PER_ENTRY
+            clock.spend(CALL_OPERATIONS + root_operations(self.instance) + branching)
+            chosen = outcome.chosen
+            if chosen is None or all(check(chosen) for check in self._checks):
+                return outcome
+            # solvers have tolerances of their own: forbid exactly what fails in exact arithmetic
+            others = np.setdiff1d(np.arange(len(self.x)), chosen)
+            self.model += self.number_among(chosen) - self.number_among(others) <= len(chosen) - 1
+        return replace(outcome, chosen=None, finished=False)
+
+    def maximise_coverage(self, solver: str, clock: Clock, share: float = 1.0) -> Generator[Progress, None, Outcome]:
+        """Solve for the largest covered weight within the limits; the outcome's bound is not scaled."""
+        outcome = yield from self.maximise(self.covered, solver, clock, share)
+        return replace(outcome, bound=outcome.bound / self.weight_scale)
+
+    def _at_least(self, covered: Expression, goal: float) -> Expression:
+        """Return the requirement of a weight, lowered by what a solver may miss it by."""
+        margin = max(self.instance.step / 2, TOLERANCE * self.instance.total)
+        return covered >= (goal - margin) * self.weight_scale
+
+    def _solve(self, solver: str, limits: tuple[float, int | None], stop: threading.Event) -> Outcome:
+        with _engine(solver, limits, stop) as engine:
+            try:
+                self.model.solve(engine)
+            except (pulp.PulpSolverError, OSError) as error:
+                raise SeipError(
+                    f"the solver {solver} stopped with an error ({error}); choose another solver"
+                ) from error
+        status = self.model.sol_status
+        solved = status in (pulp.LpSolutionOptimal, pulp.LpSolutionIntegerFeasible)
+        chosen = np.flatnonzero([round(x.value() or 0.0) for x in self.x]) if solved else None
+        finished = status in (pulp.LpSolutionOptimal, pulp.LpSolutionInfeasible)
+        return Outcome(chosen, _bound(self.model, solver), finished, _nodes(self.model, solver))
+
+    @cached_property
+    def _y(self) -> list[Any]:
+        return [self.model.add_variable(f"y{j}", 0, 1) for j in range(len(self.instance.weight))]
+
+    @cached_property
+    def _seen(self) -> list[Any]:
+        return [self.number_among(np.flatnonzero(column)) for column in self.instance.visible.T]
+
+
+def root_operations(instance: Instance) -> float:
+    """Return the work of the first linear relaxation of an instance's program, in multiplications.
+
+    The benchmark measures it against the entries of V (`seip study benchmark`, under “Growth”).
+    """
+    return ROOT_OPERATIONS * float(np.count_nonzero(instance.visible)) ** 2
+
+
+def is_affordable(instance: Instance, clock: Clock, share: float = 1.0) -> bool:
+    """Return whether an instance's program fits into memory, and its first relaxation into what is left of limits.
+
+    A solver cannot be stopped by counted work within a relaxation, and PuLP takes long to build a large program.
+    """
+    if clock.left <= 0 or np.count_nonzero(instance.visible) > MAX_ENTRIES:
+        return False
+    return root_operations(instance) <= share * clock.left * OPERATIONS_PER_UNIT
+
+
+def reaching(instance: Instance, goal: float) -> CoverProgram:
+    """Return the program of an instance whose placements cover at least ``goal``."""
+    program = CoverProgram(instance)
+    program.require_coverage(goal)
+    return program
+
+
+def cover_by_cliques(conflict: Boolean) -> Iterator[Integer]:
+    """Cover all conflicts by cliques, of each of which one candidate at most can be chosen, (k,) int64.
+
+    Cliques bound the linear relaxation more tightly than the pairs they are
+    made of. They are grown greedily, in order, so the result is always the same.
+
+    Parameters
+    ----------
+    conflict : (c, c) bool
+        Symmetric, false on the diagonal.
+    """
+    left = np.triu(conflict)
+    for first in range(len(conflict)):
+        while left[first].any():
+            clique = [first, int(np.argmax(left[first]))]
+            common = conflict[clique[0]] & conflict[clique[1]]
+            while common.any():
+                # prefer candidates whose conflict with the first is not covered yet
+                uncovered = common & left[first]
+                grown = int(np.argmax(uncovered if uncovered.any() else common))
+                clique.append(grown)
+                common &= conflict[grown]
+            members = np.sort(np.array(clique, np.int64))
+            left[np.ix_(members, members)] = False
+            yield members
+
+
+def solver_name(solver: str) -> str:
+    """Return the solver that a name means; for ``auto`` HiGHS where it is installed, else CBC."""
+    if solver == "auto":
+        return "highs" if is_available("highs") else "cbc"
+    return solver
+
+
+def check_solver(solver: str) -> str:
+    """Return name and version of a solver, for the record.
+
+    Raises
+    ------
+    SeipError
+        The solver is unknown or cannot run here; those that can are named.
+    """
+    solver = solver_name(solver)
+    if solver not in SOLVERS:
+        raise SeipError(f"unknown solver {solver!r}; choose among {', '.join(_available())}")
+    if not is_available(solver):
+        raise SeipError(f"the solver {solver} is not available here; choose among {', '.join(_available())}")
+    if solver == "cbc":
+        return f"CBC of PuLP {pulp.__version__}"
+    return f"{_PULP_NAME[solver]} {importlib.metadata.version(_PACKAGE[solver])}, PuLP {pulp.__version__}"
+
+
+def _linear(variables: list[Any], factors: Float) -> Expression:
+    return pulp.LpAffineExpression(list(zip(variables, factors.tolist(), strict=True)))
+
+
+class _Highs(pulp.HiGHS):  # type: ignore[misc]
+    """PuLP's interface to HiGHS, with the status that PuLP does not know: the limit of branches was reached."""
+
+    def findSolutionValues(self, lp: pulp.LpProblem) -> tuple[int, int]:  # noqa: N802 -- PuLP's name
+        """Return PuLP's status of problem and solution, after setting the variables."""
+        try:
+            status: tuple[int, int] = super().findSolutionValues(lp)
+        except KeyError:  # raised last of all: the variables are set
+            if math.isfinite(lp.solverModel.getObjectiveValue()):
+                return pulp.LpStatusOptimal, pulp.LpSolutionIntegerFeasible
+            return pulp.LpStatusNotSolved, pulp.LpSolutionNoSolutionFound
+        return status
+
+
+@contextmanager
+def _engine(solver: str, limits: tuple[float, int | None], stop: threading.Event) -> Iterator[Any]:
+    """Yield PuLP's interface to a solver, set to prove optimality within seconds and, where given, branches.
+
+    HiGHS ends soon after ``stop`` is set; PuLP offers no way to stop the others before their time limit.
+    """
+    limit, nodes = min(limits[0], UNLIMITED_SECONDS), limits[1]
+    solver = solver_name(solver)
+    if solver == "highs":
+        import highspy  # noqa: PLC0415 -- only where it is asked for: another solver may be all there is
+
+        def interrupt(kind: object, message: object, output: object, answer: Any, data: object) -> None:  # noqa: ANN401, ARG001
+            answer.user_interrupt = stop.is_set()
+
+        kinds = highspy.cb.HighsCallbackType
+        yield _Highs(
+            msg=False,
+            timeLimit=limit,
+            gapRel=0.0,
+            threads=1,
+            callbackTuple=(interrupt, None),
+            callbacksToActivate=[kinds.kCallbackMipInterrupt, kinds.kCallbackSimplexInterrupt],
+            **({} if nodes is None else {"mip_max_nodes": nodes}),
+        )
+    elif solver == "cbc":
+        with _executable_cbc() as path:
+            yield pulp.COIN_CMD(path=path, msg=False, timeLimit=limit, gapRel=0.0, threads=1, maxNodes=nodes)
+    else:
+        more = {} if nodes is None else {"NodeLimit": nodes}
+        yield pulp.GUROBI(msg=False, timeLimit=limit, gapRel=0.0, Threads=1, **more)
+
+
+def _bound(model: pulp.LpProblem, solver: str) -> float:
+    """Return the solver's own upper bound on the objective."""
+    if model.sol_status == pulp.LpSolutionOptimal:
+        return float(pulp.value(model.objective))
+    solver = solver_name(solver)
+    if solver == "highs":
+        return -float(model.solverModel.getInfo().mip_dual_bound)
+    if solver == "gurobi":
+        return float(model.solverModel.ObjBound)
+    return math.inf
+
+
+def _nodes(model: pulp.LpProblem, solver: str) -> int:
+    """Return how many branches a solver took; 0 where it does not say."""
+    return max(int(model.solverModel.getInfo().mip_node_count), 0) if solver_name(solver) == "highs" else 0
+
+
+@contextmanager
+def _executable_cbc() -> Iterator[str]:
+    """Yield a path of PuLP's CBC that can be run.
+
+    Archives that drop permissions leave it without its run bit, and a
+    read-only installation cannot be mended in place; a copy can.
+    """
+    if os.access(pulp_cbc_path, os.X_OK):
+        yield pulp_cbc_path
+        return
+    with tempfile.TemporaryDirectory(prefix="seip-cbc-") as folder:
+        copy = Path(folder) / Path(pulp_cbc_path).name
+        shutil.copyfile(pulp_cbc_path, copy)
+        copy.chmod(stat.S_IRWXU)
+        yield str(copy)
+
+
+def is_available(solver: str) -> bool:
+    """Return whether a known solver can run here."""
+    if solver == "cbc":
+        return os.access(pulp_cbc_path, os.R_OK)
+    return _PULP_NAME[solver] in pulp.listSolvers(onlyAvailable=True)
+
+
+_PULP_NAME = {"highs": "HiGHS", "gurobi": "GUROBI"}
+
+_PACKAGE = {"highs": "highspy", "gurobi": "gurobipy"}
+
+
+def _available() -> list[str]:
+    return [name for name in SOLVERS if is_available(name)]

@@ -1,0 +1,381 @@
+"""Criterion, scenarios, risk measure and constraints of a placement, and the problem that they make of a site."""
+
+import difflib
+import math
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SeipError
+from ...limits import CHOSEN_WEIGHT, DISTANCE, PRICE
+from ...progress import Progress
+from ...sensing.lidar.carla_dropoff import CarlaDropoff
+from ...sensing.lidar.model import LidarModel
+from ...settings import setting
+from ...site.site import Candidates, Site
+from .cheapest import cheapest_for_coverage
+from .deployment import BAND, UNRANKED, Deployment, deploy, pose_prices
+from .problem import Placement, PlacementProblem
+from .risk import Failure, Risk
+from .scenarios import Scenarios
+from .search_limits import DEFAULT_LIMITS, SolverLimits
+from .solver import solve, solve_greedy
+
+DEFAULT_COUNT = 4  # sensors to place where neither a number nor a budget nor a coverage is asked for: the study's four
+MOVED = "moved by hand"  # status of a placement whose sensors hang where a hand has put them
+MOVED_MESSAGE = "Moved by hand: evaluated where the sensors hang; nothing is proven of it."
+CHOSEN_FOR = "chosen "  # how a note begins that says what was optimised in place of nominal coverage
+
+TAILS = {"mean": 1.0, "worst-quarter": 0.25, "worst": 0.0}
+"""Share of the scenarios, the worst ones, over which each risk measure averages."""
+
+
+@dataclass(frozen=True)
+class Objective:
+    """Objective and constraints: a criterion over scenarios with a risk measure, for N sensors or a budget.
+
+    The reverse problem asks for the least price of a coverage.
+
+    Parameters
+    ----------
+    count : int, optional
+        N, the largest number of sensors.
+    budget : float, dollars, optional
+        The largest total price.
+    coverage : float, optional
+        Share (0 to 1] of the weight to be seen at the least price; the reverse problem.
+    central_weight : float or "scene", optional
+        The weighted problem: weight of the targets in weighted regions, or the scene's own weights. Without it
+        all targets count alike: the vanilla problem.
+    min_distance : float, metres
+        Least distance between two sensors.
+    forbidden, mandatory : tuple of str
+        Names of positions that must not, and that must, carry a sensor.
+    criterion : {"auto", "road", "returns", "height"}
+        What is maximised: the road seen, the expected returns from road users, or the points above the road that beams
+        pass, as traffic leaves them; see `criterion_of`.
+    shares : (float, float, float)
+        Importance of cars, cyclists and pedestrians for the returns, in proportion.
+    scenarios : Scenarios
+        What the placement is optimised over, and evaluated on.
+    risk : {"auto", "none", "mean", "worst-quarter", "worst"}
+        Risk measure over the scenarios: their mean, or that of the worst quarter (the conditional value at risk), or
+        the worst. ``auto`` is the worst quarter of pose errors and the mean of traffic; with ``none`` the placement is
+        optimised for the nominal scenario, and only evaluated on the others.
+    failures : {"none", "worst", "mean"}
+        What counts after one sensor has failed: the one that matters most, or any, on average.
+    seen_by : int
+        Number of sensors that must see a target.
+
+    Raises
+    ------
+    SeipError
+        A number is out of its limits, or the parts contradict each other.
+    """
+
+    count: int | None = setting(
+        None, f"largest number of sensors ({DEFAULT_COUNT} if no objective is given)", minimum=1, metavar="N"
+    )
+    budget: float | None = setting(
+        None, "largest total price", unit="USD", minimum=0.0, maximum=PRICE.most, metavar="USD"
+    )
+    coverage: float | None = setting(
+        None, "reach this share (0 to 1) at the least price", minimum=0.0, maximum=1.0, metavar="SHARE"
+    )
+    central_weight: float | Literal["scene"] | None = setting(
+        None, "one weight for all weighted regions", minimum=0.0, maximum=CHOSEN_WEIGHT.most, metavar="W"
+    )
+    min_distance: float = setting(0.0, "least distance between two sensors", unit="m", minimum=0.0, metavar="M")
+    forbidden: tuple[str, ...] = setting((), "positions without sensor", option="forbid", metavar="POSITION")
+    mandatory: tuple[str, ...] = setting((), "positions with a sensor", option="require", metavar="POSITION")
+    criterion: Literal["auto", "road", "returns", "height"] = setting(
+        "auto",
+        "optimise the road seen, the returns from road users, or points above the road in traffic (auto: returns, if "
+        "sensors have a range law)",
+    )
+    shares: tuple[float, float, float] = setting(
+        (1.0, 1.0, 1.0),
+        "importance of cars, cyclists and pedestrians for returns (1 1 1)",
+        minimum=0.0,
+        maximum=CHOSEN_WEIGHT.most,
+        metavar="W",
+    )
+    scenarios: Scenarios = Scenarios()
+    risk: Literal["auto", "none", "mean", "worst-quarter", "worst"] = setting(
+        "auto",
+        "measure over the scenarios (auto: worst-quarter of pose errors, mean of traffic; none: only evaluate)",
+    )
+    failures: Failure = setting("none", "optimise what is left after the worst sensor, or any sensor (mean), fails")
+    seen_by: int = setting(1, "number of sensors that must see a target", minimum=1, metavar="K")
+
+    def __post_init__(self) -> None:
+        for name, limits in (("budget", PRICE), ("min_distance", DISTANCE)):
+            value = getattr(self, name)
+            if value is not None and not limits.allow(value):
+                raise SeipError(f"the {name.replace('_', ' ')} must be {limits}, not {value}")
+        if self.coverage is not None and not 0 < self.coverage <= 1:
+            raise SeipError(f"the coverage to reach must be a share above 0 and at most 1, not {self.coverage:g}")
+        weight = self.central_weight
+        if isinstance(weight, float | int) and not CHOSEN_WEIGHT.allow(weight):
+            raise SeipError(f"the central weight must be {CHOSEN_WEIGHT}, not {weight}")
+        if self.coverage is not None and self.criterion == "returns":
+            raise SeipError("a coverage to reach is a share of the road: leave out the criterion returns")
+        if not all(CHOSEN_WEIGHT.allow(share) or share == 0 for share in self.shares) or not any(self.shares):
+            raise SeipError(
+                f"the shares of cars, cyclists and pedestrians must be {CHOSEN_WEIGHT} or 0, one of them above 0"
+            )
+        both = sorted(set(self.forbidden) & set(self.mandatory))
+        if both:
+            raise SeipError(f"position {both[0]!r} is both forbidden and mandatory: take it out of one of the two")
+        self._check_scenarios()
+
+    def _check_scenarios(self) -> None:
+        kind, measure = self.scenarios.kind, self.measure
+        looks = self.failures != "none" or self.seen_by > 1
+        if looks and (self.risk == "none" or kind == "traffic"):
+            other = "the risk none" if self.risk == "none" else "traffic"
+            raise SeipError(f"sensor failures and several sensors per target do not go with {other}: leave one out")
+        if self.criterion == "height" and (kind != "traffic" or measure is None):
+            raise SeipError("the criterion height is of traffic: add --traffic, or choose another criterion")
+        if measure is None:
+            return
+        if self.cheapest:
+            raise SeipError(
+                "optimising over scenarios or for failures needs a number of sensors or a budget, not a coverage to "
+                "reach: give one of these, or only evaluate (--risk none)"
+            )
+        if self.criterion == "returns":
+            raise SeipError(
+                "returns from road users are optimised for nominal poses and the empty road: choose the criterion road "
+                "for scenarios or failures, or only evaluate (--risk none)"
+            )
+        if self.count is not None:
+            measure.require_sensors(self.count)
+
+    @property
+    def measure(self) -> Risk | None:
+        """Risk measure that is maximised over the scenarios; None for nominal poses on the empty road."""
+        looks = self.failures != "none" or self.seen_by > 1
+        if self.risk == "none" or (self.scenarios.kind == "nominal" and not looks):
+            return None
+        usual = "worst-quarter" if self.scenarios.kind == "pose-errors" else "mean"
+        return Risk(TAILS[usual if self.risk == "auto" else self.risk], self.seen_by, self.failures)
+
+    @property
+    def weighted(self) -> bool:
+        """Whether this is the weighted problem."""
+        return self.central_weight is not None
+
+    @property
+    def cheapest(self) -> bool:
+        """Whether the least price for a coverage is asked for."""
+        return self.coverage is not None
+
+
+def criterion_of(objective: Objective, models: Mapping[str, LidarModel]) -> Literal["road", "returns", "height"]:
+    """Return the criterion of an objective for the sensor types to choose from.
+
+    Coverage of the road predicts detection where every return counts, as for the sensors of the SEIP paper. Sensors of
+    a range law detect vehicles several times as far as asphalt: there the returns from road users do.
+    """
+    if objective.criterion != "auto":
+        return objective.criterion
+    range_laws = any(not isinstance(model.law, CarlaDropoff) for model in models.values())
+    return "returns" if range_laws and not objective.cheapest and objective.measure is None else "road"
+
+
+class Evaluation(Protocol):
+    """Evaluation of a placement on held-out scenarios."""
+
+    def messages(self) -> tuple[str, ...]:
+        """Return notes on the placement: what it gains over the nominal optimum, and warnings."""
+
+    def summary(self) -> tuple[str, ...]:
+        """Return lines that compare the placement with the nominal optimum."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A solution: an objective with its placement, certificate, deployment and evaluation.
+
+    Parameters
+    ----------
+    objective : Objective
+        With the number of sensors filled in where none was asked for.
+    greedy : Placement or None
+        Greedy solution of the same problem; None for the reverse problem and over scenarios.
+    evaluation : Evaluation, optional
+        On held-out scenarios, where the placement was optimised over scenarios.
+    """
+
+    objective: Objective
+    placement: Placement
+    greedy: Placement | None
+    deployment: Deployment
+    evaluation: Evaluation | None = None
+
+    @property
+    def certificate(self) -> str:
+        """The certificate as a message: proven optimal, or within which gap."""
+        status, gap, notes = self.placement.status, self.placement.gap, self.placement.notes
+        return certificate(status, gap, cheapest=self.objective.cheapest, notes=notes)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Notes on the placement, those on the plausible gains of its sensors last."""
+        band = self.deployment.gain_band
+        return tuple(dict.fromkeys((*self.placement.notes, *(band.messages() if band else ()))))
+
+    @property
+    def caption(self) -> tuple[str, ...]:
+        """What a picture says of it: certificate, plausible gains, and the objective if not nominal coverage."""
+        return (self.certificate, *(note for note in self.notes if note.startswith((CHOSEN_FOR, BAND, UNRANKED))))
+
+
+def certificate(status: str, gap: float | None, *, cheapest: bool, notes: Sequence[str] = ()) -> str:
+    """Return a placement's certificate as a message: what is proven optimal, or within which gap.
+
+    Parameters
+    ----------
+    gap : float or None
+        Between bound and objective, as a share of the objective; None or infinite where nothing bounds it.
+    notes : sequence of str
+        Those of the placement: one may say that something other than nominal coverage was optimised.
+    """
+    if status == MOVED:
+        return MOVED_MESSAGE
+    best, among = "cheapest" if cheapest else "best", f"among these candidates{purpose(notes)}."
+    if status == "optimal":
+        return f"Proven: the {best} placement that there is {among}"
+    share = "an unknown share" if gap is None or not math.isfinite(gap) else f"{gap:.2%}"
+    return f"Within {share} of the {best} placement possible {among}"
+
+
+def purpose(notes: Sequence[str]) -> str:
+    """Return what a placement was optimised for, from its notes, after a space; empty for nominal coverage."""
+    chosen_for = next((note.removeprefix(CHOSEN_FOR) for note in notes if note.startswith(CHOSEN_FOR)), "")
+    return chosen_for and f" {chosen_for.partition(':')[0]}"
+
+
+def target_weights(site: Site, objective: Objective) -> NDArray[np.float64]:
+    """Weight of each target under an objective, (t,) float64."""
+    return weights_in_regions(objective, site.targets.weight, site.targets.central)
+
+
+def weights_in_regions(
+    objective: Objective, weight: NDArray[np.float64], central: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return the weights of points under an objective, (n,) float64.
+
+    Parameters
+    ----------
+    weight : (n,) float64
+        The scene's own weights.
+    central : (n,) bool
+        Whether a point lies in some weighted region.
+
+    Raises
+    ------
+    SeipError
+        The objective is weighted, and no point lies in a weighted region.
+    """
+    if objective.central_weight is None:
+        return np.ones(len(weight))
+    if not central.any():
+        raise SeipError("the weighted problem needs a weighted region: draw one in SEIP Weighted Regions")
+    if objective.central_weight == "scene":
+        return weight
+    return np.where(central, objective.central_weight, 1.0)
+
+
+def placement_problem(
+    site: Site, visible: NDArray[np.bool_], models: Mapping[str, LidarModel], objective: Objective
+) -> PlacementProblem:
+    """State an objective on a site as a maximal covering location problem.
+
+    Parameters
+    ----------
+    visible : (c, t) bool
+
+    Raises
+    ------
+    SeipError
+        The objective contradicts itself or the site.
+    """
+    candidates = site.candidates
+    demanded = np.array([_named(candidates, name) for name in objective.mandatory], dtype=bool)
+    groups = np.concatenate((candidates.mandatory, demanded.reshape(-1, len(candidates.position))))
+    forbidden = np.zeros(len(candidates.position), dtype=bool)
+    for name in objective.forbidden:
+        forbidden |= _named(candidates, name)
+    return PlacementProblem(
+        visible=visible,
+        weights=target_weights(site, objective),
+        prices=pose_prices(candidates, models),
+        positions=candidates.position_of,
+        xyz=candidates.xyz,
+        labels=candidates.sensor,
+        mandatory=groups[:, candidates.position_of],
+        mandatory_names=np.concatenate((candidates.mandatory_name, np.array(objective.mandatory, dtype=np.str_))),
+        forbidden=forbidden[candidates.position_of],
+        count=with_count(objective, site).count,
+        budget=objective.budget,
+        min_distance=objective.min_distance,
+    )
+
+
+def check_objective(site: Site, models: Mapping[str, LidarModel], objective: Objective) -> None:
+    """Raise SeipError where a site cannot meet an objective, before any ray is cast."""
+    everything = np.ones((len(site.candidates), len(site.targets)), dtype=bool)
+    placement_problem(site, everything, models, objective)
+
+
+def optimise(
+    site: Site,
+    visible: NDArray[np.bool_],
+    models: Mapping[str, LidarModel],
+    objective: Objective,
+    limits: SolverLimits = DEFAULT_LIMITS,
+) -> Generator[Progress, None, Solution]:
+    """Optimise a placement on a site: the most coverage, or the least price for a coverage.
+
+    Parameters
+    ----------
+    visible : (c, t) bool
+
+    Raises
+    ------
+    SeipError
+        As for `placement_problem`, `solve` and `cheapest_for_coverage`.
+    """
+    problem = placement_problem(site, visible, models, objective)
+    if objective.coverage is not None:
+        placement = yield from cheapest_for_coverage(problem, objective.coverage, limits)
+        greedy = None
+    else:
+        placement = yield from solve(problem, limits)
+        greedy = solve_greedy(problem)
+    return Solution(with_count(objective, site), placement, greedy, deploy(site, models, visible, placement.chosen))
+
+
+def with_count(objective: Objective, site: Site) -> Objective:
+    """Fill in the number of sensors where nothing is asked for that limits it."""
+    free = objective.count is None and objective.budget is None and objective.coverage is None
+    return replace(objective, count=min(DEFAULT_COUNT, len(site.candidates.position))) if free else objective
+
+
+def _named(candidates: Candidates, name: str) -> NDArray[np.bool_]:
+    """Positions of that name, (p,) bool."""
+    found: NDArray[np.bool_] = candidates.position_name == name
+    if not found.any():
+        raise SeipError(f"there is no position {name!r}{_close(name, candidates.position_name.tolist())}")
+    return found
+
+
+def _close(name: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(name, known, n=3, cutoff=0.4)
+    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {known[0]!r} to {known[-1]!r}"
+    return f"; {hint} (the candidates.csv of a run lists all; quote names with blanks)"

@@ -1,0 +1,226 @@
+"""The placement problem and its solution."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Boolean, Float, Integer, Text
+from ...errors import SeipError
+
+TIE_TOLERANCE = 1e-9  # share of all weight, or of the price, below which differences count as rounding
+
+
+@dataclass(frozen=True, eq=False)
+class PlacementProblem:
+    r"""A maximal covering location problem over candidate poses (Church and ReVelle 1974).
+
+    .. math::
+        \max \sum_j w_j y_j \quad\text{subject to}\quad
+        y_j \le \sum_i V_{ij} x_i, \quad
+        \sum_i x_i \le N, \quad \sum_i p_i x_i \le C, \quad
+        x_i \in \{0, 1\},\; 0 \le y_j \le 1,
+
+    with at most one pose per position, at least one pose of each mandatory group, and no two poses closer than the
+    minimum distance. The vanilla problem has unit weights.
+
+    Parameters
+    ----------
+    visible : (c, t) bool
+        V: whether candidate pose i sees target j.
+    weights : (t,) float64
+        w, at least 0; all ones in the vanilla problem.
+    prices : (c,) float64
+        p, at least 0.
+    positions : (c,) int64
+        Position of each pose; at most one pose is chosen at each.
+    xyz : (c, 3) float64, metres
+        Position of each pose's sensor.
+    labels : (c,) str
+        Sensor type of each pose. Poses are put into the order of x, y, z and label before anything else, so that the
+        order in which they are given never matters.
+    mandatory : (g, c) bool, optional
+        Each row is a group of poses of which at least one must be chosen.
+    forbidden : (c,) bool, optional
+        Poses that must not be chosen.
+    count : int, optional
+        N, the largest number of sensors.
+    budget : float, optional
+        C, the largest total price.
+    min_distance : float, metres
+        Smallest distance in plan between two chosen sensors.
+
+    Raises
+    ------
+    SeipError
+        The figures contradict themselves or leave nothing to choose.
+    """
+
+    visible: Boolean
+    weights: Float
+    prices: Float
+    positions: Integer
+    xyz: Float
+    labels: Text
+    mandatory: Boolean | None = None
+    mandatory_names: Text | None = None
+    forbidden: Boolean | None = None
+    count: int | None = None
+    budget: float | None = None
+    min_distance: float = 0.0
+
+    def __post_init__(self) -> None:
+        self._check_values()
+        self._check_limits()
+        for group, name in zip(self.mandatory_groups & self.allowed, self.group_names, strict=True):
+            if not group.any():
+                raise SeipError(
+                    f"{name} must carry a sensor, but every candidate there is forbidden or missing; "
+                    "lift one of the two demands or add a candidate there"
+                )
+
+    @property
+    def allowed(self) -> Boolean:
+        """Poses that may be chosen, (c,) bool."""
+        return np.ones(len(self.visible), bool) if self.forbidden is None else ~self.forbidden
+
+    @property
+    def mandatory_groups(self) -> Boolean:
+        """The mandatory groups, (g, c) bool; g is 0 when there are none."""
+        return np.zeros((0, len(self.visible)), bool) if self.mandatory is None else self.mandatory
+
+    @property
+    def group_names(self) -> list[str]:
+        """A name for each mandatory group."""
+        if self.mandatory_names is None:
+            return [f"mandatory group {index + 1}" for index in range(len(self.mandatory_groups))]
+        return [str(name) for name in self.mandatory_names]
+
+    @property
+    def most_sensors(self) -> int:
+        """The largest number of sensors that number, budget and positions allow."""
+        positions, position = np.unique(self.positions[self.allowed], return_inverse=True)
+        most = len(positions) if self.count is None else self.count
+        if self.budget is None:
+            return most
+        cheapest = np.full(len(positions), math.inf)
+        np.minimum.at(cheapest, position, self.prices[self.allowed])
+        affordable = np.count_nonzero(np.cumsum(np.sort(cheapest)) <= self.budget * (1 + TIE_TOLERANCE))
+        return min(most, max(1, int(affordable)))
+
+    def covered(self, chosen: Integer) -> float:
+        """Return the weight of the targets that some chosen candidate sees."""
+        return math.fsum(self.weights[self.visible[chosen].any(axis=0)])
+
+    def _check_values(self) -> None:
+        if len(self.visible) == 0:
+            raise SeipError("there is no candidate to choose from; add poles or candidate areas")
+        if self.visible.shape[1] == 0:
+            raise SeipError("there is no target to see; let the region of interest overlap the roads")
+        for name, values in (("weight", self.weights), ("price", self.prices)):
+            if not np.isfinite(values).all() or (values < 0).any():
+                raise SeipError(f"every {name} must be a finite number of at least 0; correct the {name}s")
+        if not self.weights.any():
+            raise SeipError("every target weighs 0; give some target a positive weight")
+        if not self.allowed.any():
+            raise SeipError("every candidate is forbidden; shrink the forbidden areas")
+        if not np.isfinite(self.xyz).all():
+            raise SeipError("a candidate's coordinates are not finite; correct the pole or area it stands on")
+        if not (math.isfinite(self.min_distance) and self.min_distance >= 0):
+            raise SeipError(f"the minimum distance is {self.min_distance} m; give a finite distance of at least 0")
+
+    def _check_limits(self) -> None:
+        places = len(np.unique(self.positions[self.allowed]))
+        if self.count is not None and self.count < 1:
+            raise SeipError(f"asked for {self.count} sensors; ask for at least 1")
+        if self.count is not None and self.count > places:
+            raise SeipError(
+                f"asked for {self.count} sensors, but there are {places} positions; ask for at most {places}"
+            )
+        cheapest = float(self.prices[self.allowed].min())
+        if self.budget is not None and not self.budget >= cheapest:
+            raise SeipError(
+                f"the budget of {self.budget:g} is below the cheapest sensor, which costs {cheapest:g}; "
+                "raise the budget"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Chosen poses, and how good they provably are.
+
+    Parameters
+    ----------
+    chosen : (k,) int64
+        Indices into the problem's candidates, in the order of x, y, z and label.
+    objective : float
+        What was optimised: the covered weight, or the total price where the
+        cheapest placement for a coverage was asked for.
+    bound : float
+        No placement has a better objective than this.
+    gap : float
+        ``abs(bound - objective) / objective``; 0 where the two are equal.
+    status : str
+        ``optimal`` (proven) or ``feasible``.
+    solver : str
+        Name and version of what solved it.
+    covered : float
+        Weight of the targets that some chosen sensor sees.
+    notes : tuple of str
+        Notes on the solution, one sentence each.
+    """
+
+    chosen: Integer
+    objective: float
+    bound: float
+    gap: float
+    status: str
+    solver: str
+    seconds: float
+    covered: float
+    price: float
+    notes: tuple[str, ...] = ()
+
+
+def canonical_order(problem: PlacementProblem) -> Integer:
+    """Return the indices that sort the candidates by x, y, z and label, (c,) int64."""
+    x, y, z = problem.xyz.T
+    order: Integer = np.lexsort((problem.prices, problem.labels, z, y, x))
+    return order
+
+
+def assess(  # noqa: PLR0913 -- the fields of one record
+    problem: PlacementProblem,
+    chosen: Integer,
+    bound: float,
+    *,
+    optimal: bool,
+    solver: str,
+    seconds: float,
+    notes: tuple[str, ...] = (),
+    objective: float | None = None,
+) -> Placement:
+    """Return a choice with coverage, price and certificate; the objective is the coverage if none is given."""
+    covered = problem.covered(chosen)
+    if objective is None:
+        objective, bound = covered, max(bound, covered)
+    bound = objective if optimal else bound
+    return Placement(
+        chosen=chosen,
+        objective=objective,
+        bound=bound,
+        gap=relative_gap(objective, bound),
+        status="optimal" if optimal else "feasible",
+        solver=solver,
+        seconds=seconds,
+        covered=covered,
+        price=math.fsum(problem.prices[chosen]),
+        notes=notes,
+    )
+
+
+def relative_gap(objective: float, bound: float) -> float:
+    """Return how far a bound is from an objective, as a share of the objective."""
+    if bound == objective:
+        return 0.0
+    return abs(bound - objective) / objective if objective > 0 else math.inf

@@ -1,0 +1,308 @@
+"""Reduced placement problem that all algorithms work on: sorted candidates, merged targets, none dominated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Boolean, Float, Integer
+from ...errors import SeipError
+from .constraints import Constrained
+from .multi_cover import COVERAGE, MultiCover
+from .problem import TIE_TOLERANCE, PlacementProblem, canonical_order
+
+MAX_EXACT_DOUBLE = 2**53  # sums of whole numbers up to here are exact in double precision
+MAX_EXACT_SINGLE = 2**24  # sums of whole numbers up to here are exact in single precision, in any order
+
+INCOMMENSURABLE_TOTAL = 2**50
+"""Total of weights that have no common unit: sums stay exact in double precision, rounding below `TIE_TOLERANCE`."""
+
+MICROMETRE = 1e-6  # metres to which positions are rounded: posts may be too close by less than this
+WHOLE_SLACK = 0.25  # whole weights differ by one or not at all
+BOUND_ROUNDING = 1e-11  # share of all weight by which rounding may move a sum in double precision, with room to spare
+MAX_BINARY_PARTS = 1024  # binary fractions up to this are taken as the unit of weights: halves, quarters, ...
+DENOMINATORS = range(1, 13)  # a common unit of all weights is sought among these parts of the smallest one
+
+
+Numbers = NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Instance(Constrained):
+    """A reduced maximal covering instance: c candidates in canonical order, t merged targets, g mandatory groups.
+
+    Parameters
+    ----------
+    visible : (c, t) bool
+        No column is empty and no two are equal.
+    weight : (t,) float64
+        Weights of the merged targets: whole numbers, so that sums are exact and ties are ties on every machine.
+    step : float
+        A placement is proven optimal where none covers more by this: one unit of weight, or half of ``slack``.
+    slack : float
+        Covered weights that differ by no more are equal. Weights with a common unit are compared exactly (``slack`` is
+        less than one unit); without one, this is `TIE_TOLERANCE` of the weight that the candidates together see.
+    margin : float
+        Rounding error that the bound of a relaxation may have.
+    price : (c,) float64
+    conflict : (c, c) bool
+        Pairs that exclude each other: same position, or too close. The diagonal is false.
+    clique : (c,) int64
+        A partition of the candidates into sets of which one at most can be
+        chosen. Without a minimum distance these are the positions.
+    mandatory : (g, c) bool
+    original : (c,) int64
+        Index of each candidate in the problem.
+    count : int
+        At most this many sensors.
+    budget : float
+        At most this total price; infinite where there is no budget.
+    cover : MultiCover
+        What a unit of weight is worth by how many sensors see it.
+    """
+
+    visible: Boolean
+    weight: Float
+    step: float
+    slack: float
+    margin: float
+    price: Float
+    conflict: Boolean
+    clique: Integer
+    mandatory: Boolean
+    original: Integer
+    count: int
+    budget: float
+    cover: MultiCover = COVERAGE
+
+    @cached_property
+    def matrix(self) -> Numbers:
+        """``visible`` as numbers, in the smallest precision in which products with increments are exact."""
+        return self.visible.astype(np.float32 if self.total < MAX_EXACT_SINGLE else np.float64)
+
+    @cached_property
+    def seen_by(self) -> tuple[Integer, Integer]:
+        """Candidates that see each target: where those of each begin (t + 1,), and all of them in a row (n,) int64."""
+        target, candidate = np.nonzero(self.visible.T)
+        number = np.bincount(target, minlength=len(self.weight))
+        return np.concatenate(([0], np.cumsum(number))), candidate
+
+    @cached_property
+    def total(self) -> float:
+        """Value of all targets, each seen as often as counts."""
+        return float(self.weight.sum()) * self.cover.unit
+
+    def attainable(self, goal: float) -> float:
+        """Return the smallest covered weight of at least ``goal`` that a placement can have at all."""
+        return math.ceil(goal - self.slack) if self.step == 1 else goal
+
+    def as_good(self, value: float) -> float:
+        """Return the smallest covered weight that is equal to ``value``, ties included."""
+        return self.attainable(value - self.slack)
+
+    def attained(self, bound: float) -> float:
+        """Return the largest covered weight up to ``bound`` that a placement can have at all."""
+        return math.floor(bound + self.margin) if self.step == 1 else bound
+
+    def times(self, chosen: Integer | Sequence[int]) -> Integer:
+        """Return how many of the chosen candidates see each target, (t,) int64."""
+        seen: Integer = self.visible[np.asarray(chosen, dtype=np.int64)].sum(axis=0, dtype=np.int64)
+        return seen
+
+    def increments(self, times: Integer, left: int = 1, level: int = 0) -> Float:
+        """Return what the next sensor adds at most to targets seen so many times; see `MultiCover.increment`."""
+        more: Float = self.weight * self.cover.increment(times, left, level)
+        return more
+
+    def layers(self, times: Integer, left: int) -> Float:
+        """Return what each of the next sensors adds at most to targets seen so many times, (top, t) float64."""
+        return np.stack([self.increments(times, left, level) for level in range(self.cover.top)])
+
+    @property
+    def unseen_layers(self) -> Float:
+        """What each of the sensors adds at most to targets that are not seen yet, (top, t) float64."""
+        return self.layers(np.zeros(len(self.weight), dtype=np.int64), self.count)
+
+    def gains(self, per_target: Float) -> Float:
+        """Return what each candidate sees of increments per target, exactly, (c, ...) float64.
+
+        Parameters
+        ----------
+        per_target : (t, ...) float64
+        """
+        gained: Float = (self.matrix @ per_target.astype(self.matrix.dtype)).astype(np.float64)
+        return gained
+
+    def value(self, chosen: Integer) -> float:
+        """Return the value of the targets that the chosen candidates see: for `COVERAGE`, the covered weight."""
+        return float(self.weight @ self.cover.value(self.times(chosen)))
+
+    def doubly(self, chosen: Integer) -> float:
+        """Return the weight that two or more of the chosen candidates cover."""
+        return float(self.weight[self.visible[chosen].sum(axis=0) > 1].sum())
+
+    def part(self, keep: Integer) -> Instance:
+        """Return the same instance with only the candidates ``keep``, targets merged anew."""
+        visible, weight = merge_targets(self.visible[keep], self.weight)
+        return replace(self.of(keep), visible=visible, weight=weight)
+
+    def of(self, keep: Integer) -> Instance:
+        """Return the same instance with only the candidates ``keep``, and all targets."""
+        return replace(
+            self,
+            visible=self.visible[keep],
+            price=self.price[keep],
+            conflict=self.conflict[np.ix_(keep, keep)],
+            clique=self.clique[keep],
+            mandatory=self.mandatory[:, keep],
+            original=self.original[keep],
+        )
+
+
+def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
+    """Reduce a problem, and return it with the factor that scaled its weights.
+
+    Raises
+    ------
+    SeipError
+        No candidate sees any target of positive weight.
+    """
+    order = canonical_order(problem)
+    order = order[problem.allowed[order]]
+    seen = problem.visible[order].any(axis=0) & (problem.weights > 0)
+    if not seen.any():
+        raise SeipError(
+            "no candidate sees any target; try other heights or sensor types, widen δ, ask for less probability of "
+            "detection or fairer weather, or clear what stands in the way"
+        )
+    unit, whole = common_unit(problem.weights[seen])
+    visible, weight = merge_targets(problem.visible[order][:, seen], np.rint(problem.weights[seen] / unit))
+    total = float(weight.sum())
+    slack = min(TIE_TOLERANCE * total, WHOLE_SLACK) if whole else TIE_TOLERANCE * total
+    conflict = conflicts(problem.positions[order], problem.xyz[order], problem.min_distance)
+    instance = Instance(
+        visible=visible,
+        weight=weight,
+        step=1.0 if whole else slack / 2,
+        slack=slack,
+        margin=BOUND_ROUNDING * total,
+        price=problem.prices[order],
+        conflict=conflict,
+        clique=cliques(conflict),
+        mandatory=problem.mandatory_groups[:, order],
+        original=order,
+        count=problem.most_sensors,
+        budget=math.inf if problem.budget is None else float(problem.budget),
+    )
+    return instance.part(np.flatnonzero(~_superfluous(instance, problem.positions[order]))), 1 / unit
+
+
+def common_unit(weights: Float) -> tuple[float, bool]:
+    """Return a unit in which all weights are whole numbers, and whether it is theirs or only a fine grain.
+
+    It is theirs where all weights are whole numbers, or binary fractions, whose sum is exact in double precision, or
+    where rounding all weights to its multiples moves no sum of them by more than `TIE_TOLERANCE` and a single unit
+    counts for more than that.
+
+    Parameters
+    ----------
+    weights : (t,) float64
+        Positive.
+    """
+    total = math.fsum(weights)
+    parts = max(weight.as_integer_ratio()[1] for weight in np.unique(weights).tolist())  # each a power of two
+    if parts <= MAX_BINARY_PARTS and total * parts <= MAX_EXACT_DOUBLE:
+        return float(np.gcd.reduce((weights * parts).astype(np.int64))) / parts, True
+    for share in DENOMINATORS:
+        unit = float(weights.min()) / share
+        rounding = math.fsum(np.abs(weights - np.rint(weights / unit) * unit))
+        if unit > 4 * TIE_TOLERANCE * total and rounding <= TIE_TOLERANCE / 2 * total:
+            return unit, True
+    return total / INCOMMENSURABLE_TOTAL, False
+
+
+def merge_targets(visible: Boolean, weight: Float) -> tuple[Boolean, Float]:
+    """Merge targets that the same candidates see and drop those that none sees.
+
+    Parameters
+    ----------
+    visible : (c, t) bool
+    weight : (t,) float64
+        Whole numbers.
+
+    Returns
+    -------
+    (c, m) bool, (m,) float64
+        Distinct columns in ascending order, and the summed weight of each.
+    """
+    seen = np.flatnonzero(visible.any(axis=0) & (weight > 0))
+    visible, weight = np.take(visible, seen, axis=1), weight[seen]
+    if len(seen) == 0:
+        return visible, weight
+    packed = np.ascontiguousarray(np.packbits(visible, axis=0).T)
+    keys = packed.view(np.dtype((np.void, packed.shape[1])))[:, 0]
+    _, first, group = np.unique(keys, return_index=True, return_inverse=True)
+    merged: Boolean = np.take(visible, first, axis=1)  # indexed, it would hold the rows of targets together in memory
+    return merged, np.bincount(group, weight).astype(np.float64)
+
+
+def conflicts(positions: Integer, xyz: Float, min_distance: float) -> Boolean:
+    """Return the pairs of candidates at one position, or closer in plan than the minimum distance, (c, c) bool."""
+    conflict: Boolean = positions[:, None] == positions[None, :]
+    if min_distance > 0:
+        for index, xy in enumerate(xyz[:, :2]):
+            conflict[index] |= np.hypot(*(xyz[:, :2] - xy).T) < min_distance - MICROMETRE
+    np.fill_diagonal(conflict, val=False)
+    return conflict
+
+
+def cliques(conflict: Boolean) -> Integer:
+    """Part the candidates into sets that all exclude each other, grown greedily in order, (c,) int64."""
+    clique = np.full(len(conflict), -1)
+    for first in range(len(conflict)):
+        if clique[first] < 0:
+            members = [first]
+            common = conflict[first] & (clique < 0)
+            while common.any():
+                members.append(int(np.argmax(common)))
+                common &= conflict[members[-1]]
+            clique[members] = first
+    numbered: Integer = np.unique(clique, return_inverse=True)[1]
+    return numbered
+
+
+def _superfluous(instance: Instance, positions: Integer) -> Boolean:
+    """Mark candidates that no canonical optimum contains.
+
+    A candidate that sees nothing and serves no mandatory group only adds to the number of sensors. A candidate at the
+    same position as another that sees all it sees, is in all its groups, excludes nothing more and is cheaper (or costs
+    the same and comes first) can always give way to it: coverage, number, price, double coverage and order all stay or
+    improve.
+    """
+    superfluous: Boolean = ~instance.visible.any(axis=1) & ~instance.mandatory.any(axis=0)
+    excluded = instance.conflict | np.eye(len(instance), dtype=bool)
+    by_position = np.argsort(positions, kind="stable")
+    for group in np.split(by_position, np.flatnonzero(np.diff(positions[by_position])) + 1):
+        price = instance.price[group]
+        rank = np.lexsort((group, price)).argsort()
+        replaceable = (
+            (rank[None, :] < rank[:, None])
+            & _within(instance.visible[group])
+            & _within(instance.mandatory[:, group].T)
+            & _within(excluded[group]).T
+        )
+        superfluous[group] |= replaceable.any(axis=1)
+    return superfluous
+
+
+def _within(rows: Boolean) -> Boolean:
+    """Return for each pair of rows whether the first is a subset of the second, (k, k) bool."""
+    overlap = rows.astype(np.float32) @ rows.T.astype(np.float32)
+    subset: Boolean = overlap == overlap.diagonal()[:, None]
+    return subset

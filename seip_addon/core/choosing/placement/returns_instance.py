@@ -1,0 +1,167 @@
+r"""Placement by expected returns: the reduced problem that its algorithms work on.
+
+With :math:`R_{ij}` the expected returns of pose i from road user j,
+
+.. math::
+    \max_{x \in X} \sum_j w_j \, g\Big(\sum_i R_{ij} x_i\Big), \qquad g(s) = \ln(1 + s),
+
+X being the placements that `PlacementProblem` allows: number, budget, one sensor per position, mandatory and forbidden
+places, least distance. g is concave, so that the objective is monotone and submodular: each further return is worth
+less than the one before.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Boolean, Float, Integer
+from ...errors import SeipError
+from .constraints import Constrained
+from .problem import TIE_TOLERANCE, PlacementProblem, canonical_order
+from .reduced_problem import cliques, conflicts
+
+_ROWS_AT_ONCE = 32
+
+
+@dataclass(frozen=True, eq=False)
+class ReturnsInstance(Constrained):
+    """A placement problem by expected returns: c candidates in canonical order, m road users, g mandatory groups.
+
+    Parameters
+    ----------
+    returns : (c, m) float32
+        R.
+    weight : (m,) float64
+        w; they add up to 1.
+    price : (c,) float64
+    conflict : (c, c) bool
+        Pairs that exclude each other. The diagonal is false.
+    clique : (c,) int64
+        A partition of the candidates into sets of which one at most can be chosen.
+    mandatory : (g, c) bool
+    original : (c,) int64
+        Index of each candidate in the problem.
+    count : int
+        Largest number of sensors.
+    budget : float
+        Largest total price; infinite where there is no budget.
+    """
+
+    returns: NDArray[np.float32]
+    weight: Float
+    price: Float
+    conflict: Boolean
+    clique: Integer
+    mandatory: Boolean
+    original: Integer
+    count: int
+    budget: float
+
+    @property
+    def margin(self) -> float:
+        """Largest difference between equal values."""
+        return TIE_TOLERANCE
+
+    def together(self, chosen: Integer) -> Float:
+        """Return the expected returns of chosen candidates together from each road user, (m,) float64."""
+        sums: Float = self.returns[chosen].sum(axis=0, dtype=np.float64)
+        return sums
+
+    def value(self, chosen: Integer) -> float:
+        """Return the objective of chosen candidates: the weighted mean of ln(1 + returns)."""
+        return float(self.weight @ np.log1p(self.together(chosen)))
+
+    def added(self, base: Float, among: Integer | None = None) -> Float:
+        """Return what each candidate adds to returns ``base``, (c,) float64, or each of those ``among``, (k,)."""
+        among = np.arange(len(self)) if among is None else among
+        gained = np.empty(len(among))
+        scale = 1.0 / (1.0 + base)
+        for part in row_blocks(len(among)):
+            rows = self.returns[among[part]] * scale
+            gained[part] = np.log1p(rows, out=rows) @ self.weight
+        return gained
+
+    def of(self, keep: Integer) -> ReturnsInstance:
+        """Return the same instance with only the candidates ``keep``."""
+        return replace(
+            self,
+            returns=self.returns[keep],
+            price=self.price[keep],
+            conflict=self.conflict[np.ix_(keep, keep)],
+            clique=self.clique[keep],
+            mandatory=self.mandatory[:, keep],
+            original=self.original[keep],
+        )
+
+
+def row_blocks(rows: int) -> Iterator[slice]:
+    """Yield slices of rows that fit into a processor's cache together."""
+    for begin in range(0, rows, _ROWS_AT_ONCE):
+        yield slice(begin, begin + _ROWS_AT_ONCE)
+
+
+def make_returns_instance(problem: PlacementProblem, returns: NDArray[np.float32]) -> ReturnsInstance:
+    """Reduce a problem to the candidates and road users that matter.
+
+    Left out are road users without weight or without returns, candidates without returns that serve no mandatory group,
+    and candidates that another one at the same position dominates: it returns as much from every road user, serves the
+    same groups and costs no more.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Its weights are those of the road users; its ``visible`` is not used.
+    returns : (c, m) float
+
+    Raises
+    ------
+    SeipError
+        No candidate has returns from a road user with weight.
+    """
+    order = canonical_order(problem)
+    order = order[problem.allowed[order]]
+    met = np.flatnonzero((problem.weights > 0) & (returns[order] > 0).any(axis=0))
+    if not len(met):
+        raise SeipError(
+            "no candidate has returns from any road user; try other heights or sensor types, or clear what stands in "
+            "the way"
+        )
+    conflict = conflicts(problem.positions[order], problem.xyz[order], problem.min_distance)
+    instance = ReturnsInstance(
+        returns=np.ascontiguousarray(returns[np.ix_(order, met)], dtype=np.float32),
+        weight=problem.weights[met] / problem.weights.sum(),
+        price=problem.prices[order],
+        conflict=conflict,
+        clique=cliques(conflict),
+        mandatory=problem.mandatory_groups[:, order],
+        original=order,
+        count=problem.most_sensors,
+        budget=math.inf if problem.budget is None else float(problem.budget),
+    )
+    return instance.of(np.flatnonzero(~_dominated(instance, problem.positions[order])))
+
+
+def _dominated(instance: ReturnsInstance, positions: Integer) -> Boolean:
+    """Return the candidates that no best placement needs, (c,) bool."""
+    out: Boolean = ~(instance.returns > 0).any(axis=1) & ~instance.mandatory.any(axis=0)
+    excluded = instance.conflict | np.eye(len(instance), dtype=bool)
+    by_position = np.argsort(positions, kind="stable")
+    for group in np.split(by_position, np.flatnonzero(np.diff(positions[by_position])) + 1):
+        for one in group:
+            for other in group:
+                first = (instance.price[other], other) < (instance.price[one], one)
+                if (
+                    first
+                    and not out[other]
+                    and (instance.returns[other] >= instance.returns[one]).all()
+                    and (instance.mandatory[:, other] >= instance.mandatory[:, one]).all()
+                    and (excluded[other] <= excluded[one]).all()
+                ):
+                    out[one] = True
+                    break
+    return out

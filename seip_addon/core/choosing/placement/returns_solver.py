@@ -1,0 +1,337 @@
+"""Placement by expected returns: greedy choice, swaps, and branch and bound with a certificate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass, field, replace
+from heapq import heappop, heappush
+from itertools import count
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Boolean, Float, Integer
+from ...progress import Progress
+from .feasibility import starting_choice
+from .greedy import addable
+from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
+from .reduced_problem import make_instance
+from .returns_bounds import Completion, ReturnsBound
+from .returns_instance import ReturnsInstance, make_returns_instance
+from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
+
+STARTS = 6  # candidates that a greedy choice begins with, before swaps
+ROOT_STEPS, NODE_STEPS = 60, 6  # of the bound, for all candidates and at each node
+OPERATIONS_PER_LOGARITHM = 20  # multiplications that take as long
+UNPROVEN = "the limit was reached before this placement was proven the best: the gap says by how much it may fall short"
+
+
+def solve_returns(
+    problem: PlacementProblem, returns: NDArray[np.float32], limits: SolverLimits = DEFAULT_LIMITS
+) -> Generator[Progress, None, Placement]:
+    """Choose the placement of largest mean of ln(1 + expected returns) from road users.
+
+    Placements are equally good where their values differ by at most `TIE_TOLERANCE`; of these the first one found is
+    returned, which the order of candidates does not change.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Weights are those of the m road users; ``visible`` is used for mandatory groups only.
+    returns : (c, m) float
+        Expected returns of each candidate from each road user.
+
+    Returns
+    -------
+    Placement
+        Objective and bound are means of ln(1 + returns); the gap is the share by which the geometric mean of
+        1 + returns may be larger.
+
+    Raises
+    ------
+    SeipError
+        The constraints cannot be met together, or there are no returns.
+    """
+    clock = limits.clock()
+    instance = make_returns_instance(problem, returns)
+    start = yield from _starting_choice(problem, instance, limits.solver)
+    chosen = yield from improved_greedy(instance, start, clock)
+    search = _Search(instance, chosen, clock)
+    finished = yield from search.run()
+    placement = assess(
+        problem,
+        instance.original[search.best],
+        search.bound,
+        optimal=finished,
+        solver="branch and bound",
+        seconds=clock.seconds,
+        notes=() if finished else (UNPROVEN,),
+        objective=search.value,
+    )
+    return replace(placement, gap=math.expm1(placement.bound - placement.objective))
+
+
+def greedy_returns(problem: PlacementProblem, returns: NDArray[np.float32]) -> Generator[Progress, None, Placement]:
+    """Choose greedily by expected returns, without a bound."""
+    clock = Clock(math.inf)
+    instance = make_returns_instance(problem, returns)
+    start = yield from _starting_choice(problem, instance, "highs")
+    chosen = max((greedy(instance, start, per_price=per_price) for per_price in _orders(instance)), key=instance.value)
+    return assess(
+        problem,
+        instance.original[chosen],
+        math.inf,
+        optimal=False,
+        solver="greedy",
+        seconds=clock.seconds,
+        objective=instance.value(chosen),
+    )
+
+
+def _starting_choice(
+    problem: PlacementProblem, instance: ReturnsInstance, solver: str
+) -> Generator[Progress, None, Integer]:
+    """Return candidates of the instance that serve all mandatory groups, (s,) int64."""
+    if not len(instance.mandatory):
+        return np.zeros(0, dtype=np.int64)
+    covering, _ = make_instance(problem)
+    chosen = yield from starting_choice(problem, covering, solver)
+    # a dominated candidate gives way to the one at its position that serves the same groups
+    found = [_stand_in(instance, problem, int(covering.original[one])) for one in chosen]
+    return np.sort(np.array(found, dtype=np.int64))
+
+
+def _stand_in(instance: ReturnsInstance, problem: PlacementProblem, candidate: int) -> int:
+    own = np.flatnonzero(instance.original == candidate)
+    if len(own):
+        return int(own[0])
+    there = np.flatnonzero(problem.positions[instance.original] == problem.positions[candidate])
+    serves = (instance.mandatory[:, there] >= problem.mandatory_groups[:, [candidate]]).all(axis=0)
+    cheap = instance.price[there] <= problem.prices[candidate]
+    return int(there[serves & cheap][0])
+
+
+def greedy(instance: ReturnsInstance, start: Integer, *, per_price: bool = False) -> Integer:
+    """Add the candidate of largest gain, or gain per price, until none can be added; return the choice, ascending."""
+    chosen = start
+    while True:
+        gain = np.where(addable(instance, chosen), instance.added(instance.together(chosen)), 0.0)
+        score = gain / np.maximum(instance.price, TIE_TOLERANCE * instance.price.max()) if per_price else gain
+        best = int(np.argmax(score))
+        if gain[best] <= 0:
+            return np.sort(chosen)
+        chosen = np.append(chosen, best)
+
+
+def improved_greedy(instance: ReturnsInstance, start: Integer, clock: Clock) -> Generator[Progress, None, Integer]:
+    """Return the best of several greedy choices after swaps, ascending."""
+    best = yield from swapped(instance, greedy(instance, start), clock)
+    if True in _orders(instance):
+        other = yield from swapped(instance, greedy(instance, start, per_price=True), clock)
+        best = max(best, other, key=instance.value)
+    first = np.where(addable(instance, start), instance.added(instance.together(start)), 0.0)
+    for candidate in np.argsort(-first, kind="stable")[1:STARTS]:
+        if first[candidate] > 0:
+            other = yield from swapped(instance, greedy(instance, np.append(start, candidate)), clock)
+            best = max(best, other, key=instance.value)
+    return best
+
+
+def swapped(instance: ReturnsInstance, chosen: Integer, clock: Clock) -> Generator[Progress, None, Integer]:
+    """Replace one sensor by another, and add sensors, for as long as the value grows.
+
+    Where a budget limits the choice, the sensors that are left may cost less than before: what can then be added is
+    added greedily, so that the numbers of sensors of each type change too.
+    """
+    value = instance.value(chosen)
+    while True:
+        yield Progress(0, 0, "swapping sensors")
+        best, chosen_then = value, chosen
+        for gone in chosen:
+            rest = chosen[chosen != gone]
+            clock.spend(OPERATIONS_PER_LOGARITHM * instance.returns.size)
+            gain = np.where(addable(instance, rest), instance.added(instance.together(rest)), -np.inf)
+            gain[gone] = -np.inf
+            rivals = [np.append(rest, int(np.argmax(gain)))] if np.isfinite(gain).any() else []
+            if math.isfinite(instance.budget):
+                rivals += [greedy(instance, np.append(rest, cheap)) for cheap in _best_of_each_price(instance, gain)]
+            for rival in rivals:
+                reached = instance.value(rival)
+                if reached > best + TIE_TOLERANCE and instance.feasible(rival):
+                    best, chosen_then = reached, np.sort(rival)
+        if best == value:
+            return chosen
+        value, chosen = best, chosen_then
+
+
+def _best_of_each_price(instance: ReturnsInstance, gain: Float) -> list[int]:
+    """Return the candidate of largest gain among those of each price."""
+    best = []
+    for price in np.unique(instance.price):
+        own = np.where(instance.price == price, gain, -np.inf)
+        if np.isfinite(own).any():
+            best.append(int(np.argmax(own)))
+    return best
+
+
+def _orders(instance: ReturnsInstance) -> list[bool]:
+    return [False, True] if math.isfinite(instance.budget) and instance.price.max() > 0 else [False]
+
+
+@dataclass(order=True)
+class _Node:
+    """Placements that contain some chosen candidates, and otherwise only some of those left.
+
+    Parameters
+    ----------
+    rank : float
+        Bound on their value, negative: nodes are taken in the order of their bounds.
+    number : int
+        Order in which nodes were made.
+    """
+
+    rank: float
+    number: int
+    chosen: Integer = field(compare=False)
+    left: Integer = field(compare=False)
+    share: Float | None = field(compare=False, default=None)
+
+
+class _Search:
+    """Best-first branch and bound.
+
+    A node's children add one candidate each and leave out those before it, in the order of their contributions to the
+    bound of the node. The bounds of children fall along that order, so that all after the first that falls short are
+    cut at once. A child gets a bound of its own when it is taken.
+
+    Attributes
+    ----------
+    best : (k,) int64
+    value : float
+        The best placement so far and its value.
+    """
+
+    def __init__(self, instance: ReturnsInstance, chosen: Integer, clock: Clock) -> None:
+        self.instance, self._clock = instance, clock
+        self.best, self.value = np.sort(chosen), instance.value(chosen)
+        self._open: list[_Node] = []
+        self._numbers = count()
+
+    @property
+    def bound(self) -> float:
+        """No placement has a larger value."""
+        return max(self.value, -self._open[0].rank if self._open else -math.inf)
+
+    def run(self) -> Generator[Progress, None, bool]:
+        """Search until the best placement is proven, or the limits are reached; return whether it is proven."""
+        everything = np.arange(len(self.instance))
+        heappush(self._open, _Node(-math.inf, next(self._numbers), np.zeros(0, dtype=np.int64), everything))
+        while self._open and -self._open[0].rank > self._least:
+            if self._clock.left <= 0:
+                return False
+            node = heappop(self._open)
+            yield Progress(0, 0, "proving that no placement has more returns")
+            self._take(node)
+        return True
+
+    @property
+    def _least(self) -> float:
+        """Value above which a placement is better."""
+        return self.value + TIE_TOLERANCE
+
+    def _take(self, node: _Node) -> None:
+        whole = self.instance
+        base = whole.together(node.chosen)
+        left = node.left[_addable_later(whole, node.chosen, node.left)]
+        if len(node.chosen) + 1 == whole.count or not len(left):
+            self._complete(node.chosen, base, left)
+            return
+        reached = float(whole.weight @ np.log1p(base))
+        rules = replace(
+            whole.of(left),
+            count=whole.count - len(node.chosen),
+            budget=whole.budget - math.fsum(whole.price[node.chosen]),
+        )
+        part = Completion(rules, base)
+        share = np.zeros(len(left)) if node.share is None else node.share[np.searchsorted(node.left, left)]
+        if not share.any():
+            gain = whole.added(base, left)
+            share[np.argsort(-gain, kind="stable")[: rules.count]] = 1.0
+        bound, share = self._bounded(part, reached, share, NODE_STEPS if len(node.chosen) else ROOT_STEPS)
+        self._offer(np.append(node.chosen, left[bound.selection.picked]))
+        self._branch(node, rules, left, reached, bound, share)
+
+    def _bounded(self, part: Completion, reached: float, share: Float, steps: int) -> tuple[ReturnsBound, Float]:
+        """Return the smallest of several bounds, and the fractional choice that it comes from."""
+        best: tuple[ReturnsBound, Float] | None = None
+        for step, (bound, own) in enumerate(part.falling_bounds(share)):
+            self._clock.spend(OPERATIONS_PER_LOGARITHM * part.rules.returns.size)
+            if best is None or bound.value < best[0].value:
+                best = bound, own
+            if step + 1 == steps or reached + best[0].value <= self._least or self._clock.left <= 0:
+                return best
+        raise AssertionError
+
+    def _branch(
+        self, node: _Node, rules: ReturnsInstance, left: Integer, reached: float, bound: ReturnsBound, share: Float
+    ) -> None:
+        """Open the children of a node whose bound is above the best value."""
+        net = bound.selection.net
+        order = np.argsort(-net, kind="stable")
+        fixed = reached + bound.value - bound.selection.value
+        for rank, (candidate, most, weakest) in enumerate(_best_after(rules, bound, order)):
+            limit = min(fixed + most, -node.rank)
+            if limit <= self._least:
+                break
+            # candidates that fall short even in place of the weakest one beside this candidate are left out
+            enough = order[rank + 1 :]
+            after = np.sort(enough[fixed + most - weakest + net[enough] > self._least])
+            chosen = np.append(node.chosen, left[candidate])
+            heappush(self._open, _Node(-limit, next(self._numbers), chosen, left[after], share[after]))
+
+    def _complete(self, chosen: Integer, base: Float, left: Integer) -> None:
+        """Offer every placement of a node with one sensor to come."""
+        self._offer(chosen)
+        if not len(left):
+            return
+        self._clock.spend(OPERATIONS_PER_LOGARITHM * len(left) * len(base))
+        gain = self.instance.added(base, left)
+        serves = self.instance.mandatory[:, chosen].any(axis=1)[:, None] | self.instance.mandatory[:, left]
+        gain = np.where(serves.all(axis=0), gain, -np.inf)
+        best = int(np.argmax(gain))
+        if np.isfinite(gain[best]):
+            self._offer(np.append(chosen, left[best]))
+
+    def _offer(self, chosen: Integer) -> None:
+        chosen = np.sort(chosen)
+        if self.instance.feasible(chosen) and (value := self.instance.value(chosen)) > self._least:
+            self.best, self.value = chosen, value
+
+
+def _addable_later(instance: ReturnsInstance, chosen: Integer, left: Integer) -> Boolean:
+    """Return which candidates left do not exclude, or cost too much beside, those chosen, (k,) bool."""
+    room: Boolean = ~instance.conflict[np.ix_(chosen, left)].any(axis=0)
+    room &= instance.affordable(math.fsum(instance.price[chosen]) + instance.price[left])
+    return room
+
+
+def _best_after(rules: ReturnsInstance, bound: ReturnsBound, order: Integer) -> Iterator[tuple[int, float, float]]:
+    """Yield each candidate of an order with the largest contributions of it and of those after it together.
+
+    At most ``count`` candidates contribute, one of each clique; the budget counts by its multiplier. The sums fall. The
+    third value is the smallest of the contributions that one more candidate would replace: 0 where there is room.
+    """
+    selection = bound.selection
+    net, clique = selection.net[order].tolist(), rules.clique[order].tolist()
+    spare = selection.multiplier * rules.budget if selection.multiplier else 0.0
+    for rank, own in enumerate(order.tolist()):
+        total, seen, last = net[rank] + spare, {clique[rank]}, 0.0
+        for later in range(rank + 1, len(net)):
+            if len(seen) == rules.count or net[later] <= 0:
+                break
+            if clique[later] not in seen:
+                seen.add(clique[later])
+                total += net[later]
+                last = net[later]
+        yield own, total, last if len(seen) == rules.count else 0.0

@@ -1,0 +1,144 @@
+r"""Risk measures of robust placement: expectation, worst case, CVaR, failures, multi-cover.
+
+In scenario k the chosen sensors S see target j :math:`n_{jk}(S)` times. The
+outcome of the scenario is the weight of the targets seen often enough,
+
+.. math::
+    f_k(S) = \sum_j w_j\, [n_{jk}(S) \ge κ],
+
+or what is left of it after one of the sensors failed: at worst :math:`\min_{i \in S} f_k(S \setminus i)`, or on
+average, each of the N sensors that are allowed failing alike (had the chosen alone part in it, a sensor that sees
+nothing would be worth adding). Of K outcomes the mean of the m smallest counts, :math:`m = \lceil αK \rceil`:
+
+.. math::
+    T(S) = \min_{p \in P} \sum_k p_k f_k(S), \qquad
+    P = \{p : 0 \le p_k \le 1/m,\; \textstyle\sum_k p_k = 1\},
+
+the conditional value at risk of the coverage (Rockafellar and Uryasev 2000):
+the expectation for α = 1, the worst scenario for α up to 1/K.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Float, Integer
+from ...errors import SeipError
+from .multi_cover import MultiCover, multi_cover
+
+Failure = Literal["none", "worst", "mean"]
+
+
+@dataclass(frozen=True)
+class Risk:
+    """What a robust placement maximises.
+
+    Parameters
+    ----------
+    tail : float
+        α: the share of the scenarios, the worst ones, whose mean counts; 1 for the expectation, 0 for the worst alone.
+    seen_by : int
+        κ: by so many sensors a target must be seen.
+    failure : {"none", "worst", "mean"}
+        Whether one of the sensors has failed: the one that is missed most, or any.
+    """
+
+    tail: float = 1.0
+    seen_by: int = 1
+    failure: Failure = "none"
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.tail <= 1:
+            raise SeipError(f"the tail must be a share of the scenarios from 0 to 1, not {self.tail:g}")
+        if self.seen_by < 1:
+            raise SeipError(f"targets cannot be seen by {self.seen_by} sensors; ask for at least 1")
+
+    @property
+    def least_sensors(self) -> int:
+        """Number of sensors below which every outcome is zero."""
+        return self.seen_by + (self.failure != "none")
+
+    def require_sensors(self, most: int) -> None:
+        """Raise SeipError where ``most`` sensors leave nothing in any outcome."""
+        if most < self.least_sensors:
+            raise SeipError(f"{self.describe()} needs at least {self.least_sensors} sensors, not {most}; allow more")
+
+    def describe(self) -> str:
+        """Name the risk measure."""
+        of = {1.0: "expected coverage", 0.0: "coverage in the worst scenario"}.get(
+            self.tail, f"mean coverage of the worst {self.tail:.0%} of the scenarios"
+        )
+        twice = "" if self.seen_by == 1 else f", seen by at least {self.seen_by}"
+        lost = {"none": "", "worst": ", the most important sensor lost", "mean": ", any one sensor lost"}[self.failure]
+        return of + twice + lost
+
+    def describe_outcome(self) -> str:
+        """Name the outcome of one scenario."""
+        by = "" if self.seen_by == 1 else f" by at least {self.seen_by} sensors"
+        lost = {
+            "none": "",
+            "worst": " after the loss of the most important sensor",
+            "mean": " after the loss of any one sensor, on average",
+        }[self.failure]
+        return f"coverage{by}{lost}"
+
+    @property
+    def alone(self) -> Risk:
+        """Return the same measure for a single scenario, by which each draw is evaluated."""
+        return replace(self, tail=1.0)
+
+    def counted(self, scenarios: int) -> int:
+        """Return m, the number of worst scenarios that count."""
+        return max(1, math.ceil(self.tail * scenarios - 1e-9))
+
+    def outcomes(self, seen: NDArray[np.uint8], weight: Float, sensors: int) -> Float:
+        """Return the outcome of a placement in each scenario, (K,) float64.
+
+        Parameters
+        ----------
+        seen : (K, s, t) uint8
+            1 where a chosen sensor sees a target.
+        weight : (t,) float64
+        sensors : int
+            N, the largest number of sensors.
+        """
+        times = seen.sum(axis=1, dtype=np.uint8)
+        whole: Float = (times >= self.seen_by) @ weight
+        if self.failure == "none":
+            return whole
+        if seen.shape[1] == 0:
+            return np.zeros(len(seen))
+        lost: Float = ((times == self.seen_by)[:, None] & seen.view(bool)) @ weight  # what each is needed for, (K, s)
+        after: Float = whole - (lost.max(axis=1) if self.failure == "worst" else lost.sum(axis=1) / sensors)
+        return after
+
+    def of(self, outcomes: Float) -> float:
+        """Return T of outcomes (K,)."""
+        counted = self.counted(len(outcomes))
+        return math.fsum(np.sort(outcomes)[:counted]) / counted
+
+    def worst(self, outcomes: Float) -> Integer:
+        """Return the scenarios that count, (m,) int64; of equal ones the first."""
+        return np.argsort(outcomes, kind="stable")[: self.counted(len(outcomes))]
+
+    def cover(self, sensors: int) -> MultiCover:
+        r"""Return the value of a target by the sensors that see it: on average, or more than at worst.
+
+        A target seen n times is worth 1 from n = κ on. After a failure among N sensors it is worth :math:`1 - κ/N` on
+        average at n = κ and 1 from :math:`κ + 1` on, which no failure of the worst kind exceeds.
+
+        Parameters
+        ----------
+        sensors : int
+            N, the largest number of sensors.
+        """
+        values = [Fraction(0)] * self.seen_by + [Fraction(1)]
+        if self.failure != "none":
+            values = [*values[:-1], max(Fraction(sensors - self.seen_by, sensors), Fraction(0)), Fraction(1)]
+        return multi_cover(values)

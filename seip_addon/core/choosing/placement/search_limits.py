@@ -1,0 +1,178 @@
+"""Remaining budget of a search, in seconds or in units of counted work."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from dataclasses import dataclass, field
+
+from ...errors import SeipError
+
+OPERATIONS_PER_UNIT = 1e10  # multiplications that make a unit of work: about a second of one processor core
+OVERHEAD_OPERATIONS = 3e6  # multiplications that take as long as what goes on around each counted step
+DEFAULT_EFFORT = 60.0  # units of work for an answer where nothing else limits it
+MIN_PART = 0.01  # seconds, or units of work, of a part of a limit where nothing is left
+
+
+class Acceptance:
+    """A user's request, from another thread, to end a search with the best placement found so far.
+
+    Attributes
+    ----------
+    searching : bool
+        Whether the search has begun, so that there is something to accept.
+    """
+
+    def __init__(self) -> None:
+        self._event = threading.Event()
+        self.searching = False
+
+    def accept(self) -> None:
+        """End the search at its next step."""
+        self._event.set()
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the search is to end."""
+        return self._event.is_set()
+
+
+@dataclass(frozen=True)
+class SolverLimits:
+    """Solver of integer programs, and the limits of a search for a placement.
+
+    At a limit, the best placement found is returned with its bound and gap.
+
+    Parameters
+    ----------
+    solver : str
+        ``highs``, ``cbc`` or ``gurobi``.
+    time_limit : float, seconds, optional
+        Limit of wall time. What is found and proven then depends on the machine and on what else runs on it.
+    effort : float, units of work, optional
+        Limit of counted work, about a second of one processor core for each unit. The same inputs give the same
+        result on every machine. Default: `DEFAULT_EFFORT`, or no limit where there is a time limit.
+    acceptance : Acceptance, optional
+        Ends the search early where a user asks for that.
+    """
+
+    solver: str = "highs"
+    time_limit: float | None = None
+    effort: float | None = None
+    acceptance: Acceptance | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def work(self) -> float:
+        """Limit of counted work, infinite where only time is limited."""
+        if self.effort is not None:
+            return self.effort
+        return DEFAULT_EFFORT if self.time_limit is None else math.inf
+
+    def clock(self) -> Clock:
+        """Return a clock that starts now.
+
+        Raises
+        ------
+        SeipError
+            A limit is not a positive number.
+        """
+        if self.acceptance is not None:
+            self.acceptance.searching = True
+        limit = math.inf if self.time_limit is None else self.time_limit
+        return Clock(limit, self.work, acceptance=self.acceptance)
+
+
+DEFAULT_LIMITS = SolverLimits()
+
+
+class Clock:
+    """Limits of a search: of time from now on, and of counted work, which is the same on every machine.
+
+    Where work is limited, shares of what is left are shares of work: as long as
+    the time suffices, nothing depends on how fast the machine is.
+
+    Parameters
+    ----------
+    limit : float, seconds
+        May be infinite.
+    effort : float, units of work
+        About as many seconds of one processor core. May be infinite.
+    whole : Clock, optional
+        What this is a part of: work that is done here is done there as well.
+    acceptance : Acceptance, optional
+        Once it is accepted, nothing is left.
+
+    Attributes
+    ----------
+    work : float
+        Units of work done.
+
+    Raises
+    ------
+    SeipError
+        A limit is no positive number.
+    """
+
+    def __init__(
+        self,
+        limit: float,
+        effort: float = math.inf,
+        whole: Clock | None = None,
+        acceptance: Acceptance | None = None,
+    ) -> None:
+        if math.isnan(limit) or limit <= 0:
+            raise SeipError(f"the time limit is {limit:g} s; give a positive number of seconds")
+        if math.isnan(effort) or effort <= 0:
+            raise SeipError(f"the effort is {effort:g} units of work; give a positive number")
+        self._start = time.perf_counter()
+        self._limit = limit
+        self._effort = effort
+        self._whole = whole
+        self.acceptance = acceptance
+        self.work = 0.0
+
+    def spend(self, operations: float) -> None:
+        """Count a step of so many multiplications as work."""
+        self.work += (operations + OVERHEAD_OPERATIONS) / OPERATIONS_PER_UNIT
+        if self._whole is not None:
+            self._whole.spend(operations)
+
+    def part(self, most: float, least: float = MIN_PART) -> Clock:
+        """Return a limit within this one, in the same measure; what is spent there is spent here."""
+        share = max(min(most, self.left), least)
+        if self.counts_work:
+            return Clock(max(self.seconds_left, least), share, self, self.acceptance)
+        return Clock(share, whole=self, acceptance=self.acceptance)
+
+    def counted_part(self, most: float) -> Clock:
+        """Return a limit of so many units of work within what is left of this one."""
+        limit = min(most, self.left) if self.counts_work else most
+        return Clock(max(self.seconds_left, MIN_PART), max(limit, MIN_PART), self, self.acceptance)
+
+    @property
+    def counts_work(self) -> bool:
+        """Whether work is limited."""
+        return math.isfinite(self._effort)
+
+    @property
+    def seconds(self) -> float:
+        """Seconds since the start."""
+        return time.perf_counter() - self._start
+
+    @property
+    def seconds_left(self) -> float:
+        """Seconds until the limit of time, negative after it, or once the user has accepted what was found."""
+        if self.acceptance is not None and self.acceptance.accepted:
+            return -1.0
+        return self._limit - self.seconds
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the start, or units of work where these are limited."""
+        return self.work if self.counts_work else self.seconds
+
+    @property
+    def left(self) -> float:
+        """Seconds or units of work until the limit, negative after it."""
+        return min(self.seconds_left, self._effort - self.work)

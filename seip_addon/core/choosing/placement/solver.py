@@ -1,0 +1,458 @@
+"""Maximal covering: an optimal placement, or the best found with a bound."""
+
+import math
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from ...arrays import Integer
+from ...counts import counted
+from ...progress import Progress, finish
+from .bounds import Bound, can_reach, lagrangian_bound
+from .branch_and_bound import BestPlacements, is_worthwhile
+from .decomposition import decomposition_bound
+from .feasibility import starting_choice
+from .greedy import (
+    drop_redundant,
+    drop_weakest,
+    greedy_bound,
+    greedy_steps,
+    greedy_with_swaps,
+    orders,
+    swap_search,
+)
+from .integer_program import CoverProgram, check_solver, is_affordable
+from .local_search import composition_search
+from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
+from .reduced_problem import Instance, common_unit, make_instance
+from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
+from .tie_breaking import MAX_SEARCHED_TIES, canonical_optimum
+
+BRANCHING_SHARE = 0.25  # of what is left of the limits, for a first branch and bound, which goes on after other methods
+
+FIRST_DECOMPOSITION_SHARE, FULL_DECOMPOSITION_SHARE = 0.05, 0.4
+"""Shares for a first bound by decomposition, and for a full one where the first gains."""
+
+MIN_BOUND_GAIN = 0.05  # share of the gap that the first bound by decomposition must close for a full one to be worth it
+MIN_CLOSED_SHARE = 0.5  # share of the gap that a first branch and bound must close to go on without goals in between
+FIRST_GOALS = 32  # the first goal that is proven out of reach is such a part of the gap below the bound
+QUICK_SHARE = 0.1  # share of what is left of the limits below which a goal was quick to prove: the next step is doubled
+PROGRAM_SHARE = 0.5  # share for the integer program, beside branch and bound
+MAX_RELAXATION_GAP = 0.01  # gap of the linear relaxation up to which the program is tried, beside branch and bound
+MIN_TIE_BREAKING_WORK = 10.0  # units of work for the choice among equally good placements, or as many as the proof took
+MIN_GAP_PROGRESS = 0.02  # share of the gap that closes in the second half of the time where more time is of use
+
+Note = Callable[[float, float], None]
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """A placement with its bound, its ties, and whether it is optimal.
+
+    Parameters
+    ----------
+    chosen : (k,) int64
+    bound : float
+        No placement covers more.
+    ties : tuple of (k,) int64, optional
+        All placements that cover as much, but for those with idle sensors, where they are known.
+    halfway : float, optional
+        The bound when half the time of the last search was over, where that ended without a proof.
+    """
+
+    chosen: Integer
+    bound: float
+    optimal: bool
+    ties: tuple[Integer, ...] | None = None
+    halfway: float | None = None
+
+
+class _Standing:
+    """Best placement and bound so far, shown with each step of a search.
+
+    Parameters
+    ----------
+    unit : float
+        Weight of the problem that makes one of the instance.
+    """
+
+    def __init__(self, unit: float) -> None:
+        self._unit = unit
+        self._value, self._bound = 0.0, math.inf
+
+    def note(self, value: float, bound: float) -> None:
+        """Take an objective value that was reached and a bound that was proven; worse ones change nothing."""
+        self._value, self._bound = max(self._value, value), min(self._bound, bound)
+
+    def shown(self, steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
+        """Run a search and add to each of its steps what is covered, and within which gap of the best possible."""
+        while True:
+            try:
+                step = next(steps)
+            except StopIteration as stop:
+                result: Result = stop.value
+                return result
+            yield replace(step, what=f"{step.what}; {self.describe()}") if self._value > 0 else step
+
+    def describe(self) -> str:
+        """Return weight and gap as a message."""
+        gap = max(self._bound, self._value) / self._value - 1
+        return f"covered so far: {self._value * self._unit:,.10g}, gap {gap:.1%}"
+
+
+def solve(
+    problem: PlacementProblem, limits: SolverLimits = DEFAULT_LIMITS, start: Integer | None = None
+) -> Generator[Progress, None, Placement]:
+    """Choose the placement that covers most.
+
+    Among optimal placements the one with fewest sensors is returned, then the cheapest, then the one with the largest
+    doubly covered weight, then the first in the canonical order of candidates: always the same one, however candidates
+    and targets are ordered.
+
+    Placements are equally good if they cover the same weight. Weights that are whole multiples of one unit are compared
+    exactly, however large their sum (up to 2^53 units). For other weights, placements are equally good if they cover at
+    most `TIE_TOLERANCE` (1e-9) of the weight that all candidates see together less than the best one.
+
+    Reductions that lose nothing come first; a greedy choice improved by swaps gives an incumbent, a Lagrangian
+    relaxation a bound; candidates that the bound rules out are dropped. Among the rest branch and bound decides; where
+    it does not soon, a tabu search improves the incumbent, decomposition and an integer program the bound where they
+    can, and branch and bound goes on with the time that is left, its bound falling all the while.
+
+    Parameters
+    ----------
+    start : (k,) int64, optional
+        Candidates of a known placement of the same problem, or of one with another number of sensors. The result
+        covers at least as much as the best that dropping, adding and swapping its sensors leads to.
+
+    Raises
+    ------
+    SeipError
+        The constraints cannot be met together, no candidate sees any target, or the solver is not available.
+    """
+    return (yield from solve_within(problem, limits.solver, limits.clock(), start))
+
+
+def solve_within(
+    problem: PlacementProblem, solver: str, clock: Clock, known: Integer | None = None
+) -> Generator[Progress, None, Placement]:
+    """Do the work of `solve` within given limits."""
+    version = check_solver(solver)
+    instance, factor = make_instance(problem)
+    start = yield from starting_choice(problem, instance, solver)
+    standing = _Standing(1 / factor)
+    steps = [*greedy_steps(instance, start)]
+    standing.note(instance.value(steps[-1]), greedy_bound(instance, steps))
+    first = yield from standing.shown(greedy_with_swaps(instance, start))
+    standing.note(instance.value(first), math.inf)
+    first = yield from standing.shown(composition_search(instance, start, first, clock))
+    if known is not None:
+        adapted = yield from _adapted(instance, np.flatnonzero(np.isin(instance.original, known)))
+        first = max(first, adapted, key=instance.value)
+    standing.note(instance.value(first), math.inf)
+    proof = yield from standing.shown(prove(instance, first, solver, clock, standing.note))
+    notes = [*scale_notes(problem)]
+    if proof.optimal:
+        part = clock.counted_part(max(clock.work, MIN_TIE_BREAKING_WORK))
+        best = instance.value(proof.chosen) if instance.step == 1 else proof.bound
+        chosen, settled = yield from canonical_optimum(instance, proof.chosen, best, proof.ties, solver, part)
+        if not settled:
+            notes.append(
+                "not all ties were broken: another placement may cover as much with fewer or cheaper sensors, or see "
+                "more targets twice"
+            )
+    else:
+        chosen = drop_redundant(instance, proof.chosen, instance.value(proof.chosen))
+        notes += [
+            "the search ended before this placement was proven optimal: the gap says by how much it may fall short",
+            *_outlook(instance, proof),
+        ]
+    if problem.count is not None and len(chosen) < problem.count:
+        notes.append(_surplus(problem.count, len(chosen)))
+    original = instance.original[chosen]
+    return assess(
+        problem,
+        original,
+        proof.bound / factor,
+        optimal=proof.optimal,
+        solver=version,
+        seconds=clock.seconds,
+        notes=tuple(notes),
+    )
+
+
+def _adapted(instance: Instance, chosen: Integer) -> Generator[Progress, None, Integer]:
+    """Return a placement of an instance made from that of a similar one; empty where its constraints forbid that."""
+    while len(chosen) > instance.count:
+        chosen = drop_weakest(instance, chosen)
+    if not instance.feasible(chosen):
+        return np.zeros(0, dtype=np.int64)
+    return (yield from swap_search(instance, chosen))
+
+
+def solve_greedy(problem: PlacementProblem) -> Placement:
+    """Choose greedily, with a certificate.
+
+    With the number of sensors alone and one pose per position, greedy covers at least 1 - 1/e (63 %) of the optimum
+    (Nemhauser, Wolsey and Fisher 1978); with several poses per position at least a half (Fisher, Nemhauser and Wolsey
+    1978); the better of gain and gain per price, under a budget alone, at least (1 - 1/e)/2 (Khuller, Moss and Naor
+    1999). The bound of the result is computed from the data and is usually far closer.
+
+    Raises
+    ------
+    SeipError
+        The constraints cannot be met together, or no candidate sees any target.
+    """
+    clock = Clock(math.inf)
+    instance, factor = make_instance(problem)
+    start = finish(starting_choice(problem, instance, "highs"))
+    runs = [[*greedy_steps(instance, start, per_price=per_price)] for per_price in orders(instance)]
+    chosen = max((np.sort(steps[-1]) for steps in runs), key=instance.value)
+    bound = min(greedy_bound(instance, steps) for steps in runs)
+    optimal = instance.attained(bound) < _better(instance, chosen)
+    original = instance.original[chosen]
+    return assess(
+        problem,
+        original,
+        bound / factor,
+        optimal=optimal,
+        solver="greedy",
+        seconds=clock.seconds,
+        notes=(_guarantee(problem, instance),),
+    )
+
+
+def prove(
+    instance: Instance, chosen: Integer, solver: str, clock: Clock, note: Note = lambda _value, _bound: None
+) -> Generator[Progress, None, Proof]:
+    """Improve an incumbent and the bound on it until they meet or the time is up.
+
+    Parameters
+    ----------
+    chosen : (k,) int64
+        A placement to begin from.
+    note : callable, optional
+        Called with the objective value reached and the bound proven each time that one of these may have improved.
+    """
+    keep, bound = yield from lagrangian_bound(instance, instance.as_good(instance.value(chosen)), clock)
+    note(instance.value(chosen), bound.value)
+    proof = yield from _prove_among(instance.part(keep), np.searchsorted(keep, chosen), bound, solver, clock, note)
+    ties = None if proof.ties is None else tuple(keep[choice] for choice in proof.ties)
+    return replace(proof, chosen=keep[proof.chosen], bound=instance.attained(proof.bound), ties=ties)
+
+
+def _prove_among(  # what is known, how far to go, and who is told
+    instance: Instance, chosen: Integer, bound: Bound, solver: str, clock: Clock, note: Note
+) -> Generator[Progress, None, Proof]:
+    """Improve an incumbent among the candidates that a bound leaves, none better being among the others."""
+    relaxed = yield from _from_relaxation(instance, bound, chosen)
+    chosen = max(chosen, relaxed, key=instance.value)
+    least = min(bound.value, instance.total)
+    as_good = np.union1d(can_reach(instance, bound, instance.as_good(instance.value(chosen))), chosen)
+    search = None
+    if is_worthwhile(instance, as_good):
+        search = BestPlacements(instance.part(as_good), instance.value(chosen), MAX_SEARCHED_TIES, least)
+        finished = yield from search.run(clock, BRANCHING_SHARE * clock.left)
+        chosen = max([chosen, *_found(search, as_good)], key=instance.value)
+        if finished:
+            return _finished(instance, search, as_good, chosen)
+        least = min(least, search.bound)
+    note(instance.value(chosen), least)
+    if least >= _better(instance, chosen) - instance.margin:
+        least = min(least, (yield from _decomposition_bound(instance, least, chosen, clock)))
+        note(instance.value(chosen), least)
+    keep = can_reach(instance, bound, _better(instance, chosen))
+    if least < _better(instance, chosen) - instance.margin or len(keep) == 0:
+        return _proven(instance, chosen)
+    tight = bound.value - instance.value(chosen) <= MAX_RELAXATION_GAP * instance.value(chosen)
+    share = 1.0 if search is None else PROGRAM_SHARE
+    if (tight or search is None) and is_affordable(instance.of(keep), clock, share):
+        yield Progress(0, 0, f"proving with {len(keep)} of {len(instance)} candidates")
+        known = Proof(chosen, least, optimal=False)
+        proof = yield from _decide(instance, keep, known, solver, clock, share)
+        if proof.optimal:
+            return proof
+        chosen, least = proof.chosen, proof.bound
+    if search is None or clock.left <= 0:
+        return Proof(chosen, least, optimal=False)
+    known, value = Proof(chosen, least, optimal=False), instance.value(chosen)
+    if search.bound - value > (1 - MIN_CLOSED_SHARE) * (bound.value - value):
+        known = yield from lower_by_goals(instance, bound, known, clock, note)
+        if known.optimal or clock.left <= 0:
+            return known
+    return (yield from _search_on(instance, search, as_good, known.bound, known.chosen, clock))
+
+
+def lower_by_goals(
+    instance: Instance, bound: Bound, known: Proof, clock: Clock, note: Note = lambda _value, _bound: None
+) -> Generator[Progress, None, Proof]:
+    """Lower the bound by proofs that no placement reaches a goal, each goal below the one before.
+
+    A search for a goal near the bound cuts far more than one for what is better than the incumbent: it is quick, and
+    where no proof of optimality can be had it is the better use of the time.
+    """
+    chosen, least, halfway, half = known.chosen, min(known.bound, instance.total), None, clock.left / 2
+    step = (least - instance.value(chosen)) / FIRST_GOALS
+    while clock.left > 0 and least - step > _better(instance, chosen):
+        goal, left = least - step, clock.left
+        keep = can_reach(instance, bound, goal)
+        yield Progress(0, 0, f"proving that no placement covers {goal / instance.total:.2%}")
+        search = BestPlacements(instance.part(keep), goal, 1, least) if len(keep) else None
+        finished = search is None or (yield from search.run(clock, clock.left))
+        if search is not None:
+            chosen = max([chosen, *_found(search, keep)], key=instance.value)
+        if search is not None and not finished:
+            least = min(least, max(search.bound, goal, instance.value(chosen)))
+        elif instance.value(chosen) >= goal - instance.slack:
+            return _proven(instance, chosen)
+        else:
+            least = instance.attainable(goal) - 1 if instance.step == 1 else goal
+        note(instance.value(chosen), least)
+        if left - clock.left < QUICK_SHARE * left:
+            step *= 2
+        if halfway is None and clock.left <= half:
+            halfway = least
+    optimal = instance.attained(least) < _better(instance, chosen)
+    return Proof(chosen, max(least, instance.value(chosen)), optimal=optimal, halfway=halfway)
+
+
+def _search_on(  # what is known, and how far to go
+    instance: Instance, search: BestPlacements, among: Integer, least: float, chosen: Integer, clock: Clock
+) -> Generator[Progress, None, Proof]:
+    """Go on with a branch and bound until it ends or the limits are reached."""
+    if np.isin(chosen, among).all():
+        search.offer(np.searchsorted(among, chosen))
+    halfway = None
+    for share in (0.5, 1.0):
+        finished = yield from search.run(clock, share * clock.left)
+        chosen = max([chosen, *_found(search, among)], key=instance.value)
+        if finished:
+            return _finished(instance, search, among, chosen)
+        least = min(least, search.bound)
+        halfway = least if halfway is None else halfway
+    optimal = instance.attained(least) < _better(instance, chosen)
+    return Proof(chosen, max(least, instance.value(chosen)), optimal=optimal, halfway=halfway)
+
+
+def _found(search: BestPlacements, among: Integer) -> list[Integer]:
+    return [among[choice] for choice in search.found]
+
+
+def _finished(instance: Instance, search: BestPlacements, among: Integer, chosen: Integer) -> Proof:
+    """Return the proof that a search has come to its end gives."""
+    ties = None if search.overflowed else (chosen, *_found(search, among))
+    return Proof(chosen, instance.value(chosen), optimal=True, ties=ties)
+
+
+def _decomposition_bound(
+    instance: Instance, least: float, chosen: Integer, clock: Clock
+) -> Generator[Progress, None, float]:
+    """Bound by parts of the candidates: shortly first, and with more time where that closes part of the gap."""
+    better = _better(instance, chosen)
+    first = yield from decomposition_bound(instance, better, clock, FIRST_DECOMPOSITION_SHARE * clock.left)
+    if first < better or least - first < MIN_BOUND_GAIN * (least - better):
+        return first
+    return (yield from decomposition_bound(instance, better, clock, FULL_DECOMPOSITION_SHARE * clock.left))
+
+
+def _better(instance: Instance, chosen: Integer) -> float:
+    """Return the covered weight that a strictly better placement reaches at least."""
+    return instance.value(chosen) + instance.step
+
+
+def _from_relaxation(instance: Instance, bound: Bound, chosen: Integer) -> Generator[Progress, None, Integer]:
+    """Return a placement made from the relaxation's own selection, where that meets the constraints."""
+    picked = np.sort(bound.selection.picked)
+    if not instance.feasible(picked):
+        return chosen
+    return (yield from swap_search(instance, picked))
+
+
+def _decide(  # what is known, and how far to go
+    instance: Instance, keep: Integer, known: Proof, solver: str, clock: Clock, share: float
+) -> Generator[Progress, None, Proof]:
+    """Look for better placements among the candidates that one may contain; that there is none is the proof.
+
+    Solvers have tolerances: of two placements that differ by less they may return either. So what they call the best
+    is only a better one, until they find none.
+    """
+    program, chosen, bound = CoverProgram(instance.part(keep)), known.chosen, known.bound
+    ends = clock.elapsed + share * clock.left
+    while True:
+        program.require_better(instance.value(chosen))
+        part = min(max((ends - clock.elapsed) / clock.left, 0.0), 1.0) if clock.left > 0 else 0.0
+        outcome = yield from program.maximise_coverage(solver, clock, part)
+        if outcome.chosen is None:
+            break
+        chosen = keep[outcome.chosen]
+    if not outcome.finished:
+        bound = max(instance.value(chosen), min(bound, outcome.bound))
+    if outcome.finished or instance.attained(bound) < _better(instance, chosen):
+        return _proven(instance, chosen)
+    return Proof(chosen, bound, optimal=False)
+
+
+def _proven(instance: Instance, chosen: Integer) -> Proof:
+    """Return the proof that no placement covers more than the chosen one by the instance's step."""
+    value = instance.value(chosen)
+    return Proof(chosen, value if instance.step == 1 else value + instance.step, optimal=True)
+
+
+def _outlook(instance: Instance, proof: Proof) -> list[str]:
+    """Return notes on what more time would gain."""
+    value = instance.value(proof.chosen)
+    if proof.halfway is None or value <= 0:
+        return []
+    before, now = (bound / value - 1 for bound in (proof.halfway, proof.bound))
+    if before - now < MIN_GAP_PROGRESS * before:
+        slow = (
+            "the gap has hardly closed in the second half of the search: a proof may take many times as long; fewer "
+            "candidates (a larger spacing, fewer heights) or fewer sensors make it easier"
+        )
+        return [slow]
+    return [
+        f"the gap was {before:.2%} halfway through the search and is {now:.2%} now: a higher limit may close more of it"
+    ]
+
+
+def _surplus(asked: int, used: int) -> str:
+    enough = counted(used, "suffices", "suffice")
+    return f"asked for {counted(asked, 'sensor')}, {enough}: no further sensor that the constraints allow adds coverage"
+
+
+def _guarantee(problem: PlacementProblem, instance: Instance) -> str:
+    single = len(np.unique(instance.clique)) == len(instance)
+    both = problem.count is not None and problem.budget is not None
+    if len(instance.mandatory) or problem.min_distance > 0 or both or (problem.budget is not None and not single):
+        return "greedy has no guarantee under these constraints beyond the bound given"
+    if problem.budget is not None:
+        return "greedy covers at least (1 - 1/e)/2 (32 %) of the optimum"
+    return f"greedy covers at least {'1 - 1/e (63 %)' if single else 'one half'} of the optimum"
+
+
+def scale_notes(problem: PlacementProblem) -> tuple[str, ...]:
+    """Return notes on targets and prices too small, beside others, to affect the choice.
+
+    Returns
+    -------
+    tuple of str
+        One sentence for weights and one for prices, where there is anything to say.
+    """
+    notes = []
+    weights = problem.weights[problem.weights > 0]
+    light = int(np.count_nonzero(weights < TIE_TOLERANCE * weights.sum()))
+    if light and not common_unit(weights)[1]:
+        notes.append(
+            f"{light:,} of {len(weights):,} targets weigh less than {TIE_TOLERANCE:g} of all weight each: beside the "
+            "others they cannot decide; bring the weights closer together"
+        )
+    prices = problem.prices[problem.allowed & (problem.prices > 0)]
+    cheap = int(np.count_nonzero(prices < TIE_TOLERANCE * prices.max(initial=0.0)))
+    if cheap:
+        notes.append(
+            f"{cheap:,} candidates cost less than {TIE_TOLERANCE:g} of the dearest: beside it their prices cannot "
+            "decide; give all prices in the same currency"
+        )
+    return tuple(notes)

@@ -1,0 +1,63 @@
+"""Coverage of a placement over the plausible gains of sensors whose law of detection comes from a data sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+
+import numpy as np
+
+from ...progress import Progress
+from ...sensing.lidar.model import LidarModel
+from ...sensing.visibility.surroundings import Surroundings
+from ...sensing.visibility.visibility_model import visibility_model
+from ..placement.deployment import Deployment, GainBand, TypeBand
+
+
+def with_gain_band(around: Surroundings, deployment: Deployment) -> Generator[Progress, None, Deployment]:
+    """Return a deployment with its coverage at the lowest and at the highest plausible gains of its sensors.
+
+    Where there are several sensor types to choose from, the band has the coverage of each type as well, with all of the
+    sensors of that type: what an uncertain gain leaves of a comparison of types at this site.
+
+    Parameters
+    ----------
+    around : Surroundings
+        With all types that there were to choose from.
+
+    Returns
+    -------
+    Deployment
+        Unchanged if no sweep is missing: each type is calibrated, or counts every return.
+    """
+    sensors = deployment.sensors
+    types = list(around.models.values())
+    if not sensors or not any(is_uncertain(model) for model in (*types, *(one.model for one in sensors))):
+        return deployment
+    compared = types if len(types) > 1 else []
+    visibility = visibility_model(around.site, around.sight, around.engine)
+    seen = np.zeros((2 + 2 * len(compared), len(around.site.targets)), dtype=bool)
+    for done, sensor in enumerate(sensors):
+        yield Progress(done, len(sensors), "coverage over plausible gains")
+        # rays from one position are shared by all variants
+        variants = [variant for model in (sensor.model, *compared) for variant in _ends(model)]
+        seen |= visibility.see_all(variants, sensor.xyz, sensor.orientation)[0]
+    shares = [float(row.mean()) for row in seen]
+    band = GainBand(
+        low=min(shares[0], deployment.coverage),
+        high=max(shares[1], deployment.coverage),
+        sheets=tuple(sorted({one.model.key for one in sensors if is_uncertain(one.model)})),
+        types=tuple(TypeBand(model.key, *shares[2 + 2 * n : 4 + 2 * n]) for n, model in enumerate(compared)),
+    )
+    return replace(deployment, gain_band=band)
+
+
+def is_uncertain(model: LidarModel) -> bool:
+    """Return whether the gain of a model is only known within a band."""
+    low, high = model.gains
+    return low < high
+
+
+def _ends(model: LidarModel) -> tuple[LidarModel, LidarModel]:
+    low, high = model.gains
+    return model.amplified(low), model.amplified(high)

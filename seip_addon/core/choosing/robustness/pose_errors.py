@@ -1,0 +1,120 @@
+r"""Pose errors: normally distributed position, height, yaw and tilt.
+
+A sensor planned at p with the yaw ψ and the tilt θ hangs at p + e and is turned as
+
+.. math::
+    R = R_z(ψ + δ_ψ)\, R_y(θ + δ_θ)\, R_x(δ_φ), \qquad
+    e_x, e_y \sim N(0, σ_p^2),\; e_z \sim N(0, σ_h^2),\;
+    δ_ψ \sim N(0, σ_ψ^2),\; δ_θ, δ_φ \sim N(0, σ_t^2),
+
+all independent of each other and from post to post: yaw first, then pitch about
+the new y axis (nose down is positive), then roll about the new x axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...arrays import Boolean, Float
+from ...errors import SeipError
+from ...geometry.orientation import orientations
+from ...limits import DRAWS
+from ...site.obstruction import inside_any
+from ...site.scene_geometry import Mesh
+from ..placement.scenarios import PoseErrors
+
+_MICROMETRE = 1e-6
+_KINDS_DRAWN = 6  # x, y, z, yaw, pitch, roll
+
+
+@dataclass(frozen=True, eq=False)
+class PoseDraws:
+    """Poses of s sensors in n draws of errors.
+
+    Parameters
+    ----------
+    shift : (n, s, 3) float64, metres
+        From where each was planned.
+    yaw, pitch, roll : (n, s) float64, radians
+    """
+
+    shift: Float
+    yaw: Float
+    pitch: Float
+    roll: Float
+
+    def __len__(self) -> int:
+        return len(self.shift)
+
+    def orientations(self, planned_yaw: Float, planned_tilt: Float) -> Float:
+        """Return how sensors hang, (n, s, 3, 3) float64, from their axes to the site's.
+
+        Parameters
+        ----------
+        planned_yaw, planned_tilt : (s,) float64, radians
+        """
+        return orientations(planned_yaw + self.yaw, planned_tilt + self.pitch, self.roll)
+
+
+def require_draws(draws: int) -> None:
+    """Raise SeipError where the number of draws is below one, or more than memory holds."""
+    if not DRAWS.allow(draws):
+        raise SeipError(f"asked for {draws} draws or scenarios of pose errors; ask for {DRAWS}")
+
+
+def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseDraws:
+    """Draw random pose errors of sensors.
+
+    What is drawn for a sensor follows from the seed, the number of the draw and the sensor's position alone: whichever
+    type hangs there at whichever height, whatever hangs elsewhere, and however many draws there are. Errors of other
+    sizes are the same draws, scaled.
+
+    Parameters
+    ----------
+    foot : (s, 3) float64, metres
+        Ground point of each sensor's position; equal ones have equal errors.
+    seed : int
+        At least 0.
+    """
+    require_draws(draws)
+    if seed < 0:
+        raise SeipError(f"the seed of the pose errors is {seed}; give a whole number of at least 0")
+    positions, of_position = np.unique(np.rint(foot / _MICROMETRE).astype(np.int64), axis=0, return_inverse=True)
+    standard = np.stack([_standard_normal(seed, position, draws) for position in positions.tolist()], axis=1)
+    scale = [errors.position, errors.position, errors.height, errors.yaw, errors.tilt, errors.tilt]
+    drawn = standard[:, of_position.ravel()] * np.array(scale)
+    return PoseDraws(drawn[..., :3], *np.moveaxis(drawn[..., 3:], -1, 0))
+
+
+def _standard_normal(seed: int, position: Sequence[int], draws: int) -> Float:
+    """Return one position's draws, (draws, 6): more draws begin with the same."""
+    signs = sum((coordinate < 0) << bit for bit, coordinate in enumerate(position))
+    words = [seed, signs, *(abs(coordinate) for coordinate in position)]
+    return np.random.default_rng(words).standard_normal((draws, _KINDS_DRAWN))
+
+
+def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> tuple[PoseDraws, Boolean]:
+    """Move sensors that a draw puts inside an object: to the opposite side, or else to the planned position.
+
+    Parameters
+    ----------
+    xyz : (s, 3) float64, metres
+        The planned positions.
+
+    Returns
+    -------
+    PoseDraws
+    (n, s) bool
+        Which draws would have put a sensor inside an object.
+    """
+    shift = draws.shift.copy()
+    blocked: Boolean = inside_any((xyz + shift).reshape(-1, 3), objects).reshape(shift.shape[:-1])
+    shift[blocked] *= -1
+    still = np.zeros_like(blocked)
+    where = np.broadcast_to(xyz, shift.shape)
+    still[blocked] = inside_any(where[blocked] + shift[blocked], objects)
+    shift[still] = 0.0
+    return replace(draws, shift=shift), blocked

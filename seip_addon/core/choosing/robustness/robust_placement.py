@@ -1,0 +1,324 @@
+r"""Robust placement over scenarios of pose errors, sensor failures or traffic.
+
+With K scenarios of pose errors, V of each known for every candidate,
+
+.. math::
+    \max_{x \in X} \; \min_{p \in P} \sum_k p_k \sum_j w_j\, y_{jk}
+    \quad\text{subject to}\quad
+    κ\, y_{jk} \le \sum_i V_{ijk} x_i, \quad y_{jk} \in \{0, 1\},
+
+X being the placements of the problem (number, budget, one sensor per position, mandatory and forbidden places, least
+distance) and P that of `risk`. The expectation is the maximal covering location problem of K × t targets. Any p in P
+gives an upper bound,
+
+.. math::
+    \max_{x \in X} T(x) \le \max_{x \in X} F_p(x),
+
+of which p = 1/K says that nothing exceeds the largest expectation. A p with a small bound comes of fictitious play
+(Brown 1951): placements answer the mean of the scenarios that were worst for the placements before. Branch and bound on
+F_p then proves the best T (`robust_search`), where it comes to an end. Another bound knows each scenario beforehand
+(Madansky 1960), and takes K problems of t targets:
+
+.. math::
+    \max_{x \in X} T(x) \le \min_{p \in P} \sum_k p_k \max_{x \in X} f_k(x),
+
+the mean of the m smallest of the K largest coverages.
+"""
+
+import math
+from collections.abc import Generator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...arrays import Float, Integer
+from ...progress import Progress, within
+from ..placement.bounds import Bound, lagrangian_bound
+from ..placement.branch_and_bound import FIRST_STEPS
+from ..placement.feasibility import starting_choice
+from ..placement.greedy import swap_search
+from ..placement.problem import TIE_TOLERANCE, Placement, PlacementProblem, assess, relative_gap
+from ..placement.reduced_problem import WHOLE_SLACK, Instance, common_unit, make_instance, merge_targets
+from ..placement.risk import Risk
+from ..placement.search_limits import DEFAULT_LIMITS, Clock, SolverLimits
+from ..placement.solver import BRANCHING_SHARE, MIN_CLOSED_SHARE, Proof, lower_by_goals, solve, solve_within
+from .robust_search import BestUnderRisk, swap_search_by_risk, swap_search_from_pairs
+from .scenario_visibility import ScenarioVisibility
+
+ROUNDS = 16  # of fictitious play; weights of scenarios are multiples of 1 / (ROUNDS · m)
+SCENARIO_SHARE = 0.5  # share of the time for the problems of single scenarios
+GOALS_SHARE = 0.98  # share of the time for proofs that goals cannot be reached, where branching lowers no bound
+WEAK_BRANCHING_SHARE = 0.05  # share of the time for a first branch and bound where its bounds are weak
+MIN_SECONDS = 1.0  # or units of work, for what comes after them, however slow they were
+
+
+UNPROVEN_MESSAGE = (
+    "the search ended before this placement was proven optimal: the gap says by how much it may fall short"
+)
+
+
+def solve_robust(
+    problem: PlacementProblem,
+    scenarios: ScenarioVisibility,
+    risk: Risk,
+    limits: SolverLimits = DEFAULT_LIMITS,
+    foreseen: Sequence[Placement] | None = None,
+) -> Generator[Progress, None, Placement]:
+    """Choose the placement that maximises a risk measure over scenarios.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        With the visibility of the poses as planned.
+    scenarios : ScenarioVisibility
+        Of all candidates.
+    foreseen : sequence of Placement, optional
+        See `foresee`; found within the time limit if not given, and only of use where one look is enough.
+
+    Returns
+    -------
+    Placement
+        Objective and bound are T, in units of the targets' weight; ``covered`` is what it covers as planned. The same
+        whatever the order of candidates. Of equally good placements the one with fewest sensors, then the cheapest;
+        for the expectation as `placement.solve` chooses.
+
+    Raises
+    ------
+    SeipError
+        As `placement.solve`, or fewer sensors are allowed than the risk asks for.
+    """
+    most = problem.most_sensors
+    risk.require_sensors(most)
+    different = _without_copies(scenarios)
+    plain = risk.seen_by == 1 and risk.failure == "none"
+    if plain and len(different) == 1:
+        planned = replace(problem, visible=different.seen(0))
+        placement = yield from solve(planned, limits)
+        return replace(placement, covered=problem.covered(placement.chosen))
+    solver, clock = limits.solver, limits.clock()
+    if foreseen is None and risk.seen_by == 1:
+        foreseen = yield from foresee(problem, different, solver, clock.part(SCENARIO_SHARE * clock.left))
+    slack = equal_within(problem, risk, len(different))
+    placement = yield from _searched(problem, different, risk, slack, solver, clock.part(math.inf, MIN_SECONDS))
+    if foreseen is not None and risk.seen_by == 1:  # coverage by one look bounds that by two as well, but far above
+        placement = _with_foresight(problem, different, risk, slack, placement, foreseen)
+    return replace(placement, seconds=clock.seconds)
+
+
+def equal_within(problem: PlacementProblem, risk: Risk, scenarios: int) -> float:
+    """Return by how much two values of T may differ and still be equal, as `placement.solve` compares coverage.
+
+    Where the weights have a common unit, T is a multiple of a share of it, and different multiples differ. Elsewhere
+    values are equal that differ by less than `TIE_TOLERANCE` of all weight.
+    """
+    tolerance = TIE_TOLERANCE * math.fsum(problem.weights)
+    unit, whole = common_unit(problem.weights[problem.weights > 0])
+    parts = risk.counted(scenarios) * (problem.most_sensors if risk.failure == "mean" else 1)
+    return min(tolerance, WHOLE_SLACK * unit / parts) if whole else tolerance
+
+
+def foresee(
+    problem: PlacementProblem, scenarios: ScenarioVisibility, solver: str, clock: Clock
+) -> Generator[Progress, None, tuple[Placement, ...]]:
+    """Solve each scenario by itself: no placement does better there.
+
+    Returns
+    -------
+    tuple of Placement
+        One for each scenario; one alone where all are the same.
+    """
+    scenarios = _without_copies(scenarios)
+    found = []
+    for scenario in range(len(scenarios)):
+        here = Progress(scenario, len(scenarios), "solving each scenario by itself", counted=False)
+        yield here
+        alone = replace(problem, visible=scenarios.seen(scenario))
+        # what the quick ones leave goes to those that follow
+        part = clock.part(clock.left / (len(scenarios) - scenario), MIN_SECONDS)
+        found.append((yield from within(here, solve_within(alone, solver, part))))
+    return tuple(found)
+
+
+def _with_foresight(
+    problem: PlacementProblem,
+    scenarios: ScenarioVisibility,
+    risk: Risk,
+    slack: float,
+    placement: Placement,
+    foreseen: Sequence[Placement],
+) -> Placement:
+    """Lower the bound to what foresight could reach, and take a scenario's own placement where that is better."""
+    value, chosen = placement.objective, placement.chosen
+    for other in foreseen:
+        reached = risk.of(outcomes_of(problem, scenarios, risk, other.chosen))
+        if reached > value + slack and placement.status != "optimal":
+            value, chosen = reached, other.chosen
+    bound = max(min(placement.bound, risk.of(np.array([other.bound for other in foreseen]))), value)
+    optimal = placement.status == "optimal" or bound <= value + slack
+    return assess(
+        problem,
+        chosen,
+        bound,
+        optimal=optimal,
+        solver=placement.solver,
+        seconds=placement.seconds,
+        notes=() if optimal else placement.notes,
+        objective=value,
+    )
+
+
+def at_least(found: Placement, other: Placement, reached: float) -> Placement:
+    """Return the placement found, or another where that reaches more of the same objective.
+
+    A search that ran out of time may have missed the placement that knows of no scenarios.
+    """
+    if reached <= found.objective * (1 + TIE_TOLERANCE):
+        return found
+    bound = max(found.bound, reached)
+    return replace(
+        found,
+        chosen=other.chosen,
+        objective=reached,
+        bound=bound,
+        gap=relative_gap(reached, bound),
+        covered=other.covered,
+        price=other.price,
+    )
+
+
+def outcomes_of(problem: PlacementProblem, scenarios: ScenarioVisibility, risk: Risk, chosen: Integer) -> Float:
+    """Return the outcome of chosen candidates in each scenario, (K,) float64, in units of the targets' weight."""
+    return risk.outcomes(scenarios.seen_by_each(chosen), problem.weights, problem.most_sensors)
+
+
+def _without_copies(scenarios: ScenarioVisibility) -> ScenarioVisibility:
+    """Return one scenario where all are the same, so that without errors nothing is rounded otherwise."""
+    same = (scenarios.packed == scenarios.packed[:1]).all()
+    return ScenarioVisibility(scenarios.packed[:1], scenarios.targets) if same else scenarios
+
+
+def _stacked(problem: PlacementProblem, scenarios: ScenarioVisibility, share: Float) -> PlacementProblem:
+    """Return the problem of all scenarios' targets, those of each weighted by its share; without those of share 0."""
+    used = np.flatnonzero(share)
+    visible = np.concatenate([scenarios.seen(scenario) for scenario in used], axis=1)
+    return replace(problem, visible=visible, weights=np.concatenate([share[k] * problem.weights for k in used]))
+
+
+def _searched(
+    problem: PlacementProblem, scenarios: ScenarioVisibility, risk: Risk, slack: float, solver: str, clock: Clock
+) -> Generator[Progress, None, Placement]:
+    """Find scenarios' weights with a small bound, then the best placement by branch and bound."""
+    yield Progress(0, 0, "reducing the scenarios' targets")
+    whole, _ = make_instance(_stacked(problem, scenarios, np.ones(len(scenarios))))
+    game = FictitiousPlay(problem, scenarios, risk, whole, clock)
+    start = yield from starting_choice(problem, whole, solver)
+    chosen, share = yield from game.play(start)
+    instance, unit = game.instance(share), game.unit(share)
+    goal = (game.evaluate(chosen) - slack) * unit
+    root = yield from lagrangian_bound(instance, goal, clock, iterations=FIRST_STEPS)
+    search = BestUnderRisk(instance, unit, game.evaluate, chosen, slack, root)
+    finished, bound = yield from _bounded_by_goals(search, instance, unit, root, clock)
+    return assess(
+        problem,
+        whole.original[search.best],
+        bound,
+        optimal=finished,
+        solver="branch and bound",
+        seconds=clock.seconds,
+        notes=() if finished else (UNPROVEN_MESSAGE,),
+        objective=search.value,
+    )
+
+
+def _bounded_by_goals(
+    search: BestUnderRisk, instance: Instance, unit: float, root: tuple[Integer, Bound], clock: Clock
+) -> Generator[Progress, None, tuple[bool, float]]:
+    """Run a branch and bound; where its bound hardly falls, lower it goal by goal, then go on with the time left.
+
+    F bounds T, so that a proof that no placement reaches a goal in F is one in T as well.
+
+    Returns
+    -------
+    bool
+        Whether the search has ended.
+    float
+        Bound on T.
+    """
+    # where several sensors must see a target, bounds of branches are weak, and a short trial tells
+    share = BRANCHING_SHARE if instance.cover.concave else WEAK_BRANCHING_SHARE
+    finished = yield from search.run(clock, share * clock.left)
+    keep, bound = root  # what can reach the first incumbent, which all that follow are among
+    value = search.value * unit
+    closing = search.bound * unit - value <= (1 - MIN_CLOSED_SHARE) * (bound.value - value)
+    if finished or closing or not np.isin(search.best, keep).all():
+        finished = finished or (yield from search.run(clock, clock.left))
+        return finished, search.bound
+    known = Proof(np.searchsorted(keep, search.best), search.bound * unit, optimal=False)
+    proof = yield from lower_by_goals(instance.part(keep), bound, known, clock.part(GOALS_SHARE * clock.left))
+    finished = yield from search.run(clock, clock.left)
+    return finished, search.bound if finished else max(search.value, min(search.bound, proof.bound / unit))
+
+
+class FictitiousPlay:
+    """Fictitious play for scenario weights with a small bound: placements answer the worst scenarios so far.
+
+    Parameters
+    ----------
+    whole : Instance
+        Of all scenarios: candidates that can matter, with their constraints.
+    clock : Clock
+        Limits of the search, which evaluations count against.
+    """
+
+    def __init__(
+        self, problem: PlacementProblem, scenarios: ScenarioVisibility, risk: Risk, whole: Instance, clock: Clock
+    ) -> None:
+        self._scenarios, self._risk, self._whole, self._clock = scenarios, risk, whole, clock
+        self._weight = problem.weights
+        self._used = problem.weights > 0
+        self._unit, _ = common_unit(problem.weights[self._used])
+        self._sensors = problem.most_sensors
+        self._cover = risk.cover(self._sensors)
+
+    def evaluate(self, chosen: Integer) -> float:
+        """Return T of candidates of the whole instance."""
+        self._clock.spend(8.0 * self._scenarios.packed[:, 0].size * len(chosen))
+        seen = self._scenarios.seen_by_each(self._whole.original[chosen])
+        return self._risk.of(self._risk.outcomes(seen, self._weight, self._sensors))
+
+    def instance(self, share: Integer) -> Instance:
+        """Return the instance whose objective value is F, for whole shares of the scenarios."""
+        weight = np.rint(self._weight[self._used] / self._unit)
+        scenarios = np.flatnonzero(share).tolist()
+        columns = [self._scenarios.seen(k)[np.ix_(self._whole.original, self._used)] for k in scenarios]
+        weights = np.concatenate([share[k] * weight for k in scenarios])
+        visible, merged = merge_targets(np.concatenate(columns, axis=1), weights)
+        return replace(self._whole, visible=visible, weight=merged, cover=self._cover)
+
+    def unit(self, share: Integer) -> float:
+        """Return by what T is to be multiplied to be compared with F."""
+        return float(share.sum()) * self._cover.unit / self._unit
+
+    def play(self, start: Integer) -> Generator[Progress, None, tuple[Integer, Integer]]:
+        """Return the best placement met, and how often each scenario was among the worst, (K,) int64."""
+        even = np.ones(len(self._scenarios), dtype=np.int64)
+        instance = self.instance(even)
+        chosen = yield from swap_search(instance, start)
+        if not self._cover.concave:
+            chosen = yield from swap_search_from_pairs(instance, start, chosen, self._clock)
+            chosen = yield from swap_search_by_risk(instance, self.evaluate, chosen)
+        best, value = chosen, self.evaluate(chosen)
+        if self._risk.counted(len(even)) == len(even):
+            return best, even
+        share = np.zeros_like(even)
+        for _ in range(ROUNDS):
+            if self._clock.left < 0:
+                break
+            yield Progress(0, 0, "weighing the scenarios")
+            self._clock.spend(2 * self._scenarios.packed.size * 8)
+            seen = self._scenarios.seen_by_each(self._whole.original[chosen])
+            share[self._risk.worst(self._risk.outcomes(seen, self._weight, self._sensors))] += 1
+            chosen = yield from swap_search(self.instance(share), chosen)
+            if self.evaluate(chosen) > value:
+                best, value = chosen, self.evaluate(chosen)
+        return best, share if share.any() else even

@@ -1,0 +1,174 @@
+"""Price and benefit of robust placements, evaluated on held-out scenarios."""
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...arrays import Float, Integer
+from ...estimates import IntervalEstimate, mean_of, quantile_gain, quantile_of
+from ...progress import Progress, within
+from ...sensing.visibility.surroundings import Surroundings
+from ..placement.problem import Placement, PlacementProblem
+from ..placement.risk import Risk
+from ..placement.scenarios import Scenarios
+from ..placement.search_limits import DEFAULT_LIMITS, SolverLimits
+from ..placement.solver import solve
+from .robust_placement import at_least, foresee, outcomes_of, solve_robust
+from .scenario_visibility import ScenarioVisibility
+from .visibility_under_errors import draws_for, visibility_under_errors
+
+LOW_QUANTILE = 0.05  # quantile of coverage by which placements are compared
+COMPARED_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))  # compared by default
+
+
+@dataclass(frozen=True, eq=False)
+class Contender:
+    """A placement with its outcomes in unseen draws.
+
+    Parameters
+    ----------
+    name : str
+        What it was optimised for.
+    planned : float
+        Share of the targets' weight that it covers as planned, by one look and without any failure.
+    evaluated_by : Risk
+        Whose outcome the following are: coverage, or what is left of it after a loss, or what several sensors see.
+    undisturbed : float
+        The outcome for the poses as planned, as a share of the targets' weight.
+    unseen : (n,) float64
+        The same in each unseen draw.
+    """
+
+    name: str
+    placement: Placement
+    planned: float
+    evaluated_by: Risk
+    undisturbed: float
+    unseen: Float
+
+    @property
+    def low(self) -> IntervalEstimate:
+        """The 5 % quantile over unseen draws."""
+        return quantile_of(self.unseen, LOW_QUANTILE)
+
+    @property
+    def mean(self) -> IntervalEstimate:
+        """The mean over unseen draws."""
+        return mean_of(self.unseen)
+
+
+@dataclass(frozen=True, eq=False)
+class RobustStudy:
+    """Comparison of the nominal optimum with robust placements.
+
+    Parameters
+    ----------
+    scenarios : Scenarios
+        Of pose errors, or nominal: then the one scenario is also what placements are evaluated on.
+    nominal : tuple of Contender
+        The placement chosen for the poses as planned, once for each way in which the others are evaluated.
+    robust : tuple of Contender
+        One for each risk.
+    total : float
+        Weight of all targets, the unit of placements' objectives.
+    """
+
+    scenarios: Scenarios
+    nominal: tuple[Contender, ...]
+    robust: tuple[Contender, ...]
+    total: float
+
+    def beside(self, contender: Contender) -> Contender:
+        """Return the nominal optimum, evaluated as a contender is."""
+        return next(nominal for nominal in self.nominal if nominal.evaluated_by == contender.evaluated_by)
+
+    def price(self, contender: Contender) -> float:
+        """Return the planned coverage that a contender loses against the nominal optimum."""
+        return self.beside(contender).planned - contender.planned
+
+    def saving(self, contender: Contender) -> IntervalEstimate:
+        """Estimate by how much its 5 % quantile over unseen draws exceeds the nominal optimum's."""
+        return quantile_gain(contender.unseen, self.beside(contender).unseen, LOW_QUANTILE)
+
+    def is_converged(self, contender: Contender) -> bool:
+        """Whether half of the unseen draws give the same estimates, within their intervals."""
+        half = len(contender.unseen) // 2
+        saved = quantile_gain(contender.unseen[:half], self.beside(contender).unseen[:half], LOW_QUANTILE)
+        return saved.agrees_with(self.saving(contender))
+
+
+def robust_study(
+    around: Surroundings,
+    problem: PlacementProblem,
+    scenarios: Scenarios,
+    risks: Sequence[Risk] = COMPARED_RISKS,
+    limits: SolverLimits = DEFAULT_LIMITS,
+) -> Generator[Progress, None, RobustStudy]:
+    """Optimise for the planned poses and for each risk measure, and evaluate all placements on held-out scenarios.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Of all candidates of the site.
+    risks : sequence of Risk
+        A risk measure for each placement that is compared.
+    """
+    every = np.flatnonzero(problem.allowed)  # no rays are cast from poses that may not be chosen
+    views = yield from _views(around, problem, scenarios, every)
+    spread = views.spread_to(every, len(problem.visible))
+    nominal = yield from solve(problem, limits)
+    foreseen = None
+    if any(risk.seen_by == 1 for risk in risks):
+        foreseen = yield from foresee(problem, spread, limits.solver, limits.clock())
+    ways = dict.fromkeys(risk.alone for risk in risks)  # in the order of the risks, each once
+    entries = [("the poses as planned", nominal, way) for way in ways]
+    for number, risk in enumerate(risks):
+        here = Progress(number, len(risks), f"placing for {risk.describe()}", counted=False)
+        yield here
+        steps = solve_robust(problem, spread, risk, limits, foreseen)
+        found: Placement = yield from within(here, steps)
+        placed = at_least(found, nominal, risk.of(outcomes_of(problem, spread, risk, nominal.chosen)))
+        entries.append((risk.describe() if scenarios.errs else risk.describe_outcome(), placed, risk.alone))
+    contenders = yield from _evaluated(around, problem, scenarios, entries)
+    return RobustStudy(
+        scenarios, tuple(contenders[: len(ways)]), tuple(contenders[len(ways) :]), float(problem.weights.sum())
+    )
+
+
+def _views(
+    around: Surroundings, problem: PlacementProblem, scenarios: Scenarios, poses: Integer, *, held_out: bool = False
+) -> Generator[Progress, None, ScenarioVisibility]:
+    """Compute the visibility of poses in the scenarios to optimise over, or in the held-out ones."""
+    if not scenarios.errs:
+        return ScenarioVisibility(np.packbits(problem.visible[poses], axis=1)[None], problem.visible.shape[1])
+    number, seed = (scenarios.evaluated, scenarios.seed + 1) if held_out else (scenarios.optimised, scenarios.seed)
+    drawn, _ = draws_for(around, poses, scenarios.pose_errors, number, seed)
+    return (yield from visibility_under_errors(around, poses, drawn))
+
+
+def _evaluated(
+    around: Surroundings,
+    problem: PlacementProblem,
+    scenarios: Scenarios,
+    entries: Sequence[tuple[str, Placement, Risk]],
+) -> Generator[Progress, None, list[Contender]]:
+    """Evaluate placements on held-out scenarios, all chosen poses at once."""
+    used = np.unique(np.concatenate([placement.chosen for _, placement, _ in entries]))
+    views = yield from _views(around, problem, scenarios, used, held_out=True)
+    planned = replace(views, packed=np.packbits(problem.visible[used], axis=1)[None])
+    total = float(problem.weights.sum())
+    contenders = []
+    for name, placement, evaluated_by in entries:
+        rows = np.searchsorted(used, placement.chosen)
+        (undisturbed,) = outcomes_of(problem, planned, evaluated_by, rows)
+        outcomes = [  # one draw at a time: all at once take much memory
+            outcomes_of(problem, replace(views, packed=views.packed[[draw]]), evaluated_by, rows)
+            for draw in range(len(views))
+        ]
+        unseen = np.concatenate(outcomes) / total
+        planned_coverage = placement.covered / total
+        contenders.append(
+            Contender(name, placement, planned_coverage, evaluated_by, float(undisturbed) / total, unseen)
+        )
+    return contenders

@@ -1,0 +1,132 @@
+"""Sampled instants of traffic with the vehicles present."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Float, Integer
+from ...errors import SeipError
+from ...sensing.scans.motion import rotations
+from ...sensing.traffic.bodies import fitted_body
+from ...sensing.traffic.trajectories import Snapshot, Trajectories
+
+WARM_UP = 2.0  # seconds from the first sample of a run to the first instant that is used
+BATCH_SECONDS = 12.0  # seconds of a run whose instants count as one draw, since the same queues block the view at them
+_MARGIN = 1e-3  # metres by which bounding boxes are larger than what they bound: ray casters compute in float32
+
+_CORNERS = np.array(np.meshgrid((0, 1), (0, 1), (0, 1), indexing="ij")).reshape(3, 8).T
+
+
+@dataclass(frozen=True, eq=False)
+class TrafficObstacles:
+    """Bodies of the k road users present at one instant; n triangles together.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float64, metres
+        Of their bodies, local site axes.
+    reflectivity : (n,) float64, 0 to 1
+    hulls : (k, 8, 3) float64, metres
+        Corners of their bounding boxes.
+    """
+
+    triangles: Float
+    reflectivity: Float
+    hulls: Float
+
+
+NO_TRAFFIC = TrafficObstacles(np.empty((0, 3, 3)), np.empty(0), np.empty((0, 8, 3)))  # the empty road
+
+
+@dataclass(frozen=True, eq=False)
+class Instants:
+    """Some n instants of runs of traffic.
+
+    Parameters
+    ----------
+    runs : tuple of Trajectories
+        In the scene's local axes.
+    run : (n,) int64
+        Which of the runs.
+    time : (n,) float64, seconds
+    batch : (n,) int64
+        Batch of time of each instant; instants of different batches are nearly independent.
+    """
+
+    runs: tuple[Trajectories, ...]
+    run: Integer
+    time: Float
+    batch: Integer
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def obstacles(self) -> list[TrafficObstacles]:
+        """Return the bodies present at each instant."""
+        return [
+            obstacles_of(self.runs[run], self.runs[run].at(time))
+            for run, time in zip(self.run.tolist(), self.time.tolist(), strict=True)
+        ]
+
+    def of(self, which: Integer) -> Instants:
+        """Return some of the instants."""
+        return Instants(self.runs, self.run[which], self.time[which], self.batch[which])
+
+
+def spread_instants(runs: Sequence[Trajectories], number: int, seed: int) -> Instants:
+    """Draw instants that are spread evenly: one anywhere in each of so many equal parts of the runs' time.
+
+    Raises
+    ------
+    SeipError
+        None is asked for, or a run is too short.
+    """
+    if number < 1:
+        raise SeipError(f"ask for one instant of traffic or more, not {number}")
+    begin = np.array([run.span[0] + WARM_UP for run in runs])
+    lasts = np.array([run.span[1] for run in runs]) - begin
+    if (lasts <= 0).any():
+        short = runs[int(np.argmin(lasts))]
+        raise SeipError(f"{_name(short)} is not longer than the {WARM_UP:g} s that are left out: simulate more traffic")
+    before = np.concatenate([[0.0], np.cumsum(lasts)])
+    drawn = (np.arange(number) + np.random.default_rng(seed).random(number)) * before[-1] / number
+    run = np.searchsorted(before[1:-1], drawn, side="right")
+    into = drawn - before[run]
+    parts = np.maximum(np.rint(lasts / BATCH_SECONDS), 1).astype(np.int64)
+    part = np.minimum(into / lasts[run] * parts[run], parts[run] - 1).astype(np.int64)
+    return Instants(tuple(runs), run, begin[run] + into, np.concatenate([[0], np.cumsum(parts)])[run] + part)
+
+
+def check_runs(runs: Sequence[Trajectories], region: BaseGeometry) -> None:
+    """Raise SeipError where a run has no road user in the region of interest: it is of another place."""
+    for run in runs:
+        if not shapely.contains_xy(region, run.position[:, 0], run.position[:, 1]).any():
+            raise SeipError(
+                f"nobody of {_name(run)} is ever in the region of interest: it is traffic of another place, or the "
+                "scene's seip_origin is not that of its map"
+            )
+
+
+def obstacles_of(trajectories: Trajectories, snapshot: Snapshot) -> TrafficObstacles:
+    """Return the bodies of the road users of an instant, in place."""
+    if len(snapshot) == 0:
+        return NO_TRAFFIC
+    attitudes = rotations(snapshot.yaw, snapshot.pitch)
+    triangles, reflectivity, hulls = [], [], []
+    for user, position, attitude in zip(snapshot.user.tolist(), snapshot.position, attitudes, strict=True):
+        body = fitted_body(trajectories.users[user])
+        own = body.triangles
+        low, high = own.min(axis=(0, 1)) - _MARGIN, own.max(axis=(0, 1)) + _MARGIN
+        triangles.append(position + own @ attitude.T)
+        reflectivity.append(body.reflectivity)
+        hulls.append(position + (low + _CORNERS * (high - low)) @ attitude.T)
+    return TrafficObstacles(np.concatenate(triangles), np.concatenate(reflectivity), np.array(hulls))
+
+
+def _name(run: Trajectories) -> str:
+    return f"the run of traffic ({run.source})" if run.source else "a run of traffic"

@@ -1,0 +1,89 @@
+"""Time that road users spend on each target's square."""
+
+from collections.abc import Generator, Sequence
+
+import numpy as np
+
+from ...arrays import Float, Integer
+from ...errors import SeipError
+from ...progress import Progress
+from ...sensing.traffic.trajectories import Trajectories
+from ...site.targets import Targets
+from .traffic_instants import WARM_UP
+
+INTERVAL = 0.2  # seconds between samples: a car at 50 km/h moves 2.8 m, less than its length
+
+_ALONG, _ACROSS = 12, 4
+"""Points of a footprint, evenly spread, each for its share: whole numbers of shares keep weights commensurable."""
+
+_SHARES = np.stack(
+    np.meshgrid((np.arange(_ALONG) + 0.5) / _ALONG - 0.5, (np.arange(_ACROSS) + 0.5) / _ACROSS - 0.5), axis=-1
+).reshape(-1, 2)
+
+
+def road_user_seconds(targets: Targets, runs: Sequence[Trajectories]) -> Generator[Progress, None, Float]:
+    """Find for how long road users are over each target, each road user counting alike whatever its size.
+
+    Parameters
+    ----------
+    runs : sequence of Trajectories
+        In the scene's local axes; all of each but its first `WARM_UP` seconds.
+
+    Yields
+    ------
+    Progress
+        After each run.
+
+    Returns
+    -------
+    (t,) float64, seconds
+        A road user whose footprint lies half in a target's square is half there: they add up to the time that
+        all road users together spend over targets.
+
+    Raises
+    ------
+    SeipError
+        Nobody is ever over a target.
+    """
+    square = _Squares(targets)
+    parts = np.zeros(len(targets), dtype=np.int64)
+    for number, run in enumerate(runs):
+        yield Progress(number, len(runs), "watching where road users are")
+        size = np.array([(user.length, user.width) for user in run.users])
+        begin, end = run.span[0] + WARM_UP, run.span[1]
+        for time in (begin + INTERVAL * (np.arange(max(round((end - begin) / INTERVAL), 0)) + 0.5)).tolist():
+            now = run.at(time)
+            ahead = np.column_stack([np.cos(now.yaw), np.sin(now.yaw)])
+            left = np.column_stack([-np.sin(now.yaw), np.cos(now.yaw)])
+            inside = size[now.user][:, None] * _SHARES
+            places = now.position[:, None, :2] + inside[..., :1] * ahead[:, None] + inside[..., 1:] * left[:, None]
+            target = square.of(places.reshape(-1, 2))
+            parts += np.bincount(target[target >= 0], minlength=len(targets))
+    if not parts.any():
+        raise SeipError("no road user is ever over a target: the traffic is of another place, or too short")
+    yield Progress(len(runs), len(runs), "watching where road users are")
+    return parts * (INTERVAL / len(_SHARES))
+
+
+class _Squares:
+    """The squares of the targets' grid, to be found by what lies in them."""
+
+    def __init__(self, targets: Targets) -> None:
+        self._side = targets.spacing
+        self._low = targets.xyz[:, :2].min(axis=0) - self._side / 2
+        column, row = self._cells(targets.xyz[:, :2])
+        self._target = np.full((column.max() + 1, row.max() + 1), -1, dtype=np.int64)
+        self._target[column, row] = np.arange(len(targets))
+
+    def of(self, places: Float) -> Integer:
+        """Return the target in whose square each place (n, 2) lies, (n,); -1 for none."""
+        column, row = self._cells(places)
+        most = self._target.shape
+        inside = (column >= 0) & (column < most[0]) & (row >= 0) & (row < most[1])
+        found = np.full(len(places), -1, dtype=np.int64)
+        found[inside] = self._target[column[inside], row[inside]]
+        return found
+
+    def _cells(self, places: Float) -> tuple[Integer, Integer]:
+        column, row = np.floor((places - self._low) / self._side).astype(np.int64).T
+        return column, row

@@ -1,0 +1,275 @@
+"""Coverage that traffic leaves of a placement, and what optimising for traffic regains.
+
+Placements are optimised on some instants of traffic and evaluated at others, of other runs, by the share of time that
+each target is seen and by the mean share of the targets' weight. Instants near in time see the same queues: intervals
+come of the means of batches of time (`mean_over_time`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...arrays import Boolean, Float, Integer
+from ...estimates import IntervalEstimate, mean_over_time
+from ...progress import Progress
+from ...sensing.visibility.surroundings import Surroundings
+from ..placement.problem import Placement, PlacementProblem
+from ..placement.risk import Risk
+from ..placement.search_limits import DEFAULT_LIMITS, SolverLimits
+from ..placement.solver import solve
+from .robust_placement import at_least, outcomes_of, solve_robust
+from .scenario_visibility import ScenarioVisibility
+from .traffic_instants import NO_TRAFFIC, Instants, TrafficObstacles
+from .visibility_in_traffic import LAYER_HEIGHT, TrafficLayer, visibility_in_traffic
+
+NOTABLE_LOSS = 0.01  # share of the targets' weight whose loss in traffic is worth a warning
+IN_TRAFFIC = "in traffic"  # first words of a `traffic_message`, and of no other
+MOSTLY_SEEN_SHARE = 0.9  # share of time from which on a target counts as mostly seen
+
+MEAN = Risk()
+
+LAYER_NAMES: Mapping[TrafficLayer, str] = {"road": "road", "height": f"points {LAYER_HEIGHT:g} m above the road"}
+"""For messages and charts."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrafficScenarios:
+    """Visibility grids of all candidates: of the empty road, and at the instants that a placement is optimised on.
+
+    Parameters
+    ----------
+    layer : {"road", "height"}
+        The layer to be seen.
+    empty : (c, t) bool
+        On the empty road.
+    views : ScenarioVisibility
+        At each instant.
+    """
+
+    layer: TrafficLayer
+    empty: Boolean
+    views: ScenarioVisibility
+
+
+@dataclass(frozen=True, eq=False)
+class TrafficCoverage:
+    """Coverage of a placement on the empty road and at n instants of traffic.
+
+    Parameters
+    ----------
+    empty : float
+        Share of the targets' weight on the empty road.
+    at : (n,) float64
+        The same share at each instant.
+    hidden_at : (n,) float64
+        Share of the weight that is seen on the empty road and not at each instant.
+    empty_targets : (t,) bool
+        Which targets on the empty road.
+    time : (t,) float64
+        Share of the instants at which each target is seen.
+    batch : (n,) int64
+        Batch of each instant.
+    """
+
+    empty: float
+    at: Float
+    hidden_at: Float
+    empty_targets: Boolean
+    time: Float
+    batch: Integer
+
+    @property
+    def mean(self) -> IntervalEstimate:
+        """Mean over time of the share of the targets' weight that is seen."""
+        return mean_over_time(self.at, self.batch)
+
+    @property
+    def loss(self) -> IntervalEstimate:
+        """Coverage of the empty road minus that in traffic: hidden weight, less what returns from vehicles add."""
+        return mean_over_time(self.empty - self.at, self.batch)
+
+    @property
+    def hidden(self) -> IntervalEstimate:
+        """Share of the weight seen on the empty road that vehicles hide, on average over time."""
+        return mean_over_time(self.hidden_at / self.empty if self.empty else self.hidden_at, self.batch)
+
+    @property
+    def rarely_seen(self) -> float:
+        """Share of the targets seen on the empty road that are seen less than `MOSTLY_SEEN_SHARE` of the time."""
+        return float((self.time[self.empty_targets] < MOSTLY_SEEN_SHARE).mean()) if self.empty_targets.any() else 0.0
+
+    def more_than(self, other: TrafficCoverage) -> IntervalEstimate:
+        """Estimate the gain in coverage over another placement at the same instants."""
+        return mean_over_time(self.at - other.at, self.batch)
+
+
+@dataclass(frozen=True, eq=False)
+class TrafficEvaluation:
+    """A placement with its coverage in traffic that it was not optimised on.
+
+    Parameters
+    ----------
+    name : str
+        What it was optimised for.
+    seen : mapping of {"road", "height"} to TrafficCoverage
+        Of the targets, and of the points `LAYER_HEIGHT` metres above them.
+    """
+
+    name: str
+    placement: Placement
+    seen: Mapping[TrafficLayer, TrafficCoverage]
+
+
+@dataclass(frozen=True, eq=False)
+class TrafficStudy:
+    """Comparison of the optimum for the empty road with the placement optimised on traffic.
+
+    Parameters
+    ----------
+    layer : {"road", "height"}
+        The layer that both were optimised to see.
+    chosen_at : int
+        Number of instants that the traffic-aware placement was optimised on.
+    road_users : float
+        Mean number of road users at the evaluated instants.
+    """
+
+    layer: TrafficLayer
+    chosen_at: int
+    road_users: float
+    empty: TrafficEvaluation
+    traffic: TrafficEvaluation
+
+    def gain(self, layer: TrafficLayer) -> IntervalEstimate:
+        """Estimate the gain in coverage in traffic from optimising on traffic rather than for the empty road."""
+        return self.traffic.seen[layer].more_than(self.empty.seen[layer])
+
+    def is_converged(self) -> bool:
+        """Whether every other instant gives the same means as all, within their intervals."""
+        rows = [seen.at for placed in (self.empty, self.traffic) for seen in placed.seen.values()]
+        rows.append(self.traffic.seen[self.layer].at - self.empty.seen[self.layer].at)
+        batch = self.empty.seen[self.layer].batch
+        return all(mean_over_time(row[::2], batch[::2]).agrees_with(mean_over_time(row, batch)) for row in rows)
+
+    def messages(self) -> tuple[str, ...]:
+        """Return what optimising on traffic gains or loses, and warnings where traffic costs much."""
+        seen = f"of the {LAYER_NAMES[self.layer]} than the best placement for the empty road"
+        gain = self.gain(self.layer)
+        messages = [f"this placement sees {gain.as_change()} {seen}, in traffic that neither was chosen on"]
+        if not self.is_converged():
+            messages.append("half of the instants give a different result: evaluate on more instants (--held-out)")
+        messages += [
+            f"the best placement for the empty road sees {seen.mean.value:.1%} of the {LAYER_NAMES[layer]} on average "
+            f"over time in traffic ({self.road_users:.0f} road users at a time), not {seen.empty:.1%}: "
+            f"{seen.loss.value:.1%} less"
+            for layer, seen in self.empty.seen.items()
+            if seen.loss.value >= NOTABLE_LOSS
+        ]
+        if gain.low <= 0 and not np.array_equal(self.empty.placement.chosen, self.traffic.placement.chosen):
+            messages.append(
+                "on held-out traffic this placement is not significantly better than the empty-road optimum: use more "
+                "instants (--scenarios), or keep that one"
+            )
+        return tuple(messages)
+
+    def summary(self) -> tuple[str, ...]:
+        """Return a line for each placement: its coverage in traffic and on the empty road."""
+        return tuple(
+            f"chosen for {placed.name}: "
+            + "; ".join(
+                f"{seen.mean.describe()} of the {LAYER_NAMES[layer]} on average over time, {seen.empty:.2%} on the "
+                "empty road"
+                for layer, seen in placed.seen.items()
+            )
+            for placed in (self.empty, self.traffic)
+        )
+
+
+def traffic_scenarios(
+    around: Surroundings, problem: PlacementProblem, instants: Instants, layer: TrafficLayer = "road"
+) -> Generator[Progress, None, TrafficScenarios]:
+    """Compute visibility at instants of traffic, for the candidates that may be chosen; the others see nothing."""
+    every = np.flatnonzero(problem.allowed)
+    views = yield from visibility_in_traffic(around, every, [NO_TRAFFIC, *instants.obstacles()], layer)
+    spread = views.spread_to(every, len(problem.visible))
+    return TrafficScenarios(layer, spread.seen(0), ScenarioVisibility(spread.packed[1:], spread.targets))
+
+
+def traffic_study(
+    around: Surroundings,
+    problem: PlacementProblem,
+    scenarios: TrafficScenarios,
+    evaluation: Instants,
+    limits: SolverLimits = DEFAULT_LIMITS,
+    risk: Risk = MEAN,
+) -> Generator[Progress, None, TrafficStudy]:
+    """Optimise for the empty road and for traffic, and evaluate both placements at other instants.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Of all candidates of the site; what they see is taken from the scenarios.
+    evaluation : Instants
+        Of runs that are not those of the scenarios.
+    risk : Risk
+        Measure over the instants that is maximised.
+    """
+    problem = replace(problem, visible=scenarios.empty)
+    empty = yield from solve(problem, limits)
+    found = yield from solve_robust(problem, scenarios.views, risk, limits)
+    reached = risk.of(outcomes_of(problem, scenarios.views, risk, empty.chosen))
+    placed = at_least(found, empty, reached)
+    used = np.unique(np.concatenate([empty.chosen, placed.chosen]))
+    obstacles = evaluation.obstacles()
+    layers: tuple[TrafficLayer, ...] = ("road", "height")
+    views: dict[TrafficLayer, ScenarioVisibility] = {}
+    for layer in layers:
+        views[layer] = yield from visibility_in_traffic(around, used, [NO_TRAFFIC, *obstacles], layer)
+
+    def evaluate(name: str, placement: Placement) -> TrafficEvaluation:
+        rows = np.searchsorted(used, placement.chosen)
+        seen = {layer: _seen(views[layer], rows, problem.weights, evaluation.batch) for layer in layers}
+        return TrafficEvaluation(name, placement, seen)
+
+    return TrafficStudy(
+        layer=scenarios.layer,
+        chosen_at=len(scenarios.views),
+        road_users=_users(obstacles),
+        empty=evaluate("the empty road", empty),
+        traffic=evaluate("traffic", placed),
+    )
+
+
+def _seen(views: ScenarioVisibility, rows: Integer, weight: Float, batch: Integer) -> TrafficCoverage:
+    """Return the joint coverage of some poses; the first view is of the empty road."""
+    seen = views.seen_by_any(rows)
+    share, hidden = (which @ weight / weight.sum() for which in (seen, seen[0] & ~seen[1:]))
+    return TrafficCoverage(float(share[0]), share[1:], hidden, seen[0], seen[1:].mean(axis=0), batch)
+
+
+def traffic_message(
+    around: Surroundings, poses: Integer, weight: Float, instants: Instants
+) -> Generator[Progress, None, str]:
+    """Describe how much of the road poses see in traffic, on average over time, and when it is empty.
+
+    Parameters
+    ----------
+    poses : (s,) int64
+        Among the site's candidates.
+    weight : (t,) float64
+        Of the targets.
+    """
+    obstacles = instants.obstacles()
+    views = yield from visibility_in_traffic(around, poses, [NO_TRAFFIC, *obstacles], "road")
+    seen = _seen(views, np.arange(len(poses)), weight, instants.batch)
+    return (
+        f"{IN_TRAFFIC} ({_users(obstacles):.0f} road users at a time) this placement sees {seen.mean.describe()} of "
+        f"the road on average over time, {seen.empty:.2%} when it is empty"
+    )
+
+
+def _users(obstacles: Sequence[TrafficObstacles]) -> float:
+    return float(np.mean([len(instant.hulls) for instant in obstacles]))

@@ -1,0 +1,291 @@
+r"""Visibility grids at instants of traffic, with vehicles as occluders.
+
+Two things are asked for, of all rays of a sensor's scan, each of which ends at the
+distance d on the first of the scene's triangles or of the bodies of road users:
+
+- ``road``: a return nearer than δ to the target, as on the empty road. A return from
+  a vehicle that stands on a target, or beside it, sees that place as one from the road does.
+- ``height``: a beam that comes nearer than δ to the point `LAYER_HEIGHT` metres above the
+  target before it ends, where the sensor detects what faces it. On the empty road nothing is
+  there to return it; whatever were there would. A vehicle adds nothing to this: where more stand less is seen.
+
+The empty road is cast against once for a pose. At an instant only those rays are
+cast that pass through the bounding box of a road user, at the bodies alone, and a
+target's answer is looked at again only where one of its own rays was stopped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
+
+import numpy as np
+
+from ...arrays import Boolean, Float, Integer
+from ...progress import Progress
+from ...sensing.lidar.beams import BeamPattern
+from ...sensing.scans.beam_culling import BeamWindows
+from ...sensing.scans.sensor import level_orientation
+from ...sensing.visibility.near_surfaces import NearSurfaces, near_surfaces, rotated_surfaces
+from ...sensing.visibility.ray_casting import engine_name, make_ray_caster
+from ...sensing.visibility.scanning import Caster, ScanPosition
+from ...sensing.visibility.surroundings import Surroundings
+from ...sensing.visibility.target_index import TargetIndex
+from ...sensing.visibility.visibility_model import in_sensor_axes
+from ...site.scene_geometry import DEFAULT_REFLECTIVITY
+from .scenario_visibility import ScenarioVisibility, each_in_threads
+from .traffic_instants import TrafficObstacles
+
+TrafficLayer = Literal["road", "height"]
+
+LAYER_HEIGHT = 1.5  # metres above its target at which a car has its roof, and a van or a truck its side
+_RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
+_POINTS_AT_ONCE = 128  # bounds that of the rays past points
+_CUBE_SLACK = 1e-6  # share by which a cube about a ball is larger, so that rounding leaves no ray out
+_CORNERS = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1), indexing="ij")).reshape(3, 8).T
+
+
+def visibility_in_traffic(
+    around: Surroundings, poses: Integer, instants: Sequence[TrafficObstacles], layer: TrafficLayer = "road"
+) -> Generator[Progress, None, ScenarioVisibility]:
+    """Compute visibility from poses at instants of traffic.
+
+    Parameters
+    ----------
+    poses : (s,) int64
+        Among the site's candidates.
+    instants : sequence of TrafficObstacles
+        Bodies of the vehicles present at each of n instants.
+    layer : {"road", "height"}
+        The layer to be seen.
+
+    Yields
+    ------
+    Progress
+        After each pose.
+
+    Returns
+    -------
+    ScenarioVisibility
+        Of layer ``road``, the same as a full scan's with all triangles in one ray caster.
+    """
+    site, candidates = around.site, around.site.candidates
+    engine = engine_name(around.engine)
+    caster = make_ray_caster(site.triangles, engine)
+    vehicles = [_vehicle_caster(around, one) for one in instants]
+    wanted = site.targets.xyz + np.array([0.0, 0.0, LAYER_HEIGHT if layer == "height" else 0.0])
+    index = TargetIndex(wanted, around.sight.delta)
+    surfaces = near_surfaces(site.triangles, wanted, around.sight.delta, site.reflectivity)
+    packed = np.zeros((len(instants), len(poses), (len(wanted) + 7) // 8), dtype=np.uint8)
+
+    def compute(number: int) -> None:
+        pose = int(poses[number])
+        model, xyz, yaw = around.models[str(candidates.sensor[pose])], candidates.xyz[pose], candidates.yaw[pose]
+        place = ScanPosition(caster, xyz, float(yaw), [model], around.sight, site.reflectivity)
+        points, near, found, present = wanted, surfaces, index, vehicles
+        if candidates.tilt[pose] != 0:  # in the axes of the sensor, as visibility on the empty road
+            orientation = candidates.orientation(pose)
+            present = [one.rotated(place, orientation) for one in vehicles]
+            place, near = in_sensor_axes(place, orientation), rotated_surfaces(surfaces, xyz, orientation)
+            points, found = near.xyz, TargetIndex(near.xyz, around.sight.delta)
+        static = _StaticScan(place, points)
+        visibility: _LayerVisibility = (
+            _HeightVisibility(static, points) if layer == "height" else _RoadVisibility(static, found, near)
+        )
+        for instant, vehicle in enumerate(present):
+            packed[instant, number] = np.packbits(visibility.seen(static.blocked_by(vehicle)))
+
+    yield from each_in_threads(compute, range(len(poses)), caster.threads, "looking between vehicles")
+    return ScenarioVisibility(packed, len(wanted))
+
+
+@dataclass(frozen=True, eq=False)
+class _VehicleCaster:
+    """The road users of an instant, ready to be cast against."""
+
+    caster: Caster
+    reflectivity: Float
+    hulls: Float
+
+    def rotated(self, place: ScanPosition, orientation: Float) -> _VehicleCaster:
+        """Return them in the axes of the sensor at a place, which is so oriented."""
+        there = in_sensor_axes(replace(place, caster=self.caster), orientation)
+        return replace(self, caster=there.caster, hulls=(self.hulls - place.origin) @ orientation)
+
+
+def _vehicle_caster(around: Surroundings, present: TrafficObstacles) -> _VehicleCaster:
+    """Make a caster of bodies that rounds as one of the scene and the bodies together would."""
+    site = around.site
+    everything = np.concatenate([site.triangles, present.triangles])
+    bodies = np.arange(len(everything)) >= len(site.triangles)
+    reflectivity = np.concatenate([site.reflectivity, present.reflectivity])
+    return _VehicleCaster(make_ray_caster(everything, engine_name(around.engine), bodies), reflectivity, present.hulls)
+
+
+@dataclass(frozen=True, eq=False)
+class _BlockedRays:
+    """Rays that end on a road user, ascending; k of them.
+
+    Parameters
+    ----------
+    ray : (k,) int64
+    distance : (k,) float64, metres
+    returns : (k,) bool
+        Which of them return.
+    """
+
+    ray: Integer
+    distance: Float
+    returns: Boolean
+
+
+class _StaticScan:
+    """Ends of the rays of one pose on the empty road, of those that pass the box about the targets.
+
+    Parameters
+    ----------
+    place : ScanPosition
+        Of one sensor.
+    wanted : (t, 3) float64, metres
+    """
+
+    def __init__(self, place: ScanPosition, wanted: Float) -> None:
+        self.place, (self.model,) = place, place.models
+        self._windows = BeamWindows(self.model)
+        self._pattern = BeamPattern(self.model, place.yaw)
+        self._orientation = level_orientation(place.yaw)
+        low, high = wanted.min(axis=0) - place.settings.delta, wanted.max(axis=0) + place.settings.delta
+        self._matters = np.zeros(self.rays, dtype=bool)
+        self._matters[self.through(np.where(_CORNERS > 0, high, low)[None])[1]] = True
+        self.distance = np.full(self.rays, np.inf)
+        self.counts = np.zeros(self.rays, dtype=bool)
+        matters = np.flatnonzero(self._matters)
+        for ray in np.array_split(matters, max(1, -(-len(matters) // _RAYS_AT_ONCE))):
+            directions = self.directions(ray)
+            self.distance[ray], triangle = place.caster.cast(place.origin, directions, self.model.max_range)
+            self.counts[ray] = place.counting(self.model, directions, self.distance[ray], triangle)
+
+    @property
+    def reach(self) -> float:
+        """How far off something of usual reflectivity is detected that faces the sensor, metres."""
+        detected = self.model.law.reach(DEFAULT_REFLECTIVITY, self.place.settings.detection)
+        return min(self.model.max_range, detected)
+
+    @property
+    def rays(self) -> int:
+        """Number of all rays."""
+        return self.model.channels * self.model.azimuth_count
+
+    def through(self, hulls: Float) -> tuple[Integer, Integer]:
+        """Pair hulls with rays that may pass through them; see `BeamWindows.rays_towards`."""
+        return self._windows.rays_towards((hulls - self.place.origin) @ self._orientation)
+
+    def nearest_to(self, points: Float) -> Integer:
+        """Return a ray next to the direction of each point, (n,) int64."""
+        x, y, z = ((points - self.place.origin) @ self._orientation).T
+        order = np.argsort(self.model.elevations, kind="stable")
+        between = (self.model.elevations[order][1:] + self.model.elevations[order][:-1]) / 2
+        channel = order[np.searchsorted(between, np.arctan2(z, np.hypot(x, y)))]
+        steps, size = self.model.azimuth_count, self.model.azimuth_step
+        middle = (steps - 1) / 2  # of the steps, to whose both sides half a turn lies
+        turn = np.arctan2(y, x) - self.model.azimuth_offsets[channel] - self.model.first_azimuth - middle * size
+        step = np.rint(((turn + np.pi) % (2 * np.pi) - np.pi) / size + middle).astype(np.int64)
+        nearest: Integer = channel * steps + np.clip(step, 0, steps - 1)
+        return nearest
+
+    def directions(self, ray: Integer) -> Float:
+        """Return the directions of rays, (n, 3)."""
+        return self._pattern.directions(ray)
+
+    def blocked_by(self, present: _VehicleCaster) -> _BlockedRays:
+        """Cast at road users with the rays that pass their boxes, and keep what they stop before its end."""
+        towards = np.zeros(self.rays, dtype=bool)
+        towards[self.through(present.hulls)[1]] = True
+        ray = np.flatnonzero(towards & self._matters)
+        directions = self.directions(ray)
+        distance, triangle = present.caster.cast(self.place.origin, directions, self.model.max_range)
+        sooner = distance < self.distance[ray]
+        ray, distance = ray[sooner], distance[sooner]
+        bodies = replace(self.place, caster=present.caster, reflectivity=present.reflectivity)
+        return _BlockedRays(ray, distance, bodies.counting(self.model, directions[sooner], distance, triangle[sooner]))
+
+
+class _LayerVisibility(Protocol):
+    def seen(self, stopped: _BlockedRays) -> Boolean:
+        """Return what is seen while road users stop some rays, (t,) bool."""
+
+
+class _RoadVisibility:
+    """Returns near targets; each is counted, so that those of stopped rays can be taken off."""
+
+    def __init__(self, static: _StaticScan, index: TargetIndex, surfaces: NearSurfaces) -> None:
+        self._static, self._index, self._surfaces, self._targets = static, index, surfaces, len(surfaces.xyz)
+        returning = np.flatnonzero(static.counts)
+        near = [
+            self._near(part, static.distance[part])
+            for part in np.array_split(returning, max(1, len(returning) // _RAYS_AT_ONCE))
+        ]
+        self._target = np.concatenate([target for _, target in near]).astype(np.int32)
+        many = np.bincount(np.concatenate([ray for ray, _ in near]), minlength=static.rays)
+        self._first = np.concatenate([[0], np.cumsum(many)])
+        self._times = np.bincount(self._target, minlength=self._targets)
+
+    def seen(self, stopped: _BlockedRays) -> Boolean:
+        begin = self._first[stopped.ray]
+        count = self._first[stopped.ray + 1] - begin
+        lost = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
+        seen: Boolean = self._times > np.bincount(self._target[lost], minlength=self._targets)
+        seen[self._near(stopped.ray[stopped.returns], stopped.distance[stopped.returns])[1]] = True
+        return seen
+
+    def _near(self, ray: Integer, distance: Float) -> tuple[Integer, Integer]:
+        """Pair rays that return with the targets that they see, rays in their order."""
+        static, directions = self._static, self._static.directions(ray)
+        which, target = self._index.pairs_within_delta(static.place.origin + distance[:, None] * directions)
+        strong = static.place.counting_at_borders(
+            static.model, self._surfaces, directions[which], distance[which], target
+        )
+        return ray[which[strong]], target[strong]
+
+
+class _HeightVisibility:
+    """Beams past points; for each point one that passes it on the empty road is known."""
+
+    def __init__(self, static: _StaticScan, points: Float) -> None:
+        self._static, self._points = static, points
+        self._end = np.minimum(static.distance, static.reach)
+        self._witness = static.nearest_to(points)
+        self._seen = self._pass(self._witness, np.arange(len(points)))
+        for point, ray in self._passing(np.flatnonzero(~self._seen)):
+            self._seen[point], self._witness[point] = True, ray
+
+    def seen(self, stopped: _BlockedRays) -> Boolean:
+        usual = self._end[stopped.ray]
+        self._end[stopped.ray] = stopped.distance
+        seen = self._seen.copy()
+        doubtful = np.flatnonzero(seen & np.isin(self._witness, stopped.ray))
+        doubtful = doubtful[~self._pass(self._witness[doubtful], doubtful)]
+        seen[doubtful] = False
+        for point, _ in self._passing(doubtful):
+            seen[point] = True
+        self._end[stopped.ray] = usual
+        return seen
+
+    def _passing(self, points: Integer) -> Iterator[tuple[Integer, Integer]]:
+        """Try all rays past points, and return some points at a time with the rays that pass them."""
+        reach = self._static.place.settings.delta * (1 + _CUBE_SLACK)
+        for part in np.array_split(points, max(1, -(-len(points) // _POINTS_AT_ONCE))):
+            hull, ray = self._static.through(self._points[part][:, None] + reach * _CORNERS)
+            passing = self._pass(ray, part[hull])
+            yield part[hull[passing]], ray[passing]
+
+    def _pass(self, ray: Integer, point: Integer) -> Boolean:
+        """Return which rays come nearer than δ to points within the sensor's range and before they end, (n,)."""
+        static, end = self._static, self._end[ray]
+        towards = self._points[point] - static.place.origin
+        ahead = (towards * static.directions(ray)).sum(axis=1)
+        along = np.clip(ahead, static.model.min_range, end)
+        squared = (towards**2).sum(axis=1) - 2 * along * ahead + along**2
+        passes: Boolean = (squared < static.place.settings.delta**2) & (end >= static.model.min_range)
+        return passes

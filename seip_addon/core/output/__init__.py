@@ -1,0 +1,1 @@
+"""What the program writes: records, tables, pictures, reports and datasets."""

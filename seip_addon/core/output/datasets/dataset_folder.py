@@ -1,0 +1,237 @@
+"""A dataset's folder: samples run by run, and ``manifest.json`` with settings, counts and digests."""
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Generator, Iterable
+from pathlib import Path
+from typing import Any
+
+from ...errors import SeipError
+from ...progress import Progress
+from ...sensing.scans.frame import Frame
+from ...storage.files import digest, save_json, whole_file
+from ..results.placement_record import versions
+from .format_interface import Format
+from .sample import OUTCOMES, SPLITS, Sample, SensorPose, TrafficRun, make_sample, require_file_name
+
+SCHEMA = "seip-dataset/1"
+MANIFEST = "manifest.json"
+PARTS = {"format", "settings", "classes", "runs", "files"}
+
+Record = dict[str, Any]
+
+
+def write_dataset(
+    kind: Format, frames: Iterable[tuple[str, Frame]], run: TrafficRun, folder: str | Path, *, min_points: int = 1
+) -> Generator[Progress, None, Record]:
+    """Write a traffic run into a dataset; further runs, of the same split or of another, are appended by further calls.
+
+    Of each frame those labels are written that lie inside the region, have a class in the format, and
+    ``min_points`` returns of all sensors together or more; the manifest counts the others by reason. The same frames
+    give the same bytes. Stopped and called again with the same run it goes on: files that are there are kept.
+
+    Parameters
+    ----------
+    frames : iterable of (str, Frame)
+        The run's frames with their ids, in order of time.
+    folder : path-like
+        Of the dataset: new, empty, or with other runs in the same format.
+    min_points : int
+        1 leaves out what no sensor sees, which no detector can learn; 0 writes that as well.
+
+    Yields
+    ------
+    Progress
+        After each frame.
+
+    Returns
+    -------
+    dict
+        What the manifest says of the run.
+
+    Raises
+    ------
+    SeipError
+        The folder cannot be written, or holds something that this run cannot be added to; the format cannot be
+        written here.
+    """
+    folder = Path(folder)
+    manifest = _manifest_of(folder, kind, min_points)
+    entry = _entry_of(manifest, run, kind, folder)
+    if entry["finished"] and _all_there(folder, manifest, entry):
+        return entry
+    entry.update(finished=False, samples=[], labels=dict.fromkeys(OUTCOMES, 0) if kind.classes else {}, classes={})
+    save_json(folder / MANIFEST, manifest)
+    for done, (frame_id, frame) in enumerate(frames):
+        _check(frame_id, frame, run, entry["samples"])
+        sample = make_sample((entry["first"] + done, frame_id), run, frame, kind.classes, min_points)
+        _count(entry, sample)
+        entry["samples"].append(_written(folder, kind, sample))
+        yield Progress(done + 1, 0, f"writing {kind.name}")
+    if not entry["samples"]:
+        raise SeipError(f"the run '{run.name}' has no frames; simulate it again")
+    entry.update(finished=True, frames=len(entry["samples"]))
+    splits: dict[str, list[str]] = {split: [] for split in SPLITS}
+    for each in manifest["runs"]:
+        splits[each["split"]] += [sample["name"] for sample in each["samples"]]
+    index = kind.index_files(folder, splits)
+    manifest["files"] = {path: _write(folder / path, content) for path, content in index.items()}
+    save_json(folder / MANIFEST, manifest)
+    return entry
+
+
+def load_manifest(folder: str | Path) -> Record:
+    """Return what a dataset's manifest says.
+
+    Raises
+    ------
+    SeipError
+        There is none, or it is damaged or of another version.
+    """
+    path = Path(folder) / MANIFEST
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+        known = manifest["schema"] == SCHEMA
+        complete = not known or manifest.keys() >= PARTS
+    except FileNotFoundError as error:
+        raise SeipError(f"there is no dataset in {folder}: it has no {MANIFEST}; write one") from error
+    except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+        raise SeipError(f"{path} is damaged; delete the folder and write the dataset again") from error
+    if not known:
+        raise SeipError(f"{path} is not of this version; write the dataset again into another folder")
+    if not complete:
+        raise SeipError(f"{path} lacks a part; delete the folder and write the dataset again")
+    return dict(manifest)
+
+
+def _manifest_of(folder: Path, kind: Format, min_points: int) -> Record:
+    """Return the manifest that is there, or a new one where the folder is new or empty."""
+    if (folder / MANIFEST).is_file():
+        manifest = load_manifest(folder)
+        there = (manifest["format"], manifest["settings"])
+        if there != (kind.key, {"min_points": min_points}):
+            settings = ", ".join(f"{name} {value}" for name, value in manifest["settings"].items())
+            raise SeipError(
+                f"{folder} holds a dataset in the format {manifest['format']} with {settings}; "
+                "choose another folder, or the same format and settings"
+            )
+        return {**manifest, "versions": versions()}
+    if folder.is_dir() and any(folder.iterdir()):
+        raise SeipError(f"{folder} holds other things than a dataset; choose a new or an empty folder")
+    return {
+        "schema": SCHEMA,
+        "format": kind.key,
+        "settings": {"min_points": min_points},
+        "classes": dict(kind.classes),
+        "runs": [],
+        "files": {},
+        "versions": versions(),
+    }
+
+
+def _entry_of(manifest: Record, run: TrafficRun, kind: Format, folder: Path) -> Record:
+    """Return the manifest's entry of a run: the one that is there, or a new one at the end."""
+    new = _new_entry(run, kind)
+    runs: list[Record] = manifest["runs"]
+    for entry in runs:
+        if entry["name"] == run.name:
+            if entry["key"] != new["key"] or entry["split"] != run.split:
+                raise SeipError(
+                    f"{folder} has a run '{run.name}' already, of other frames or in another split; "
+                    "give this one another name, or choose another folder"
+                )
+            return entry
+        if entry["simulation_key"] == run.key:
+            raise SeipError(
+                f"the runs '{run.name}' and '{entry['name']}' are the same frames, which would count twice or leak "
+                "from one split into another; simulate one of them with another seed"
+            )
+    unfinished = next((entry["name"] for entry in runs if not entry["finished"]), None)
+    if unfinished is not None:
+        raise SeipError(f"the run '{unfinished}' in {folder} is half-written; write it again to its end first")
+    new["first"] = sum(entry["frames"] for entry in runs)
+    runs.append(new)
+    return new
+
+
+def _new_entry(run: TrafficRun, kind: Format) -> Record:
+    sensors = [_sensor_record(sensor, run) for sensor in run.sensors]
+    parts = [part for sensor in run.sensors for part in (sensor.label, sensor.model, sensor.xyz, sensor.orientation)]
+    place = [repr(run.geo_reference)] if run.geo_reference.projection else []
+    return {
+        "name": run.name,
+        "split": run.split,
+        "finished": False,
+        "key": digest(SCHEMA, kind.key, run.key, run.origin, *place, *parts),
+        "simulation_key": run.key,
+        "simulation": dict(run.record),
+        "origin_m": run.origin.tolist(),
+        "sensors": sensors,
+        "notes": list(kind.notes(run)),
+        "first": 0,
+        "frames": 0,
+        "labels": {},
+        "classes": {},
+        "samples": [],
+    }
+
+
+def _sensor_record(sensor: SensorPose, run: TrafficRun) -> Record:
+    return {
+        "label": sensor.label,
+        "model": sensor.model,
+        "local_m": sensor.xyz.tolist(),
+        "map_m": (sensor.xyz + run.origin).tolist(),
+        "orientation": sensor.orientation.tolist(),
+    }
+
+
+def _all_there(folder: Path, manifest: Record, entry: Record) -> bool:
+    paths = [*manifest["files"], *(path for sample in entry["samples"] for path in sample["files"])]
+    return all((folder / path).is_file() for path in paths)
+
+
+def _check(frame_id: str, frame: Frame, run: TrafficRun, samples: list[Record]) -> None:
+    require_file_name(frame_id, "the frame", "call it something else")
+    if samples and frame_id <= samples[-1]["frame"]:
+        raise SeipError(f"frame '{frame_id}' of the run '{run.name}' comes after '{samples[-1]['frame']}'; sort them")
+    count = len(run.sensors)
+    if frame.labels.points.shape[1] != count or (len(frame) and int(frame.sensor.max()) >= count):
+        raise SeipError(
+            f"frame '{frame_id}' is of other sensors than the {count} of the run '{run.name}'; simulate it again"
+        )
+
+
+def _count(entry: Record, sample: Sample) -> None:
+    """Add a sample's labels to those of its run; a format of clouds alone counts none."""
+    counts = Counter(sample.fates)
+    entry["labels"] = {word: count + counts[word] for word, count in entry["labels"].items()}
+    for name, count in sorted(Counter(sample.classes).items()):
+        entry["classes"][name] = entry["classes"].get(name, 0) + count
+
+
+def _written(folder: Path, kind: Format, sample: Sample) -> Record:
+    """Write a sample's files, but for those that are there, and return what the manifest says of it."""
+    files = {}
+    for path, content in kind.sample_files(sample).items():
+        target = folder / path
+        files[path] = _sha256(target.read_bytes()) if target.is_file() else _write(target, content())
+    return {
+        "name": sample.name,
+        "frame": sample.frame_id,
+        "time_s": sample.frame.time,
+        "points": len(sample.frame),
+        "labels": len(sample.boxes),
+        "files": files,
+    }
+
+
+def _write(path: Path, content: bytes) -> str:
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content)
+    return _sha256(content)
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

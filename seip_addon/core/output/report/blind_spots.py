@@ -1,0 +1,170 @@
+"""Parts of the road that no sensor sees, and how much of each named place is seen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Boolean, Float, Integer
+from ...site.targets import Targets
+from ..results.site_file import PLACE, WEIGHTED, Area
+
+DIRECTIONS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
+ARMS = DIRECTIONS[::2]
+MIN_DISTANCE = 0.5  # metres from a centre from which on there is a direction from it
+
+
+@dataclass(frozen=True, eq=False)
+class Centre:
+    """A point from which distances and directions are counted.
+
+    Parameters
+    ----------
+    name : str
+        What it is the centre of, in words.
+    xy : (2,) float64, metres
+        Local.
+    """
+
+    name: str
+    xy: Float
+
+
+@dataclass(frozen=True, eq=False)
+class BlindSpot:
+    """A connected part of the road that no sensor sees.
+
+    Parameters
+    ----------
+    targets : (n,) int64
+        Indices of the targets in it.
+    middle : (3,) float64, metres
+        The one of these that is nearest to their mean, local.
+    area : float, square metres
+    where : str
+        In words.
+    """
+
+    targets: Integer
+    middle: Float
+    area: float
+    where: str
+
+
+@dataclass(frozen=True)
+class SeenPlace:
+    """A named part of the road: its area in square metres, and the shares that one and two sensors or more see."""
+
+    name: str
+    area: float
+    seen: float
+    seen_twice: float
+
+
+def blind_spots(targets: Targets, seen: Boolean, areas: Sequence[Area]) -> list[BlindSpot]:
+    """Return the connected unseen parts of the road, the largest first.
+
+    Targets are connected where their squares share a side.
+
+    Parameters
+    ----------
+    seen : (t,) bool
+    """
+    unseen = np.flatnonzero(~seen)
+    labels = _components(np.round((targets.xyz[unseen, :2] - targets.xyz[:, :2].min(axis=0)) / targets.spacing))
+    spots = []
+    for label in np.unique(labels):
+        own = unseen[labels == label]
+        places = targets.xyz[own]
+        middle = places[np.argmin(np.hypot(*(places - places.mean(axis=0))[:, :2].T))]
+        spots.append(BlindSpot(own, middle, len(own) * targets.spacing**2, _where(own, middle, targets, areas)))
+    return sorted(spots, key=lambda spot: (-spot.area, *spot.middle.tolist()))
+
+
+def seen_places(targets: Targets, seen_by: Integer, areas: Sequence[Area]) -> list[SeenPlace]:
+    """Return what is seen of each named area; where no street is named, of the road towards each side as well."""
+    parts = [(f"{area.name} (weighted)" if area.kind == WEIGHTED else area.name, area.within) for area in areas]
+    if not any(area.kind == PLACE for area in areas):
+        parts += _arms(targets, centres(targets, areas))
+    return [
+        SeenPlace(
+            name,
+            float(within.sum() * targets.spacing**2),
+            float((seen_by[within] > 0).mean()),
+            float((seen_by[within] > 1).mean()),
+        )
+        for name, within in parts
+        if within.any()
+    ]
+
+
+def centres(targets: Targets, areas: Sequence[Area]) -> list[Centre]:
+    """Return the points from which places on the road are counted: the centres of the weighted regions.
+
+    The weighted region of a site that was built is its junction. Without a weighted region the centre is that of the
+    road to be seen, the mean of its squares.
+    """
+    weighted = [area for area in areas if area.kind == WEIGHTED and area.within.any()]
+    return [Centre(area.name, targets.xyz[area.within, :2].mean(axis=0)) for area in weighted] or [
+        Centre("the road", targets.xyz[:, :2].mean(axis=0))
+    ]
+
+
+def _arms(targets: Targets, origins: Sequence[Centre]) -> Iterator[tuple[str, Boolean]]:
+    """Yield the targets on each side of the nearest centre, without those in weighted regions."""
+    nearest, angle, _ = _from_nearest(origins, targets.xyz)
+    quarter = np.round(angle / (math.pi / 2)).astype(np.int64) % 4
+    for origin, centre in enumerate(origins):
+        for number, name in enumerate(ARMS):
+            within = (nearest == origin) & (quarter == number) & ~targets.central
+            yield f"Road {name} of the centre of {centre.name}", within
+
+
+def _from_nearest(origins: Sequence[Centre], points: Float) -> tuple[Integer, Float, Float]:
+    """Return index of, direction from (radians) and distance from (metres) the centre nearest to each point (n, 3)."""
+    offsets = points[:, None, :2] - np.array([centre.xy for centre in origins])
+    distances = np.hypot(*np.moveaxis(offsets, 2, 0))
+    nearest = distances.argmin(axis=1)
+    rows = np.arange(len(points))
+    x, y = offsets[rows, nearest].T
+    return nearest, np.arctan2(y, x), distances[rows, nearest]
+
+
+def _where(own: Integer, middle: Float, targets: Targets, areas: Sequence[Area]) -> str:
+    """Return where a blind spot is: the area that holds most of it, and distance and direction from a centre."""
+    origins = centres(targets, areas)
+    (nearest,), (angle,), (distance,) = _from_nearest(origins, middle[None])
+    direction = DIRECTIONS[round(float(angle) / (math.pi / 4)) % 8]
+    away = f"{distance:.0f} m {direction} of" if distance >= MIN_DISTANCE else "at"
+    words = f"{away} the centre of {origins[nearest].name}"
+    shares = [(int(area.within[own].sum()), area.name) for area in areas]
+    most, name = max(shares, key=lambda one: one[0], default=(0, ""))
+    return f"{name}, {words}" if 2 * most >= len(own) else words
+
+
+def _components(places: Float) -> Integer:
+    """Return a number for each whole place (n, 2), the same for those that are joined by steps of one."""
+    column, row = places.astype(np.int64).T
+    width = int(row.max(initial=0)) + 2  # no row's end is beside another's beginning
+    code = column * width + row
+    order = np.argsort(code)
+    labels = np.arange(len(code))
+    ones, others = [], []
+    for step in (1, width):
+        at = np.searchsorted(code[order], code + step)
+        found = np.flatnonzero((at < len(code)) & (code[order[np.minimum(at, len(code) - 1)]] == code + step))
+        ones.append(found)
+        others.append(order[at[found]])
+    one, other = np.concatenate(ones), np.concatenate(others)
+    while True:
+        lower = np.minimum(labels[one], labels[other])
+        new = labels.copy()
+        np.minimum.at(new, one, lower)
+        np.minimum.at(new, other, lower)
+        new = new[new]
+        if np.array_equal(new, labels):
+            return labels
+        labels = new

@@ -1,0 +1,67 @@
+"""``detection.json``: what a detector finds with the sensors of a placement."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+from ... import limits
+from ...errors import SeipError
+from ...storage.json_dataclass import from_json
+
+SCHEMA = "seip-detection/1"
+MAIN_RULE = "bev_0.7"
+"""Counts all road users; in every record."""
+FORMATS = ("kitti", "openpcdet")
+"""Folders of the detections of each frame, beside ``detection.json``."""
+
+
+Share = Annotated[float, limits.SHARE]
+
+
+@dataclass(frozen=True)
+class RecordedPrecision:
+    """Average precision by one rule.
+
+    Parameters
+    ----------
+    average_precision : float, 0 to 1
+    interval : (float, float) or None
+        95 %, over runs of traffic; None where they are too few.
+    road_users : int
+        How many count, over all frames.
+    """
+
+    average_precision: Share
+    interval: tuple[Share, Share] | None
+    road_users: Annotated[int, limits.COUNT]
+
+
+@dataclass(frozen=True)
+class DetectionRecord:
+    """What is shown of a ``detection.json``: average precision by the names of rules, and warnings."""
+
+    average_precision: Mapping[str, RecordedPrecision]
+    warnings: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        if MAIN_RULE not in self.average_precision:
+            raise ValueError(f"average_precision.{MAIN_RULE} is missing")
+
+
+def parsed_detection(text: str) -> DetectionRecord:
+    """Read the text of a ``detection.json``.
+
+    Raises
+    ------
+    SeipError
+        It is none, or one of another version.
+    """
+    try:
+        content = json.loads(text)
+        schema = content.get("schema") if isinstance(content, dict) else None
+        if schema == SCHEMA:
+            return from_json(DetectionRecord, content)
+    except (ValueError, RecursionError) as error:
+        raise SeipError(f"the figures of detection are damaged: {error}; detect again") from error
+    raise SeipError(f"the figures of detection have the schema {schema!r}, not {SCHEMA!r}: use one version of SEIP")

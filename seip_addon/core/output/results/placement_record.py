@@ -1,0 +1,537 @@
+"""``placement.json``: a placement with all that it takes to read it, check it and make it again."""
+
+import importlib.util
+import json
+import math
+import os
+import platform
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from datetime import datetime
+from functools import cached_property, lru_cache
+from importlib import metadata
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from ... import limits
+from ...arrays import Float
+from ...choosing.placement.deployment import GainBand, Sensor, TypeBand, price_text
+from ...choosing.placement.objective import Objective, Solution
+from ...choosing.placement.problem import Placement
+from ...choosing.placement.returns_summary import ReturnsSummary, share_reached
+from ...errors import SeipError
+from ...geometry.geo_reference import GeoReference
+from ...geometry.orientation import orientation
+from ...site.site import Site
+from ...site.sources import SourceCount
+from ...storage.files import save_json
+from ...storage.json_dataclass import from_json
+from .headings import degrees, tilt_degrees
+from .record_check import check_consistency
+
+Coordinate = Annotated[float, limits.LOCAL_COORDINATE]
+MapCoordinate = Annotated[float, limits.MAP_COORDINATE]
+Point = tuple[Coordinate, Coordinate, Coordinate]
+MapPoint = tuple[MapCoordinate, MapCoordinate, MapCoordinate]
+Height = Annotated[float, limits.ABOVE_GROUND]
+Degrees = Annotated[float, limits.DEGREES]
+Dollars = Annotated[float, limits.PRICE]
+Share = Annotated[float, limits.SHARE]
+Total = Annotated[float, limits.TOTAL_WEIGHT]
+Count = Annotated[int, limits.COUNT]
+Seconds = Annotated[float, limits.DURATION]
+
+SCHEMA = "seip-placement/3"
+LIBRARIES = ("numpy", "shapely", "pulp", "highspy")
+MANIFEST = Path(__file__).parents[4] / "blender_manifest.toml"
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """When and with what a placement was made: what may differ where the placement does not.
+
+    Parameters
+    ----------
+    created : datetime
+        With its time zone.
+    durations : mapping of str to float, seconds
+    versions : mapping of str to str
+        Of the program and what it stands on; see `versions`.
+    """
+
+    created: datetime
+    durations: Mapping[str, float]
+    versions: Mapping[str, str]
+
+
+def versions(**more: str) -> dict[str, str]:
+    """Return the versions of this program, of Python and of the libraries that results stand on, and ``more``."""
+    if MANIFEST.is_file():
+        program = tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"]
+    else:  # installed by pip
+        program = metadata.version("seip")
+    there = {name for name in LIBRARIES if importlib.util.find_spec(name)}  # HiGHS need not be
+    libraries = {name: metadata.version(name) for name in LIBRARIES if name in there}
+    return {"seip": program, "python": platform.python_version(), **libraries, **more}
+
+
+def relevant_warnings(warnings: Iterable[str], considered: Iterable[str], chosen: Iterable[str]) -> list[str]:
+    """Return the warnings but those of sensor types that were considered and not chosen; types are catalogue keys."""
+    others = set(considered) - set(chosen)
+    return [warning for warning in warnings if warning.partition(":")[0] not in others]
+
+
+@dataclass(frozen=True)
+class RecordedGeoReference:
+    """What the scene's map says of where on the Earth it is: see `GeoReference`."""
+
+    projection: str
+    header_offset_m: MapPoint
+    header_heading_deg: Degrees
+
+
+@dataclass(frozen=True)
+class RecordedSite:
+    """A scene, the map coordinates of its local origin, and what its map says of where that is.
+
+    Records of earlier versions hold no ``geo_reference``, ``sources`` and ``attribution``.
+
+    Parameters
+    ----------
+    sources : tuple of SourceCount
+        Where the scene's surfaces come from.
+    attribution : tuple of str
+        Credits that these sources demand.
+    """
+
+    name: str
+    origin_m: MapPoint
+    geo_reference: RecordedGeoReference | None = None
+    sources: tuple[SourceCount, ...] = ()
+    attribution: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class RecordedSensor:
+    """One chosen sensor, by its label: see `placement.deployment.Sensor`.
+
+    Parameters
+    ----------
+    pose : int or None
+        Row of the visibility grid; None where a hand has put the sensor elsewhere.
+    sensor : str
+        Its type's key in the catalogue.
+    roll_deg : float, optional
+        Of a sensor that a hand has put elsewhere, and of no other.
+    latitude_deg, longitude_deg, altitude_m : float, optional
+        On WGS 84, and the height above the map's zero; None where the map's projection is not known.
+    easting_m, northing_m : float, optional
+        Coordinates of the map's projection: map coordinates and the offset of the map's header. None likewise.
+    evidence : str
+        What its type's law of detection rests on; records of earlier versions lack it.
+    installation_usd : float, optional
+        Of the price, what it takes to install the sensor; None where prices are those of sensors alone.
+    """
+
+    id: str
+    pose: Count | None
+    sensor: str
+    sensor_name: str
+    position: str
+    on_pole: bool
+    local_m: Point
+    map_m: MapPoint
+    height_m: Height
+    yaw_deg: Degrees
+    tilt_deg: Degrees
+    price_usd: Dollars
+    coverage_alone: Share
+    coverage_added: Share
+    coverage_marginal: Share
+    roll_deg: Degrees | None = None
+    latitude_deg: Annotated[float, limits.LATITUDE] | None = None
+    longitude_deg: Annotated[float, limits.LONGITUDE] | None = None
+    altitude_m: MapCoordinate | None = None
+    easting_m: MapCoordinate | None = None
+    northing_m: MapCoordinate | None = None
+    evidence: str = ""
+    installation_usd: Dollars | None = None
+
+    @property
+    def orientation(self) -> Float:
+        """How it is turned: the rotation from its axes to the site's, (3, 3) float64."""
+        yaw, tilt, roll = map(math.radians, (self.yaw_deg, self.tilt_deg, self.roll_deg or 0.0))
+        return orientation(yaw, tilt, roll)
+
+
+@dataclass(frozen=True)
+class RecordedCoverage:
+    """Shares of the targets, or of their weight, that are seen.
+
+    ``central`` is None without weighted regions, ``gain_band`` where all sensors are calibrated on sweeps.
+    """
+
+    whole: Share
+    central: Share | None
+    weighted: Share
+    seen_twice: Share
+    gain_band: GainBand | None = None
+
+
+@dataclass(frozen=True)
+class RecordedObjective:
+    """What was optimised, in covered weight or dollars, and what is proven of it; None where nothing bounds it."""
+
+    kind: Literal["vanilla", "weighted"]
+    sought: Literal["most coverage", "most returns", "least price"]
+    value: Total
+    bound: Total | None
+    gap: Annotated[float, limits.RELATIVE_GAP] | None
+    status: str
+    solver: str
+
+    @property
+    def cheapest(self) -> bool:
+        """Whether the least price was sought."""
+        return self.sought == "least price"
+
+
+@dataclass(frozen=True)
+class RecordedGreedy:
+    """The greedy answer to the same question, and the share of the objective that it loses."""
+
+    value: Total
+    bound: Total | None
+    gap_to_placement: Annotated[float, limits.SIGNED_SHARE]
+    poses: tuple[Count, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RecordedCounts:
+    """How many targets, positions and poses there were, and how many candidates were dropped, by reason."""
+
+    targets: Count
+    targets_central: Count
+    positions: Count
+    positions_on_poles: Count
+    poses: Count
+    dropped: Mapping[str, Count]
+
+
+@dataclass(frozen=True)
+class RecordedTimes:
+    """When a placement was made (ISO 8601), and how many seconds each step took."""
+
+    created: str
+    durations_s: Mapping[str, Seconds]
+
+
+@dataclass(frozen=True)
+class RecordedCandidates:
+    """The sensor types that there were to choose from, by catalogue key."""
+
+    sensors: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The settings of a record that are read again: what was asked for, and of which sensor types."""
+
+    goal: Objective
+    candidates: RecordedCandidates
+
+
+@dataclass(frozen=True)
+class PlacementRecord:
+    """What ``placement.json`` holds but for its schema, key by key: see docs/formats.md.
+
+    Parameters
+    ----------
+    sensors : tuple of RecordedSensor
+        In the order of their labels.
+    price_usd : float, dollars
+    settings : mapping
+        All that could have been set, by name; `asked` is the part that this program reads again.
+    inputs : mapping of str to str
+        Digests of what went in.
+    returns : ReturnsSummary, optional
+        Returns from road users, where the placement was chosen for them.
+    """
+
+    site: RecordedSite
+    sensors: tuple[RecordedSensor, ...]
+    price_usd: Dollars
+    coverage: RecordedCoverage
+    objective: RecordedObjective
+    greedy: RecordedGreedy | None
+    counts: RecordedCounts
+    settings: Mapping[str, object]
+    seeds: Mapping[str, Annotated[int, limits.SEED]]
+    inputs: Mapping[str, str]
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+    versions: Mapping[str, str]
+    times: RecordedTimes
+    returns: ReturnsSummary | None = None
+
+    @cached_property
+    def asked(self) -> Asked:
+        """What was asked for."""
+        return from_json(Asked, self.settings, "settings")
+
+    @property
+    def installed(self) -> bool:
+        """Whether its prices count posts, mounting, power and backhaul."""
+        return any(sensor.installation_usd is not None for sensor in self.sensors)
+
+    @property
+    def price_text(self) -> str:
+        """The price in dollars, as text."""
+        return price_text(self.price_usd, installed=self.installed)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the value of ``placement.json``, its keys in order."""
+        return {"schema": SCHEMA, **asdict(self, dict_factory=_without_absent)}
+
+    def text(self) -> str:
+        """Return the record in one line of JSON, for `parsed_record`."""
+        return json.dumps(self.as_json(), ensure_ascii=False, allow_nan=False)
+
+
+def placement_record(
+    site: Site,
+    solution: Solution,
+    provenance: Provenance,
+    *,
+    settings: Mapping[str, object],
+    inputs: Mapping[str, str],
+    warnings: tuple[str, ...],
+) -> PlacementRecord:
+    """Return the record of a placement.
+
+    Parameters
+    ----------
+    settings : mapping
+        All that the user could have set, defaults included, by name; values that JSON can hold.
+    inputs : mapping of str to str
+        Digests or names of what went in.
+    warnings : tuple of str
+        What the user should know before trusting the figures.
+    """
+    deployment, placement, greedy = solution.deployment, solution.placement, solution.greedy
+    return PlacementRecord(
+        site=RecordedSite(
+            site.name, _metres(site.origin), _geo_reference(site.geo_reference), site.sources, site.attribution
+        ),
+        sensors=tuple(_sensor(sensor, site) for sensor in deployment.sensors),
+        price_usd=_rounded(deployment.price, 2),
+        coverage=RecordedCoverage(
+            whole=_share(deployment.coverage),
+            central=None if deployment.central is None else _share(deployment.central),
+            weighted=_share(deployment.weighted),
+            seen_twice=_share(deployment.seen_twice),
+            gain_band=deployment.gain_band and _rounded_band(deployment.gain_band),
+        ),
+        objective=RecordedObjective(
+            kind=_kind(solution),
+            sought=_sought(solution),
+            value=_significant(placement.objective),
+            bound=_found(placement.bound),
+            gap=_found(placement.gap),
+            status=placement.status,
+            solver=placement.solver,
+        ),
+        greedy=None if greedy is None else _greedy(greedy, placement, of_returns=deployment.returns is not None),
+        counts=_counts(site),
+        settings=dict(settings),
+        seeds={},  # visibility and placement draw no random numbers
+        inputs=dict(inputs),
+        notes=placement.notes,
+        warnings=warnings,
+        versions=dict(provenance.versions),
+        times=RecordedTimes(
+            provenance.created.isoformat(timespec="seconds"),
+            {step: _rounded(seconds, 3) for step, seconds in provenance.durations.items()},
+        ),
+        returns=deployment.returns and _rounded_returns(deployment.returns),
+    )
+
+
+@lru_cache(maxsize=8)
+def parsed_record(text: str) -> PlacementRecord:
+    """Return the record that a scene keeps as a text; panels ask for it at every redraw.
+
+    Raises
+    ------
+    SeipError
+        It is no placement of a version that this program knows.
+    """
+    return _read(text.encode(), "the placement that this scene keeps")
+
+
+def comparable(record: PlacementRecord) -> dict[str, Any]:
+    """Return what `PlacementRecord.as_json` does, but for what differs from one machine and run to the next.
+
+    That are times and versions.
+    """
+    return {key: value for key, value in record.as_json().items() if key not in {"times", "versions"}}
+
+
+def save_placement_record(path: str | os.PathLike[str], record: PlacementRecord) -> None:
+    """Write ``placement.json``."""
+    save_json(path, record.as_json())
+
+
+def load_placement_record(path: str | os.PathLike[str]) -> PlacementRecord:
+    """Read ``placement.json``.
+
+    Raises
+    ------
+    SeipError
+        There is no such file, or it is no placement of a version that this program knows.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise SeipError(f"cannot read {path}: {error.strerror}; name the placement.json of a finished run") from error
+    return _read(content, str(path))
+
+
+def _read(text: bytes, where: str) -> PlacementRecord:
+    try:
+        content = json.loads(text.decode(), parse_float=_finite, parse_constant=_finite)
+        schema = content.get("schema") if isinstance(content, dict) else None
+        if schema == SCHEMA:
+            record = from_json(PlacementRecord, content)
+            _ = record.asked, record.text().encode()  # refused if these cannot be read or written again
+            check_consistency(record)
+            return record
+    except (SeipError, ValueError, RecursionError) as error:
+        raise SeipError(f"{where} is damaged or no placement: {error}; place the sensors again") from error
+    raise SeipError(f"{where} has the schema {schema!r}, not {SCHEMA!r}; place the sensors again with this version")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is no finite number")
+    return value
+
+
+def _without_absent(items: list[tuple[str, Any]]) -> dict[str, Any]:
+    return {name: value for name, value in items if name not in _LEFT_OUT or value is not None}
+
+
+_LEFT_OUT = {"roll_deg", "installation_usd", "returns"}  # where there are none
+
+
+def _geo_reference(known: GeoReference) -> RecordedGeoReference | None:
+    if not known.projection:
+        return None
+    return RecordedGeoReference(
+        known.projection, _metres(np.array(known.header_offset[:3])), tilt_degrees(known.header_offset[3])
+    )
+
+
+def _sensor(sensor: Sensor, site: Site) -> RecordedSensor:
+    place = site.geographic(sensor.xyz[None])
+    longitude, latitude, altitude = (None, None, None) if place is None else place[0]
+    map_xyz = sensor.xyz + site.origin
+    easting, northing = (None, None) if place is None else site.geo_reference.projected(map_xyz[None])[0, :2]
+    return RecordedSensor(
+        id=sensor.label,
+        pose=sensor.pose,
+        sensor=sensor.model.key,
+        sensor_name=sensor.model.name,
+        position=sensor.position_name,
+        on_pole=sensor.on_pole,
+        local_m=_metres(sensor.xyz),
+        map_m=_metres(map_xyz),
+        height_m=_rounded(sensor.height, 6),
+        yaw_deg=degrees(sensor.yaw),
+        tilt_deg=tilt_degrees(sensor.tilt),
+        price_usd=_rounded(sensor.price, 2),
+        coverage_alone=_share(sensor.alone),
+        coverage_added=_share(sensor.added),
+        coverage_marginal=_share(sensor.marginal),
+        roll_deg=tilt_degrees(sensor.roll) if sensor.pose is None else None,
+        latitude_deg=None if latitude is None else _rounded(latitude, 8),
+        longitude_deg=None if longitude is None else _rounded(longitude, 8),
+        altitude_m=None if altitude is None else _rounded(altitude, 6),
+        easting_m=None if easting is None else _rounded(easting, 3),
+        northing_m=None if northing is None else _rounded(northing, 3),
+        evidence=sensor.model.evidence,
+        installation_usd=None if sensor.installation is None else _rounded(sensor.installation, 2),
+    )
+
+
+def _rounded_band(band: GainBand) -> GainBand:
+    types = tuple(TypeBand(one.sensor, _share(one.low), _share(one.high)) for one in band.types)
+    return replace(band, low=_share(band.low), high=_share(band.high), types=types)
+
+
+def _kind(solution: Solution) -> Literal["vanilla", "weighted"]:
+    return "weighted" if solution.objective.weighted else "vanilla"
+
+
+def _sought(solution: Solution) -> Literal["most coverage", "most returns", "least price"]:
+    if solution.objective.cheapest:
+        return "least price"
+    return "most coverage" if solution.deployment.returns is None else "most returns"
+
+
+def _rounded_returns(returns: ReturnsSummary) -> ReturnsSummary:
+    """Round to what single precision holds."""
+    crossings = tuple(replace(one, least=_rounded(one.least, 3)) for one in returns.crossings)
+    of_each = {name: _rounded(number, 3) for name, number in returns.of_each.items()}
+    return ReturnsSummary(_rounded(returns.typical, 3), of_each, crossings)
+
+
+def _greedy(greedy: Placement, placement: Placement, *, of_returns: bool) -> RecordedGreedy:
+    return RecordedGreedy(
+        value=_significant(greedy.objective),
+        # The better of the two bounds: once the optimum is proven, it no longer hangs on a platform's rounding.
+        bound=_found(min(greedy.bound, placement.bound)),
+        gap_to_placement=_share(1.0 - share_reached(greedy.objective, placement.objective, of_returns=of_returns)),
+        poses=tuple(int(pose) for pose in greedy.chosen),
+        notes=greedy.notes,
+    )
+
+
+def _counts(site: Site) -> RecordedCounts:
+    candidates = site.candidates
+    return RecordedCounts(
+        targets=len(site.targets),
+        targets_central=int(np.count_nonzero(site.targets.central)),
+        positions=len(candidates.position),
+        positions_on_poles=int(np.count_nonzero(candidates.on_pole)),
+        poses=len(candidates),
+        dropped={reason: int(count) for reason, count in sorted(candidates.dropped.items())},
+    )
+
+
+def _metres(point: Float) -> Point:
+    """Round to the micrometre, which hides the last bits in which platforms differ."""
+    x, y, z = (_rounded(value, 6) for value in point)
+    return x, y, z
+
+
+def _share(value: float) -> float:
+    return _rounded(value, 9)
+
+
+def _rounded(value: float, digits: int) -> float:
+    return round(float(value), digits) + 0.0  # no negative zero
+
+
+def _significant(value: float) -> float:
+    return float(f"{value:.12g}")
+
+
+def _found(value: float) -> float | None:
+    """Return None for a bound, or a gap, that the solver has not found."""
+    return _significant(value) if math.isfinite(value) else None

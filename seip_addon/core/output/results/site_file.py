@@ -1,0 +1,189 @@
+"""``site.npz``: what the rows and columns of ``visibility.npz`` are, for reports and analyses without Blender."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ... import limits
+from ...arrays import Boolean, Float
+from ...choosing.placement.objective import Solution
+from ...choosing.placement.problem import PlacementProblem
+from ...sensing.visibility.grid import VisibilityGrid
+from ...site.scene_geometry import NamedArea, SceneGeometry
+from ...site.site import Site, Targets
+from ...storage.array_file import ArrayFile, ArrayRule, ContentError
+
+FILE = ArrayFile(
+    "seip.site",
+    1,
+    "table of targets and poses",
+    "place the sensors again",
+    {
+        "targets": ArrayRule("f8", ("targets", 3), limits.LOCAL_COORDINATE),
+        "weight": ArrayRule("f8", ("targets",), limits.WEIGHT),
+        "central": ArrayRule("u1", ("targets",), limits.SHARE),
+        "within": ArrayRule("u1", ("areas", "targets"), limits.SHARE),
+        "seen": ArrayRule("u1", ("sensors", "targets"), limits.SHARE),
+        "counted": ArrayRule("f8", ("targets",), limits.TOTAL_WEIGHT),
+        "price": ArrayRule("f8", ("poses",), limits.PRICE),
+        "position": ArrayRule("i8", ("poses",), limits.COUNT),
+        "xyz": ArrayRule("f8", ("poses", 3), limits.LOCAL_COORDINATE),
+        "sensor": ArrayRule("U", ("poses",)),
+        "forbidden": ArrayRule("u1", ("poses",), limits.SHARE),
+        "mandatory": ArrayRule("u1", ("groups", "poses"), limits.SHARE),
+    },
+)
+WEIGHTED, PLACE = "weighted region", "place"
+
+
+@dataclass(frozen=True, eq=False)
+class Area:
+    """A named part of the region, and which targets lie in it.
+
+    Parameters
+    ----------
+    kind : str
+        `WEIGHTED`, or `PLACE` for a street or crossing of the map.
+    within : (t,) bool
+    """
+
+    name: str
+    kind: str
+    within: Boolean
+
+
+@dataclass(frozen=True, eq=False)
+class SiteFile:
+    """Targets, named areas, what each chosen sensor sees, and the problem that was solved.
+
+    Parameters
+    ----------
+    key : str
+        Of the visibility grid that this belongs to.
+    seen : (k, t) bool
+        What each sensor sees, in the order of the record.
+    problem : PlacementProblem
+        Without its visibility; see `with_visibility`.
+    """
+
+    key: str
+    targets: Targets
+    areas: tuple[Area, ...]
+    seen: Boolean
+    problem: PlacementProblem
+
+    def with_visibility(self, grid: VisibilityGrid) -> PlacementProblem:
+        """Return the problem as it was solved."""
+        return replace(self.problem, visible=grid.visible)
+
+
+def save_site_file(
+    path: str | os.PathLike[str],
+    key: str,
+    geometry: SceneGeometry,
+    site: Site,
+    solution: Solution,
+    problem: PlacementProblem,
+) -> None:
+    """Write ``site.npz``.
+
+    Parameters
+    ----------
+    key : str
+        Of the visibility grid.
+    problem : PlacementProblem
+        That the objective of the solution makes of the site.
+    """
+    targets = site.targets
+    areas = [(WEIGHTED, area) for area in geometry.weighted_regions] + [(PLACE, area) for area in geometry.places]
+    names = [str(name) for name in problem.group_names]
+    header = {
+        "key": key,
+        "spacing_m": targets.spacing,
+        "areas": [[area.name, kind] for kind, area in areas],
+        "groups": names,
+        "count": problem.count,
+        "budget_usd": problem.budget,
+        "min_distance_m": problem.min_distance,
+    }
+    arrays = {
+        "targets": targets.xyz,
+        "weight": targets.weight,
+        "central": targets.central,
+        "within": _within([area for _, area in areas], targets.xyz),
+        "seen": solution.deployment.rows.reshape(-1, len(targets)),
+        "counted": problem.weights,
+        "price": problem.prices,
+        "position": problem.positions,
+        "xyz": problem.xyz,
+        "sensor": problem.labels,
+        "forbidden": ~problem.allowed,
+        "mandatory": problem.mandatory_groups,
+    }
+    FILE.save(path, header, arrays)
+
+
+def load_site_file(path: str | os.PathLike[str]) -> SiteFile:
+    """Read what `save_site_file` wrote.
+
+    Raises
+    ------
+    SeipError
+        The file is missing, damaged or something else.
+    """
+    with FILE.reading(path) as (header, arrays):
+        targets = Targets(
+            arrays["targets"], arrays["weight"], arrays["central"].astype(bool), float(header["spacing_m"])
+        )
+        named = [(str(name), str(kind)) for name, kind in header["areas"]]
+        if len(named) != len(arrays["within"]) or not len(targets):
+            raise ContentError("its areas or targets are not those that it names")
+        _check_header(header, len(arrays["mandatory"]), len(arrays["price"]), len(arrays["seen"]))
+        problem = PlacementProblem(
+            visible=np.broadcast_to(np.zeros(1, dtype=bool), (len(arrays["price"]), len(targets))),
+            weights=arrays["counted"],
+            prices=arrays["price"],
+            positions=arrays["position"],
+            xyz=arrays["xyz"],
+            labels=arrays["sensor"],
+            mandatory=arrays["mandatory"].astype(bool),
+            mandatory_names=np.array(header["groups"], dtype=np.str_),
+            forbidden=arrays["forbidden"].astype(bool),
+            count=header["count"],
+            budget=header["budget_usd"],
+            min_distance=float(header["min_distance_m"]),
+        )
+        areas = tuple(Area(*one, row.astype(bool)) for one, row in zip(named, arrays["within"], strict=True))
+        return SiteFile(str(header["key"]), targets, areas, arrays["seen"].astype(bool), problem)
+
+
+def _check_header(header: Mapping[str, Any], groups: int, poses: int, sensors: int) -> None:
+    """Raise `ContentError` where a number of the header is out of its limits or contradicts the arrays."""
+    count, budget = header["count"], header["budget_usd"]
+    checks = {
+        "spacing_m": limits.SIZE.fault(header["spacing_m"]),
+        "count": "" if count is None else limits.SENSORS.fault(count),
+        "budget_usd": "" if budget is None else limits.PRICE.fault(budget),
+        "min_distance_m": limits.DISTANCE.fault(header["min_distance_m"]),
+    }
+    for name, fault in checks.items():
+        if fault:
+            raise ContentError(f"{name} {fault}")
+    if count is not None and not isinstance(count, int):
+        raise ContentError(f"count is {count!r}, not a whole number")
+    if len(header["groups"]) != groups:
+        raise ContentError(f"it names {len(header['groups'])} mandatory groups and holds {groups}")
+    if sensors > poses:
+        raise ContentError(f"it has {sensors} sensors at {poses} poses")
+
+
+def _within(areas: Sequence[NamedArea], xyz: Float) -> Boolean:
+    """Return which targets (t, 3) lie in which areas, (a, t) bool."""
+    rows = [shapely.intersects_xy(area.polygon, xyz[:, 0], xyz[:, 1]) for area in areas]
+    return np.array(rows, dtype=bool).reshape(len(areas), len(xyz))

@@ -1,0 +1,56 @@
+"""The azimuth steps of channels that lie in arcs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...arrays import Boolean, Float, Integer
+
+
+def steps_in_arcs(
+    azimuth: Float, half_width: Float, size: Float, steps: Integer, all_round: Boolean
+) -> tuple[Integer, Integer, Integer]:
+    """Find the rows of neighbouring azimuth steps in arcs.
+
+    Parameters
+    ----------
+    azimuth : (k,) float64, radians
+        Of the middle of each arc, from step 0 of its channel.
+    half_width : (k,) float64, radians
+        An arc of half a turn or more to each side is the full circle.
+    size : (k,) float64, radians
+        Of a step.
+    steps : (k,) int64
+        Of the channel.
+    all_round : (k,) bool
+        Whether step 0 follows the last one. If not, an arc over both ends of the field of view holds two rows.
+
+    Returns
+    -------
+    arc : (n,) int64
+        Arc of each row, ascending.
+    first : (n,) int64
+        First step, possibly negative or beyond the revolution where the channel goes all round.
+    width : (n,) int64
+        Number of steps, at least 1. No step is twice in the rows of an arc.
+    """
+    arc = np.arange(len(azimuth))
+    lowest, end = np.full(len(arc), -math.inf), np.full(len(arc), math.inf)
+    if not all_round.all():
+        in_one = all_round | (half_width >= math.pi)
+        arc = np.repeat(arc, np.where(in_one, 1, 3))
+        azimuth, half_width, size, steps, limited = (
+            values[arc] for values in (azimuth, half_width, size, steps, ~all_round)
+        )
+        # steps of a limited field of view lie within a turn from step 0 on: arcs there, a turn before and one after
+        azimuth = np.where(limited, azimuth % math.tau, azimuth)
+        azimuth[~in_one[arc]] += np.tile((-math.tau, 0.0, math.tau), int((~in_one).sum()))
+        half_width = np.where(limited & in_one[arc], math.inf, half_width)
+        lowest, end = np.where(limited, 0.0, -math.inf), np.where(limited, steps, math.inf)
+    first = np.clip(np.ceil((azimuth - half_width) / size), lowest, end).astype(np.int64)
+    last = np.clip(np.floor((azimuth + half_width) / size), lowest - 1, end - 1).astype(np.int64)
+    width = np.minimum(last - first + 1, steps)
+    some = np.flatnonzero(width > 0)
+    return arc[some], first[some], width[some]

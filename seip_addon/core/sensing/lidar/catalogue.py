@@ -1,0 +1,317 @@
+"""The catalogue of LiDAR models: TOML files, the shipped one and those that users add, and beams of single units."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from ...errors import SeipError
+from ...limits import ACCUMULATION, CHANNELS
+from ...storage.toml_table import Key, number, parse_toml, read_table
+from .carla_dropoff import CarlaDropoff
+from .model import DetectionLaw, LidarModel
+from .range_equation import MAKER_PROBABILITY, RangeEquation
+from .rosette import Rosette
+from .unit_files import is_unit_file, read_unit_file
+
+
+def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, LidarModel]:
+    """Read the shipped models and those of further files, later ones winning.
+
+    Parameters
+    ----------
+    extra : iterable of path-like
+        TOML files in the form of the shipped ``catalogue.toml``, and calibration files of units (`unit_files`), whose
+        beams take the place of those of the model that ``KEY=`` before the path names, or else the product's name in
+        the file, or the file's name.
+
+    Returns
+    -------
+    dict of str to LidarModel
+        By catalogue key, in the order of the files.
+
+    Raises
+    ------
+    SeipError
+        A file cannot be read, or a model in it is at fault.
+    """
+    shipped = resources.files(__package__).joinpath("catalogue.toml").read_text(encoding="utf-8")
+    catalogue = _parse(shipped, "catalogue.toml")
+    for path in map(Path, extra):
+        if is_unit_file(path):
+            model = _unit(path, catalogue)
+            catalogue[model.key] = model
+            continue
+        try:
+            content = path.read_text(encoding="utf-8-sig")
+        except (OSError, UnicodeDecodeError) as error:
+            raise SeipError(f"cannot read the LiDAR catalogue {path}: {error}; name a TOML file") from error
+        catalogue |= _parse(content, str(path))
+    return catalogue
+
+
+def find_models(catalogue: Mapping[str, LidarModel], keys: Sequence[str]) -> dict[str, LidarModel]:
+    """Pick models by key; an unknown key is an error that names close ones."""
+    for key in keys:
+        if key not in catalogue:
+            close = difflib.get_close_matches(key, catalogue, n=3, cutoff=0.4) or list(catalogue)
+            raise SeipError(f"no LiDAR '{key}' in the catalogue; did you mean {', '.join(close)}?")
+    return {key: catalogue[key] for key in keys}
+
+
+def _unit(named: Path, catalogue: Mapping[str, LidarModel]) -> LidarModel:
+    """Return the model of a catalogue with the beams of a unit, named by its file or as ``KEY=path``."""
+    key, _, rest = str(named).partition("=")
+    path = named if named.exists() or not rest else Path(rest)
+    beams = read_unit_file(path)
+    if path is named:
+        key = beams.key or path.stem.lower()
+        if key not in catalogue:
+            raise SeipError(f"{path} does not say which LiDAR it is of: name one, as in --catalogue KEY={path.name}")
+    return beams.as_model(find_models(catalogue, [key])[key], path.name)
+
+
+def _parse(content: str, file: str) -> dict[str, LidarModel]:
+    return {key: _model(key, table, file) for key, table in parse_toml(content, file).items()}
+
+
+def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - whatever the file holds
+    where = f"LiDAR '{key}' in {file}"
+    if not isinstance(table, dict):
+        raise SeipError(f"{where} is no table; write [{key}] and its values below it")
+    values = read_table(table, where, _keys(table, where))
+    rosette = _rosette(values, where) if "pattern" in values else None
+    if "channels" in values:
+        low, high = values.pop("field_of_view_deg")
+        if not low < high:
+            raise SeipError(f"{where}: field_of_view_deg must be increasing, lower edge first, not {[low, high]}")
+        values["elevations_deg"] = np.linspace(high, low, values.pop("channels"))
+    (low, high), price_range = values.pop("range_m"), tuple(values.pop("price_usd"))
+    given = {_FIELDS.get(name, name): value for name, value in values.items() if value is not None}
+    angles = {name: np.radians(given.pop(f"{name}_deg")) for name in ("elevations", "azimuth_offsets")}
+    field_of_view = math.radians(given.pop("horizontal_field_of_view_deg"))
+    kind = given.pop("model", (CarlaDropoff if _DROPOFF.keys() & given.keys() else RangeEquation).model)
+    beams = given.pop("assumed")
+    own = {name: given.pop(name) for name in (*_DROPOFF, *_DETECTION) if name in given}
+    strange = [name for name in own if name not in (_DROPOFF if kind == CarlaDropoff.model else _DETECTION)]
+    if strange:
+        raise SeipError(
+            f'{where}: {strange[0]} is no figure of the model "{kind}": leave it out, or name the other model'
+        )
+    try:
+        calibration, gains = given.pop("calibration", ""), given.pop("gain_band", None)
+        law: DetectionLaw
+        if kind == CarlaDropoff.model:
+            law, assumed, likely = _dropoff(own), "", CALIBRATED
+        else:
+            law, assumed, likely = _range_equation(own, high)
+            calibration = calibration or ("a measurement of its own" if "detection_law" in own else "")
+        return LidarModel(
+            key=key,
+            min_range=low,
+            max_range=high,
+            price_range=price_range,
+            law=law,
+            assumed_beams=beams,
+            assumed_law=assumed,
+            calibration=calibration,
+            gains=tuple(gains or (CALIBRATED if calibration else likely)),
+            field_of_view=field_of_view,
+            rosette=rosette,
+            **angles,
+            **given,
+        )
+    except SeipError as error:
+        sentence = str(error)
+        raise SeipError(f"{sentence} (in {file})" if key in sentence else f"{where}: {sentence}") from error
+
+
+def _keys(table: Mapping[str, Any], where: str) -> dict[str, Key]:
+    """Return the keys that a table may have, by how its beams are described."""
+    if "pattern" in table:
+        strange = sorted(((_ROTATION | _EVEN | _UNEVEN).keys() - _ROSETTE.keys()) & table.keys())
+        if strange:
+            raise SeipError(f"{where}: {strange[0]} is no figure of a rosette: leave it out, or leave out pattern")
+        return _KEYS | _ROSETTE
+    if "elevations_deg" in table and _EVEN.keys() & table.keys():
+        raise SeipError(f"{where}: give either elevations_deg or {', '.join(_EVEN)}")
+    return _KEYS | _ROTATION | (_UNEVEN if "elevations_deg" in table else _EVEN)
+
+
+def _rosette(values: dict[str, Any], where: str) -> Rosette:
+    """Take the figures of a rosette out of the values of a table, and put in what a model has in their place."""
+    figures = {name: values.pop(name) for name in _ROSETTE}
+    time, view = figures["accumulation_s"], figures["horizontal_field_of_view_deg"]
+    try:
+        (one, other), (first, second) = figures["prism_rates_rpm"], figures["prism_wedges_deg"]
+        wedges = math.radians(first), math.radians(second)
+        rosette = Rosette((one / 60.0, other / 60.0), wedges, figures["refractive_index"])
+    except SeipError as error:
+        raise SeipError(f"{where}: {error}") from error
+    drawn = 2 * math.degrees(rosette.reach)
+    if not abs(drawn - view) <= _VIEW_TOLERANCE:
+        raise SeipError(
+            f"{where}: its prisms draw a circle of {drawn:.1f} degrees, but horizontal_field_of_view_deg is {view:g}: "
+            "correct one of them"
+        )
+    values |= {"rotation_rate_hz": 1.0 / time, "elevations_deg": (), "azimuth_offsets_deg": ()}
+    values["horizontal_field_of_view_deg"] = view
+    return rosette
+
+
+def _dropoff(given: Mapping[str, float]) -> CarlaDropoff:
+    return CarlaDropoff(**{_DROPOFF[name]: value for name, value in given.items()})
+
+
+def _range_equation(given: Mapping[str, Any], longest: float) -> tuple[RangeEquation, str, tuple[float, float]]:
+    """Return the law of published ranges or of a measurement, what of it is assumed, and its plausible gains."""
+    if "detection_law" in given:
+        if len(given) > 1:
+            raise SeipError("give either detection_law, as measured, or detection_range_m and detection_probability")
+        threshold, spread, ceiling = given["detection_law"]
+        return RangeEquation(threshold, spread, ceiling), "", CALIBRATED
+    probability = given.get("detection_probability", MAKER_PROBABILITY)
+    if "detection_range_m" in given:
+        published = given["detection_range_m"]
+        law = RangeEquation.of_ranges(published[0], [*published, published[0] * _SQRT_8][1], probability)
+        return law, "", SHEET_GAINS
+    assumed = f"its longest range, {longest:g} m, is taken to be the range at 10 % reflectivity"
+    return RangeEquation.of_ranges(longest, longest * _SQRT_8, probability), assumed, LONGEST_RANGE_GAINS
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    # Whole numbers of any length are valid TOML, but no measure of anything beyond this.
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and not abs(value) > 1e300
+
+
+def _number(value: object) -> float:
+    if not _is_number(value):
+        raise ValueError(f"must be a number, not {value!r}")
+    return float(value)
+
+
+def _boolean(value: object) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError(f"must be true or false, not {value!r}")  # noqa: TRY004 -- what `read_table` takes
+    return value
+
+
+def _numbers(value: object) -> list[float]:
+    if not isinstance(value, list) or not all(map(_is_number, value)):
+        raise ValueError(f"must be a list of numbers, not {value!r}")
+    return [float(one) for one in value]
+
+
+def _several(count: int) -> Callable[[object], list[float]]:
+    def read(value: object) -> list[float]:
+        numbers = _numbers(value)
+        if len(numbers) != count:
+            raise ValueError(f"must hold {count} numbers, not {len(numbers)}")
+        return numbers
+
+    return read
+
+
+def _one_or_two(value: object) -> list[float]:
+    numbers = _numbers(value)
+    if len(numbers) not in {1, 2}:
+        raise ValueError(f"must hold the range at 10 % reflectivity, and that at 80 % if it is known, not {numbers}")
+    return numbers
+
+
+def _law(value: object) -> str:
+    if value not in _LAWS:
+        raise ValueError(f"must be one of {', '.join(map(repr, _LAWS))}, not {value!r}")
+    return str(value)
+
+
+def _pattern(value: object) -> str:
+    if value != "rosette":
+        raise ValueError(f"must be 'rosette', or left out where there are channels, not {value!r}")
+    return str(value)
+
+
+def _channels(value: object) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or not CHANNELS.allow(value):
+        raise ValueError(f"must be a whole number from {CHANNELS}, not {value!r}")
+    return value
+
+
+CALIBRATED = (1.0, 1.0)
+SHEET_GAINS = (0.3, 2.3)
+"""Gains that sweeps of one maker's sensors needed in addition to the ranges of their data sheets."""
+LONGEST_RANGE_GAINS = (0.3, 5.0)
+"""The same where a data sheet has only a longest range, taken to be that at 10 %: two sensors needed 2.3 and 4.9."""
+
+_LAWS = (RangeEquation.model, CarlaDropoff.model)
+_SQRT_8 = math.sqrt(8.0)
+"""Ratio of the ranges at 80 and at 10 % reflectivity where power falls with 1/r² alone."""
+
+_FIELDS = {
+    "rotation_rate_hz": "rotation_rate",
+    "range_noise_std_m": "range_noise_std",
+    "range_noise_growth_per_m": "range_noise_growth",
+}
+"""Fields of a model that a catalogue calls by another name, with their units."""
+
+_DROPOFF = {
+    "attenuation_per_m": "attenuation",
+    "dropoff_general_rate": "general",
+    "dropoff_intensity_limit": "intensity_limit",
+    "dropoff_zero_intensity": "zero_intensity",
+}
+"""Figures of `CarlaDropoff`, by their names in a catalogue."""
+
+_pair = _several(2)
+_OPTIONAL = Key(_number, None)
+_DETECTION = {
+    "detection_range_m": Key(_one_or_two, None),
+    "detection_probability": _OPTIONAL,
+    "detection_law": Key(_several(3), None),
+}
+"""Figures of the range equation."""
+
+_KEYS = {
+    "name": Key(str),
+    "manufacturer": Key(str),
+    "source": Key(str),
+    "range_m": Key(_pair),
+    "points_per_second": Key(_number),
+    "price_usd": Key(_pair),
+    "price_source": Key(str, None),
+    "assumed": Key(str, ""),
+    "calibration": Key(str, ""),
+    "gain_band": Key(_pair, None),
+    "range_noise_std_m": _OPTIONAL,
+    "range_noise_growth_per_m": _OPTIONAL,
+    "model": Key(_law, None),
+    **_DETECTION,
+    **dict.fromkeys(_DROPOFF, _OPTIONAL),
+}
+_ROTATION = {
+    "rotation_rate_hz": Key(_number),
+    "azimuth_offsets_deg": Key(_numbers, ()),
+    "horizontal_field_of_view_deg": Key(_number, 360.0),
+    "clockwise": Key(_boolean, False),  # noqa: FBT003 -- the value where none is given
+}
+_EVEN = {"channels": Key(_channels), "field_of_view_deg": Key(_pair)}
+_UNEVEN = {"elevations_deg": Key(_numbers)}
+"""Beams at even elevations between two, or at elevations of their own."""
+
+_ROSETTE = {
+    "pattern": Key(_pattern),
+    "prism_rates_rpm": Key(_pair),
+    "prism_wedges_deg": Key(_pair),
+    "refractive_index": Key(_number),
+    "horizontal_field_of_view_deg": Key(_number),
+    "accumulation_s": Key(number(ACCUMULATION), 0.1),
+}
+"""Two prisms in place of channels that turn."""
+_VIEW_TOLERANCE = 0.1  # degrees: as data sheets round

@@ -1,0 +1,248 @@
+"""The LiDAR model: beam table, ranges, rates, price and noise parameters."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ... import limits
+from ...arrays import Boolean, Float, Integer
+from ...errors import SeipError
+from ...limits import Limits
+from .carla_dropoff import CarlaDropoff
+from .range_equation import RangeEquation
+from .rosette import Rosette
+
+DetectionLaw = RangeEquation | CarlaDropoff
+"""Law by which returns are detected: physical, or the one of CARLA."""
+
+
+@dataclass(frozen=True, eq=False)
+class LidarModel:
+    """A LiDAR that turns all round, scans a limited horizontal field of view in columns, or draws a rosette.
+
+    Each ray of a rosette is a channel of its own, with one azimuth step, in the order in which they go out: elevations,
+    azimuth offsets and field of view follow from the rosette, whatever is given.
+
+    Parameters
+    ----------
+    key : str
+        Name in the catalogue.
+    name, manufacturer : str
+        For people.
+    source : str
+        Document that the figures are from.
+    elevations : (c,) float64, radians
+        Elevation of each channel above the sensor's horizontal plane, in the
+        order in which they are published.
+    min_range, max_range : float, metres
+        A return nearer or farther than these is none.
+    points_per_second : float
+        Single returns, all channels together.
+    rotation_rate : float, hertz
+        Revolutions per second at which the sensor is used; frames where its field of view is limited. The rays of a
+        rosette's frame are all that it sends in that time.
+    price_range : tuple of two floats, US dollars
+        Lowest and highest price.
+    price_source : str
+        Where the price is from.
+    azimuth_offsets : (c,) float64, radians
+        What each channel's azimuth is ahead of the head's, counter-clockwise.
+        Zeros when not given.
+    field_of_view : float, radians
+        Horizontal, symmetrical about azimuth zero: 2π for a sensor that turns all round.
+    clockwise : bool
+        Whether it turns clockwise, seen from above. That changes when an azimuth is looked along, and nothing else.
+    range_noise_std : float, metres
+        Standard deviation of the range noise (Gaussian) near the sensor.
+    range_noise_growth : float, 1/m
+        What is added to it for each square metre of r².
+    law : RangeEquation or CarlaDropoff
+        By which returns are detected.
+    calibration : str
+        Sweep that the law was calibrated on; empty where it is derived from a data sheet.
+    gains : (float, float)
+        Lowest and highest plausible gain: power received, as a multiple of what the law says. Both are 1 for a
+        calibrated law, and for one that counts every return.
+    assumed_beams, assumed_law : str
+        What of its beams, and of its law, no document says; empty where all is published.
+    rosette : Rosette, optional
+        Of a sensor whose pattern does not repeat.
+    """
+
+    key: str
+    name: str
+    manufacturer: str
+    source: str
+    elevations: Float
+    min_range: float
+    max_range: float
+    points_per_second: float
+    rotation_rate: float
+    price_range: tuple[float, float]
+    price_source: str = ""
+    azimuth_offsets: Float = field(default_factory=lambda: np.zeros(0))
+    field_of_view: float = math.tau
+    clockwise: bool = False
+    range_noise_std: float = 0.03
+    range_noise_growth: float = 0.0
+    law: DetectionLaw = field(default_factory=CarlaDropoff)
+    calibration: str = ""
+    gains: tuple[float, float] = (1.0, 1.0)
+    assumed_beams: str = ""
+    assumed_law: str = ""
+    rosette: Rosette | None = None
+
+    def __post_init__(self) -> None:
+        if self.rosette is not None:
+            self._draw(self.rosette)
+        if self.azimuth_offsets.size == 0:
+            object.__setattr__(self, "azimuth_offsets", np.zeros(len(self.elevations)))
+        _require_valid(self)
+
+    def _draw(self, rosette: Rosette) -> None:
+        """Set the angles to those of the rays of one frame."""
+        points = self.points_per_second
+        if not 2 * self.rotation_rate <= points <= MAX_ROSETTE_RAYS * self.rotation_rate:
+            raise SeipError(
+                f"LiDAR '{self.key}': a rosette must be accumulated over 2 to {MAX_ROSETTE_RAYS:,} points: with "
+                f"{points:g} points per second take another time"
+            )
+        x, y, z = rosette.directions(np.arange(round(points / self.rotation_rate)) / points).T
+        object.__setattr__(self, "elevations", np.arctan2(z, np.hypot(x, y)))
+        object.__setattr__(self, "azimuth_offsets", np.arctan2(y, x))
+        object.__setattr__(self, "field_of_view", 2 * rosette.reach)
+
+    @property
+    def channels(self) -> int:
+        """Number of channels."""
+        return len(self.elevations)
+
+    @property
+    def azimuth_count(self) -> int:
+        """Azimuth steps in a revolution or frame, from points per second, rotation and channels."""
+        return max(1, round(self.points_per_second / self.rotation_rate / self.channels))
+
+    @property
+    def all_round(self) -> bool:
+        """Whether its field of view is the full circle: step 0 follows the last one."""
+        return self.field_of_view == math.tau
+
+    @property
+    def azimuth_step(self) -> float:
+        """Radians between neighbouring azimuth steps."""
+        return self.field_of_view / self.azimuth_count
+
+    @property
+    def first_azimuth(self) -> float:
+        """Azimuth of step 0, radians; the steps of a limited field of view lie symmetrically about azimuth zero."""
+        return 0.0 if self.all_round else (self.azimuth_step - self.field_of_view) / 2
+
+    def faces(self, vectors: Float) -> Boolean:
+        """Return which vectors (n, 3) in the sensor's axes lie within its horizontal field of view, (n,) bool.
+
+        That of a rosette is a circle about its axis.
+        """
+        x, y, z = vectors.T
+        across = y if self.rosette is None else np.hypot(y, z)
+        within: Boolean = np.abs(np.arctan2(across, x)) <= self.field_of_view / 2
+        return within
+
+    @property
+    def price(self) -> float:
+        """Middle of the price range in US dollars."""
+        return sum(self.price_range) / 2
+
+    @property
+    def assumed(self) -> str:
+        """What of it no document says."""
+        return "; ".join(filter(None, (self.assumed_beams, self.assumed_law)))
+
+    def range_noise(self, distance: Float) -> Float:
+        """Return the standard deviation of the range noise, (n,) float64, at distances (n,), all in metres."""
+        return self.range_noise_std + self.range_noise_growth * distance**2
+
+    @property
+    def beams_key(self) -> str:
+        """Digest of the directions of its beams."""
+        steps = (float(self.azimuth_count), self.field_of_view)
+        return hashlib.sha256(np.concatenate([self.elevations, self.azimuth_offsets, steps]).tobytes()).hexdigest()[:16]
+
+    def at(self, time: float) -> LidarModel:
+        """Return the sensor with the directions of the frame that begins at a time in seconds; only a rosette's move.
+
+        A rosette goes on where the frame before ended.
+        """
+        return self if self.rosette is None else replace(self, rosette=self.rosette.later(time))
+
+    def delay(self, ray: Integer) -> Float:
+        """Return when rays (n,) int64 go out after the beginning of the revolution or frame, (n,) float64, seconds."""
+        if self.rosette is not None:
+            return ray / self.points_per_second
+        steps = self.azimuth_count
+        order = ray % steps
+        if self.clockwise:  # all round it begins at azimuth zero, else at the other end of the field of view
+            order = -order % steps if self.all_round else steps - 1 - order
+        return order / (steps * self.rotation_rate)
+
+    @property
+    def evidence(self) -> str:
+        """What its law of detection rests on, for people."""
+        if isinstance(self.law, CarlaDropoff):
+            return "every return in range counts (CARLA's model)"
+        if self.calibration:
+            return f"calibrated on {self.calibration}"
+        low, high = self.gains
+        return f"derived from a data sheet; plausible gains {low:g} to {high:g}"
+
+    def amplified(self, gain: float) -> LidarModel:
+        """Return the sensor with a gain: ``gain`` times the power received. A law without power stays."""
+        if gain == 1.0 or isinstance(self.law, CarlaDropoff):
+            return self
+        return replace(self, law=self.law.amplified(gain))
+
+    def in_air(self, extinction: float) -> LidarModel:
+        """Return the sensor in air that takes so much more light, in 1/m, on each way."""
+        return replace(self, law=self.law.in_air(extinction))
+
+
+MAX_RAYS = 50_000_000
+"""Limit on the rays of a revolution: fifty times the finest type of the study."""
+MAX_ROSETTE_RAYS = 2_000_000
+"""Limit on the rays of a rosette's frame: twenty seconds of a sensor of 100,000 points per second."""
+
+
+def _require_valid(model: LidarModel) -> None:
+    fault = Limits.first_fault(
+        {
+            "an elevation": (np.degrees(model.elevations), limits.BEAM_ELEVATION),
+            "an azimuth offset": (np.degrees(model.azimuth_offsets), limits.BEAM_OFFSET),
+            "the horizontal field of view": (math.degrees(model.field_of_view), limits.HORIZONTAL_VIEW),
+            "its range": ((model.min_range, model.max_range), limits.LIDAR_RANGE),
+            "the number of points per second": (model.points_per_second, limits.POINT_RATE),
+            "the rotation rate": (model.rotation_rate, limits.ROTATION_RATE),
+            "a plausible gain": (model.gains, limits.GAIN),
+            "its price": (model.price_range, limits.PRICE),
+            "the range noise": (model.range_noise_std, limits.RANGE_NOISE),
+            "the growth of the range noise": (model.range_noise_growth, limits.NOISE_GROWTH),
+        }
+    )
+    if fault:
+        raise SeipError(f"LiDAR '{model.key}': {fault}")
+    low, high = model.price_range
+    checks = {
+        "it needs at least one channel": model.channels > 0,
+        "it needs one azimuth offset per channel": model.azimuth_offsets.shape == model.elevations.shape,
+        "its range must be increasing": model.min_range < model.max_range,
+        f"a revolution must have at most {MAX_RAYS:,} rays": (
+            model.points_per_second <= MAX_RAYS * model.rotation_rate and model.channels <= MAX_RAYS
+        ),
+        "its plausible gains must not be decreasing": model.gains[0] <= model.gains[1],
+        "its price range must be positive and not decreasing": 0 < low <= high,
+    }
+    for sentence, holds in checks.items():
+        if not holds:
+            raise SeipError(f"LiDAR '{model.key}': {sentence}")

@@ -1,0 +1,267 @@
+r"""Detection of a LiDAR's returns by the range equation.
+
+Of a diffuse (Lambertian) surface that fills the beam a LiDAR receives, but for a constant of the sensor, the power
+
+.. math::
+
+    p = \frac{ρ \cos θ \, e^{-2 α r}}{r^2}
+
+(Jelalian 1992, *Laser Radar Systems*, section 1.2), and it detects the return with the probability
+
+.. math::
+
+    P = c \, Φ\left(\frac{\ln p - m}{s}\right).
+
+ρ is the reflectivity of the surface, θ the angle of incidence, α the extinction of the air, r the range and Φ the
+normal distribution. c is below 1 because some returns are lost whatever their power; s is the spread of ln p about
+what reflectivity and angle tell of it. m follows from the data sheet: from the range at which a surface of 10 % is
+detected.
+
+Most of the spread is the surface's own and the same for every ray that meets it at the same place: of the variance
+s² a share `SURFACE_SHARE` is that of surfaces. Given how far, in standard deviations z, a place deviates from what
+its material promises,
+
+.. math::
+
+    P(z) = c \, Φ\left(\frac{\ln p + z s \sqrt{q} - m}{s \sqrt{1 - q}}\right),
+
+whose mean over z is P again.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from statistics import NormalDist
+from typing import ClassVar
+
+import numpy as np
+
+from ...arrays import Float
+from ...errors import SeipError
+from ...limits import DETECTION_RANGE, DETECTION_SPREAD, DETECTION_THRESHOLD, EXTINCTION, POSITIVE_SHARE, Limits
+from .carla_dropoff import CarlaDropoff
+
+CEILING = 0.985
+SPREAD = 0.9
+"""c and s where nothing is known of the sensor: sweeps of three makes have c of 0.98 to 1.00 and s of 0.5 to 1.3."""
+
+SURFACE_SHARE = 0.95
+"""q: with it the fate of a ray on a road is as much the same from sweep to sweep as in real sweeps."""
+
+MAKER_PROBABILITY = 0.9
+"""Probability of detection that the ranges of data sheets have where they name none."""
+
+DROPOFF_REFLECTIVITY = 0.2
+"""Of the surfaces, between asphalt and walls, for which `RangeEquation.as_dropoff` is right."""
+
+LEAST_RATIO = 1.3  # of the ranges at 80 and at 10 %: less of it leaves 1/400 of the light to the air
+
+_TINY = 1e-300
+_STANDARD = NormalDist()
+
+
+@dataclass(frozen=True)
+class RangeEquation:
+    """How likely a LiDAR detects the return of a surface.
+
+    Parameters
+    ----------
+    threshold : float
+        m: ln p, in 1/m², at which half of the ceiling is reached.
+    spread : float
+        s, above 0.
+    ceiling : float, above 0 to 1
+        c.
+    extinction : float, 1/m
+        α, 0 or more: of clear air, where data sheets were measured, next to nothing.
+
+    Raises
+    ------
+    SeipError
+        A parameter is out of its range.
+    """
+
+    model: ClassVar[str] = "range equation"
+    threshold: float
+    spread: float = SPREAD
+    ceiling: float = CEILING
+    extinction: float = 0.0
+
+    def __post_init__(self) -> None:
+        fault = Limits.first_fault(
+            {
+                "the threshold of detection": (self.threshold, DETECTION_THRESHOLD),
+                "the spread of detection": (self.spread, DETECTION_SPREAD),
+                "the ceiling of detection": (self.ceiling, POSITIVE_SHARE),
+                "the extinction": (self.extinction, EXTINCTION),
+            }
+        )
+        if fault:
+            raise SeipError(fault)
+
+    @classmethod
+    def of_ranges(
+        cls,
+        at_10: float,
+        at_80: float,
+        probability: float = MAKER_PROBABILITY,
+        spread: float = SPREAD,
+        ceiling: float = CEILING,
+    ) -> RangeEquation:
+        """Return the law of a data sheet.
+
+        Parameters
+        ----------
+        at_10, at_80 : float, metres
+            Ranges at which surfaces of 10 and 80 % reflectivity that face the sensor are detected. Where the longer one
+            is more than √8 times the other, which no extinction explains, the range at 10 % counts.
+        probability : float
+            With which they are, below the ceiling.
+
+        Raises
+        ------
+        SeipError
+            The range at 80 % is not the longer one, or the probability is not between 0 and the ceiling.
+        """
+        if not (DETECTION_RANGE.allow((at_10, at_80)) and LEAST_RATIO * at_10 <= at_80):
+            raise SeipError(
+                f"the range at 80 % reflectivity ({at_80:g} m) must be {LEAST_RATIO:g} times the one at 10 % "
+                f"({at_10:g} m) or more, and both {DETECTION_RANGE}: check which is which"
+            )
+        # p falls by a factor of 8 from one range to the other: what 1/r² leaves of that is extinction
+        extinction = max(0.0, (math.log(8.0) - 2.0 * math.log(at_80 / at_10)) / (2.0 * (at_80 - at_10)))
+        law = cls(0.0, spread, ceiling, extinction)
+        at_least = math.log(0.1) - 2.0 * math.log(at_10) - 2.0 * extinction * at_10
+        return replace(law, threshold=at_least - math.log(law.least_strength(probability)))
+
+    def in_air(self, extinction: float) -> RangeEquation:
+        """Return the law in air that takes so much more light, in 1/m, on each way."""
+        return replace(self, extinction=self.extinction + extinction)
+
+    def amplified(self, gain: float) -> RangeEquation:
+        """Return the law of a sensor that receives ``gain`` times the power."""
+        return replace(self, threshold=self.threshold - math.log(gain))
+
+    def losing(self, share: float) -> RangeEquation:
+        """Return the law where so large a share of what is detected is lost, less than all."""
+        return replace(self, ceiling=self.ceiling * (1.0 - share))
+
+    def as_dropoff(self) -> CarlaDropoff:
+        """Return the drop-off that loses as much of a surface of `DROPOFF_REFLECTIVITY` at two ranges.
+
+        They are those at which 0.9 and 0.5 of the ceiling are detected of a surface that faces the sensor; CARLA's
+        intensity exp(−a · r) knows neither reflectivity nor angle.
+        """
+        near, far = (self.reach(DROPOFF_REFLECTIVITY, share * self.ceiling) for share in (0.9, 0.5))
+        attenuation = math.log(0.9 / 0.5) / (far - near)
+        return CarlaDropoff(attenuation, 1.0 - self.ceiling, min(1.0, math.exp(-attenuation * near) / 0.9), 1.0)
+
+    def strength(self, distance: Float, reflected: Float) -> Float:
+        """Return p in 1/m² of hits: 0 where they are infinitely far, infinite at no distance.
+
+        Parameters
+        ----------
+        distance : (n,) float64, metres
+        reflected : (n,) float64
+            ρ · |cos θ|.
+
+        Returns
+        -------
+        (n,) float64
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            power: Float = self.intensity(distance, reflected) / distance**2
+        return np.where(np.isnan(power), 0.0, power)
+
+    def intensity(self, distance: Float, reflected: Float) -> Float:
+        """Return what sensors report of returns: power but for 1/r², as makers calibrate it; (n,)."""
+        intensity: Float = reflected * np.exp(-2.0 * self.extinction * distance)
+        return intensity
+
+    def least_strength(self, probability: float, min_intensity: float = 0.0) -> float:  # noqa: ARG002  # the other law's
+        """Return p in 1/m² from which on a return is detected with a probability or more.
+
+        Raises
+        ------
+        SeipError
+            The probability is not between 0 and the ceiling.
+        """
+        if not 0 < probability < self.ceiling:
+            raise SeipError(
+                f"a probability of detection must lie above 0 and below {self.ceiling:g}, which is the most that the "
+                f"sensor reaches, not {probability:g}"
+            )
+        return math.exp(self.threshold + self.spread * _STANDARD.inv_cdf(probability / self.ceiling))
+
+    def farthest_on_planes(self, reflectivity: Float, height: Float, least: float) -> Float:
+        """Return a distance (n,) in metres beyond which no plane has a power of ``least``.
+
+        Parameters
+        ----------
+        height : (n,) float64, metres
+            Of the sensor above each plane: cos θ is height / r there, so that p falls with r³.
+        """
+        strength = reflectivity * height / least
+        far: Float = np.cbrt(strength)
+        if self.extinction == 0.0:
+            return far
+        # f(r) = 3 ln r + 2αr − ln strength grows ever more slowly: the zero of a tangent lies before its own, and that
+        # of the chord from there to r = ∛strength, where f is 2αr, behind it
+        begin = np.maximum(far - 2 * self.extinction * far / (3 / np.maximum(far, _TINY) + 2 * self.extinction), _TINY)
+        below = 3 * np.log(begin) + 2 * self.extinction * begin - np.log(np.maximum(strength, _TINY))
+        above = 2 * self.extinction * far
+        return np.where(below < 0, begin - below * (far - begin) / np.maximum(above - below, _TINY), far)
+
+    def chance(self, distance: Float, reflected: Float, deviation: Float | float | None = None) -> Float:
+        """Return the probability that each hit is detected, (n,) float64, 0 to `ceiling`.
+
+        Parameters
+        ----------
+        distance : (n,) float64, metres
+            Infinite on a miss, which is never detected.
+        reflected : (n,) float64
+            ρ · |cos θ|.
+        deviation : (n,) float64, optional
+            Standard deviations that surfaces there deviate; the mean over all surfaces if not given.
+        """
+        with np.errstate(divide="ignore"):
+            power = np.log(self.strength(distance, reflected))
+        if deviation is None:
+            return self.ceiling * _normal_cdf((power - self.threshold) / self.spread)
+        shift = deviation * self.spread * math.sqrt(SURFACE_SHARE)
+        return self.ceiling * _normal_cdf(
+            (power + shift - self.threshold) / (self.spread * math.sqrt(1 - SURFACE_SHARE))
+        )
+
+    def reach(self, reflectivity: float, probability: float) -> float:
+        """Return the range in metres up to which a surface that faces the sensor is detected with a probability."""
+        return self._reach(reflectivity / self.least_strength(probability), 2)
+
+    def reach_on_level(self, reflectivity: float, probability: float, height: float) -> float:
+        """Return the range in metres up to which a level surface so far below the sensor is detected."""
+        return max(self._reach(reflectivity * height / self.least_strength(probability), 3), 0.0)
+
+    def _reach(self, strength: float, power: int) -> float:
+        """Solve strength · exp(−2αr) = rⁿ by halving."""
+        near, far = 0.0, float(strength ** (1.0 / power))
+        if self.extinction == 0.0:
+            return far
+        for _ in range(200):  # until no number lies between
+            middle = (near + far) / 2.0
+            if not near < middle < far:
+                break
+            if strength * math.exp(-2.0 * self.extinction * middle) >= middle**power:
+                near = middle
+            else:
+                far = middle
+        return near
+
+
+def _normal_cdf(z: Float) -> Float:
+    """Return Φ(z) to 1.5e-7 (Abramowitz and Stegun 1964, formula 7.1.26)."""
+    x = np.abs(z) / math.sqrt(2.0)
+    t = 1.0 / (1.0 + 0.3275911 * x)
+    series = t * (0.254829592 + t * (-0.284496736 + t * (1.421413741 + t * (-1.453152027 + t * 1.061405429))))
+    tail: Float = 0.5 * series * np.exp(-(x**2))
+    return np.where(z < 0.0, tail, 1.0 - tail)

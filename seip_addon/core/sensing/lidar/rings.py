@@ -1,0 +1,105 @@
+"""The rings that a LiDAR's beams draw on a flat road, or its rosette, and the edges of its field of view."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Boolean, Float
+from .beams import BeamPattern
+from .model import LidarModel
+
+RING_AZIMUTHS = 120
+RIM_BEAMS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class BeamRings:
+    """Rings and edges of the field of view, as lines.
+
+    Parameters
+    ----------
+    rings : (n, 2, 3) float64, metres
+        Pieces of the rings on the road, or of the line that a rosette draws there in a frame.
+    wide : (n,) bool
+        Whether the next ring inwards is farther away than asked: what is there may lie between two rings. Of a rosette:
+        whether it is beyond where that is so.
+    cone : (m, 2, 3) float64, metres
+        Beams of the lowest and the highest channel, from the sensor to the road or to the end of its range, at a few
+        azimuths; first and last are those of a limited field of view. Of a rosette: beams at the rim.
+    """
+
+    rings: Float
+    wide: Boolean
+    cone: Float
+
+
+def beam_rings(
+    model: LidarModel, place: Float, axes: Float, ground: float, gap: float, resolved: float = math.inf
+) -> BeamRings:
+    """Return the rings of a sensor on a flat road, and the edges of its field of view.
+
+    Parameters
+    ----------
+    place : (3,) float64, metres
+        Optical centre.
+    axes : (3, 3) float64
+        Columns are the sensor's x, y and z axis.
+    ground : float, metres
+        Height of the road.
+    gap : float, metres
+        Distance of neighbouring rings up to which they are dense: twice δ.
+    resolved : float, metres
+        Radius up to which a rosette leaves no gaps.
+    """
+    if model.rosette is not None:
+        return _rosette_lines(model, place, axes, ground, resolved)
+    beams = _directions(model) @ axes.T
+    hits, meets = _on_road(model, place, beams, ground)
+    inwards = np.full(meets.shape, np.inf)  # to the next ring, along each azimuth
+    inwards[1:] = np.linalg.norm(hits[1:, :, :2] - hits[:-1, :, :2], axis=-1)
+    inwards[1:][~meets[:-1]] = 0.0
+    inwards[0] = 0.0
+    drawn = meets[:, :-1] & meets[:, 1:]
+    rings = np.stack([hits[:, :-1], hits[:, 1:]], axis=2)[drawn]
+    ends = np.where(meets[..., None], hits, place + model.max_range * beams)
+    across = np.arange(0, RING_AZIMUTHS if model.all_round else RING_AZIMUTHS + 1, RING_AZIMUTHS // 12)
+    edges = ends[[0, -1]][:, across].reshape(-1, 3)
+    cone = np.stack([np.broadcast_to(place, edges.shape), edges], axis=1)
+    return BeamRings(rings, (np.maximum(inwards[:, :-1], inwards[:, 1:]) > gap)[drawn], cone)
+
+
+def _rosette_lines(model: LidarModel, place: Float, axes: Float, ground: float, resolved: float) -> BeamRings:
+    """Return the line that a rosette draws on a flat road, and its rim; see `beam_rings`."""
+    hits, meets = _on_road(model, place, BeamPattern(model).directions(np.arange(model.channels)) @ axes.T, ground)
+    drawn = meets[:-1] & meets[1:]
+    line = np.stack([hits[:-1], hits[1:]], axis=1)[drawn]
+    wide = np.hypot(*(line[:, 1, :2] - place[:2]).T) > resolved
+    turn = np.arange(RIM_BEAMS) * (math.tau / RIM_BEAMS)
+    along, aside = math.cos(model.field_of_view / 2), math.sin(model.field_of_view / 2)
+    rim = np.column_stack([np.full(RIM_BEAMS, along), aside * np.cos(turn), aside * np.sin(turn)]) @ axes.T
+    ends, met = _on_road(model, place, rim, ground)
+    ends = np.where(met[:, None], ends, place + model.max_range * rim)
+    return BeamRings(line, wide, np.stack([np.broadcast_to(place, ends.shape), ends], axis=1))
+
+
+def _on_road(model: LidarModel, place: Float, beams: Float, ground: float) -> tuple[Float, Boolean]:
+    """Return where beams (…, 3) meet a flat road, and which do within the sensor's range."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = (ground - place[2]) / beams[..., 2]
+    meets = (reach > model.min_range) & (reach <= model.max_range)
+    return place + np.where(meets, reach, 0.0)[..., None] * beams, meets
+
+
+def _directions(model: LidarModel) -> Float:
+    """Return unit directions (channels, `RING_AZIMUTHS` + 1, 3) in the sensor's axes, the lowest channel first.
+
+    The last azimuth is the first again where the model looks all round.
+    """
+    span = model.azimuth_count if model.all_round else model.azimuth_count - 1
+    steps = np.arange(RING_AZIMUTHS + 1) * span // RING_AZIMUTHS % model.azimuth_count
+    channels = np.argsort(model.elevations, kind="stable")
+    rays = channels[:, None] * model.azimuth_count + steps
+    return BeamPattern(model).directions(rays.ravel()).reshape(model.channels, RING_AZIMUTHS + 1, 3)

@@ -1,0 +1,270 @@
+r"""Expected number of returns of a LiDAR from road users.
+
+Let a panel of width w, height h and reflectivity :math:`ρ` stand at horizontal distance d from the sensor and rise from
+:math:`z_0` above it (`bodies`). A ray of azimuth φ and elevation ε meets it where
+
+.. math::
+    |φ - φ_0| \le \arcsin\frac{w}{2d}, \qquad z_0 \le d \tan ε \le z_0 + h,
+
+at the range :math:`r = d / \cos ε`. The return is detected with the probability :math:`P(r, ρ \cos ε)` of the sensor's
+law, unless the ray is stopped before by the static scene, at a horizontal distance below d. The expected number is
+
+.. math::
+    R = \sum_{\text{free rays on the panel}} P(r, ρ \cos ε).
+
+Rays of one channel have one elevation, so that P is the same for all rays of a channel on a panel, and the rays of a
+channel on a panel are neighbours. Rays are cast once for all panels, and only those that meet some panel. How many are
+free follows from the smallest distance among neighbours, which a sparse table gives (Bender and Farach-Colton 2000):
+rays are counted one by one only where that is below d.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Boolean, Float, Integer
+from ..lidar.beams import BeamPattern
+from ..lidar.model import LidarModel
+from ..visibility.beam_culling import counted
+from ..visibility.scanning import Caster
+from ..visibility.visibility_model import is_upright, yaw_of
+from .bodies import PANELS
+from .road_users import BODIES, RoadUsers
+
+_PAIRS_AT_ONCE = 1 << 21  # of rays and panels; bounds the memory where rays have no neighbours
+
+
+@dataclass(frozen=True, eq=False)
+class PanelRows:
+    """Panels as a sensor at the origin meets them; m panels.
+
+    Parameters
+    ----------
+    distance : (m,) float64, metres
+        Horizontal distance, at least half the width.
+    azimuth : (m,) float64, radians
+    half : (m,) float64, radians
+        Half the width of the panel, seen from the sensor.
+    low, high : (m,) float64
+        Tangent of the elevation of its lower and upper edge.
+    reflected : (m,) float64
+    """
+
+    distance: Float
+    azimuth: Float
+    half: Float
+    low: Float
+    high: Float
+    reflected: Float
+
+    @classmethod
+    def seen_from(cls, origin: Float, users: RoadUsers) -> PanelRows:
+        """Return the panels of road users as a sensor at ``origin`` (3,) meets them."""
+        panels = [PANELS[name] for name in BODIES]
+        width, height, reflected = (
+            np.array([getattr(panel, name) for panel in panels])[users.body]
+            for name in ("width", "height", "reflected")
+        )
+        x, y, z = (users.xyz - origin).T
+        distance = np.maximum(np.hypot(x, y), width / 2)
+        half = np.arcsin(width / (2 * distance))
+        return cls(distance, np.arctan2(y, x), half, z / distance, (z + height) / distance, reflected)
+
+
+def expected_returns(
+    caster: Caster, origin: Float, orientation: Float, model: LidarModel, users: RoadUsers
+) -> tuple[Float, int]:
+    """Compute the expected returns of a sensor from each road user.
+
+    Parameters
+    ----------
+    caster : Caster
+        Of the static scene.
+    origin : (3,) float64, metres
+    orientation : (3, 3) float64
+        Rotation from the sensor's axes to the site's.
+
+    Returns
+    -------
+    returns : (m,) float64
+    cast : int
+        Number of rays.
+    """
+    if model.rosette is None and is_upright(orientation):
+        return upright_returns(caster, origin, yaw_of(orientation), model, users)
+    return all_ray_returns(caster, origin, orientation, model, users)
+
+
+def upright_returns(
+    caster: Caster, origin: Float, yaw: float, model: LidarModel, users: RoadUsers
+) -> tuple[Float, int]:
+    """Compute the expected returns of an upright sensor from each road user.
+
+    Parameters
+    ----------
+    caster : Caster
+        Of the static scene.
+    origin : (3,) float64, metres
+    yaw : float, radians
+        Direction of azimuth zero.
+    model : LidarModel
+        With channels: not a rosette.
+
+    Returns
+    -------
+    returns : (m,) float64
+    cast : int
+        Number of rays.
+    """
+    panels = PanelRows.seen_from(origin, users)
+    steps, step = model.azimuth_count, model.azimuth_step
+    order = np.argsort(model.elevations, kind="stable")
+    elevation = model.elevations[order]
+    item, channel = _channels_on(panels, np.tan(elevation))
+    level = np.cos(elevation)[channel]
+    distance = panels.distance[item]
+    ranged = distance / level
+    within = (ranged >= model.min_range) & (ranged <= model.max_range)
+    item, channel, level = item[within], channel[within], level[within]
+    distance, ranged = distance[within], ranged[within]
+    ahead = panels.azimuth[item] - (yaw + model.azimuth_offsets[order] + model.first_azimuth)[channel]
+    if not model.all_round:  # the field of view begins at step 0: a panel lies before or behind its middle
+        middle = (steps - 1) / 2 * step
+        ahead = middle + (ahead - middle + math.pi) % math.tau - math.pi
+    first = np.ceil((ahead - panels.half[item]) / step).astype(np.int64)
+    last = np.floor((ahead + panels.half[item]) / step).astype(np.int64)
+    if not model.all_round:
+        first, last = np.maximum(first, 0), np.minimum(last, steps - 1)
+    count = np.minimum(last - first + 1, steps)
+    there = np.flatnonzero(count > 0)
+    if not len(there):
+        return np.zeros(len(users)), 0
+    item, channel, first, count = item[there], channel[there], first[there] % steps, count[there]
+    rows, row = np.unique(channel, return_inverse=True)
+    wanted = _wanted(row, first, count, len(rows), steps)
+    cast = np.flatnonzero(wanted)
+    directions = BeamPattern(model, yaw).directions(order[rows[cast // steps]] * steps + cast % steps)
+    free = np.full(wanted.shape, np.inf)
+    free.ravel()[cast] = caster.cast(origin, directions, model.max_range)[0] * np.cos(elevation[rows[cast // steps]])
+    number = _at_least(np.concatenate([free, free], axis=1), row, first, count, distance[there])
+    chance = model.law.chance(ranged[there], panels.reflected[item] * level[there])
+    return _summed(item, chance * number, users), len(cast)
+
+
+def all_ray_returns(
+    caster: Caster, origin: Float, orientation: Float, model: LidarModel, users: RoadUsers
+) -> tuple[Float, int]:
+    """Compute the expected returns of a sensor of any pattern and orientation from each road user.
+
+    Parameters
+    ----------
+    orientation : (3, 3) float64
+        Rotation from the sensor's axes to the site's.
+
+    Returns
+    -------
+    returns : (m,) float64
+    cast : int
+        Number of rays.
+    """
+    panels = PanelRows.seen_from(origin, users)
+    directions = BeamPattern(model).directions(np.arange(model.channels * model.azimuth_count)) @ orientation.T
+    level = np.hypot(directions[:, 0], directions[:, 1])
+    with np.errstate(divide="ignore"):
+        rise = directions[:, 2] / level
+    useful = np.flatnonzero((rise >= panels.low.min()) & (rise <= panels.high.max()))
+    azimuth = np.arctan2(directions[useful, 1], directions[useful, 0])
+    order = np.argsort(azimuth, kind="stable")
+    useful, azimuth = useful[order], azimuth[order]
+    item, ray = _rays_on(panels, azimuth, rise[useful])
+    met, place = np.unique(ray, return_inverse=True)
+    used = useful[met]
+    distance = caster.cast(origin, directions[used], model.max_range)[0] * level[used]
+    ranged = panels.distance[item] / level[used][place]
+    detected = (distance[place] >= panels.distance[item]) & (ranged >= model.min_range) & (ranged <= model.max_range)
+    item, place, ranged = item[detected], place[detected], ranged[detected]
+    chance = model.law.chance(ranged, panels.reflected[item] * level[used][place])
+    return _summed(item, chance, users), len(used)
+
+
+def _summed(item: Integer, chance: Float, users: RoadUsers) -> Float:
+    return np.bincount(item, chance, minlength=len(users)).astype(np.float64)
+
+
+def _channels_on(panels: PanelRows, tangent: Float) -> tuple[Integer, Integer]:
+    """Return all pairs of a panel and a channel whose elevation it covers, (k,) int64 each.
+
+    Parameters
+    ----------
+    tangent : (c,) float64
+        Of the channels' elevations, ascending.
+    """
+    first = np.searchsorted(tangent, panels.low, "left")
+    count = np.maximum(np.searchsorted(tangent, panels.high, "right") - first, 0)
+    item = np.repeat(np.arange(len(first)), count)
+    return item, counted(first, count)
+
+
+def _wanted(row: Integer, first: Integer, count: Integer, rows: int, steps: int) -> Boolean:
+    """Return which azimuth steps of which channels meet some panel, (rows, steps) bool."""
+    width = 2 * steps + 1  # runs may pass the last step
+    size = rows * width
+    change = np.bincount(row * width + first, minlength=size) - np.bincount(row * width + first + count, minlength=size)
+    met = np.cumsum(change.reshape(rows, width), axis=1)[:, : 2 * steps] > 0
+    wanted: Boolean = met[:, :steps] | met[:, steps:]
+    return wanted
+
+
+def _at_least(values: Float, row: Integer, first: Integer, count: Integer, least: Float) -> Integer:
+    """Return how many of ``count`` neighbouring values of a row are at least ``least``, (k,) int64.
+
+    Parameters
+    ----------
+    values : (rows, n) float64
+    row, first, count, least : (k,)
+        ``first + count`` is at most n, and ``count`` at least 1.
+    """
+    smallest = np.empty(len(row))
+    power = np.frexp(count.astype(np.float64))[1] - 1  # of two, the largest up to the count
+    table = values
+    for exponent in range(int(power.max()) + 1):
+        if exponent:
+            shift = 1 << (exponent - 1)
+            table = np.minimum(table[:, :-shift], table[:, shift:])
+        these = np.flatnonzero(power == exponent)
+        begin, end = first[these], first[these] + count[these] - (1 << exponent)
+        smallest[these] = np.minimum(table[row[these], begin], table[row[these], end])
+    number = count.copy()
+    partly = np.flatnonzero(smallest < least)
+    if len(partly):
+        own = count[partly]
+        place = counted(row[partly] * values.shape[1] + first[partly], own)
+        reaches = values.ravel()[place] >= np.repeat(least[partly], own)
+        number[partly] = np.add.reduceat(reaches, np.cumsum(own) - own, dtype=np.int64)
+    return number
+
+
+def _rays_on(panels: PanelRows, azimuth: Float, rise: Float) -> tuple[Integer, Integer]:
+    """Return all pairs of a panel and a ray that meets it, (k,) int64 each.
+
+    Parameters
+    ----------
+    azimuth : (n,) float64, radians
+        Of the rays, ascending, from -π to π.
+    rise : (n,) float64
+        Tangent of their elevation.
+    """
+    around = np.concatenate([azimuth - math.tau, azimuth, azimuth + math.tau])
+    first = np.searchsorted(around, panels.azimuth - panels.half, "left")
+    count = np.searchsorted(around, panels.azimuth + panels.half, "right") - first
+    found = []
+    for part in np.array_split(np.arange(len(first)), max(1, math.ceil(count.sum() / _PAIRS_AT_ONCE))):
+        item = np.repeat(part, count[part])
+        ray = counted(first[part], count[part]) % len(azimuth)
+        on = (rise[ray] >= panels.low[item]) & (rise[ray] <= panels.high[item])
+        found.append((item[on], ray[on]))
+    items, rays = zip(*found, strict=True)
+    return np.concatenate(items), np.concatenate(rays)

@@ -1,0 +1,157 @@
+"""One frame: the merged cloud of all sensors, and the road users of that instant."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import limits
+from ...arrays import Boolean, Float, Integer, Text
+from ...storage.array_file import ArrayFile, ArrayRule, ContentError
+from ..traffic.trajectories import CATEGORIES
+
+_POINTS = {
+    "points": ArrayRule("f4", ("n", 3), limits.LOCAL_COORDINATE),
+    "sensor": ArrayRule("i2", ("n",), limits.COUNT),
+    "delay": ArrayRule("f4", ("n",), limits.DELAY),
+    "intensity": ArrayRule("f4", ("n",), limits.ROUNDED_SHARE),
+    "instance": ArrayRule("i4", ("n",), limits.INDEX),
+    "foreground": ArrayRule("b1", ("n",)),
+}
+_LABELS = {
+    "labels.user": ArrayRule("i8", ("k",), limits.COUNT),
+    "labels.category": ArrayRule("U", ("k",)),
+    "labels.centre": ArrayRule("f8", ("k", 3), limits.LOCAL_COORDINATE),
+    "labels.size": ArrayRule("f8", ("k", 3), limits.ROAD_USER_SIZE),
+    "labels.yaw": ArrayRule("f8", ("k",), limits.YAW),
+    "labels.pitch": ArrayRule("f8", ("k",), limits.PITCH),
+    "labels.speed": ArrayRule("f8", ("k",), limits.APPARENT_SPEED),
+    "labels.points": ArrayRule("i8", ("k", "s"), limits.COUNT),
+    "labels.visibility": ArrayRule("f8", ("k",), limits.ROUNDED_SHARE),
+    "labels.inside": ArrayRule("b1", ("k",)),
+}
+FILE = ArrayFile("seip.frame", 3, "frame of scans", "simulate it again", _POINTS | _LABELS, compressed=False)
+
+STATIC_INSTANCE = -1
+"""The instance of a point that is on no road user."""
+
+
+@dataclass(frozen=True, eq=False)
+class Labels:
+    """The road users of one frame, all of them, seen or not; k boxes.
+
+    They are those of the frame's time; with a rolling shutter each is at the mean time of its own returns, without
+    any halfway through the frame.
+
+    Parameters
+    ----------
+    user : (k,) int64
+        Index into the trajectories' road users; what the points' ``instance`` refers to.
+    category : (k,) str
+    centre : (k, 3) float64, metres
+        Middle of the box, local site axes.
+    size : (k, 3) float64, metres
+        Length, width, height.
+    yaw, pitch : (k,) float64, radians
+        Yaw counter-clockwise from +x, in [-π, π); pitch nose up positive.
+    speed : (k,) float64, metres per second
+    points : (k, s) int64
+        Returns from it, by sensor.
+    visibility : (k,) float64, 0 to 1
+        Of the rays of all sensors that would meet it with nothing else there, the share that does.
+    inside : (k,) bool
+        Whether the middle of the box is in the region of interest in plan.
+    """
+
+    user: Integer
+    category: Text
+    centre: Float
+    size: Float
+    yaw: Float
+    pitch: Float
+    speed: Float
+    points: Integer
+    visibility: Float
+    inside: Boolean
+
+    def __len__(self) -> int:
+        """Return the number of boxes."""
+        return len(self.user)
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Point cloud of all sensors in one revolution, sensor after sensor; n points.
+
+    Parameters
+    ----------
+    time : float, seconds
+        Of the simulation, at which the revolution begins.
+    points : (n, 3) float32, metres
+        Local site axes.
+    sensor : (n,) int16
+        Number of the sensor, in the order of the manifest.
+    delay : (n,) float32, seconds
+        Of each point after ``time``; zero unless the shutter rolls.
+    intensity : (n,) float32, 0 to 1
+    instance : (n,) int32
+        Road user that returned it, `STATIC_INSTANCE` for none.
+    foreground : (n,) bool
+        Whether it is nearer than the range of the same ray in the empty scene, by more than the noise: what a sensor
+        that knows the background of its site keeps.
+    """
+
+    time: float
+    points: NDArray[np.float32]
+    sensor: NDArray[np.int16]
+    delay: NDArray[np.float32]
+    intensity: NDArray[np.float32]
+    instance: NDArray[np.int32]
+    foreground: Boolean
+    labels: Labels
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self.points)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the frame as npz: arrays by their names, those of the labels as ``labels.NAME``."""
+        labels = {f"labels.{part.name}": getattr(self.labels, part.name) for part in fields(Labels)}
+        FILE.save(path, {"time": self.time}, {name: getattr(self, name) for name in _POINTS} | labels)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Frame:
+        """Read a frame.
+
+        Raises
+        ------
+        SeipError
+            The file is not there, damaged, or something else.
+        """
+        with FILE.reading(path) as (header, arrays):
+            labels = Labels(**{part.name: arrays[f"labels.{part.name}"] for part in fields(Labels)})
+            frame = cls(time=float(header["time"]), labels=labels, **{name: arrays[name] for name in _POINTS})
+            frame._check()  # its own
+            return frame
+
+    def _check(self) -> None:
+        """Raise `ContentError` where parts contradict each other."""
+        labels = self.labels
+        if not set(labels.category.tolist()) <= set(CATEGORIES):
+            raise ContentError("a label has an unknown category")
+        if (np.diff(labels.user) <= 0).any():
+            raise ContentError("road users are labelled twice")
+        if not np.isin(self.instance[self.instance != STATIC_INSTANCE], labels.user).all():
+            raise ContentError("points lie on road users without a label")
+        if len(self) and int(self.sensor.max()) >= labels.points.shape[1]:
+            raise ContentError("points are from sensors that the labels do not count")
+        hits = self.instance != STATIC_INSTANCE
+        counted = np.zeros_like(labels.points)
+        np.add.at(counted, (np.searchsorted(labels.user, self.instance[hits]), self.sensor[hits]), 1)
+        if len(labels) and (counted != labels.points).any():
+            raise ContentError("the labels count other points than there are")
+        if fault := limits.TIME.fault(self.time):
+            raise ContentError(f"its time {fault}")

@@ -1,0 +1,286 @@
+"""A folder of frames: ``frames/000123.npz`` and ``manifest.json``, which says what they follow from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ... import limits
+from ...arrays import Float
+from ...errors import SeipError
+from ...geometry.geo_reference import GeoReference
+from ...progress import Progress
+from ...storage.files import digest, save_json
+from ...storage.source_digest import source_digest
+from ..lidar.model import LidarModel
+from ..traffic.bodies import Body
+from ..traffic.trajectories import Trajectories
+from .frame import Frame, Labels
+from .sensor import MountedSensor
+from .simulation import ScanSettings, Simulation
+from .static_scene import StaticScene
+
+SCHEMA = "seip-run/1"
+MANIFEST, FRAMES = "manifest.json", "frames"
+PLACEMENT = "placement.json"  # by which a folder is one of a placement
+
+Record = dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """All inputs of the frames of a run.
+
+    Parameters
+    ----------
+    origin : (3,) float64, metres
+        Map coordinates of the local origin.
+    trajectories : Trajectories
+        In local axes.
+    bodies : sequence of Body
+        Of each road user.
+    times : (n,) float64, seconds
+    settings : ScanSettings
+        With the engine's own name, not ``auto``.
+    versions : mapping of str to str
+        Of this program and what it stands on.
+    geo_reference : GeoReference
+        Where on the Earth the map is; frames do not follow from it, datasets may.
+    """
+
+    static: StaticScene
+    origin: Float
+    sensors: Sequence[MountedSensor]
+    trajectories: Trajectories
+    bodies: Sequence[Body]
+    times: Float
+    settings: ScanSettings
+    versions: Mapping[str, str]
+    geo_reference: GeoReference = field(default_factory=GeoReference)
+
+    @property
+    def key(self) -> str:
+        """Digest of everything: runs of the same key have the same frames."""
+        trajectories = self.trajectories
+        users = json.dumps([asdict(user) for user in trajectories.users])
+        motion = [getattr(trajectories, name) for name in ("first", "time", "position", "yaw", "pitch", "speed")]
+        sensors = [part for sensor in self.sensors for part in (sensor.label, sensor.xyz, sensor.orientation)]
+        models = [part for sensor in self.sensors for part in _parts(sensor.model)]
+        bodies = {id(body): digest(body.triangles, body.reflectivity) for body in self.bodies}
+        return digest(
+            SCHEMA,
+            self.versions["seip"],
+            source_digest(__name__),
+            json.dumps(asdict(self.settings)),
+            *(self.static.triangles, self.static.reflectivity, self.static.region.wkb, self.origin, self.times),
+            *(users, *motion, *sensors, *models),
+            *(bodies[id(body)] for body in self.bodies),
+        )
+
+    def record(self, frames: Sequence[Mapping[str, Any]] = ()) -> Record:
+        """Return what the manifest holds."""
+        return {
+            "schema": SCHEMA,
+            "key": self.key,
+            "complete": len(frames) == len(self.times),
+            "settings": _listed({name: value for name, value in asdict(self.settings).items() if name != "seed"}),
+            "seeds": {"returns": self.settings.seed},
+            "origin_m": self.origin.tolist(),
+            "sensors": [_sensor_record(sensor) for sensor in self.sensors],
+            "trajectories": {"source": self.trajectories.source, "road_users": len(self.trajectories)},
+            "versions": dict(self.versions),
+            "frames": list(frames),
+        }
+
+
+def write_run(folder: Path, run: Run, simulation: Simulation) -> Generator[Progress, None, Record]:
+    """Write the frames of a run that are not there yet, and then the manifest that names all.
+
+    Parameters
+    ----------
+    folder : path
+        New, empty, or with this run's frames, as an earlier start left them.
+    simulation : Simulation
+        Of the run.
+
+    Yields
+    ------
+    Progress
+        Frames done, of all.
+
+    Returns
+    -------
+    dict
+        The manifest.
+
+    Raises
+    ------
+    SeipError
+        The folder holds something else, or cannot be written.
+    """
+    check_run_folder(folder, run)
+    if not (folder / MANIFEST).exists():
+        save_json(folder / MANIFEST, run.record())
+    frames: list[Record] = []
+    for number, time in enumerate(run.times.tolist()):
+        yield Progress(number, len(run.times), "frames")
+        path = frame_path(folder, number)
+        if path.exists():
+            frame = Frame.load(path)
+        else:
+            frame = simulation.frame(number, time)
+            frame.save(path)
+        frames.append(_frame_record(number, frame))
+    record = run.record(frames)
+    save_json(folder / MANIFEST, record)
+    yield Progress(len(run.times), len(run.times), "frames")
+    return record
+
+
+def check_run_folder(folder: Path, run: Run) -> None:
+    """Raise SeipError where a folder holds something other than frames of this run."""
+    check_no_placement(folder)
+    if (folder / MANIFEST).exists():
+        if load_manifest(folder)["key"] != run.key:
+            raise SeipError(
+                f"{folder} holds a run of another scene, traffic or settings: name another folder, or delete that one"
+            )
+    elif (folder / FRAMES).exists():
+        raise SeipError(
+            f"{folder} holds frames without a {MANIFEST} that says whose: delete them, or name another folder"
+        )
+
+
+def check_no_placement(folder: Path) -> None:
+    """Raise SeipError where a folder holds a placement, whose files those of a run would mix with."""
+    if (folder / PLACEMENT).exists():
+        raise SeipError(f"{folder} holds a placement, which a run is not written to: name another folder")
+
+
+def load_manifest(folder: Path) -> Record:
+    """Return the manifest of a run.
+
+    Raises
+    ------
+    SeipError
+        There is none, or it is damaged or of another version.
+    """
+    path = folder / MANIFEST
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        known = record["schema"] == SCHEMA
+        whole = known and _is_whole(record)
+    except FileNotFoundError as error:
+        raise SeipError(f"{folder} holds no run of scans: make one with headless/simulate.py") from error
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        raise SeipError(f"{path} is damaged: delete the folder and simulate again") from error
+    if not known:
+        raise SeipError(f"{path} is not of this version: delete the folder and simulate again")
+    if not whole:
+        raise SeipError(f"{path} is damaged: delete the folder and simulate again")
+    return dict(record)
+
+
+def _is_whole(record: Record) -> bool:
+    """Return whether a manifest has what is read of it, and its frames are counted from 0."""
+    sensors = np.array([sensor["local_m"] for sensor in record["sensors"]], dtype=np.float64)
+    texts = [record["key"], record["trajectories"]["source"], *(sensor["sensor"] for sensor in record["sensors"])]
+    texts += [frame["sha256"] for frame in record["frames"]]
+    names = [frame["name"] for frame in record["frames"]]
+    frames = record["frames"]
+    times = np.array([frame["time_s"] for frame in frames], dtype=np.float64)
+    counts = [frame[what] for frame in frames for what in ("points", "road_users")]
+    road_users = record["trajectories"]["road_users"]
+    return (
+        isinstance(record["complete"], bool)
+        and sensors.shape == (len(sensors), 3)
+        and limits.LOCAL_COORDINATE.allow(sensors)
+        and limits.TIME.allow(times)
+        and bool((np.diff(times) > 0.0).all())
+        and all(type(count) is int for count in (*counts, road_users))
+        and limits.COUNT.allow(np.array([*counts, road_users], dtype=np.float64))
+        and all(frame["road_users"] <= road_users for frame in frames)
+        and all(isinstance(text, str) for text in texts)
+        and names == [f"{number:06d}" for number in range(len(names))]
+        and bool(names) >= record["complete"]
+    )
+
+
+def load_frames(folder: Path) -> Iterator[tuple[str, Frame]]:
+    """Yield the frames of a finished run with their names, in the order of time.
+
+    Raises
+    ------
+    SeipError
+        There is no run, or it was not finished.
+    """
+    record = load_manifest(folder)
+    if not record["complete"]:
+        raise SeipError(f"the run in {folder} was stopped half-way: run the same simulation again to finish it")
+    for entry in record["frames"]:
+        path = folder / FRAMES / f"{entry['name']}.npz"
+        frame = Frame.load(path)
+        if content_hash(frame) != entry["sha256"]:
+            raise SeipError(f"{path} is a frame of another run: delete {folder} and simulate again")
+        sensors = frame.labels.points.shape[1]
+        if entry != _frame_record(int(entry["name"]), frame) or sensors not in {0, len(record["sensors"])}:
+            raise SeipError(f"{folder / MANIFEST} contradicts {path.name}: delete {folder} and simulate again")
+        yield entry["name"], frame
+
+
+def frame_path(folder: Path, number: int) -> Path:
+    """Return where a frame is kept."""
+    return folder / FRAMES / f"{number:06d}.npz"
+
+
+def content_hash(frame: Frame) -> str:
+    """Return the digest of a frame's values, whatever the file looks like."""
+    own = [getattr(frame, part.name) for part in fields(Frame) if part.name != "labels"]
+    return digest(*own, *(getattr(frame.labels, part.name) for part in fields(Labels)))
+
+
+def _frame_record(number: int, frame: Frame) -> Record:
+    return {
+        "name": f"{number:06d}",
+        "time_s": frame.time,
+        "points": len(frame),
+        "road_users": len(frame.labels),
+        "sha256": content_hash(frame),
+    }
+
+
+def _sensor_record(sensor: MountedSensor) -> Record:
+    law = {"model": sensor.model.law.model, **asdict(sensor.model.law)}
+    model = {name: np.asarray(value).tolist() for name, value in _fields(sensor.model)} | {"law": law}
+    if sensor.model.rosette is not None:  # from which the angles of its rays follow
+        model |= {"elevations": [], "azimuth_offsets": [], "rosette": _listed(asdict(sensor.model.rosette))}
+    return {
+        "label": sensor.label,
+        "sensor": sensor.model.key,
+        "local_m": sensor.xyz.tolist(),
+        "orientation": sensor.orientation.tolist(),
+        "model": model,
+    }
+
+
+def _listed(record: Mapping[str, Any]) -> Record:
+    """Return a record as JSON gives it back: lists in place of tuples."""
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in record.items()}
+
+
+def _fields(model: LidarModel) -> list[tuple[str, Any]]:
+    values = [(part.name, getattr(model, part.name)) for part in fields(model)]
+    return [(name, value) for name, value in values if name != "rosette" or value is not None]
+
+
+def _parts(model: LidarModel) -> list[Any]:
+    """Return the figures that scans follow from, not the words for people."""
+    unused = {"name", "manufacturer", "source", "price_source", "assumed_beams", "assumed_law"}
+    return [
+        repr(value) if name in {"law", "rosette"} else value for name, value in _fields(model) if name not in unused
+    ]

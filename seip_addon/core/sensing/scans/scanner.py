@@ -1,0 +1,289 @@
+"""Scans of one sensor: cached static returns, and returns of traffic.
+
+What moves is cast against in its own axes, in which its shape never changes, and only by the rays that pass through
+its bounding box. A ray ends at the nearest of what it meets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Boolean, Float, Integer
+from ..lidar.beams import BeamPattern
+from ..lidar.noisy_returns import return_chance
+from ..lidar.range_equation import RangeEquation
+from ..lidar.surface_patches import surface_deviation
+from ..visibility.ray_casting import RayCaster
+from .beam_culling import BeamWindows
+from .frame import STATIC_INSTANCE
+from .motion import Motion
+from .sensor import MountedSensor
+
+_RAYS_AT_ONCE = 1 << 17  # bounds the memory of the static scan
+_MARGIN = 1e-3
+"""Metres by which bounding boxes are larger than what they bound: engines compute in float32."""
+_MAX_LEVEL_SLOPE = 1e-12  # a ray of less slope than this is off by less than the margin at any range
+_CORNERS = np.array(np.meshgrid((0, 1), (0, 1), (0, 1), indexing="ij")).reshape(3, 8).T
+
+
+class ReflectiveSurface:
+    """Triangles that rays are cast against, and how they reflect.
+
+    Parameters
+    ----------
+    caster : RayCaster
+        Of the triangles.
+    reflectivity : (n,) float64, 0 to 1
+    """
+
+    def __init__(self, caster: RayCaster, reflectivity: Float) -> None:
+        self.caster = caster
+        self._reflectivity = reflectivity
+        a, b, c = caster.triangles.transpose(1, 0, 2)
+        normal = np.cross(b - a, c - a)
+        self._normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+
+    def reflected(self, directions: Float, triangle: Integer) -> Float:
+        """Return reflectivity times cosine (n,) where rays, with directions in the triangles' axes, meet triangles."""
+        cos_incidence = np.einsum("ni,ni->n", self._normal[triangle], directions)
+        reflected: Float = np.abs(cos_incidence) * self._reflectivity[triangle]
+        return reflected
+
+
+class BodySurface(ReflectiveSurface):
+    """A road user's surface in its own axes, with its bounding box.
+
+    Parameters
+    ----------
+    reflectivity : (n,) float64, 0 to 1
+    """
+
+    def __init__(self, caster: RayCaster, reflectivity: Float) -> None:
+        super().__init__(caster, reflectivity)
+        points = caster.triangles.reshape(-1, 3)
+        self.low, self.high = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
+
+    def hull(self, motion: Motion) -> Float:
+        """Return points (8 s, 3) whose convex hull holds the bounding box during all of a motion, in site axes.
+
+        Between two samples a corner leaves its chord by an eighth of its greatest
+        acceleration times the time squared at most; angles change evenly.
+        """
+        size = self.high - self.low
+        corners = self.low + _CORNERS * size
+        turned = np.abs(np.diff(motion.yaw)) + np.abs(np.diff(motion.pitch))
+        bulge = np.linalg.norm(corners, axis=1).max() * turned.max(initial=0.0) ** 2 / 8
+        corners += (2 * _CORNERS - 1) * bulge
+        placed: Float = motion.position[:, None] + corners @ motion.attitude.transpose(0, 2, 1)
+        return placed.reshape(-1, 3)
+
+    def may_hit(self, origin: Float, directions: Float, reach: float) -> Boolean:
+        """Return which rays pass through the bounding box within so many metres, by its slabs (Kay and Kajiya 1986).
+
+        Parameters
+        ----------
+        origin : (3, 1) or (3, n) float64, metres
+        directions : (3, n) float64
+        reach : float, metres
+
+        Returns
+        -------
+        (n,) bool
+        """
+        slowness = 1.0 / np.where(np.abs(directions) < _MAX_LEVEL_SLOPE, _MAX_LEVEL_SLOPE, directions)
+        one, other = (self.low[:, None] - origin) * slowness, (self.high[:, None] - origin) * slowness
+        enter = np.minimum(one, other).max(axis=0)
+        leave = np.maximum(one, other).min(axis=0)
+        passes: Boolean = (enter <= leave) & (leave >= 0.0) & (enter <= reach)
+        return passes
+
+
+@dataclass(frozen=True, eq=False)
+class MovingTraffic:
+    """The k road users that move during a revolution.
+
+    Parameters
+    ----------
+    shapes : sequence of BodySurface
+        Of each, in the same order.
+    hulls : (k, m, 3) float64, metres
+        Points about each way, in site axes.
+    """
+
+    motions: Sequence[Motion]
+    shapes: Sequence[BodySurface]
+    hulls: Float
+
+    @classmethod
+    def of(cls, motions: Sequence[Motion], shapes: Sequence[BodySurface]) -> MovingTraffic:
+        """Bound the ways of road users, given the shape of each."""
+        hulls = [shape.hull(motion) for motion, shape in zip(motions, shapes, strict=True)]
+        most = max(map(len, hulls), default=0)
+        even = [np.concatenate([hull, np.repeat(hull[-1:], most - len(hull), axis=0)]) for hull in hulls]
+        return cls(motions, shapes, np.array(even).reshape(len(hulls), most, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """Hits of the rays of one revolution; r rays in the order of `BeamPattern`.
+
+    Parameters
+    ----------
+    distance : (r,) float64, metres
+        Infinite on a miss.
+    empty : (r,) float64, metres
+        The distance without traffic.
+    intensity : (r,) float64, 0 to 1
+    chance : (r,) float32
+        That the ray's return is not lost.
+    instance : (r,) int32
+        Road user, or `STATIC_INSTANCE`.
+    unoccluded : (u,) int64
+        For each of the trajectories' road users, how many rays would return from it with nothing else there.
+    visible : (u,) int64
+        How many of these do.
+    """
+
+    distance: Float
+    empty: Float
+    intensity: Float
+    chance: NDArray[np.float32]
+    instance: NDArray[np.int32]
+    unoccluded: Integer
+    visible: Integer
+
+
+@dataclass(frozen=True, eq=False)
+class _Hits:
+    """Hits of rays; n of them, with the product of reflectivity and cosine, and the chance to return."""
+
+    ray: Integer
+    distance: Float
+    reflected: Float
+    chance: Float
+
+
+class Scanner:
+    """Makes the scans of one sensor.
+
+    Parameters
+    ----------
+    ground : ReflectiveSurface
+        All that stands still, in site axes.
+    seed : int
+        Of how surfaces deviate from their materials.
+
+    Attributes
+    ----------
+    directions : (r, 3) float64
+        Of the rays, in site axes.
+    coarse_directions : (r, 3) float32
+        The same, for points: 1e-5 m at 200 m.
+    delay : (r,) float64, seconds
+        After the beginning of the revolution at which each ray goes out.
+    threads : int
+        How many scanners may scan at once to advantage.
+    """
+
+    def __init__(self, sensor: MountedSensor, ground: ReflectiveSurface, seed: int) -> None:
+        self.sensor, self._ground, self._seed, self.threads = sensor, ground, seed, ground.caster.threads
+        self.delay = sensor.model.delay(np.arange(sensor.model.channels * sensor.model.azimuth_count))
+        self._model = sensor.model
+        self._cast_at_ground()
+
+    def aim(self, time: float) -> None:
+        """Turn the rays to where they are in the frame that begins at a time in seconds; only a rosette's move."""
+        model = self.sensor.model.at(time)
+        if model.rosette != self._model.rosette:
+            self._model = model
+            self._cast_at_ground()
+
+    def _cast_at_ground(self) -> None:
+        """Cast all rays against what stands still."""
+        sensor, rays = self.sensor, np.arange(len(self.delay))
+        self._windows = BeamWindows(self._model)
+        self.directions: Float = BeamPattern(self._model).directions(rays) @ sensor.orientation.T
+        self.coarse_directions: NDArray[np.float32] = self.directions.astype(np.float32)
+        self._distance = np.full(len(rays), np.inf)
+        self._intensity = np.zeros(len(rays))
+        self._chance = np.zeros(len(rays), dtype=np.float32)
+        for begin in range(0, len(rays), _RAYS_AT_ONCE):
+            part = slice(begin, begin + _RAYS_AT_ONCE)
+            hits = self._cast(self._ground, sensor.xyz, self.directions[part], rays[part])
+            self._distance[hits.ray], self._chance[hits.ray] = hits.distance, hits.chance
+            self._intensity[hits.ray] = self._model.law.intensity(hits.distance, hits.reflected)
+        self._still_hits: dict[int, tuple[Motion, _Hits]] = {}
+
+    @property
+    def sees_nothing(self) -> bool:
+        """Whether no ray ends on anything that stands still."""
+        return not np.isfinite(self._distance).any()
+
+    def scan(self, traffic: MovingTraffic, users: int) -> Scan:
+        """Return what the rays, as they are aimed, end on with traffic that is one of so many road users."""
+        distance, intensity, chance = self._distance.copy(), self._intensity.copy(), self._chance.copy()
+        instance = np.full(len(distance), STATIC_INSTANCE, dtype=np.int32)
+        unoccluded = np.zeros(users, dtype=np.int64)
+        for motion, hits in self._hits(traffic):
+            unoccluded[motion.user] = self.in_range(hits.distance).sum()
+            nearest = hits.distance < distance[hits.ray]
+            ray = hits.ray[nearest]
+            distance[ray], chance[ray] = hits.distance[nearest], hits.chance[nearest]
+            intensity[ray] = self._model.law.intensity(hits.distance[nearest], hits.reflected[nearest])
+            instance[ray] = motion.user
+        visible = returns_by_user(instance[self.in_range(distance) & (instance != STATIC_INSTANCE)], users)
+        return Scan(distance, self._distance, intensity, chance, instance, unoccluded, visible)
+
+    def in_range(self, distance: Float) -> Boolean:
+        """Return which distances the sensor can measure."""
+        return (distance >= self._model.min_range) & (distance <= self._model.max_range)
+
+    def _hits(self, traffic: MovingTraffic) -> Iterator[tuple[Motion, _Hits]]:
+        """Return what the rays meet of each road user if nothing else is there; of one that stood still, as before."""
+        stood, self._still_hits = self._still_hits, {}
+        if not traffic.motions:
+            return
+        hull, ray = self._windows.rays_towards((traffic.hulls - self.sensor.xyz) @ self.sensor.orientation)
+        first = np.searchsorted(hull, np.arange(len(traffic.motions) + 1))
+        for number, (motion, shape) in enumerate(zip(traffic.motions, traffic.shapes, strict=True)):
+            before, hits = stood.get(motion.user, (None, None))
+            if hits is None or not motion.same_as(before):
+                hits = self._cast_at(shape, motion, ray[first[number] : first[number + 1]])
+            if motion.is_still:
+                self._still_hits[motion.user] = motion, hits
+            yield motion, hits
+
+    def _cast_at(self, shape: BodySurface, motion: Motion, ray: Integer) -> _Hits:
+        """Cast rays against one road user, in its axes."""
+        directions = self.directions.take(ray, axis=0)
+        if motion.is_still:
+            origin = motion.attitude[0].T @ (self.sensor.xyz - motion.position[0])[:, None]
+            directions = motion.attitude[0].T @ directions.T
+        else:
+            position, attitude = motion.at(self.delay[ray])
+            origin = np.einsum("ni,nij->jn", self.sensor.xyz - position, attitude)
+            directions = np.einsum("ni,nij->jn", directions, attitude)
+        passing = np.flatnonzero(shape.may_hit(origin, directions, self._model.max_range))
+        start = origin[:, 0] if motion.is_still else origin[:, passing].T
+        return self._cast(shape, start, directions[:, passing].T, ray[passing], motion.user + 1)
+
+    def _cast(self, surface: ReflectiveSurface, origin: Float, directions: Float, ray: Integer, of: int = 0) -> _Hits:
+        """Cast rays at a surface in its axes; ``of`` is 0 for what stands still, else a road user's number and 1."""
+        distance, triangle = surface.caster.cast(origin, directions, self._model.max_range)
+        hit = np.flatnonzero(triangle >= 0)
+        distance, directions = distance[hit], directions[hit]
+        reflected = surface.reflected(directions, triangle[hit])
+        deviation = None
+        if isinstance(self._model.law, RangeEquation):
+            start = origin if origin.ndim == 1 else origin[hit]
+            deviation = surface_deviation(start + distance[:, None] * directions, (self._seed, of))
+        return _Hits(ray[hit], distance, reflected, return_chance(self._model, distance, reflected, deviation))
+
+
+def returns_by_user(instance: NDArray[np.int32], users: int) -> Integer:
+    """Return how many of some returns are from each of so many road users, (u,)."""
+    return np.bincount(instance[instance != STATIC_INSTANCE], minlength=users)

@@ -1,0 +1,46 @@
+"""A mounted sensor: LiDAR model, position and orientation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Float
+from ...errors import SeipError
+from ..lidar.model import LidarModel
+
+_ORTHONORMAL_TOLERANCE = 1e-6
+"""How far an orientation's columns may be from unit vectors at right angles."""
+
+
+@dataclass(frozen=True, eq=False)
+class MountedSensor:
+    """A LiDAR model at a position and orientation.
+
+    Parameters
+    ----------
+    label : str
+        Label, as ``S1``.
+    xyz : (3,) float64, metres
+        Optical centre, local site axes.
+    orientation : (3, 3) float64
+        Rotation from the sensor's axes (x along azimuth zero, z up along its axis) to the site's.
+    """
+
+    label: str
+    model: LidarModel
+    xyz: Float
+    orientation: Float
+
+    def __post_init__(self) -> None:
+        turn = self.orientation
+        rigid = np.allclose(turn.T @ turn, np.eye(3), rtol=0, atol=_ORTHONORMAL_TOLERANCE) and np.linalg.det(turn) > 0
+        if not (rigid and np.isfinite(self.xyz).all()):
+            raise SeipError(f"sensor {self.label!r} has no place, or is not turned but mirrored or skewed: set it anew")
+
+
+def level_orientation(yaw: float) -> Float:
+    """Return the orientation of an upright sensor whose azimuth zero points along ``yaw`` (radians)."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])

@@ -1,0 +1,173 @@
+"""Bodies of road users: closed meshes of few triangles, stretched to a road user's size."""
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...arrays import Float, Text
+from ...errors import SeipError
+from .trajectories import CATEGORIES, RoadUser, bent
+
+MESHES = Path(__file__).parent / "body_meshes"
+"""Wavefront OBJ files, ``CATEGORY.obj`` or ``CATEGORY.MODEL.obj``; the README there says what they may hold."""
+
+REFLECTIVITY: Mapping[str, float] = {
+    "glass": 0.05,  # nearly all goes through or is mirrored away
+    "tyre": 0.05,
+    "trim": 0.08,
+    "rim": 0.45,
+    "frame": 0.35,
+    "headlamp": 0.60,
+    "tail lamp": 0.60,  # its reflectors send back what comes
+    "cargo box": 0.65,
+    "skin": 0.50,
+    "hair": 0.20,
+    "trousers": 0.25,
+}
+"""Share of near infrared (905 nm) that each material sends back, assumed; paint and clothes have the road user's."""
+
+PAINT_COLOURS = (
+    *((0.12, "black"), (0.24, "blue"), (0.34, "green"), (0.44, "red"), (0.56, "grey"), (0.70, "silver")),
+    (1.00, "white"),
+)
+"""Up to which reflectivity paint and clothes are shown in which colour."""
+
+KEPT_BODIES = 4096  # bodies that memory keeps for road users of one size, shape and paint
+
+PAINTED_MATERIALS = ("paint", "cloth")  # have the road user's reflectivity; in a body a colour follows: ``paint red``
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """The surface of a road user in its own axes; n triangles.
+
+    The origin is the middle of the underside; x points forward, y left, z up.
+    Arrays are shared between road users of one size and cannot be written.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float64, metres
+        Corners counter-clockwise seen from outside; closed parts that may reach into each other.
+    reflectivity : (n,) float64, 0 to 1
+    material : (n,) str
+        Keys of `scene.materials.COLOURS`.
+    """
+
+    triangles: Float
+    reflectivity: Float
+    material: Text
+
+    def __len__(self) -> int:
+        return len(self.triangles)
+
+
+def fitted_body(user: RoadUser) -> Body:
+    """Return the body of a road user, whose bounding box is exactly its length × width × height.
+
+    Road users of one category, size, shape and paint get the same object, and
+    those of one category, size and shape the same array of triangles.
+
+    Raises
+    ------
+    SeipError
+        There is no such category, or no such size.
+    """
+    if user.category not in CATEGORIES:
+        raise SeipError(
+            f"road user {user.name!r} is a {user.category!r}, which has no body; it may be {', '.join(CATEGORIES)}"
+        )
+    size = (user.length, user.width, user.height)
+    if not all(0 < side < np.inf for side in size):
+        raise SeipError(
+            f"road user {user.name!r} is {' × '.join(f'{side:g}' for side in size)} m large; "
+            "give its type a length, width and height above zero"
+        )
+    return _painted(user.category, size, user.shape, user.paint)
+
+
+def colour_of(paint: float) -> str:
+    """Return the colour in which a reflectivity of paint or clothes is shown."""
+    return next((name for limit, name in PAINT_COLOURS if paint <= limit), PAINT_COLOURS[-1][1])
+
+
+@functools.lru_cache(KEPT_BODIES)
+def _painted(category: str, size: tuple[float, ...], shape: tuple[float, ...], paint: float) -> Body:
+    triangles, material = _shaped(category, size, shape)
+    painted = np.isin(material, PAINTED_MATERIALS)
+    reflectivity = np.array([paint if own else REFLECTIVITY[name] for name, own in zip(material, painted, strict=True)])
+    named = np.where(painted, np.char.add(material, f" {colour_of(paint)}"), material)
+    for array in (reflectivity, named):
+        array.flags.writeable = False
+    return Body(triangles, reflectivity, named)
+
+
+@functools.lru_cache(KEPT_BODIES)
+def _shaped(category: str, size: tuple[float, ...], shape: tuple[float, ...]) -> tuple[Float, Text]:
+    """Return the mesh of the model nearest in size, bent to a shape and stretched over the middle of its underside.
+
+    The nearest is that whose length, width and height have to be stretched least, by the sum of squared logarithms.
+    """
+    triangles, material = min(
+        _models(category), key=lambda model: float((np.log(size / np.ptp(model[0], axis=(0, 1))) ** 2).sum())
+    )
+    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    share = (triangles - low) / (high - low)
+    if any(shape):
+        share[..., 0] = bent(share[..., 0], *shape[:2])
+        share[..., 2] = bent(share[..., 2], *shape[2:])
+    stretched: Float = (share - [0.5, 0.5, 0.0]) * size
+    stretched.flags.writeable = False
+    return stretched, material
+
+
+@functools.cache
+def _models(category: str) -> list[tuple[Float, Text]]:
+    """Return the triangles (n, 3, 3) and materials (n,) of every model of a category."""
+    paths = sorted(path for path in MESHES.glob("*.obj") if path.name.split(".")[0] == category)
+    if not paths:
+        raise SeipError(f"{MESHES} holds no mesh of a {category}; install the add-on again")
+    return [read_mesh(path) for path in paths]
+
+
+def read_mesh(path: Path) -> tuple[Float, Text]:
+    """Read the mesh of a body from a Wavefront OBJ file.
+
+    Returns
+    -------
+    triangles : (n, 3, 3) float64, metres
+    material : (n,) str
+
+    Raises
+    ------
+    SeipError
+        It is no mesh of triangles with a length, width and height, or names an unknown material.
+    """
+    vertices: list[list[float]] = []
+    faces: list[list[int]] = []
+    material: list[str] = []
+    name = ""
+    try:
+        for line in path.read_text(encoding="utf-8").splitlines():
+            match line.split():
+                case ["v", x, y, z, *_]:
+                    vertices.append([float(x), float(y), float(z)])
+                case ["usemtl", name]:
+                    name = name.replace("_", " ")
+                case ["f", *corners]:
+                    faces.append([int(corner.split("/")[0]) - 1 for corner in corners])
+                    material.append(name)
+        if not all(len(set(face)) == 3 and min(face) >= 0 for face in faces):
+            raise SeipError(f"{path.name}: not all faces are triangles; export it triangulated")
+        triangles = np.array(vertices)[np.array(faces)]
+    except (OSError, ValueError, IndexError) as error:
+        raise SeipError(f"{path.name} is no Wavefront OBJ mesh ({error}); export it again") from error
+    if not (np.isfinite(triangles).all() and np.ptp(triangles, axis=(0, 1)).min() > 0.0):
+        raise SeipError(f"{path.name} has no length, width and height; correct its vertices")
+    unknown = set(material) - REFLECTIVITY.keys() - set(PAINTED_MATERIALS)
+    if unknown:
+        known = ", ".join(sorted({*REFLECTIVITY, *PAINTED_MATERIALS}))
+        raise SeipError(f"{path.name}: unknown material {min(unknown)!r}; known are {known}")
+    return triangles, np.array(material)

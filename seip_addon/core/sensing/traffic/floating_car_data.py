@@ -1,0 +1,349 @@
+"""SUMO's floating car data (FCD): where each road user was at each step of a simulation.
+
+A vehicle's position is the middle of its front bumper, its angle is counted clockwise from north in degrees, and
+coordinates are those of the network: the map's plus the network's offset (SUMO's documentation, "FCDOutput"). A
+person's position is taken as the person's middle, as SUMO draws it.
+"""
+
+import csv
+import io
+import math
+import os
+from array import array
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Boolean, Float, Integer
+from ...counts import counted
+from ...errors import SeipError
+from ...limits import MAP_COORDINATE, SPEED, TIME
+from ...progress import Progress
+from ...storage.files import digest
+from ...storage.xml_stream import Attributes, opened, quoted, read_tags, short
+from .trajectories import RoadUser, Trajectories
+from .vehicle_types import CAR, PERSON, VehicleType
+
+_MAX_NAMED = 5  # as many road users a message names; the others it counts
+_LINES_PER_REPORT = 20_000  # of csv between two reports of progress
+
+
+@dataclass(frozen=True, eq=False)
+class FloatingCarData:
+    """Content of a file of floating car data, one road user after the other; u road users, n samples.
+
+    Parameters
+    ----------
+    names, types : tuple of str
+        Id and vehicle type of each; the type is empty where the file does not say.
+    person : (u,) bool
+        Whether it walks.
+    first : (u + 1,) int64
+        Samples of road user i are ``first[i]`` up to ``first[i + 1]``, one or more.
+    time : (n,) float64, seconds
+        Strictly increasing for each road user.
+    position : (n, 3) float64, metres
+        Of the front bumper, or of the person, in map coordinates; z is NaN where the file does not say.
+    yaw : (n,) float64, radians
+        Counter-clockwise from +x, unwrapped.
+    speed : (n,) float64, metres per second
+    elsewhere : int
+        Further road users in the file that never come into the bounds.
+    """
+
+    names: tuple[str, ...]
+    types: tuple[str, ...]
+    person: Boolean
+    first: Integer
+    time: Float
+    position: Float
+    yaw: Float
+    speed: Float
+    elsewhere: int = 0
+
+
+class Extent(NamedTuple):
+    """Part of a file to read: a span of the simulation in seconds, and a rectangle of the map in metres."""
+
+    begin: float = -math.inf
+    end: float = math.inf
+    bounds: tuple[float, float, float, float] = (-math.inf, -math.inf, math.inf, math.inf)
+
+
+def read_floating_car_data(
+    path: str | os.PathLike[str], net_offset: Float | None = None, window: Extent | None = None
+) -> Generator[Progress, None, FloatingCarData]:
+    """Read floating car data, as XML or as csv (in either of SUMO's namings), packed with gzip or not.
+
+    Parameters
+    ----------
+    path : path-like
+        ``.xml`` or ``.csv``, perhaps with ``.gz``.
+    net_offset : (2,) float64, metres, optional
+        Of the network: map = network − offset.
+    window : Extent, optional
+        What lies outside is not kept in memory.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be read, is something else or unfinished, its times run backwards, or a number makes no sense.
+    """
+    rows = _Rows(Path(path).name, np.zeros(2) if net_offset is None else net_offset, window or Extent())
+    suffixes = [suffix.lower() for suffix in Path(path).suffixes if suffix.lower() != ".gz"]
+    if suffixes[-1:] == [".csv"]:
+        yield from _read_csv(path, rows)
+    else:
+        yield from read_tags(path, rows.take)
+    return rows.gathered()
+
+
+def read_trajectories(
+    data: FloatingCarData, types: Mapping[str, VehicleType], origin: Float, source: str
+) -> tuple[Trajectories, tuple[str, ...]]:
+    """Return trajectories of road users with their sizes, in local axes.
+
+    Parameters
+    ----------
+    types : mapping of str to VehicleType
+        As `read_vehicle_types` returns them.
+    origin : (3,) float64, metres
+        Map coordinates of the local origin.
+    source : str
+        What the trajectories come from, for people.
+
+    Returns
+    -------
+    trajectories : Trajectories
+        Not on the road yet: pitch is zero, and heights are those of the file, NaN where it does not say.
+    warnings : tuple of str
+        Which road users have no size.
+
+    Raises
+    ------
+    SeipError
+        There is no road user.
+    """
+    if not data.names:
+        raise SeipError(
+            f"FCD of another map, or of another time: none of the {data.elsewhere} road users in {source} comes near "
+            "the scene's road; simulate on the scene's own map, and name its .net.xml where that has a netOffset"
+        )
+    sizes = [
+        types.get(name, PERSON if walks else CAR) for name, walks in zip(data.types, data.person.tolist(), strict=True)
+    ]
+    users = tuple(
+        RoadUser(name, size.category, size.length, size.width, size.height, _paint(name))
+        for name, size in zip(data.names, sizes, strict=True)
+    )
+    ahead = np.where(data.person, 0.0, [size.length / 2.0 for size in sizes])
+    ahead = np.repeat(ahead, np.diff(data.first))
+    heading = np.stack([np.cos(data.yaw), np.sin(data.yaw), np.zeros_like(data.yaw)], axis=1)
+    trajectories = Trajectories(
+        users=users,
+        origin=origin,
+        first=data.first,
+        time=data.time,
+        position=data.position - ahead[:, None] * heading - origin,
+        yaw=data.yaw,
+        pitch=np.zeros_like(data.yaw),
+        speed=data.speed,
+        source=source,
+    )
+    unknown = [name for name, kind in zip(data.names, data.types, strict=True) if kind not in types]
+    return trajectories, _missing_sizes(unknown, len(users))
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return the first few names, and how many more there are."""
+    more = len(names) - _MAX_NAMED
+    return ", ".join(short(name) for name in names[:_MAX_NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def unwrapped(yaw: Float, first: Integer) -> Float:
+    """Return headings with whole turns added so that neighbouring samples of a road user differ by at most π.
+
+    Parameters
+    ----------
+    yaw : (n,) float64, radians
+    first : (u + 1,) int64
+        Where the samples of each road user begin.
+
+    Returns
+    -------
+    (n,) float64, radians
+        The first heading of each road user is as it was.
+    """
+    if not len(yaw):
+        return yaw
+    turns = np.concatenate([[0.0], -np.round(np.diff(yaw) / (2.0 * np.pi))])
+    turns[first[:-1]] = 0.0
+    sums = np.cumsum(turns)
+    whole: Float = yaw + 2.0 * np.pi * (sums - np.repeat(sums[first[:-1]], np.diff(first)))
+    return whole
+
+
+class _Rows:
+    """Rows of a file as they come, in columns that stay small."""
+
+    def __init__(self, file: str, net_offset: Float, window: Extent) -> None:
+        self._file = file
+        self._window = window
+        self._shift_x, self._shift_y = net_offset.tolist()
+        self._numbers: dict[tuple[str, bool], int] = {}  # a vehicle and a person may share an id
+        self._types: list[str] = []
+        self._outside: set[tuple[str, bool]] = set()
+        self._steps = 0
+        self._time = -math.inf
+        self._user = array("q")
+        self._columns = [array("d") for _ in range(6)]
+
+    def take(self, tag: str, attributes: Attributes) -> None:
+        """Take an element of the XML file."""
+        if tag == "timestep":
+            self.begin(attributes.get("time", ""))
+        elif tag in ("vehicle", "person") and self._steps:
+            self.add(attributes, walks=tag == "person")
+
+    def begin(self, text: str) -> None:
+        """Begin a step of the simulation."""
+        time = self._number(text, "time", "a time step", TIME.most)
+        if time < self._time:
+            raise SeipError(
+                f"{self._file}: times run backwards, {time:g} s comes after {self._time:g} s; "
+                "it must be the record of one simulation, in its order"
+            )
+        self._time = time
+        self._steps += 1
+
+    def add(self, row: Attributes, *, walks: bool) -> None:
+        """Add where a road user is."""
+        if not self._window.begin <= self._time <= self._window.end:
+            return
+        name = row.get("id", "")
+        x = self._number(row.get("x", ""), "x", name, MAP_COORDINATE.most) - self._shift_x
+        y = self._number(row.get("y", ""), "y", name, MAP_COORDINATE.most) - self._shift_y
+        left, low, right, high = self._window.bounds
+        key = (name, walks)
+        if not (left <= x <= right and low <= y <= high):
+            self._outside.add(key)
+            return
+        if key not in self._numbers:
+            self._numbers[key] = len(self._numbers)
+            self._types.append(row.get("type", ""))
+        self._user.append(self._numbers[key])
+        z = row.get("z") or "nan"
+        values = (
+            self._time,
+            x,
+            y,
+            math.nan if z == "nan" else self._number(z, "z", name, MAP_COORDINATE.most),
+            self._number(row.get("angle", ""), "angle", name, 1e4),
+            self._number(row.get("speed") or "0", "speed", name, SPEED.most),
+        )
+        for column, value in zip(self._columns, values, strict=True):
+            column.append(value)
+
+    def gathered(self) -> FloatingCarData:
+        """Return the rows by road user, in the order in which these appear."""
+        if not self._steps:
+            raise SeipError(f"{self._file} is no floating car data: it has no time steps; name SUMO's --fcd-output")
+        user = np.frombuffer(self._user, dtype=np.int64)
+        order = np.argsort(user, kind="stable")
+        user = user[order]
+        time, x, y, z, angle, speed = (np.array(column, dtype=np.float64)[order] for column in self._columns)
+        vehicles = {name for name, walks in self._numbers if not walks}
+        names = tuple(f"person {name}" if walks and name in vehicles else name for name, walks in self._numbers)
+        twice = (np.diff(user) == 0) & (np.diff(time) <= 0)
+        if twice.any():
+            number = int(np.flatnonzero(twice)[0])
+            raise SeipError(
+                f"{self._file}: road user {quoted(names[user[number]])} is there twice at {time[number]:g} s; "
+                "it must be the record of one simulation"
+            )
+        first = np.searchsorted(user, np.arange(len(names) + 1))
+        return FloatingCarData(
+            names=names,
+            types=tuple(self._types),
+            person=np.array([walks for _, walks in self._numbers], dtype=np.bool_),
+            first=first.astype(np.int64),
+            time=time,
+            position=np.stack([x, y, z], axis=1),
+            yaw=unwrapped(np.radians(90.0 - angle), first),
+            speed=speed,
+            elsewhere=len(self._outside.difference(self._numbers)),
+        )
+
+    def _number(self, text: str, what: str, where: str, most: float) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not abs(value) <= most:
+            known = f" at {self._time:g} s" if math.isfinite(self._time) else ""
+            fault = f"is beyond {most:g}" if math.isfinite(value) else "is no number"
+            raise SeipError(
+                f"{self._file}: {what}={quoted(text)} of {quoted(where)}{known} {fault}; write the file again"
+            )
+        return value
+
+
+def _read_csv(path: str | os.PathLike[str], rows: _Rows) -> Generator[Progress, None, None]:
+    with opened(path) as (stream, progress):
+        text = io.TextIOWrapper(stream, encoding="utf-8-sig", newline="")
+        try:
+            header = text.readline()
+            table = csv.reader(text, delimiter=";" if ";" in header else ",")
+            columns = next(csv.reader([header.strip()], delimiter=";" if ";" in header else ","), [])
+            if "timestep_time" not in columns:
+                raise SeipError(
+                    f"{Path(path).name} is no floating car data: it has no column timestep_time; "
+                    "name what SUMO's --fcd-output or its xml2csv wrote"
+                )
+            for number, cells in enumerate(table):
+                if len(cells) not in {0, len(columns)}:  # a blank line has none
+                    raise SeipError(
+                        f"{Path(path).name}: line {table.line_num + 1} has {len(cells)} cells under {len(columns)} "
+                        "columns; write the file again"
+                    )
+                if cells:
+                    _take_line(dict(zip(columns, cells, strict=True)), rows)
+                if number % _LINES_PER_REPORT == 0:
+                    yield progress()
+        except (UnicodeDecodeError, csv.Error) as error:
+            raise SeipError(f"{Path(path).name} is no csv table ({error}); write it again") from error
+
+
+def _take_line(cells: Attributes, rows: _Rows) -> None:
+    """Take a line of the table: SUMO writes persons as vehicles without a lane, xml2csv in columns of their own."""
+    rows.begin(cells["timestep_time"])
+    if cells.get("person_id"):
+        rows.add(_part(cells, "person_"), walks=True)
+    if cells.get("vehicle_id"):
+        walks = bool(cells.get("vehicle_edge")) and not cells.get("vehicle_lane")
+        rows.add(_part(cells, "vehicle_"), walks=walks)
+
+
+def _part(cells: Attributes, prefix: str) -> Attributes:
+    return {name.removeprefix(prefix): cell for name, cell in cells.items() if name.startswith(prefix)}
+
+
+def _paint(name: str) -> float:
+    """Return the reflectivity of a road user's paint: any from dark to white, always the same for the same name."""
+    share = int(digest(name)[:8], 16) / 0xFFFFFFFF
+    return round(0.1 + 0.7 * share, 3)
+
+
+def _missing_sizes(unknown: list[str], count: int) -> tuple[str, ...]:
+    if not unknown:
+        return ()
+    one = len(unknown) == 1
+    sentence = (
+        f"missing sizes: {len(unknown)} of {counted(count, 'road user')} {'is' if one else 'are'} of no known vehicle "
+        f"type ({listed(unknown)}) and {'gets' if one else 'get'} SUMO's default, "
+        f"for vehicles {CAR.length:g} × {CAR.width:g} × {CAR.height:g} m; name their route file"
+    )
+    return (sentence,)

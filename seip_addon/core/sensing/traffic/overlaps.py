@@ -1,0 +1,111 @@
+"""Removal of overlapping road users from simulated traffic."""
+
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from ...arrays import Float, Integer
+from ...progress import Progress
+from .trajectories import Snapshot, Trajectories
+
+MIN_OVERLAP = 0.02  # square metres of two footprints in one place below which they only touch
+
+
+@dataclass(frozen=True, eq=False)
+class Overlaps:
+    """Pairs of road users that overlap at some sampled instant; k pairs.
+
+    Parameters
+    ----------
+    pair : (k, 2) int64
+        Indices of road users, the smaller first.
+    area : (k,) float64, square metres
+        The largest overlap of their footprints at any of the instants.
+    time : (k,) float64, seconds
+    """
+
+    pair: Integer
+    area: Float
+    time: Float
+
+    def __len__(self) -> int:
+        return len(self.pair)
+
+
+def footprints(trajectories: Trajectories, snapshot: Snapshot) -> Float:
+    """Return the corners (k, 4, 2) in plan of an instant's road users, counter-clockwise from the front left."""
+    half = np.array([(user.length / 2.0, user.width / 2.0) for user in trajectories.users])[snapshot.user]
+    heading = np.stack([np.cos(snapshot.yaw), np.sin(snapshot.yaw)], axis=1)
+    ahead = heading * half[:, :1]
+    left = np.stack([-heading[:, 1], heading[:, 0]], axis=1) * half[:, 1:]
+    corners: Float = snapshot.position[:, None, :2] + np.stack(
+        [ahead + left, left - ahead, -ahead - left, ahead - left], axis=1
+    )
+    return corners
+
+
+def find_overlaps(trajectories: Trajectories, interval: float = 0.2) -> Generator[Progress, None, Overlaps]:
+    """Find road users that are in one place, looking every ``interval`` seconds.
+
+    Returns
+    -------
+    Overlaps
+        In the order of the pairs.
+    """
+    begin, end = trajectories.span
+    instants = np.arange(begin, end + interval / 2.0, interval)
+    worst: dict[tuple[int, int], tuple[float, float]] = {}
+    for done, time in enumerate(instants.tolist()):
+        snapshot = trajectories.at(time)
+        polygons = shapely.polygons(footprints(trajectories, snapshot))
+        one, other = shapely.STRtree(polygons).query(polygons, predicate="intersects")
+        one, other = one[one < other], other[one < other]
+        area = shapely.area(shapely.intersection(polygons[one], polygons[other]))
+        deep = area > MIN_OVERLAP
+        for pair, value in zip(snapshot.user[np.stack([one, other], axis=1)][deep].tolist(), area[deep], strict=True):
+            key = (pair[0], pair[1])
+            worst[key] = max(worst.get(key, (0.0, 0.0)), (float(value), time))
+        yield Progress(done + 1, len(instants), "looking for collisions")
+    pairs = sorted(worst)
+    return Overlaps(
+        pair=np.array(pairs, dtype=np.int64).reshape(-1, 2),
+        area=np.array([worst[pair][0] for pair in pairs]),
+        time=np.array([worst[pair][1] for pair in pairs]),
+    )
+
+
+def without_overlaps(trajectories: Trajectories) -> Generator[Progress, None, tuple[Trajectories, tuple[str, ...]]]:
+    """Remove road users until no two overlap: first the one that overlaps most others, then the shortest present.
+
+    Returns
+    -------
+    trajectories : Trajectories
+    names : tuple of str
+        Names of the road users removed.
+    """
+    overlaps = yield from find_overlaps(trajectories)
+    pairs = overlaps.pair
+    stay = np.diff(trajectories.first)
+    gone: list[int] = []
+    while len(pairs):
+        user, others = np.unique(pairs, return_counts=True)
+        gone.append(int(user[np.lexsort((user, stay[user], -others))[0]]))
+        pairs = pairs[(pairs != gone[-1]).all(axis=1)]
+    names = tuple(trajectories.users[number].name for number in sorted(gone))
+    return _without(trajectories, gone), names
+
+
+def _without(trajectories: Trajectories, gone: list[int]) -> Trajectories:
+    stays = np.ones(len(trajectories), dtype=np.bool_)
+    stays[gone] = False
+    counts = np.diff(trajectories.first)
+    kept = np.repeat(stays, counts)
+    arrays = {name: getattr(trajectories, name)[kept] for name in ("time", "position", "yaw", "pitch", "speed")}
+    return replace(
+        trajectories,
+        users=tuple(user for user, stay in zip(trajectories.users, stays.tolist(), strict=True) if stay),
+        first=np.concatenate([[0], np.cumsum(counts[stays])]).astype(np.int64),
+        **arrays,
+    )

@@ -1,0 +1,223 @@
+"""Fit of road users to the road surface of a scene: heights, slopes, and removal where there is no road."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from ...arrays import Boolean, Float, Integer
+from ...counts import counted
+from ...errors import SeipError
+from ...geometry.plan import MIN_AREA, heights_over, plane_height, signed_area
+from ...site.scene_geometry import SceneGeometry, joined
+from .floating_car_data import listed, unwrapped
+from .smooth_walks import out_of_reach
+from .trajectories import LoadedTraffic, RoadUser, Trajectories
+
+ROAD_TOLERANCE = 1.0
+"""Metres in plan that the middle of a road user may be beside the road and still counts as on it.
+
+As far as that a bus of 12 m, which simulations move like a rod on its lane, cuts a tight corner.
+"""
+
+MAX_SAMPLES = 2_000  # of trajectories, by which they are told from those of another site
+WHEELBASE_SHARE = 0.6  # of the length of a vehicle: its pitch is that of the road between two axles this far apart
+MAX_GAP = 2.5  # sampling intervals; between samples further apart than this a road user was somewhere else
+
+_DIGITS = {"time": 3, "position": 3, "yaw": 4, "pitch": 4, "speed": 2}
+"""Of what is kept: a millimetre and a ten-thousandth of a radian, as fine as simulations write."""
+
+
+def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> LoadedTraffic:
+    """Fit road users to the road of a scene, leaving out samples off the road.
+
+    Vehicles stand on the roads, pedestrians on roads and pavements. Where surfaces lie above one another the one that
+    is nearest to the height in the trajectories counts, and the highest where they say none. A road user who leaves
+    the road or the scene and comes back, or whom the simulation puts somewhere else, is another one then: NAME/2.
+
+    Parameters
+    ----------
+    trajectories : Trajectories
+        Their heights may be NaN.
+
+    Returns
+    -------
+    LoadedTraffic
+        In the local axes of the scene, to the millimetre, with pitches.
+
+    Raises
+    ------
+    SeipError
+        Nobody comes near the region of interest, or most who do are off the road there: it is another map's traffic.
+    """
+    local = trajectories.moved_to(geometry.origin)
+    roads = _RoadSurface(joined(geometry.roads))
+    both = _RoadSurface(joined((*geometry.roads, *geometry.ground)))
+    user = np.repeat(np.arange(len(local)), np.diff(local.first))
+    walks = np.array([each.category == "pedestrian" for each in local.users], dtype=np.bool_)[user]
+
+    def height(plan: Float, hint: Float) -> Float:
+        found = np.empty(len(plan))
+        found[~walks] = roads.height(plan[~walks], hint[~walks])
+        found[walks] = both.height(plan[walks], hint[walks])
+        return found
+
+    plan = local.position[:, :2]
+    z = height(plan, local.position[:, 2])
+    on_road = np.isfinite(z)
+    hull = geometry.region.convex_hull
+    near = shapely.contains_xy(hull, plan[:, 0], plan[:, 1])
+    warnings = _off_the_road(local, user, near, on_road)
+    length = np.array([each.length for each in local.users])[user]
+    pitch = np.where(walks, 0.0, _pitch(height, plan, z, local.yaw, length))
+    fitted = replace(local, position=np.column_stack([plan, z]), pitch=pitch)
+    return LoadedTraffic(_rounded(_without_gaps(fitted, user, on_road)), warnings)
+
+
+def share_on_road(local: Trajectories, geometry: SceneGeometry) -> float:
+    """Return the share of vehicle samples that are on the road of the scene, 0 to 1.
+
+    Samples are those near the region of interest; where no vehicle comes near it, those within the extent of the roads.
+    On the road is within `ROAD_TOLERANCE` in plan and in height.
+
+    Parameters
+    ----------
+    local : Trajectories
+        In the local axes of the scene.
+
+    Returns
+    -------
+    float
+        Of at most `MAX_SAMPLES` samples, spread evenly; 1 without vehicles, and 0 where all of them are elsewhere.
+    """
+    user = np.repeat(np.arange(len(local)), np.diff(local.first))
+    drives = np.array([each.category != "pedestrian" for each in local.users], dtype=np.bool_)[user]
+    if not drives.any() or not geometry.roads:
+        return 1.0
+    x, y = local.position[:, 0], local.position[:, 1]
+    extent = shapely.MultiPoint(joined(geometry.roads)[:, :, :2].reshape(-1, 2)).envelope
+    areas = (geometry.region.convex_hull, extent)
+    within = (np.flatnonzero(drives & shapely.contains_xy(area, x, y)) for area in areas)
+    near = next((samples for samples in within if len(samples)), None)
+    if near is None:
+        return 0.0
+    sample = local.position[near[np.linspace(0, len(near) - 1, min(len(near), MAX_SAMPLES)).astype(np.int64)]]
+    height = _RoadSurface(joined(geometry.roads)).height(sample[:, :2], sample[:, 2])
+    return float(np.mean(np.abs(height - sample[:, 2]) <= ROAD_TOLERANCE))
+
+
+class _RoadSurface:
+    """Triangles (n, 3, 3) that road users can stand on."""
+
+    def __init__(self, triangles: Float) -> None:
+        self._triangles = triangles[np.abs(signed_area(triangles)) > MIN_AREA]
+        self._tree = shapely.STRtree(shapely.polygons(self._triangles[:, :, :2]))
+
+    def height(self, plan: Float, hint: Float) -> Float:
+        """Return the height (n,) of the surface at points (n, 2), nearest to a hint (n,); NaN off the road."""
+        point, heights = heights_over(plan, self._triangles)
+        height = _nearest_heights(len(plan), point, heights, hint)
+        beside = np.flatnonzero(np.isnan(height))
+        places = shapely.points(plan[beside])
+        number, triangle = self._tree.query_nearest(places, max_distance=ROAD_TOLERANCE)
+        nearest = shapely.get_coordinates(
+            shapely.get_point(shapely.shortest_line(self._tree.geometries[triangle], places[number]), 0)
+        )
+        heights = plane_height(self._triangles[triangle], nearest)
+        height[beside] = _nearest_heights(len(beside), number, heights, hint[beside])
+        return height
+
+
+def _nearest_heights(count: int, point: Integer, heights: Float, hint: Float) -> Float:
+    """Of the heights found at points return for each the one nearest to its hint, or the highest where that is NaN."""
+    wanted = np.where(np.isnan(hint[point]), np.inf, hint[point])
+    badness = np.where(np.isinf(wanted), -heights, np.abs(heights - wanted))
+    order = np.lexsort((badness, point))
+    first = np.unique(point[order], return_index=True)[1]
+    height = np.full(count, np.nan)
+    height[point[order][first]] = heights[order][first]
+    return height
+
+
+def _pitch(height: Callable[[Float, Float], Float], plan: Float, z: Float, yaw: Float, length: Float) -> Float:
+    """Return the slope of the road between the axles, radians; where one of them is off the road, up to the middle."""
+    half = WHEELBASE_SHARE / 2.0 * length
+    ahead = half[:, None] * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
+    front, rear = height(plan + ahead, z), height(plan - ahead, z)
+    rise = np.where(np.isnan(front), z, front) - np.where(np.isnan(rear), z, rear)
+    run = half * (np.isfinite(front).astype(float) + np.isfinite(rear))
+    pitch: Float = np.where(run > 0.0, np.arctan2(rise, np.where(run > 0.0, run, 1.0)), 0.0)
+    return pitch
+
+
+def _off_the_road(local: Trajectories, user: Integer, near: Boolean, on_road: Boolean) -> tuple[str, ...]:
+    """Return warnings on road users off the road near the region; raise SeipError where most are."""
+    count = len(local)
+    seen = np.bincount(user[near], minlength=count)
+    off = np.bincount(user[near & ~on_road], minlength=count)
+    visitors = int(np.count_nonzero(seen))
+    if not visitors:
+        raise SeipError(
+            f"FCD of another map: {counted(count, 'road user')}, none in the region of interest; "
+            "simulate on the scene's own map, and name its .net.xml where that has a netOffset"
+        )
+    astray = [local.users[number].name for number in np.flatnonzero(off)]
+    mostly = int(np.count_nonzero(off > seen / 2.0))
+    if mostly > visitors / 2.0:
+        raise SeipError(
+            f"FCD of another map: {mostly} of {counted(visitors, 'road user')} in the region of interest "
+            f"{'is' if mostly == 1 else 'are'} off the road, by more than {ROAD_TOLERANCE:g} m "
+            f"({listed(astray)}); simulate on the scene's own map, and name its .net.xml where that has a netOffset"
+        )
+    if not astray:
+        return ()
+    sentence = (
+        f"{len(astray)} of {counted(visitors, 'road user')} {'leaves' if len(astray) == 1 else 'leave'} the road by "
+        f"more than {ROAD_TOLERANCE:g} m and {'is' if len(astray) == 1 else 'are'} left out there: {listed(astray)}"
+    )
+    return (sentence,)
+
+
+def _without_gaps(trajectories: Trajectories, user: Integer, keep: Boolean) -> Trajectories:
+    """Keep some samples; a gap divides a road user into two, and a single sample is dropped."""
+    kept = np.flatnonzero(keep)
+    user, time = user[kept], trajectories.time[kept]
+    new = np.ones(len(kept), dtype=np.bool_)
+    new[1:] = (np.diff(user) != 0) | (np.diff(kept) > 1) | (np.diff(time) > _longest_gap(trajectories))
+    new[1:] |= out_of_reach(trajectories)[kept[1:] - 1]
+    begin = np.flatnonzero(new)
+    end = np.append(begin[1:], len(kept))
+    stays = end - begin > 1
+    begin, end = begin[stays], end[stays]
+    if not len(begin):
+        raise SeipError("no road user is on the road of the scene for two samples; simulate more of its traffic")
+    chosen = kept[np.concatenate([np.arange(a, b) for a, b in zip(begin, end, strict=True)])]
+    first = np.concatenate([[0], np.cumsum(end - begin)])
+    owner = user[begin]
+    visit = np.arange(len(owner)) - np.searchsorted(owner, owner)
+    return replace(
+        trajectories,
+        users=tuple(_visit(trajectories.users[a], b) for a, b in zip(owner.tolist(), visit.tolist(), strict=True)),
+        first=first.astype(np.int64),
+        time=trajectories.time[chosen],
+        position=trajectories.position[chosen],
+        yaw=unwrapped(trajectories.yaw[chosen], first),
+        pitch=trajectories.pitch[chosen],
+        speed=trajectories.speed[chosen],
+    )
+
+
+def _longest_gap(trajectories: Trajectories) -> float:
+    """Return how many seconds may lie between two samples of one stay."""
+    steps = np.delete(np.diff(trajectories.time), trajectories.first[1:-1] - 1)
+    return MAX_GAP * float(np.median(steps)) if len(steps) else 0.0
+
+
+def _visit(user: RoadUser, visit: int) -> RoadUser:
+    return user if visit == 0 else replace(user, name=f"{user.name}/{visit + 1}")
+
+
+def _rounded(trajectories: Trajectories) -> Trajectories:
+    arrays = {name: np.round(getattr(trajectories, name), digits) + 0.0 for name, digits in _DIGITS.items()}
+    return replace(trajectories, **arrays)

@@ -1,0 +1,117 @@
+"""Overlap of two runs of traffic: share of vehicles at the same place at the same instant."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ...arrays import Float
+from ...errors import SeipError
+from .trajectories import Trajectories
+
+MATCH_RADIUS = 1.0  # metres in plan within which two vehicles are in one place
+
+MAX_OVERLAP = 0.5
+"""Share of the vehicles beyond which two runs are held to be copies. Independent runs queue in the same places."""
+
+MOST_NAMED = 6  # pairs of runs that are named each; of more the range and the closest are said
+
+_INTERVAL = 1.0
+_SAME_TIME = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class VehiclePositions:
+    """Positions of the vehicles of a run, at some instants.
+
+    Parameters
+    ----------
+    name : str
+        Of the run, for messages.
+    time : (n,) float64, seconds
+        Ascending.
+    xy : sequence of (k, 2) float64, metres
+        At each instant, in plan.
+    """
+
+    name: str
+    time: Float
+    xy: Sequence[Float]
+
+
+def vehicle_positions(name: str, trajectories: Trajectories) -> VehiclePositions:
+    """Return where the vehicles of a run are at every full second; pedestrians are none."""
+    begin, end = trajectories.span
+    time = np.arange(np.ceil(begin / _INTERVAL), end / _INTERVAL + _SAME_TIME) * _INTERVAL
+    rolls = np.array([user.category != "pedestrian" for user in trajectories.users], dtype=bool)
+    snapshots = [trajectories.at(float(instant)) for instant in time]
+    return VehiclePositions(name, time, [snapshot.position[rolls[snapshot.user], :2] for snapshot in snapshots])
+
+
+def overlap_of(one: VehiclePositions, other: VehiclePositions) -> float | None:
+    """Return the share of the vehicles of a run that are within `MATCH_RADIUS` of one of the other at the same instant.
+
+    Instants are the same by the clock, or as long after the first: the larger share counts,
+    and of the two runs that which has more of its vehicles in the other.
+
+    Returns
+    -------
+    float or None
+        None where the runs have no instant in common.
+    """
+    if not len(one.time) or not len(other.time):
+        return None
+    shares = [_aligned(one, other, shift) for shift in {0.0, float(other.time[0] - one.time[0])}]
+    return max((share for share in shares if share is not None), default=None)
+
+
+def _aligned(one: VehiclePositions, other: VehiclePositions, shift: float) -> float | None:
+    """Return the share where the clock of the one is behind by so many seconds."""
+    wanted = one.time + shift
+    after = np.clip(np.searchsorted(other.time, wanted - _SAME_TIME), 0, len(other.time) - 1)
+    both = np.flatnonzero(np.abs(other.time[after] - wanted) <= _SAME_TIME)
+    if not len(both):
+        return None
+    close = np.zeros(2)
+    there = np.zeros(2)
+    for here, then in zip(both.tolist(), after[both].tolist(), strict=True):
+        pair = one.xy[here], other.xy[then]
+        there += [len(xy) for xy in pair]
+        if all(len(xy) for xy in pair):
+            close += [_near(*pair), _near(*pair[::-1])]
+    return float(np.max(close / np.maximum(there, 1)))
+
+
+def _near(xy: Float, others: Float) -> int:
+    """Return the number of points (n, 2) that have one of others (k, 2) nearby."""
+    nearby = shapely.STRtree(shapely.points(others)).query(
+        shapely.points(xy), predicate="dwithin", distance=MATCH_RADIUS
+    )
+    return len(np.unique(nearby[0]))
+
+
+def require_independent(pairs: Iterable[tuple[VehiclePositions, VehiclePositions]]) -> str:
+    """Return a sentence on how much the runs of each pair overlap.
+
+    Raises
+    ------
+    SeipError
+        A pair overlaps by more than `MAX_OVERLAP`.
+    """
+    said, shares = [], []
+    for one, other in pairs:
+        share = overlap_of(one, other)
+        if share is not None and share > MAX_OVERLAP:
+            raise SeipError(
+                f"{one.name} and {other.name} are nearly the same traffic: {share:.0%} of the vehicles of one are "
+                f"within {MATCH_RADIUS:g} m of one of the other at the same instant, and {MAX_OVERLAP:.0%} is the most "
+                "for runs that are to be independent: name runs that were simulated with other demand and other seeds"
+            )
+        said.append(f"{one.name} and {other.name} {'cannot be told' if share is None else format(share, '.0%')}")
+        shares.append(-1.0 if share is None else share)
+    if len(said) > MOST_NAMED:
+        known = [share for share in shares if share >= 0.0] or [0.0]
+        said = [f"{min(known):.0%} to {max(known):.0%} in {len(said)} pairs, most of {said[int(np.argmax(shares))]}"]
+    measure = f"vehicles of one run within {MATCH_RADIUS:g} m of one of another at the same instant"
+    return f"runs of traffic are independent (below {MAX_OVERLAP:.0%}): {measure}: {', '.join(said)}"

@@ -1,0 +1,290 @@
+"""Trajectories of road users."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ... import limits
+from ...arrays import Float, Integer
+from ...storage.array_file import ArrayFile, ArrayRule, ContentError
+from ...storage.files import digest
+
+MAX_BEND = 0.6  # of the lines of a body along one axis
+MAX_EXTENT = 1e6  # metres from one sample to another at most, along each axis
+
+_ARRAYS = {
+    "origin": ArrayRule("f8", (3,), limits.MAP_COORDINATE),
+    "first": ArrayRule("i8", ("users + 1",), limits.COUNT),
+    "time": ArrayRule("f8", ("samples",), limits.TIME),
+    "position": ArrayRule("f8", ("samples", 3), limits.MAP_COORDINATE),
+    "yaw": ArrayRule("f8", ("samples",), limits.UNWRAPPED_ANGLE),
+    "pitch": ArrayRule("f8", ("samples",), limits.PITCH),
+    "speed": ArrayRule("f8", ("samples",), limits.SPEED),
+}
+FILE = ArrayFile(
+    "seip.trajectories", 2, "file of trajectories", "import or simulate them again", _ARRAYS, undigested=True
+)
+
+CATEGORIES = ("car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian")  # of road users
+
+
+@dataclass(frozen=True)
+class RoadUser:
+    """One road user and its size.
+
+    Parameters
+    ----------
+    name : str
+        Its id in the simulation.
+    category : str
+        One of `CATEGORIES`.
+    length, width, height : float, metres
+    paint : float, 0 to 1
+        Reflectivity of its painted parts, or of its clothes.
+    shape : (4,) float
+        How the lines of its body differ from those of its model: see `bent`. First two for the length, then two for
+        the height; the absolute values of each two add up to `MAX_BEND` at most.
+    """
+
+    name: str
+    category: str
+    length: float
+    width: float
+    height: float
+    paint: float = 0.5
+    shape: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+
+
+def bent(share: Float, shift: float, spread: float) -> Float:
+    """Return shares, 0 to 1, of a length moved along it: a cubic that keeps both ends and the order of all.
+
+    Its slope is 1 − |shift| − |spread| at least.
+
+    Parameters
+    ----------
+    shift : float
+        Moves all shares forward, the middle by a quarter of this.
+    spread : float
+        Moves shares below the middle back and those above it forward.
+    """
+    middle = 2.0 * share - 1.0
+    moved: Float = share + share * (1.0 - share) * (shift + spread * middle)
+    return moved
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """Positions and headings of the k road users present at one instant.
+
+    Parameters
+    ----------
+    time : float, seconds
+    user : (k,) int64
+        Index into the trajectories' road users, ascending.
+    position : (k, 3) float64, metres
+        Middle of each road user's underside, on the road, local site axes.
+    yaw : (k,) float64, radians
+        Of its heading, counter-clockwise from +x.
+    pitch : (k,) float64, radians
+        Of the road under it, nose up positive.
+    speed : (k,) float64, metres per second
+    """
+
+    time: float
+    user: Integer
+    position: Float
+    yaw: Float
+    pitch: Float
+    speed: Float
+
+    def __len__(self) -> int:
+        return len(self.user)
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectories:
+    """Samples of all road users' motion, one road user after the other; n samples.
+
+    Parameters
+    ----------
+    origin : (3,) float64, metres
+        Map coordinates of the local origin: map = local + origin.
+    first : (u + 1,) int64
+        Samples of road user i are ``first[i]`` up to ``first[i + 1]``, one or more.
+    time : (n,) float64, seconds
+        Strictly increasing for each road user.
+    position : (n, 3) float64, metres
+        Middle of the underside, on the road, local site axes.
+    yaw : (n,) float64, radians
+        Counter-clockwise from +x and unwrapped: neighbouring samples never differ by more than π.
+    pitch : (n,) float64, radians
+        Nose up positive.
+    speed : (n,) float64, metres per second
+    source : str
+        What they were made from, for people: the file or the simulation and its seed.
+    """
+
+    users: tuple[RoadUser, ...]
+    origin: Float
+    first: Integer
+    time: Float
+    position: Float
+    yaw: Float
+    pitch: Float
+    speed: Float
+    source: str = ""
+
+    def __len__(self) -> int:
+        return len(self.users)
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of who moves how, whatever the road users and the source are called."""
+        sizes = [_look(user) for user in self.users]
+        return digest(repr(sizes), self.first, self.time, self.position, self.yaw, self.pitch, self.speed)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time of any sample, seconds."""
+        return float(self.time.min()), float(self.time.max())
+
+    def at(self, time: float) -> Snapshot:
+        """Return who is on the road at an instant, between two samples on the straight line from one to the other.
+
+        Parameters
+        ----------
+        time : float, seconds
+
+        Returns
+        -------
+        Snapshot
+            Of the road users whose first sample is not later and whose last is not earlier.
+        """
+        begin, end = self.time[self.first[:-1]], self.time[self.first[1:] - 1]
+        user = np.flatnonzero((begin <= time) & (time <= end))
+        before = np.array([self._last_not_after(int(number), time) for number in user], dtype=np.int64)
+        after = np.minimum(before + 1, self.first[user + 1] - 1)
+        gap = self.time[after] - self.time[before]
+        share = np.where(gap > 0, (time - self.time[before]) / np.where(gap > 0, gap, 1.0), 0.0)
+
+        def between(values: Float) -> Float:
+            part = share if values.ndim == 1 else share[:, None]
+            moved: Float = values[before] + part * (values[after] - values[before])
+            return moved
+
+        return Snapshot(
+            time=time,
+            user=user,
+            position=between(self.position),
+            yaw=between(self.yaw),
+            pitch=between(self.pitch),
+            speed=between(self.speed),
+        )
+
+    def _last_not_after(self, user: int, time: float) -> int:
+        begin, end = int(self.first[user]), int(self.first[user + 1])
+        return begin + int(np.searchsorted(self.time[begin:end], time, side="right")) - 1
+
+    def moved_to(self, origin: Float) -> Trajectories:
+        """Return the same motion in the local axes of another origin."""
+        return replace(self, origin=origin, position=self.position + (self.origin - origin))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the trajectories as npz: the arrays by their names, and the text ``header`` (JSON)."""
+        header = {"source": self.source, "users": [_as_record(user) for user in self.users]}
+        FILE.save(path, header, {name: getattr(self, name) for name in _ARRAYS})
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Trajectories:
+        """Read trajectories.
+
+        Raises
+        ------
+        SeipError
+            The file is not there, damaged, or something else.
+        """
+        with FILE.reading(path) as (header, arrays):
+            users = tuple(_from_record(user) for user in header["users"])
+            read = cls(users=users, source=str(header["source"]), **{name: arrays[name] for name in _ARRAYS})
+            _check_users(users)
+            _check_samples(read)
+            return read
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedTraffic:
+    """Trajectories, and what a user should know before trusting them (one sentence each)."""
+
+    trajectories: Trajectories
+    warnings: tuple[str, ...]
+
+
+def _look(user: RoadUser) -> tuple[object, ...]:
+    """Return what a road user looks like, its shape where that is not its model's own."""
+    look = (user.category, user.length, user.width, user.height, user.paint)
+    return (*look, user.shape) if any(user.shape) else look
+
+
+def _as_record(user: RoadUser) -> dict[str, Any]:
+    """Return a road user for a header; its shape where that is not its model's own."""
+    record = asdict(user)
+    if not any(user.shape):
+        del record["shape"]
+    return record
+
+
+def _from_record(record: dict[str, Any]) -> RoadUser:
+    return RoadUser(**{**record, "shape": tuple(record.get("shape", RoadUser.shape))})
+
+
+def _check_users(users: tuple[RoadUser, ...]) -> None:
+    """Raise `ContentError` where a road user is none."""
+    for user in users:
+        sizes = (user.length, user.width, user.height)
+        if not isinstance(user.name, str) or user.category not in CATEGORIES:
+            raise ContentError(f"road user {str(user.name)[:40]!r} is {str(user.category)[:40]!r}")
+        if not limits.ROAD_USER_SIZE.allow(sizes):
+            raise ContentError(f"road user {user.name[:40]!r} is {str(sizes)[:80]} m large")
+        if not limits.SHARE.allow(user.paint):
+            raise ContentError(f"the paint of road user {user.name[:40]!r} reflects {str(user.paint)[:40]}")
+        if not is_shape(user.shape):
+            raise ContentError(f"the shape of road user {user.name[:40]!r} is {str(user.shape)[:80]}")
+
+
+def is_shape(values: Sequence[object]) -> bool:
+    """Return whether values are a shape of a road user."""
+    bends = [abs(value) for value in values if isinstance(value, int | float)]
+    return len(bends) == len(values) == 4 and sum(bends[:2]) <= MAX_BEND and sum(bends[2:]) <= MAX_BEND
+
+
+def _check_samples(read: Trajectories) -> None:
+    """Raise `ContentError` where samples contradict each other or the road users."""
+    count, first = len(read.time), read.first
+    if not len(read.users) or len(first) != len(read.users) + 1:
+        raise ContentError(f"it names {len(read.users)} road users and has the samples of {len(first) - 1}")
+    if first[0] != 0 or first[-1] != count or (np.diff(first) < 1).any():
+        raise ContentError("its samples are not those of its road users, one after the other")
+    within = np.ones(max(count - 1, 0), dtype=np.bool_)
+    within[first[1:-1] - 1] = False
+    late = within & (np.diff(read.time) <= 0)
+    if late.any():
+        user = int(np.searchsorted(first, np.flatnonzero(late)[0], side="right")) - 1
+        raise ContentError(f"the times of road user {read.users[user].name[:40]!r} do not ascend")
+    if (within & (np.abs(np.diff(read.yaw)) > math.pi + _TURN_TOLERANCE)).any():
+        raise ContentError("a heading leaps by more than half a turn")
+    begin, end = read.span
+    if not limits.DURATION.allow(end - begin):
+        raise ContentError(f"it lasts {end - begin:g} s")
+    widest = float(np.ptp(read.position, axis=0).max())
+    if widest > MAX_EXTENT:
+        raise ContentError(f"its road users are up to {widest / 1e3:,.0f} km apart")
+
+
+_TURN_TOLERANCE = 1e-3  # radians by which rounding may widen a turn

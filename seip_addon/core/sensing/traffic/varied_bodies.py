@@ -1,0 +1,209 @@
+"""Bodies drawn at random for the road users of a run: sizes as real ones have them, roof and bonnet lines."""
+
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...arrays import Float
+from ...errors import SeipError
+from ...progress import Progress
+from .overlaps import find_overlaps
+from .trajectories import CATEGORIES, RoadUser, Trajectories
+
+CORRELATION = 0.5  # of any two dimensions of one kind of road user
+REACH = 2.0  # standard deviations from the mean that a drawn dimension lies at most
+MAX_CHANGE = 0.5  # share by which `resized` changes a dimension at most
+_HALVINGS = 3  # times that a growth which makes road users overlap is halved before it is given up
+
+
+@dataclass(frozen=True)
+class BodyKind:
+    """A kind of road user: its share within its category, and mean and standard deviation of its dimensions.
+
+    Parameters
+    ----------
+    length, width, height : (mean, standard deviation), metres
+        Of normal distributions that are cut off `REACH` standard deviations from the mean.
+    """
+
+    share: float
+    length: tuple[float, float]
+    width: tuple[float, float]
+    height: tuple[float, float]
+
+
+KINDS: Mapping[str, Mapping[str, BodyKind]] = {
+    "car": {
+        "city car": BodyKind(0.10, (3.68, 0.04), (1.66, 0.03), (1.50, 0.03)),
+        "supermini": BodyKind(0.22, (4.03, 0.07), (1.74, 0.03), (1.46, 0.04)),
+        "compact": BodyKind(0.20, (4.32, 0.08), (1.80, 0.03), (1.47, 0.03)),
+        "saloon or estate": BodyKind(0.18, (4.78, 0.12), (1.85, 0.03), (1.46, 0.03)),
+        "small SUV": BodyKind(0.17, (4.32, 0.11), (1.82, 0.03), (1.61, 0.04)),
+        "large SUV": BodyKind(0.08, (4.85, 0.15), (1.94, 0.04), (1.73, 0.05)),
+        "people carrier": BodyKind(0.05, (4.60, 0.20), (1.84, 0.04), (1.68, 0.06)),
+    },
+    "van": {
+        "small van": BodyKind(0.35, (4.52, 0.14), (1.85, 0.03), (1.85, 0.03)),
+        "medium van": BodyKind(0.25, (5.20, 0.16), (1.96, 0.04), (1.98, 0.05)),
+        "large van": BodyKind(0.28, (5.95, 0.20), (2.04, 0.03), (2.60, 0.08)),
+        "long van": BodyKind(0.12, (6.90, 0.20), (2.05, 0.03), (2.77, 0.08)),
+    },
+    "truck": {
+        "light truck": BodyKind(0.30, (6.60, 0.45), (2.25, 0.08), (2.90, 0.22)),
+        "medium truck": BodyKind(0.40, (8.00, 0.45), (2.48, 0.04), (3.45, 0.15)),
+        "large truck": BodyKind(0.30, (9.90, 0.60), (2.54, 0.01), (3.75, 0.10)),
+    },
+    "bus": {
+        "minibus": BodyKind(0.15, (7.60, 0.30), (2.25, 0.08), (2.85, 0.08)),
+        "midibus": BodyKind(0.25, (9.60, 0.50), (2.44, 0.03), (3.00, 0.08)),
+        "city bus": BodyKind(0.45, (12.05, 0.12), (2.54, 0.01), (3.15, 0.12)),
+        "coach": BodyKind(0.15, (12.80, 0.45), (2.54, 0.01), (3.65, 0.12)),
+    },
+    "motorcycle": {
+        "scooter": BodyKind(0.50, (1.93, 0.08), (0.74, 0.03), (1.66, 0.05)),
+        "motorcycle": BodyKind(0.50, (2.15, 0.08), (0.84, 0.04), (1.61, 0.06)),
+    },
+    "bicycle": {
+        "bicycle": BodyKind(0.80, (1.80, 0.06), (0.62, 0.03), (1.75, 0.07)),
+        "cargo bicycle": BodyKind(0.20, (2.45, 0.12), (0.70, 0.04), (1.75, 0.07)),
+    },
+    "pedestrian": {
+        "adult": BodyKind(0.88, (0.48, 0.07), (0.56, 0.04), (1.71, 0.09)),
+        "child": BodyKind(0.12, (0.36, 0.04), (0.44, 0.03), (1.32, 0.09)),
+    },
+}
+"""Spread of what drives and walks in European cities, riders included; by published dimensions of common models.
+
+Articulated vehicles are none of them: their bodies bend, and those here do not.
+"""
+
+SHAPES: Mapping[str, tuple[float, float, float, float]] = dict.fromkeys(CATEGORIES, (0.10, 0.06, 0.10, 0.06)) | {
+    "car": (0.24, 0.10, 0.14, 0.08),
+    "van": (0.20, 0.10, 0.12, 0.08),
+}
+"""Absolute value of each number of a shape at most: the foot of a car's windscreen lies up to 0.2 m elsewhere."""
+
+
+def varied(trajectories: Trajectories, seed: int) -> Generator[Progress, None, Trajectories]:
+    """Give each road user a size and a shape of its own, drawn from `KINDS` and `SHAPES`.
+
+    One that is longer than any kind of its category keeps its size. One that
+    would run into another grows by less, down to its own size, so that in dense
+    traffic sizes are somewhat below those of the table.
+
+    Parameters
+    ----------
+    seed : int, 0 or above
+        The same bodies for the same trajectories and seed.
+    """
+    random = _generator(seed)
+    drawn = [_size_within_kinds(user, random) for user in trajectories.users]
+    return (yield from with_sizes(shaped(trajectories, seed), np.array(drawn)))
+
+
+def shaped(trajectories: Trajectories, seed: int) -> Trajectories:
+    """Give each road user a shape of its own, and leave its size."""
+    random = _generator(seed, 1)
+    return replace(
+        trajectories,
+        users=tuple(replace(user, shape=draw_shape(user.category, random)) for user in trajectories.users),
+    )
+
+
+def resized(trajectories: Trajectories, change: float, seed: int) -> Generator[Progress, None, Trajectories]:
+    """Multiply each dimension of each road user by a factor of its own, uniform from 1 − ``change`` to 1 + ``change``.
+
+    One that would run into another grows by less. A larger change of the same
+    seed changes each dimension the same way, and more; other traffic has other
+    factors.
+
+    Raises
+    ------
+    SeipError
+        The change is below 0 or above `MAX_CHANGE`.
+    """
+    if not 0.0 <= change <= MAX_CHANGE:
+        raise SeipError(f"sizes change by a share of 0 to {MAX_CHANGE:g}, not {change:g}")
+    sizes = np.array([_size(user) for user in trajectories.users])
+    factors = 1.0 + change * _generator(seed, int(trajectories.key, 16)).uniform(-1.0, 1.0, sizes.shape)
+    return (yield from with_sizes(trajectories, sizes * factors))
+
+
+def with_sizes(trajectories: Trajectories, wanted: Float) -> Generator[Progress, None, Trajectories]:
+    """Give each road user a size; one that would run into another grows by less, down to its own size.
+
+    Parameters
+    ----------
+    wanted : (u, 3) float64, metres
+        Length, width and height of each.
+
+    Returns
+    -------
+    Trajectories
+        In which no two overlap that did not before.
+    """
+    users = trajectories.users
+    own = np.array([_size(user) for user in users])
+    before = yield from find_overlaps(trajectories)
+    known = {tuple(pair) for pair in before.pair.tolist()}
+    growth = np.ones(len(users))
+    found = trajectories
+    for halvings in range(_HALVINGS + 1):
+        sizes = np.where(wanted > own, own + growth[:, None] * (wanted - own), wanted)
+        sizes = np.where(sizes == own, own, sizes.round(3))
+        found = replace(trajectories, users=tuple(map(_with_size, users, sizes.tolist())))
+        overlaps = yield from find_overlaps(found)
+        pairs = [pair for pair in overlaps.pair.tolist() if tuple(pair) not in known]
+        if not pairs:
+            break
+        growth[np.unique(pairs)] *= 0.5 if halvings < _HALVINGS - 1 else 0.0
+    return found
+
+
+def draw_size(category: str, random: np.random.Generator) -> tuple[float, float, float]:
+    """Return a length, width and height of a category, metres to the centimetre."""
+    kinds = list(KINDS[category].values())
+    shares = np.array([kind.share for kind in kinds])
+    kind = kinds[int(random.choice(len(kinds), p=shares / shares.sum()))]
+    return _draw_of(kind, random)
+
+
+def draw_shape(category: str, random: np.random.Generator) -> tuple[float, float, float, float]:
+    """Return a shape of a category: uniform within its `SHAPES`."""
+    shift, spread, rise, stretch = (random.uniform(-1.0, 1.0, 4) * SHAPES[category]).round(4).tolist()
+    return shift, spread, rise, stretch
+
+
+def _draw_of(kind: BodyKind, random: np.random.Generator) -> tuple[float, float, float]:
+    means, deviations = np.array([kind.length, kind.width, kind.height]).T
+    while True:
+        common, own = random.standard_normal(), random.standard_normal(3)
+        scores = np.sqrt(CORRELATION) * common + np.sqrt(1.0 - CORRELATION) * own
+        if np.abs(scores).max() <= REACH:
+            length, width, height = (means + deviations * scores).round(2).tolist()
+            return length, width, height
+
+
+def _size_within_kinds(user: RoadUser, random: np.random.Generator) -> tuple[float, float, float]:
+    size = draw_size(user.category, random)
+    longest = max(kind.length[0] + REACH * kind.length[1] for kind in KINDS[user.category].values())
+    return size if user.length <= longest else _size(user)
+
+
+def _with_size(user: RoadUser, size: list[float]) -> RoadUser:
+    length, width, height = size
+    return replace(user, length=length, width=width, height=height)
+
+
+def _size(user: RoadUser) -> tuple[float, float, float]:
+    return user.length, user.width, user.height
+
+
+def _generator(seed: int, stream: int = 0) -> np.random.Generator:
+    if seed < 0:
+        raise SeipError(f"a seed of bodies is a whole number of 0 or more, not {seed}")
+    return np.random.default_rng([seed, _STREAM, stream])
+
+
+_STREAM = 0x626F6479  # keeps these draws apart from others of the same seed

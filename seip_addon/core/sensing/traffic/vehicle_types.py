@@ -1,0 +1,125 @@
+"""Category and size of SUMO's vehicle types."""
+
+import math
+import os
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...errors import SeipError
+from ...limits import ROAD_USER_SIZE
+from ...progress import Progress
+from ...storage.xml_stream import Attributes, quoted, read_tags
+
+
+@dataclass(frozen=True)
+class VehicleType:
+    """A type of road user.
+
+    Parameters
+    ----------
+    category : str
+        One of `seip_addon.core.sensing.traffic.CATEGORIES`.
+    length, width, height : float, metres
+    """
+
+    category: str
+    length: float
+    width: float
+    height: float
+
+
+CAR = VehicleType("car", 5.0, 1.8, 1.5)  # what SUMO drives where nothing else is said
+PERSON = VehicleType("pedestrian", 0.215, 0.478, 1.719)  # what SUMO lets walk where nothing else is said
+
+_CLASSES = {
+    "pedestrian": PERSON,
+    "wheelchair": VehicleType("pedestrian", 0.8, 0.8, 1.5),
+    "bicycle": VehicleType("bicycle", 1.6, 0.65, 1.7),
+    "scooter": VehicleType("bicycle", 1.2, 0.5, 1.7),
+    "moped": VehicleType("motorcycle", 2.1, 0.78, 1.7),
+    "motorcycle": VehicleType("motorcycle", 2.2, 0.9, 1.5),
+    "delivery": VehicleType("van", 6.5, 2.16, 2.86),
+    "emergency": VehicleType("van", 6.5, 2.16, 2.86),
+    "truck": VehicleType("truck", 7.1, 2.4, 2.4),
+    "trailer": VehicleType("truck", 16.5, 2.55, 4.0),
+    "bus": VehicleType("bus", 12.0, 2.5, 3.4),
+    "coach": VehicleType("bus", 14.0, 2.6, 4.0),
+    "tram": VehicleType("bus", 22.0, 2.4, 3.2),
+}
+"""Sizes that a vClass brings with it (SUMO's "Vehicle Type Parameter Defaults"); all others are cars."""
+
+_SHAPES_OF = {
+    "pedestrian": ("pedestrian",),
+    "bicycle": ("bicycle", "scooter"),
+    "motorcycle": ("moped", "motorcycle"),
+    "car": ("passenger", "passenger/sedan", "passenger/hatchback", "passenger/wagon", "taxi", "evehicle", "police"),
+    "van": ("passenger/van", "delivery", "emergency"),
+    "truck": ("firebrigade", "truck", "truck/semitrailer", "truck/trailer"),
+    "bus": ("bus", "bus/coach", "bus/flexible", "bus/trolley"),
+}
+"""Values of guiShape, which says more than the vClass where both are given, by category."""
+
+_SHAPES = {shape: category for category, shapes in _SHAPES_OF.items() for shape in shapes}
+
+BUILT_IN = {
+    "DEFAULT_VEHTYPE": CAR,
+    "DEFAULT_TAXITYPE": CAR,
+    "DEFAULT_PEDTYPE": PERSON,
+    "DEFAULT_BIKETYPE": _CLASSES["bicycle"],
+}
+"""Types that SUMO knows without a file."""
+
+
+def read_vehicle_types(paths: Sequence[str | os.PathLike[str]]) -> Generator[Progress, None, dict[str, VehicleType]]:
+    """Read the types from route and additional files, those within distributions included.
+
+    Parameters
+    ----------
+    paths : sequence of path-like
+        XML, may be packed with gzip.
+
+    Returns
+    -------
+    dict of str to VehicleType
+        By id, SUMO's own among them. What a type does not say is as in SUMO: by its vClass.
+
+    Raises
+    ------
+    SeipError
+        A file cannot be read, or a size in it makes no sense.
+    """
+    types = dict(BUILT_IN)
+    for path in paths:
+        name = Path(path).name
+
+        def take(tag: str, attributes: Attributes, name: str = name) -> None:
+            if tag == "vType":
+                types[attributes.get("id", "")] = _vehicle_type(attributes, name)
+
+        yield from read_tags(path, take)
+    return types
+
+
+def _vehicle_type(attributes: Attributes, file: str) -> VehicleType:
+    usual = _CLASSES.get(attributes.get("vClass", "passenger"), CAR)
+    return VehicleType(
+        category=_SHAPES.get(attributes.get("guiShape", ""), usual.category),
+        length=_size(attributes, "length", usual.length, file),
+        width=_size(attributes, "width", usual.width, file),
+        height=_size(attributes, "height", usual.height, file),
+    )
+
+
+def _size(attributes: Attributes, what: str, usual: float, file: str) -> float:
+    text = attributes.get(what)
+    if text is None:
+        return usual
+    try:
+        size = float(text)
+    except ValueError:
+        size = math.nan
+    if not ROAD_USER_SIZE.allow(size):
+        kind = quoted(attributes.get("id", ""))
+        raise SeipError(f"{file}: {what}={quoted(text)} of vType {kind} is no size in metres; correct it")
+    return size

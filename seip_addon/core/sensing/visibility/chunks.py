@@ -1,0 +1,139 @@
+"""Chunks of the visibility grid, which are computed in any order, on any machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Float, Integer
+from ...progress import REPORT_INTERVAL, Progress
+from ...site.candidates import Candidates
+from ...site.site import Site
+from ..lidar.model import LidarModel
+from .visibility_model import VisibilityModel
+
+_POSITIONS_IN_A_CHUNK = 16  # a second's work or less
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Rows of the visibility grid for k candidate poses, bit-packed.
+
+    Parameters
+    ----------
+    packed : (k, ceil(t / 8)) uint8
+        Visibility of t targets from each pose, packed along axis 1 by `numpy.packbits`.
+    rays : int
+        How many rays were cast for it.
+    """
+
+    packed: NDArray[np.uint8]
+    rays: int
+
+
+def compute_rows(
+    model: VisibilityModel, candidates: Candidates, models: Mapping[str, LidarModel], poses: Integer
+) -> Rows:
+    """Compute which targets some candidate poses see.
+
+    Parameters
+    ----------
+    models : mapping of str to LidarModel
+        At least those that the candidates name.
+    poses : (k,) int64
+    """
+    packed = np.zeros((len(poses), (model.targets + 7) // 8), dtype=np.uint8)
+    rays = 0
+    for members in sharing_rays(candidates.xyz[poses], candidates.yaw[poses], candidates.tilt[poses]):
+        first = poses[members[0]]
+        types = [models[key] for key in candidates.sensor[poses[members]].tolist()]
+        if candidates.tilt[first] == 0:
+            seen, cast = model.see_upright(types, candidates.xyz[first], float(candidates.yaw[first]))
+        else:
+            seen, cast = model.see_all(types, candidates.xyz[first], candidates.orientation(int(first)))
+        packed[members] = np.packbits(seen, axis=1)
+        rays += cast
+    return Rows(packed, rays)
+
+
+def sharing_rays(xyz: Float, yaw: Float, tilt: Float) -> list[Integer]:
+    """Group poses that have position, yaw and tilt in common: their sensors can share rays.
+
+    Parameters
+    ----------
+    xyz : (c, 3) float64, metres
+    yaw, tilt : (c,) float64, radians
+
+    Returns
+    -------
+    list of (k,) int64
+        In the order of their first poses.
+    """
+    _, first, place = np.unique(np.column_stack([xyz, yaw, tilt]), axis=0, return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))[place.ravel()]
+    order = np.argsort(rank, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(rank))[:-1])
+
+
+def chunks_of(site: Site) -> list[Integer]:
+    """Divide the poses of a site into chunks of work; poses that share rays stay together."""
+    groups = sharing_rays(site.candidates.xyz, site.candidates.yaw, site.candidates.tilt)
+    begins = range(0, len(groups), _POSITIONS_IN_A_CHUNK)
+    return [np.concatenate(groups[begin : begin + _POSITIONS_IN_A_CHUNK]) for begin in begins]
+
+
+class Checkpoint(Protocol):
+    """Storage in which finished chunks outlive an interruption."""
+
+    def load(self, number: int) -> Rows | None:
+        """Return a stored chunk, or None."""
+
+    def save(self, number: int, rows: Rows) -> None:
+        """Store a chunk."""
+
+
+def compute_chunks(
+    chunks: Sequence[Integer], submit: Callable[[Integer], Future[Rows]], checkpoint: Checkpoint | None = None
+) -> Generator[Progress, None, list[Rows]]:
+    """Compute chunks with an executor and collect the results.
+
+    Parameters
+    ----------
+    chunks : sequence of (k,) int64
+        Candidate poses.
+    submit : callable
+        Starts the work on one chunk.
+    checkpoint : Checkpoint, optional
+        Chunks in it are not computed again; those that are finished are added.
+
+    Returns
+    -------
+    list of Rows
+        One for each chunk.
+    """
+    loaded = {number: checkpoint.load(number) for number in range(len(chunks))} if checkpoint else {}
+    rows = {number: found for number, found in loaded.items() if found and len(found.packed) == len(chunks[number])}
+    total = sum(map(len, chunks))
+    done = sum(len(chunks[number]) for number in rows)
+    yield Progress(done, total, "visibility")
+    numbers = {submit(chunk): number for number, chunk in enumerate(chunks) if number not in rows}
+    pending = set(numbers)
+    try:
+        while pending:
+            finished, pending = wait(pending, REPORT_INTERVAL, FIRST_COMPLETED)  # so that the caller can cancel soon
+            for future in finished:
+                number = numbers[future]
+                rows[number] = future.result()
+                if checkpoint:
+                    checkpoint.save(number, rows[number])
+                done += len(chunks[number])
+            yield Progress(done, total, "visibility")
+    finally:
+        for future in pending:
+            future.cancel()
+    return [rows[number] for number in range(len(chunks))]

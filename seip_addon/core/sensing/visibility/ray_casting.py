@@ -1,0 +1,276 @@
+"""Ray casting against static triangles, behind one interface.
+
+Blender's BVH tree exists within Blender's Python alone and is imported where
+its caster is made. Embree (embreex) is used when it is installed.
+"""
+
+from __future__ import annotations
+
+import functools
+import gc
+import importlib.util
+import itertools
+import operator
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Literal, Protocol
+
+import numpy as np
+
+from ...arrays import Boolean, Float, Integer
+from ...errors import SeipError
+
+Engine = Literal["auto", "bvh", "embree"]
+
+# Rays are cast a little farther than asked for and cut off afterwards, in float64: a hit at the very end of one ray
+# is then the same as on a longer ray.
+_EXCESS = 1 + 1e-6
+
+_MAX_NEEDLE_HEIGHT = 1 / 300
+"""Height over longest side below which Embree's float32 distances are off by centimetres, though its hits are right."""
+
+MAX_THREADS = min(4, os.cpu_count() or 1)
+"""That cast at once to advantage: the work between casts holds Python's lock for a part of the time."""
+
+
+class RayCaster(Protocol):
+    """Interface of ray casters. Both sides of a triangle stop a ray.
+
+    Attributes
+    ----------
+    name : str
+        Of the engine, ``bvh`` or ``embree``.
+    triangles : (n, 3, 3) float64, metres
+        As they were given, so that hits index them.
+    threads : int
+        How many threads may cast at once to advantage.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name of the engine."""
+
+    @property
+    def triangles(self) -> Float:
+        """The triangles that hits index."""
+
+    @property
+    def threads(self) -> int:
+        """Number of threads that may cast at once to advantage."""
+
+    def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
+        """Cast rays from one point, or each from a point of its own.
+
+        Parameters
+        ----------
+        origin : (3,) or (n, 3) float64, metres
+        directions : (n, 3) float64
+            Unit vectors.
+        max_range : float, metres
+            What is farther away is not hit.
+
+        Returns
+        -------
+        distance : (n,) float64, metres
+            To the first triangle; infinite on a miss. A ray's result does not
+            depend on the rays that are cast with it.
+        triangle : (n,) int64
+            Its index; -1 on a miss.
+        """
+
+
+def engine_name(engine: Engine) -> Engine:
+    """Return ``bvh`` or ``embree``; for ``auto`` Embree where it is installed, else Blender's BVH tree."""
+    if engine == "auto":
+        return "embree" if importlib.util.find_spec("embreex") else "bvh"
+    return engine
+
+
+def make_ray_caster(triangles: Float, engine: Engine = "auto", keep: Boolean | None = None) -> RayCaster:
+    """Build a ray caster; see `engine_name` for ``auto``.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float64, metres
+    engine : {"auto", "bvh", "embree"}
+    keep : (n,) bool, optional
+        Which of them stop rays; all if not given. What a ray that meets these alone
+        hits, and how far away, is the same bits whatever else is kept.
+
+    Raises
+    ------
+    SeipError
+        A coordinate is not finite, or the engine is not there.
+    """
+    name = engine_name(engine)
+    if name == "embree":
+        return EmbreeRayCaster(triangles, keep)
+    if name == "bvh":
+        return BvhRayCaster(triangles, keep)
+    raise SeipError(f"no ray-casting engine '{engine}'; choose auto, bvh or embree")
+
+
+_FACE, _DISTANCE = operator.itemgetter(2), operator.itemgetter(3)  # of what Blender's tree returns
+
+
+class BvhRayCaster:
+    """Casts rays with ``mathutils.bvhtree``.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float64, metres
+    keep : (n,) bool, optional
+        Which of them stop rays.
+    """
+
+    name = "bvh"
+    threads = 1  # casting a ray holds Python's lock
+
+    def __init__(self, triangles: Float, keep: Boolean | None = None) -> None:
+        try:
+            from mathutils.bvhtree import BVHTree  # noqa: PLC0415 - exists within Blender's Python alone
+        except ImportError as error:
+            raise SeipError(
+                "the ray-casting engine bvh needs Blender's Python: run within Blender, or import bpy first"
+            ) from error
+        self.triangles = triangles
+        self._index, self._centre, corners = _rebased(triangles, keep)
+        with _no_garbage_collection():  # else it walks the growing lists again and again
+            points = corners.reshape(-1, 3).tolist()
+            faces = np.arange(len(points)).reshape(-1, 3).tolist()
+            self._tree = BVHTree.FromPolygons(points, faces, all_triangles=True)
+
+    def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
+        """Cast rays; see `RayCaster.cast`."""
+        start = (origin - self._centre).tolist()
+        starts = itertools.repeat(start) if origin.ndim == 1 else start
+        with _no_garbage_collection():
+            hits = list(map(self._tree.ray_cast, starts, directions.tolist(), itertools.repeat(max_range * _EXCESS)))
+            # None, on a miss, becomes NaN
+            face = np.array(list(map(_FACE, hits)), dtype=np.float64)
+            distance = np.array(list(map(_DISTANCE, hits)), dtype=np.float64)
+        return _result(distance, np.where(face >= 0, face, -1.0).astype(np.int64), self._index, max_range)
+
+
+class EmbreeRayCaster:
+    """Casts rays with Embree, through embreex.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float64, metres
+    keep : (n,) bool, optional
+        Which of them stop rays.
+    """
+
+    name = "embree"
+    threads = MAX_THREADS
+
+    def __init__(self, triangles: Float, keep: Boolean | None = None) -> None:
+        try:
+            from embreex.mesh_construction import TriangleMesh  # noqa: PLC0415 - an extra that need not be installed
+            from embreex.rtcore_scene import EmbreeScene  # noqa: PLC0415 - as above
+        except ImportError as error:
+            raise SeipError("the ray-casting engine embree is not installed; choose bvh or install embreex") from error
+        self.triangles = triangles
+        self._index, self._centre, corners = _rebased(triangles, keep)
+        self._scene = EmbreeScene(_embree_device(), robust=True)  # robust: no leaks along shared edges
+        self._mesh = TriangleMesh(self._scene, corners.astype(np.float32)) if len(corners) else None
+        self._needle = _needles(corners)
+        self._any_needle = bool(self._needle.any())
+        self.cast(self._centre, np.array([[0.0, 0.0, 1.0]]), 1.0)  # builds the tree, before threads may ask for it
+
+    def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
+        """Cast rays; see `RayCaster.cast`."""
+        if self._mesh is None or len(directions) == 0:
+            return np.full(len(directions), np.inf), np.full(len(directions), -1, dtype=np.int64)
+        start = np.broadcast_to((origin - self._centre).astype(np.float32), directions.shape)
+        reach = np.full(len(directions), max_range * _EXCESS, dtype=np.float32)
+        hits = self._scene.run(np.ascontiguousarray(start), directions.astype(np.float32), dists=reach, output=True)
+        distance, face = hits["tfar"].astype(np.float64), hits["primID"].astype(np.int64)
+        if self._any_needle:
+            needle = np.flatnonzero((face >= 0) & self._needle[face])
+            met = self.triangles[self._index[face[needle]]]
+            distance[needle] = _to_plane(np.broadcast_to(origin, directions.shape)[needle], directions[needle], met)
+        return _result(distance, face, self._index, max_range)
+
+
+@functools.cache
+def _embree_device() -> object:
+    """Return the one Embree device of all casters.
+
+    Each device holds one of the some thousand keys of thread-local storage that a process has; Embree crashes where
+    there is none left.
+    """
+    from embreex.rtcore import EmbreeDevice  # noqa: PLC0415 - an extra that need not be installed
+
+    return EmbreeDevice()
+
+
+def _rebased(triangles: Float, keep: Boolean | None) -> tuple[Integer, Float, Float]:
+    """Pick the triangles that are kept and have an area, and move them to the common centre of all.
+
+    Both engines compute in float32, which is off by metres at map coordinates. The
+    centre does not depend on what is kept, so that the rounding does not either.
+
+    Returns
+    -------
+    index : (k,) int64
+        Of the picked triangles.
+    centre : (3,) float64, metres
+    corners : (k, 3, 3) float64, metres
+        The picked triangles, less the centre.
+    """
+    if triangles.ndim != 3 or triangles.shape[1:] != (3, 3):
+        raise SeipError(f"triangles must be an array of n x 3 corners x 3 coordinates, not {triangles.shape}")
+    broken = np.flatnonzero(~np.isfinite(triangles).all(axis=(1, 2)))
+    if len(broken):
+        raise SeipError(f"{len(broken)} triangles have coordinates that are not finite, the first is {broken[0]}")
+    if len(triangles) == 0:
+        return np.zeros(0, dtype=np.int64), np.zeros(3), triangles
+    points = triangles.reshape(-1, 3)
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    corners = triangles - centre
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    index = np.flatnonzero(area > 0 if keep is None else (area > 0) & keep)
+    return index, centre, corners[index]
+
+
+def _needles(corners: Float) -> Boolean:
+    """Return which triangles are far lower than they are long, (n,) bool."""
+    sides = corners - np.roll(corners, 1, axis=1)
+    longest = np.linalg.norm(sides, axis=2).max(axis=1, initial=0.0)
+    twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    thin: Boolean = twice_area < _MAX_NEEDLE_HEIGHT * longest**2
+    return thin
+
+
+def _to_plane(start: Float, directions: Float, corners: Float) -> Float:
+    """Return the distances (n,) at which rays (n, 3) meet the planes of the triangles (n, 3, 3) that they hit."""
+    way = corners - start[:, None]
+    normal = np.cross(way[:, 1] - way[:, 0], way[:, 2] - way[:, 0])
+    along = (way * directions[:, None]).sum(axis=2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = (way[:, 0] * normal).sum(axis=1) / (directions * normal).sum(axis=1)
+    distance = np.where(np.isfinite(distance), distance, along.mean(axis=1))
+    met: Float = np.clip(distance, along.min(axis=1), along.max(axis=1))  # a ray that grazes meets no plane
+    return met
+
+
+def _result(distance: Float, face: Integer, index: Integer, max_range: float) -> tuple[Float, Integer]:
+    """Turn an engine's faces into indices of the given triangles, and what lies too far into misses."""
+    hit = (face >= 0) & (distance <= max_range)
+    triangle = np.full(len(face), -1, dtype=np.int64)
+    triangle[hit] = index[face[hit]]
+    return np.where(hit, distance, np.inf), triangle
+
+
+@contextmanager
+def _no_garbage_collection() -> Iterator[None]:
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()

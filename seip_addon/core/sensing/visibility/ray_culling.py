@@ -1,0 +1,72 @@
+"""Ray culling: which of a list of rays of any directions can return from near a target.
+
+Returns within δ of a target lie in its patch (`beam_culling`), which takes up a range of azimuths and one of elevations
+as seen from the sensor. Both are cut into cells; what lies in no cell that some patch reaches cannot return from it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...arrays import Float, Integer
+from .beam_culling import Patches
+
+_AZIMUTHS, _ELEVATIONS = 720, 360  # cells of half a degree: about as far apart as rays are
+_MARGIN = 1e-6  # of a cell
+
+
+def rays_near(patches: Patches, azimuth: Float, elevation: Float, max_range: float) -> Integer:
+    """Find the rays that can return from patches.
+
+    Parameters
+    ----------
+    patches : Patches
+        As seen from the sensor.
+    azimuth, elevation : (n,) float64, radians
+        Of the rays.
+    max_range : float, metres
+
+    Returns
+    -------
+    (k,) int64
+        Numbers of the rays, ascending: all that can, and few that cannot.
+    """
+    near = np.maximum(patches.distance - patches.radius, 0.0)
+    some = (patches.bottom <= patches.top) & (near <= max_range)
+    near, far = near[some], (patches.distance + patches.radius)[some]
+    bottom, top = patches.bottom[some], patches.top[some]
+    lowest = np.arctan2(bottom, np.where(bottom < 0, near, far))
+    highest = np.arctan2(top, np.where(top > 0, near, far))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        half = np.arcsin(np.minimum(patches.radius / patches.distance, 1.0))[some]
+    half = np.where(near > 0, half, math.pi)
+
+    first_row, end_row = _row(lowest, -_MARGIN), _row(highest, _MARGIN) + 1
+    first = np.floor(_turns(patches.azimuth[some] - half) - _MARGIN).astype(np.int64)
+    end = np.floor(_turns(patches.azimuth[some] + half) + _MARGIN).astype(np.int64) + 1
+    end = np.minimum(end, first + _AZIMUTHS)
+    shift = first // _AZIMUTHS * _AZIMUTHS
+    first, end = first - shift, end - shift
+    reached = np.zeros((_ELEVATIONS + 1, 2 * _AZIMUTHS + 1), dtype=np.int64)
+    for row, sign in ((first_row, 1), (end_row, -1)):
+        np.add.at(reached, (row, first), sign)
+        np.add.at(reached, (row, end), -sign)
+    reached = reached.cumsum(axis=0).cumsum(axis=1)
+    both = reached[:, :_AZIMUTHS] + reached[:, _AZIMUTHS : 2 * _AZIMUTHS]
+    column = np.floor(_turns(azimuth)).astype(np.int64) % _AZIMUTHS
+    return np.flatnonzero(both[_row(elevation, 0.0), column] > 0)
+
+
+def _turns(azimuth: Float) -> Float:
+    """Return azimuths in cells."""
+    cells: Float = azimuth * (_AZIMUTHS / math.tau)
+    return cells
+
+
+def _row(elevation: Float, margin: float) -> Integer:
+    """Return the rows of cells that elevations lie in."""
+    row = np.floor((elevation / math.pi + 0.5) * _ELEVATIONS + margin)
+    rows: Integer = np.clip(row, 0, _ELEVATIONS - 1).astype(np.int64)
+    return rows

@@ -1,0 +1,160 @@
+"""Warnings where rings are too far apart for δ and the grid spacing.
+
+On a level road h below the sensor the channel of elevation -φ draws a ring of
+radius h / tan φ. Where neighbouring rings are more than 2δ apart, targets
+between them count as unseen although nothing stands before them. A sensor that is
+tilted by θ draws the ring of elevation -φ - θ on the side that it looks to, and that
+of -φ + θ, which lies farther from the next, on the other.
+
+A rosette draws a line that leaves gaps of any shape. For points of a level road within its field of view it is tried
+whether a ray of a frame ends within δ of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import lru_cache
+
+import numpy as np
+
+from ...arrays import Boolean, Float
+from ...geometry.orientation import orientation
+from ...site.site import Site
+from ..lidar.beams import BeamPattern
+from ..lidar.catalogue import find_models
+from ..lidar.model import LidarModel
+from .settings import VisibilitySettings
+from .target_index import TargetIndex
+
+
+def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings) -> tuple[str, ...]:
+    """Return warnings where rings are too far apart: coverage there depends on beams, not on line of sight.
+
+    Parameters
+    ----------
+    models : mapping of str to LidarModel
+        At least those that the candidates name.
+
+    Returns
+    -------
+    tuple of str
+        One sentence for each sensor type that is concerned, and one if targets are too far apart for δ.
+    """
+    poses = site.candidates
+    warnings = []
+    for key, model in find_models(models, np.unique(poses.sensor).tolist()).items():
+        of_type = poses.sensor == key
+        reach = min(model.max_range, _farthest(poses.xyz[of_type], site.targets.xyz))
+        if model.rosette is not None:
+            warnings += _of_rosette(model, site, of_type, settings.delta, reach)
+            continue
+        upright = of_type & (poses.tilt == 0)
+        heights = np.unique(np.round(poses.height[upright], 2))
+        limits = [(height, unresolved_from(model, float(height), settings.delta, reach)) for height in heights]
+        beyond = [f"{limit:.0f} m (at {height:g} m height)" for height, limit in limits if limit < reach]
+        if beyond:
+            warnings.append(
+                f"{key}: beyond {', '.join(beyond)} neighbouring rings on a level road are more than "
+                f"2δ = {2 * settings.delta:g} m apart, so road between them counts as unseen though nothing hides it"
+            )
+        warnings += _of_tilted(model, site, of_type & ~upright, settings.delta, reach)
+    if settings.delta < site.targets.spacing / math.sqrt(2):
+        warnings.append(
+            f"targets are {site.targets.spacing:g} m apart and δ is {settings.delta:g} m: road between them "
+            f"lies within δ of none; take a δ of at least {site.targets.spacing / math.sqrt(2):.2g} m or a finer grid"
+        )
+    return tuple(warnings)
+
+
+def _of_rosette(model: LidarModel, site: Site, of_type: Boolean, delta: float, reach: float) -> list[str]:
+    """Return a warning on the radius from which the rosettes of a type leave gaps that are too wide for δ."""
+    poses = site.candidates
+    height = np.round(poses.height, 2)
+    beyond = []
+    for level in np.unique(height[of_type]):
+        tilts = np.unique(poses.tilt[of_type & (height == level)])
+        limit = min(unresolved_from(model, float(level), delta, reach, float(tilt)) for tilt in tilts)
+        if limit < reach:
+            beyond.append(f"{limit:.0f} m (at {level:g} m height)")
+    sentence = (
+        f"{model.key}: from {', '.join(beyond)} on a frame of {1 / model.rotation_rate:g} s leaves level road in view "
+        f"more than δ = {delta:g} m from all of its rays, so road between them counts as unseen though nothing hides it"
+    )
+    return [sentence] if beyond else []
+
+
+def _of_tilted(model: LidarModel, site: Site, tilted: Boolean, delta: float, reach: float) -> list[str]:
+    """Return a warning on the radius from which the tilted sensors of a type do not resolve δ."""
+    poses = site.candidates
+    height = np.round(poses.height, 2)
+    beyond = []
+    for level in np.unique(height[tilted]):
+        tilts = np.unique(poses.tilt[tilted & (height == level)])
+        limit = min(unresolved_from(model, float(level), delta, reach, float(tilt)) for tilt in tilts)
+        if limit < reach:
+            beyond.append(f"{limit:.0f} m (at {level:g} m height)")
+    sentence = (
+        f"{model.key}: where it is tilted, beyond {', '.join(beyond)} neighbouring rings on a level road before it are "
+        f"more than 2δ = {2 * delta:g} m apart, and behind it sooner, so road between them counts as "
+        "unseen though nothing hides it"
+    )
+    return [sentence] if beyond else []
+
+
+def unresolved_from(model: LidarModel, height: float, delta: float, reach: float, tilt: float = 0.0) -> float:
+    """Return the radius from which some neighbouring returns on a level road are more than 2δ apart.
+
+    Of a rosette: from which some of the road in view has no return of a frame within δ.
+
+    Parameters
+    ----------
+    height : float, metres
+        Of the sensor above the road.
+    delta, reach : float, metres
+        Nothing is looked for beyond ``reach``.
+    tilt : float, radians
+        Of the sensor, towards where it is looked for.
+
+    Returns
+    -------
+    float, metres
+        ``reach`` if all is resolved.
+    """
+    if model.rosette is not None:
+        return _first_gap(model, height, delta, min(reach, model.max_range), tilt)
+    down = tilt - model.elevations
+    down = np.sort(down[(down > 0) & (down <= math.pi / 2)])[::-1]
+    rings = height / np.tan(down)
+    rings = np.append(rings[rings < reach], reach)
+    wide = np.flatnonzero(np.diff(rings) > 2 * delta)
+    along = 2 * delta / model.azimuth_step  # radius at which neighbours in a ring are 2δ apart
+    return float(min(rings[wide[0]] if len(wide) else reach, along, reach))
+
+
+@lru_cache(maxsize=256)
+def _first_gap(model: LidarModel, height: float, delta: float, reach: float, tilt: float) -> float:
+    """Return the radius of the nearest point of a level road in view of a rosette that has no ray within δ, metres."""
+    turned = orientation(0.0, tilt)
+    beams = BeamPattern(model).directions(np.arange(model.channels)) @ turned.T
+    down = beams[beams[:, 2] < 0]
+    hits = np.column_stack([down[:, :2] * (-height / down[:, 2:]), np.zeros(len(down))])
+    radius, azimuth = np.meshgrid(np.linspace(0.0, reach, _RADII + 1)[1:], np.linspace(-math.pi, math.pi, _AZIMUTHS))
+    road = np.column_stack([(radius * np.cos(azimuth)).ravel(), (radius * np.sin(azimuth)).ravel()])
+    seen_from = np.column_stack([road, np.full(len(road), -height)]) @ turned
+    road = road[model.faces(seen_from) & (np.linalg.norm(seen_from, axis=1) <= reach)]
+    if not len(road):
+        return reach
+    index = TargetIndex(np.column_stack([road, np.zeros(len(road))]), delta)
+    missed = np.ones(len(road), dtype=bool)
+    missed[index.within_delta(hits)] = False
+    return float(np.hypot(*road[missed].T).min(initial=reach))
+
+
+_RADII, _AZIMUTHS = 300, 361
+"""Points of a level road at which the gaps of a rosette are looked for."""
+
+
+def _farthest(poses: Float, targets: Float) -> float:
+    """Largest distance in plan between some pose and some target."""
+    return max(float(np.hypot(*(targets[:, :2] - pose[:2]).T).max()) for pose in poses)

@@ -1,0 +1,57 @@
+"""Settings of visibility: when a target counts as seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...errors import SeipError
+from ...settings import setting
+from ..lidar.model import LidarModel
+
+MAX_DELTA = 100.0
+"""Metres; a larger δ is taken for a typing error."""
+
+
+@dataclass(frozen=True)
+class VisibilitySettings:
+    """When a target counts as seen.
+
+    Parameters
+    ----------
+    delta : float, metres
+        A return nearer than this to a target sees it.
+    min_intensity : float, 0 to 1
+        Least intensity of such a return from sensors of CARLA's model. At 0 every return counts.
+    detection : float, above 0 and below 1
+        Least probability with which such a return is detected, from sensors of the range equation.
+    """
+
+    delta: float = setting(1.0, "distance from a target within which a return sees it", unit="m", maximum=MAX_DELTA)
+    min_intensity: float = setting(
+        0.0, "least intensity of a return that sees, of sensors of CARLA's model", minimum=0.0, maximum=1.0, metavar="I"
+    )
+
+    detection: float = setting(
+        0.9, "least probability of detection of a return that sees", minimum=0.01, maximum=0.98, metavar="P"
+    )
+
+    def __post_init__(self) -> None:
+        if not 0 < self.delta <= MAX_DELTA:
+            raise SeipError(f"delta must be a positive number of metres up to {MAX_DELTA:g}, not {self.delta}")
+        if not 0 <= self.min_intensity <= 1:
+            raise SeipError(f"the least intensity must lie between 0 and 1, not {self.min_intensity}")
+        if not 0 < self.detection < 1:
+            raise SeipError(f"the least probability of detection must lie between 0 and 1, not {self.detection}")
+
+    def least_strength(self, model: LidarModel) -> float:
+        """Return the strength from which on a return of a sensor counts; every return does where it is 0.
+
+        Raises
+        ------
+        SeipError
+            The sensor detects nothing with such a probability.
+        """
+        try:
+            return model.law.least_strength(self.detection, self.min_intensity)
+        except SeipError as error:
+            raise SeipError(f"{model.key}: {error}") from error

@@ -1,0 +1,161 @@
+"""On-disk cache of visibility grids, keyed by their inputs."""
+
+from __future__ import annotations
+
+import functools
+import re
+import shutil
+from collections.abc import Generator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ... import limits
+from ...errors import SeipError
+from ...progress import Progress
+from ...site.site import Site
+from ...storage.array_file import ArrayFile, ArrayRule
+from ..lidar.model import LidarModel
+from .chunks import Rows
+from .grid import VisibilityGrid, compute_visibility, visibility_key
+from .ray_casting import Engine, engine_name
+from .settings import VisibilitySettings
+
+_CHUNK = ArrayFile(
+    "seip.visibility-piece",
+    1,
+    "chunk of a visibility grid",
+    "delete it and compute it again",
+    {"packed": ArrayRule("u1", ("poses", "bytes")), "rays": ArrayRule("i8", (), limits.COUNT)},
+    compressed=False,
+)
+
+
+class CheckpointFolder:
+    """Finished chunks of a grid in the making, in a folder beside its file.
+
+    Parameters
+    ----------
+    path : path
+        The grid's file.
+    key : str
+        The grid's key. Chunks of another are removed.
+    """
+
+    def __init__(self, path: Path, key: str) -> None:
+        self._folder = path.with_name(f"{path.stem}.pieces")
+        self._prefix = key[:16]
+        for other in self._folder.glob("*.npz"):
+            if not other.name.startswith(self._prefix):
+                other.unlink(missing_ok=True)  # another process may be at it too
+
+    def load(self, number: int) -> Rows | None:
+        """Return a chunk, or None where there is none that can be used."""
+        try:
+            with _CHUNK.reading(self._file(number)) as (_, arrays):
+                return Rows(arrays["packed"], int(arrays["rays"]))
+        except SeipError:
+            return None
+
+    def save(self, number: int, rows: Rows) -> None:
+        """Write a chunk."""
+        _CHUNK.save(self._file(number), {}, {"packed": rows.packed, "rays": np.array(rows.rays)})
+
+    def remove(self) -> None:
+        """Remove the folder, once the grid is whole."""
+        shutil.rmtree(self._folder, ignore_errors=True)  # another process may have, or be at it too
+
+    def _file(self, number: int) -> Path:
+        return self._folder / f"{self._prefix}-{number:06d}.npz"
+
+
+def stored_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who does the work
+    path: Path,
+    site: Site,
+    models: Mapping[str, LidarModel],
+    settings: VisibilitySettings,
+    engine: Engine = "auto",
+    scheduler: str | None = None,
+    threads: int | None = None,
+) -> Generator[Progress, None, VisibilityGrid]:
+    """Return the grid of a file where it follows from the same inputs; else compute it and write the file.
+
+    What was finished before an interruption is kept beside the file and not computed again.
+
+    Parameters
+    ----------
+    path : path
+        The grid's file, read and written.
+    engine : {"auto", "bvh", "embree"}
+        What casts the rays.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers do the work.
+    threads : int, optional
+        How many of this process work at once at most.
+
+    Returns
+    -------
+    VisibilityGrid
+    """
+    key = visibility_key(site, models, settings, engine_name(engine))
+    stored = _load(path)
+    checkpoint = CheckpointFolder(path, key)
+    if stored is not None and stored.key == key and stored.shape == (len(site.candidates), len(site.targets)):
+        checkpoint.remove()  # what is left of a process that was killed between writing the grid and this
+        yield Progress(len(site.candidates), len(site.candidates), "visibility, from an earlier run")
+        return stored
+    grid = yield from compute_visibility(site, models, settings, engine, checkpoint, scheduler, threads)
+    grid.save(path)
+    checkpoint.remove()
+    return grid
+
+
+def _load(path: Path) -> VisibilityGrid | None:
+    """Return the grid of a file, or None where there is none that can be used again."""
+    try:
+        return VisibilityGrid.load(path)
+    except SeipError:
+        return None
+
+
+class GridFolder:
+    """A folder of grids, named by their keys; other files in it are left alone."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def megabytes(self) -> float:
+        """Return the size of all grids; quick while none comes or goes, so that a panel may ask at each drawing."""
+        try:
+            return _megabytes(self._path, self._path.stat().st_mtime_ns)
+        except OSError:  # there is no such folder
+            return 0.0
+
+    def empty(self) -> int:
+        """Delete all grids and pieces of grids, and return how many there were.
+
+        Raises
+        ------
+        SeipError
+            One cannot be deleted.
+        """
+        entries = _grids(self._path)
+        for entry in entries:
+            try:
+                shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+            except OSError as error:
+                raise SeipError(f"cannot delete {entry}: {error.strerror}; delete it by hand") from error
+        return len(entries)
+
+
+_GRID = re.compile(r"[0-9a-f]{32}\.(npz|pieces|returns\.npz)")
+
+
+def _grids(folder: Path) -> list[Path]:
+    return sorted(entry for entry in folder.iterdir() if _GRID.fullmatch(entry.name)) if folder.is_dir() else []
+
+
+@functools.lru_cache(maxsize=4)
+def _megabytes(folder: Path, _changed: int) -> float:
+    files = [file for entry in _grids(folder) for file in (entry.rglob("*") if entry.is_dir() else (entry,))]
+    return sum(file.stat().st_size for file in files) / 1e6

@@ -1,0 +1,142 @@
+"""Visibility model: which targets sensors at arbitrary positions and orientations see.
+
+What an upright sensor sees is computed in the site's axes. For any other all is
+computed in the sensor's own axes, where its channels are cones about z as those
+of an upright one are; only rays go out in the site's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...arrays import Boolean, Float, Integer
+from ...geometry.orientation import orientation as orientation_of
+from ...geometry.orientation import rotated
+from ...site.site import Site
+from ..lidar.model import LidarModel
+from .near_surfaces import NearSurfaces, near_surfaces, rotated_surfaces
+from .ray_casting import Engine, RayCaster, engine_name, make_ray_caster
+from .scanning import Caster, ScanPosition, seen_by_all_rays, seen_by_near_rays
+from .settings import VisibilitySettings
+
+_MAX_LEVEL_ANGLE = 1e-6
+"""Radians that an upright sensor's axis may be off: Blender turns objects in single precision."""
+
+
+class VisibilityModel:
+    """Visibility of a site's targets from sensors of any model, position and orientation.
+
+    Every result is the same as a full scan's.
+
+    Parameters
+    ----------
+    caster : RayCaster
+        Of the site's triangles.
+    """
+
+    def __init__(self, site: Site, settings: VisibilitySettings, caster: RayCaster) -> None:
+        self._caster, self._settings, self._reflectivity = caster, settings, site.reflectivity
+        self._surfaces = near_surfaces(site.triangles, site.targets.xyz, settings.delta, site.reflectivity)
+
+    @property
+    def targets(self) -> int:
+        """Number of targets."""
+        return len(self._surfaces.xyz)
+
+    def see(self, model: LidarModel, xyz: Float, orientation: Float) -> Boolean:
+        """Compute which targets one sensor sees, (t,) bool; see `see_all`."""
+        only: Boolean = self.see_all([model], xyz, orientation)[0][0]
+        return only
+
+    def see_all(self, models: Sequence[LidarModel], xyz: Float, orientation: Float) -> tuple[Boolean, int]:
+        """Compute which targets sensors of several models see from one position; they share rays.
+
+        Parameters
+        ----------
+        xyz : (3,) float64, metres
+            Optical centre, local site axes.
+        orientation : (3, 3) float64
+            Rotation from the sensors' axes to the site's.
+
+        Returns
+        -------
+        seen : (models, t) bool
+        cast : int
+            Number of rays.
+        """
+        if is_upright(orientation):
+            return self.see_upright(models, xyz, yaw_of(orientation))
+        position = in_sensor_axes(self._position(models, xyz, 0.0), orientation)
+        return seen_by_near_rays(position, rotated_surfaces(self._surfaces, xyz, orientation))
+
+    def see_upright(self, models: Sequence[LidarModel], xyz: Float, yaw: float) -> tuple[Boolean, int]:
+        """Compute which targets upright sensors see whose azimuth zero points to a yaw in radians; see `see_all`."""
+        return seen_by_near_rays(self._position(models, xyz, yaw), self._surfaces)
+
+    def _position(self, models: Sequence[LidarModel], xyz: Float, yaw: float) -> ScanPosition:
+        return ScanPosition(self._caster, xyz, yaw, models, self._settings, self._reflectivity)
+
+
+def visibility_model(site: Site, settings: VisibilitySettings, engine: Engine = "auto") -> VisibilityModel:
+    """Return a visibility model with a ray caster of its own."""
+    return VisibilityModel(site, settings, make_ray_caster(site.triangles, engine_name(engine)))
+
+
+def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, surfaces: NearSurfaces) -> tuple[Boolean, int]:
+    """Find which targets sensors see that are tilted by an angle (radians), by casting every ray: the reference."""
+    if tilt == 0:
+        return seen_by_all_rays(position, surfaces)
+    orientation = orientation_of(position.yaw, tilt)
+    if is_upright(orientation):
+        return seen_by_all_rays(replace(position, yaw=yaw_of(orientation)), surfaces)
+    turned = rotated_surfaces(surfaces, position.origin, orientation)
+    return seen_by_all_rays(in_sensor_axes(position, orientation), turned)
+
+
+def is_upright(orientation: Float) -> bool:
+    """Return whether a sensor with an orientation (3, 3) stands upright, except for rounding."""
+    return bool(orientation[2, 2] > 0 and math.hypot(*orientation[2, :2]) < _MAX_LEVEL_ANGLE)
+
+
+def yaw_of(orientation: Float) -> float:
+    """Return the direction of azimuth zero of an upright sensor, in radians."""
+    return math.atan2(orientation[1, 0], orientation[0, 0])
+
+
+def in_sensor_axes(position: ScanPosition, orientation: Float) -> ScanPosition:
+    """Return a position in the axes of its sensors, which are so oriented."""
+    caster = _RotatedCaster(position.caster, position.origin, orientation)
+    return replace(position, caster=caster, origin=np.zeros(3), yaw=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _RotatedCaster:
+    """A ray caster in the axes of a sensor."""
+
+    caster: Caster
+    origin: Float
+    orientation: Float
+
+    @property
+    def triangles(self) -> _RotatedTriangles:
+        return _RotatedTriangles(self)
+
+    def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
+        """Cast rays, given in the sensor's axes."""
+        start = self.origin + origin @ self.orientation.T
+        return self.caster.cast(start, rotated(directions, self.orientation), max_range)
+
+
+@dataclass(frozen=True, eq=False)
+class _RotatedTriangles:
+    """The triangles of a ray caster in the axes of a sensor, rotated on demand."""
+
+    rotated: _RotatedCaster
+
+    def __getitem__(self, which: Integer) -> Float:
+        corners: Float = (self.rotated.caster.triangles[which] - self.rotated.origin) @ self.rotated.orientation
+        return corners

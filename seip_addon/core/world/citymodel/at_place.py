@@ -1,0 +1,144 @@
+"""The buildings of a city model that stand at a place of a map."""
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Float
+from ...counts import counted
+from ...errors import SeipError
+from ...geometry.geo_reference import GeoReference
+from ...geometry.plan import outline
+from ...geometry.reference_systems import Transform, reprojection
+from ...limits import ELEVATION, HEIGHT, MAP_COORDINATE, SITE_RADIUS
+from ...progress import Progress
+from ...site.scene_geometry import FROM_CITY_MODEL
+from ..streetscape.description import PlacedSolid, SiteDescription, without_covered_buildings
+from ..streetscape.map_furniture import facade
+from .cityjson import CityModel, read_city_model
+from .solids import building_solid
+
+BUILDINGS_PER_STEP = 50
+
+_FAULTS = f"without area, wider than {SITE_RADIUS.most:,g} m or not {HEIGHT} high"
+UNUSABLE = (f"building {_FAULTS} is", f"buildings {_FAULTS} are")
+"""Reason to leave out a building, for one and for several."""
+
+
+@dataclass(frozen=True)
+class AskedBuildings:
+    """A city model that is asked for, and where it lies.
+
+    Parameters
+    ----------
+    path : Path
+        CityJSON.
+    epsg : int or None
+        Code of its reference system; None: that which it names.
+    origin : (x, y, z) or None
+        Map coordinates of its own zero, metres, in place of a reference system: then its heights count as they are.
+    """
+
+    path: Path
+    epsg: int | None = None
+    origin: tuple[float, float, float] | None = None
+
+
+def with_city_model(
+    description: SiteDescription, asked: AskedBuildings, reference: GeoReference, area: BaseGeometry
+) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...]]]:
+    """Add the buildings of a city model to a description, in place of those of an extract that they cover.
+
+    Each stands with its lowest point on the lowest ground under it: a road map's zero of heights is not the model's.
+
+    Parameters
+    ----------
+    reference : GeoReference
+        Of the map.
+    area : shapely geometry
+        What reaches into it counts, map coordinates.
+
+    Returns
+    -------
+    description : SiteDescription
+    notes : tuple of str
+
+    Raises
+    ------
+    SeipError
+        The model cannot be read, cannot be laid on the map, or has no building there.
+    """
+    yield Progress(0, 0, f"reading {asked.path.name}")
+    model = read_city_model(asked.path)
+    to_map = _to_map(model, asked, reference)
+    model = replace(model, vertices=np.column_stack([to_map(model.vertices[:, :2]), model.vertices[:, 2]]))
+    left_out = model.left_out
+    shapely.prepare(area)
+    low_x, low_y, high_x, high_y = area.bounds
+    solids: list[PlacedSolid] = []
+    for number, building in enumerate(model.buildings):
+        if number % BUILDINGS_PER_STEP == 0:
+            yield Progress(number, len(model.buildings), "buildings")
+        used = model.vertices[np.concatenate([ring for surface in building.surfaces for ring in surface.rings])]
+        (x, y, z), (far_x, far_y, top) = used.min(axis=0), used.max(axis=0)
+        if not (x <= high_x and far_x >= low_x and y <= high_y and far_y >= low_y):
+            continue
+        solid = building_solid(model, building, facade(len(solids)))
+        if solid is None or not HEIGHT.allow(top - z) or max(far_x - x, far_y - y) > SITE_RADIUS.most:
+            left_out[UNUSABLE] += 1
+            continue
+        plan = _plan(solid.vertices, np.array(solid.faces))
+        if not plan.intersects(area):
+            continue
+        raised = -float(solid.vertices[:, 2].min()) if asked.origin is None else asked.origin[2]
+        solid = replace(solid, vertices=solid.vertices + np.array([0.0, 0.0, raised]))
+        solids.append(PlacedSolid("Building", solid, plan, FROM_CITY_MODEL, on_ground=asked.origin is None))
+    if not solids:
+        raise _elsewhere(asked.path, model, reference, area)
+    kept, dropped = without_covered_buildings(description, solids)
+    notes = [f"{counted(number, *reason)} left out of {model.name}" for reason, number in left_out.items()]
+    if dropped:
+        notes.append(f"{counted(dropped, 'building')} of the extract gave way to the city model's")
+    return replace(kept, solids=(*kept.solids, *solids)).with_attribution(model.attribution), tuple(notes)
+
+
+def _to_map(model: CityModel, asked: AskedBuildings, reference: GeoReference) -> Transform:
+    if asked.origin is not None:
+        MAP_COORDINATE.require(asked.origin[:2], "--buildings-origin", "X or Y", "give map coordinates")
+        ELEVATION.require(asked.origin[2], "--buildings-origin", "Z", "give a height above the map's zero")
+        shift = np.array(asked.origin[:2])
+        return lambda xy: xy + shift
+    code = asked.epsg or model.epsg
+    if code is None:
+        raise SeipError(
+            f"{model.name} names no reference system: give it by --buildings-epsg CODE, or the map coordinates of its "
+            "zero by --buildings-origin X Y Z"
+        )
+    return reprojection(code, reference, model.name).to_map
+
+
+def _plan(vertices: Float, faces: Float) -> BaseGeometry:
+    """Return the area of a solid in plan; of walls alone that which they surround at most."""
+    area = outline(vertices[faces])
+    return area if not area.is_empty else shapely.convex_hull(shapely.multipoints(vertices[:, :2]))
+
+
+def _elsewhere(path: Path, model: CityModel, reference: GeoReference, area: BaseGeometry) -> SeipError:
+    """Return where a model lies and where the place is, as an error."""
+    x, y = np.median(model.vertices[:, :2], axis=0)
+    place = area.centroid
+    distance = math.dist((x, y), (place.x, place.y))
+    where, there = f"map ({x:.0f}, {y:.0f})", f"map ({place.x:.0f}, {place.y:.0f})"
+    degrees = reference.geographic(np.array([[x, y, 0.0], [place.x, place.y, 0.0]]))
+    if degrees is not None and np.isfinite(degrees).all():
+        where, there = (f"latitude {latitude:.5f}, longitude {longitude:.5f}" for longitude, latitude, _ in degrees)
+    how_far = f"{distance / 1000:,.1f} km" if math.isfinite(distance) else "far"
+    return SeipError(
+        f"{path.name} has no building at the place: it lies about {where}, {how_far} from the place at {there}; take "
+        "the model of the place"
+    )

@@ -1,0 +1,248 @@
+"""The ground at a place of a map, from an elevation model or a laser survey."""
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Boolean, Float, Integer
+from ...counts import counted
+from ...errors import SeipError
+from ...geometry.geo_reference import GeoReference
+from ...geometry.height_raster import HeightRaster
+from ...geometry.plan import outline
+from ...geometry.reference_systems import reprojection
+from ...geometry.solids import Solid
+from ...progress import Progress
+from ...site.scene_geometry import FROM_SURVEY
+from ..streetscape.description import PlacedSolid, SiteDescription, without_covered_buildings
+from ..streetscape.terrain import Relief
+from .geotiff import GeoTiff, read_geotiff
+from .obstacles import (
+    KINDS,
+    MIN_ABOVE,
+    RAYS,
+    UNCLASSIFIED,
+    VEGETATION,
+    Merging,
+    chosen_boxes,
+    chosen_merging,
+    obstacle_raster,
+    solids,
+)
+from .point_cloud import is_survey, read_points, survey_system
+
+SMOOTHING = 4.0  # metres: standard deviation of the Gaussian that heights are smoothed by, about a lane's width
+CELL, MAX_CELLS = 1.0, 1500  # metres of a cell, and cells along a side at most: larger places have larger ones
+POINTS_PER_CELL, MAX_CELL = 2.0, 5.0  # of a survey, and metres
+GROUND = 2  # class of a survey's points
+TRAFFIC_MARGIN = 1.0  # metres beside the carriageway within which what is not classified is traffic
+MODEL_MARGIN = 1.0  # metres beside a building of a city model within which a survey's points are that building
+MIN_COVERED = 0.5  # share of the place of which heights are known, below which a model is that of another place
+FLAT, MIN_FLAT = 0.25, 0.6  # a map is flat where such a share of its lanes is within this (metres) of one height
+
+
+@dataclass(frozen=True)
+class AskedTerrain:
+    """A file of ground that is asked for.
+
+    Parameters
+    ----------
+    path : Path
+        GeoTIFF, LAS or LAZ.
+    epsg : int or None
+        Code of a survey's reference system; None: that which it names.
+    """
+
+    path: Path
+    epsg: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class MapSurroundings:
+    """What of a map the ground at a place depends on, map coordinates.
+
+    Parameters
+    ----------
+    reference : GeoReference
+    area : shapely geometry
+        The place.
+    lanes : (n, 3) float64, metres
+        Points of the map's lanes there.
+    carriageway : shapely geometry
+        On which what a survey does not classify is traffic.
+    """
+
+    reference: GeoReference
+    area: BaseGeometry
+    lanes: Float
+    carriageway: BaseGeometry = field(default_factory=Polygon)
+
+
+def with_terrain(
+    description: SiteDescription, asked: AskedTerrain, around: MapSurroundings
+) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...], tuple[Merging, ...]]]:
+    """Lay the flat map of a place on the ground, and add what a survey has above it.
+
+    A map with heights of its own keeps them, and gets from a survey what stands there alone.
+
+    Returns
+    -------
+    description : SiteDescription
+    notes : tuple of str
+    merging : tuple of Merging
+        What was tried to make few boxes of what a survey has above the ground.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be read, does not cover the place, or the map has heights of its own.
+    """
+    path = asked.path
+    yield Progress(0, 0, f"reading {path.name}")
+    level, is_flat = _level(around.lanes)
+    if not is_flat and not is_survey(path):
+        low, high = around.lanes[:, 2].min(), around.lanes[:, 2].max()
+        raise SeipError(
+            f"the map has heights of its own there ({low:.1f} to {high:.1f} m), which its roads keep: leave out "
+            "--terrain"
+        )
+    if not is_survey(path):
+        model = read_geotiff(path)
+        smooth = _of_model(model, around.reference, around.area).smoothed(SMOOTHING)
+        credited = description.with_attribution(model.copyright)
+        return replace(credited, relief=Relief(smooth, level)), (_heights_note(path, smooth),), ()
+    points, classes = yield from _survey_points(asked, around)
+    smooth = _surveyed_ground(points, classes, around.area, path.name).smoothed(SMOOTHING)
+    yield Progress(0, 0, "boxes of the survey")
+    standing = _standing(points, classes, around, description)
+    raster = obstacle_raster(smooth, points[standing], classes[standing])
+    boxes, tried = chosen_boxes(raster, np.random.default_rng(_SEED))
+    raised = 0.0 if is_flat else float(np.median(around.lanes[:, 2] - smooth.at(around.lanes[:, :2])))
+    added = tuple(_placed(name, solid, raised) for name, solid in solids(raster, boxes))
+    description, dropped = without_covered_buildings(description, added)
+    notes = [_heights_note(path, smooth)] if is_flat else [f"the map keeps its own heights, not those of {path.name}"]
+    if boxes:
+        cells = int((raster.kind >= 0).sum())
+        stand = counted(len(boxes), "box stands", "boxes stand")
+        notes.append(
+            f"{stand} for {counted(cells, 'cell')} of {smooth.step:g} m that {path.name} has above "
+            f"{MIN_ABOVE:g} m: this changes {chosen_merging(tried).changed:.2%} of {RAYS:,} random lines of sight"
+        )
+    if dropped:
+        notes.append(f"{counted(dropped, 'building')} of the extract gave way to the survey's")
+    relief = Relief(smooth, level) if is_flat else None
+    return replace(description, relief=relief, solids=(*description.solids, *added)), tuple(notes), tried
+
+
+_SEED = 20_241
+
+
+def _heights_note(path: Path, smooth: HeightRaster) -> str:
+    low, high = float(smooth.heights.min()), float(smooth.heights.max())
+    return (
+        f"roads and ground take their heights from {path.name}, {low:.1f} to {high:.1f} m, smoothed by a Gaussian of "
+        f"{SMOOTHING:g} m"
+    )
+
+
+def _survey_points(asked: AskedTerrain, around: MapSurroundings) -> Generator[Progress, None, tuple[Float, Integer]]:
+    """Return the points of a survey at a place (n, 3), map coordinates in plan, and their classes (n,)."""
+    path = asked.path
+    named, middle = survey_system(path)
+    code = asked.epsg or named
+    if code is None:
+        raise SeipError(f"{path.name} names no reference system: give it by --terrain-epsg CODE")
+    system = reprojection(code, around.reference, path.name)
+    raster = empty_raster(around.area)
+    corners = system.from_map(raster.places)
+    cloud = yield from read_points(path, corners.min(axis=0), corners.max(axis=0))
+    if not len(cloud.points):
+        raise _elsewhere(path.name, 0.0, system.to_geographic(middle)[0], around.reference, around.area)
+    if not (cloud.classes == GROUND).any():
+        raise SeipError(
+            f"{path.name} has no points of class 2 (ground) at the place: classify it (pdal translate in.laz out.laz "
+            "smrf), or give an elevation model as GeoTIFF"
+        )
+    return np.column_stack([system.to_map(cloud.points[:, :2]), cloud.points[:, 2]]), cloud.classes
+
+
+def _surveyed_ground(points: Float, classes: Integer, area: BaseGeometry, name: str) -> HeightRaster:
+    """Return the mean height of the ground's points in each cell."""
+    raster = empty_raster(area, points)
+    rows, columns = raster.heights.shape
+    column, row = np.floor((points[:, :2] - raster.low) / raster.step + 0.5).astype(np.int64).T
+    inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+    cell, is_ground = row * columns + column, inside & (classes == GROUND)
+    covered = float(np.mean(np.bincount(cell[inside], minlength=rows * columns) > 0))
+    if covered < MIN_COVERED:
+        raise SeipError(f"{name} has points on {covered:.0%} of the place: take the survey of the whole place")
+    count = np.bincount(cell[is_ground], minlength=rows * columns)
+    total = np.bincount(cell[is_ground], points[is_ground, 2], minlength=rows * columns)
+    heights = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    return replace(raster, heights=heights.reshape(rows, columns))
+
+
+def _standing(points: Float, classes: Integer, around: MapSurroundings, description: SiteDescription) -> Boolean:
+    """Return which points count as something that stands: no traffic, and no building that a city model has."""
+    road = around.carriageway.buffer(TRAFFIC_MARGIN)
+    shapely.prepare(road)
+    traffic: Boolean = np.isin(classes, UNCLASSIFIED) & shapely.contains_xy(road, points[:, :2])
+    modelled = shapely.union_all([one.outline for one in description.solids]).buffer(MODEL_MARGIN)
+    shapely.prepare(modelled)
+    known: Boolean = shapely.contains_xy(modelled, points[:, :2]) & ~np.isin(classes, VEGETATION)
+    return ~(traffic | known)
+
+
+def _placed(name: str, solid: Solid, raised: float) -> PlacedSolid:
+    plan = outline(solid.vertices[[face[:3] for face in solid.faces]])
+    boxes = shapely.union_all([plan, outline(solid.vertices[[(face[0], *face[2:]) for face in solid.faces]])])
+    moved = replace(solid, vertices=solid.vertices + np.array([0.0, 0.0, raised]))
+    return PlacedSolid(name, moved, boxes, FROM_SURVEY, on_ground=False, is_building=name == KINDS[-1])
+
+
+def _level(lanes: Float) -> tuple[float, bool]:
+    """Return the height of a flat map, and whether it is flat."""
+    level = float(np.median(lanes[:, 2])) if len(lanes) else 0.0
+    return level, bool(np.mean(np.abs(lanes[:, 2] - level) <= FLAT) >= MIN_FLAT) if len(lanes) else True
+
+
+def _of_model(model: GeoTiff, reference: GeoReference, area: BaseGeometry) -> HeightRaster:
+    system = reprojection(model.epsg, reference, model.name)
+    raster = empty_raster(area)
+    places = raster.places
+    heights = model.at(system.from_map(places)).reshape(raster.heights.shape)
+    covered = float(np.isfinite(heights).mean())
+    if covered < MIN_COVERED:
+        raise _elsewhere(model.name, covered, system.to_geographic(model.middle)[0], reference, area)
+    return replace(raster, heights=heights)
+
+
+def _elsewhere(name: str, covered: float, middle: Float, reference: GeoReference, area: BaseGeometry) -> SeipError:
+    """Return where a file lies, whose middle is at a longitude and latitude (2,), and where the place is."""
+    place = reference.geographic(np.array([[area.centroid.x, area.centroid.y, 0.0]]))
+    there = "" if place is None else f", and the place is at latitude {place[0, 1]:.5f}, longitude {place[0, 0]:.5f}"
+    return SeipError(
+        f"{name} has heights for {covered:.0%} of the place: its middle is at latitude {middle[1]:.5f}, longitude "
+        f"{middle[0]:.5f}{there}; take the file of the place"
+    )
+
+
+def empty_raster(area: BaseGeometry, points: Float | None = None) -> HeightRaster:
+    """Return a raster over an area and what smoothing needs around it, without heights.
+
+    Where points (n, 3) are given its cells are large enough to hold some `POINTS_PER_CELL` each.
+    """
+    low_x, low_y, high_x, high_y = area.buffer(4 * SMOOTHING).bounds
+    size = max(high_x - low_x, high_y - low_y)
+    step = max(CELL, size / MAX_CELLS)
+    if points is not None:
+        apart = math.sqrt(POINTS_PER_CELL * (high_x - low_x) * (high_y - low_y) / max(len(points), 1))
+        step = min(max(step, round(2 * apart) / 2), MAX_CELL)
+    shape = tuple(math.ceil((high - low) / step) + 1 for low, high in ((low_y, high_y), (low_x, high_x)))
+    return HeightRaster(np.floor([low_x, low_y]), step, np.full(shape, np.nan))

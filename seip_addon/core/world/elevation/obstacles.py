@@ -1,0 +1,217 @@
+"""What stands above the ground in a survey, as few boxes as keep lines of sight.
+
+Cells of a raster hold the highest point of what stands there and where it begins. Neighbours of one kind and nearly one
+height are merged into boxes; random rays tell how often a box hides what its cells do not, or the other way round.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Boolean, Float, Integer
+from ...geometry.height_raster import HeightRaster
+from ...geometry.solids import Solid, join
+
+MIN_ABOVE = 2.0  # metres above the ground below which nothing counts: road users stand there
+UNCLASSIFIED, VEGETATION, BUILDING = (0, 1), (3, 4, 5), (6,)
+CROWN_BASE = 2.5  # metres above the ground from which on a crown stands free; lower ones reach the ground
+TOLERANCES = (2.0, 1.0, 0.5, 0.25, 0.0)
+"""Metres that the cells of a box may lie above or below its top, coarsest first."""
+MAX_CHANGED = 0.005  # share of rays whose state may differ
+RAYS, RAY_LENGTH, RAY_STEP = 4000, 60.0, 0.25  # metres
+EYES, TARGETS = (3.0, 8.0), (0.3, 1.7)  # metres above the ground between which rays begin and end
+FOUNDATION = 0.5  # metres that boxes reach into the ground
+TILE = 50.0  # metres: boxes of a kind within one are one object
+KINDS = ("Surveyed obstacle", "Surveyed vegetation", "Surveyed building")
+MATERIALS = (("wall", "wall"), ("leaves", "leaves"), ("facade grey", "roof"))
+"""Walls and tops of each kind."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObstacleRaster:
+    """What stands on a raster of ground.
+
+    Parameters
+    ----------
+    ground : HeightRaster
+        Its places are the middles of the cells.
+    kind : (rows, columns) int64
+        Index of `KINDS`; -1 where nothing stands.
+    low, top : (rows, columns) float64, metres
+        Between which something stands, heights as of the ground.
+    """
+
+    ground: HeightRaster
+    kind: Integer
+    low: Float
+    top: Float
+
+
+@dataclass(frozen=True)
+class Box:
+    """Rows and columns of a raster, from the first up to one after the last, and heights in metres."""
+
+    kind: int
+    rows: tuple[int, int]
+    columns: tuple[int, int]
+    low: float
+    top: float
+
+
+@dataclass(frozen=True)
+class Merging:
+    """How many boxes a tolerance (metres) leaves, and for which share of random rays they change the line of sight."""
+
+    tolerance: float
+    boxes: int
+    changed: float
+
+
+def obstacle_raster(ground: HeightRaster, points: Float, classes: Integer) -> ObstacleRaster:
+    """Return what stands on the ground by a survey.
+
+    Cells with fewer than two neighbours are left out: posts and wires are narrower than a cell.
+
+    Parameters
+    ----------
+    points : (n, 3) float64, metres
+    classes : (n,) int64
+        As of a `PointCloud`; other classes than `UNCLASSIFIED`, `VEGETATION` and `BUILDING` do not count.
+    """
+    shape = ground.heights.shape
+    column, row = np.floor((points[:, :2] - ground.low) / ground.step + 0.5).astype(np.int64).T
+    kind = np.full(len(points), -1)
+    for number, own in enumerate((UNCLASSIFIED, VEGETATION, BUILDING)):
+        kind[np.isin(classes, own)] = number
+    counts = (kind >= 0) & (column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0])
+    counts &= points[:, 2] - ground.at(points[:, :2]) > MIN_ABOVE
+    cell, height, kind = (row * shape[1] + column)[counts], points[counts, 2], kind[counts]
+    top, low, of_kind = np.full(shape[0] * shape[1], -np.inf), np.full(shape[0] * shape[1], np.inf), np.full(shape, -1)
+    np.maximum.at(top, cell, height)
+    np.minimum.at(low, cell, height)
+    for number in (1, 0, 2):  # what is more than leaves hides down to the ground
+        of_kind.ravel()[cell[kind == number]] = number
+    top, low = top.reshape(shape), low.reshape(shape)
+    of_kind[_neighbours(of_kind >= 0) < 2] = -1
+    hangs = (of_kind == 1) & (low - ground.heights > CROWN_BASE)
+    return ObstacleRaster(ground, of_kind, np.where(hangs, low, ground.heights - FOUNDATION), top)
+
+
+def merged(raster: ObstacleRaster, tolerance: float) -> tuple[Box, ...]:
+    """Return boxes that together cover all cells where something stands, and no other.
+
+    Each is as long as cells of its kind follow each other whose tops, and whose undersides where they hang, lie within
+    twice the tolerance, and then as wide.
+    """
+    free = raster.kind >= 0
+    boxes = []
+    hangs = raster.low > raster.ground.heights
+    for row, column in np.argwhere(free).tolist():
+        if not free[row, column]:
+            continue
+
+        def fits(rows: slice, columns: slice, at: tuple[int, int] = (row, column)) -> bool:
+            alike = (raster.kind[rows, columns] == raster.kind[at]) & (hangs[rows, columns] == hangs[at])
+            if not (free[rows, columns] & alike).all():
+                return False
+            spreads = [np.ptp(raster.top[rows, columns])] + [np.ptp(raster.low[rows, columns])] * bool(hangs[at])
+            return bool(max(spreads) <= 2 * tolerance)
+
+        right, down = column + 1, row + 1
+        while right < free.shape[1] and fits(slice(row, row + 1), slice(column, right + 1)):
+            right += 1
+        while down < free.shape[0] and fits(slice(row, down + 1), slice(column, right)):
+            down += 1
+        rows, columns = slice(row, down), slice(column, right)
+        free[rows, columns] = False
+        top, low = raster.top[rows, columns], raster.low[rows, columns]
+        foot = (low.min() + low.max()) / 2 if hangs[row, column] else low.min()
+        middle = (float(top.min()) + float(top.max())) / 2
+        boxes.append(Box(int(raster.kind[row, column]), (row, down), (column, right), float(foot), middle))
+    return tuple(boxes)
+
+
+def of_boxes(raster: ObstacleRaster, boxes: Sequence[Box]) -> ObstacleRaster:
+    """Return the raster that boxes stand for."""
+    kind, low, top = np.full(raster.kind.shape, -1), raster.low.copy(), raster.top.copy()
+    for box in boxes:
+        cells = slice(*box.rows), slice(*box.columns)
+        kind[cells], low[cells], top[cells] = box.kind, box.low, box.top
+    return ObstacleRaster(raster.ground, kind, low, top)
+
+
+def chosen_boxes(raster: ObstacleRaster, rng: np.random.Generator) -> tuple[tuple[Box, ...], tuple[Merging, ...]]:
+    """Return the fewest boxes that change at most `MAX_CHANGED` of random lines of sight, and what tolerances do."""
+    begin, end = random_rays(raster, rng)
+    true = blocked(raster, begin, end)
+    choices = [merged(raster, tolerance) for tolerance in TOLERANCES]
+    changed = [
+        np.mean(blocked(of_boxes(raster, boxes), begin, end) != true) if len(begin) else 0.0 for boxes in choices
+    ]
+    tried = tuple(
+        Merging(tolerance, len(boxes), float(share))
+        for tolerance, boxes, share in zip(TOLERANCES, choices, changed, strict=True)
+    )
+    return choices[tried.index(chosen_merging(tried))], tried
+
+
+def chosen_merging(tried: Sequence[Merging]) -> Merging:
+    """Return the coarsest merging that changes few enough lines of sight; without tolerance none is changed."""
+    return next(one for one in tried if one.changed <= MAX_CHANGED)
+
+
+def random_rays(raster: ObstacleRaster, rng: np.random.Generator) -> tuple[Float, Float]:
+    """Return where rays begin and end (n, 3): at a sensor's height where nothing stands, and at a road user's."""
+    empty = np.flatnonzero(raster.kind.ravel() < 0)
+    if not len(empty):
+        return np.empty((0, 3)), np.empty((0, 3))
+    places = raster.ground.places[rng.choice(empty, RAYS)]
+    angle, length = rng.uniform(0, 2 * np.pi, RAYS), RAY_LENGTH * np.sqrt(rng.random(RAYS))
+    ends = places + length[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    ends = np.clip(ends, raster.ground.low, raster.ground.places[-1])
+    heights = [raster.ground.at(xy) + rng.uniform(*span, RAYS) for xy, span in ((places, EYES), (ends, TARGETS))]
+    return np.column_stack([places, heights[0]]), np.column_stack([ends, heights[1]])
+
+
+def blocked(raster: ObstacleRaster, begin: Float, end: Float) -> Boolean:
+    """Return whether something stands between two places (n, 3) each, looked up at least each `RAY_STEP` metres."""
+    steps = int(np.ceil(RAY_LENGTH / RAY_STEP))
+    hit: Boolean = np.zeros(len(begin), dtype=np.bool_)
+    for share in np.linspace(0.0, 1.0, steps + 1):
+        place = begin + share * (end - begin)
+        column, row = np.floor((place[:, :2] - raster.ground.low) / raster.ground.step + 0.5).astype(np.int64).T
+        stands = raster.kind[row, column] >= 0
+        hit |= stands & (place[:, 2] >= raster.low[row, column]) & (place[:, 2] <= raster.top[row, column])
+    return hit
+
+
+def solids(raster: ObstacleRaster, boxes: Sequence[Box]) -> Iterator[tuple[str, Solid]]:
+    """Yield the name and the solid of all boxes of a kind in a tile, in the coordinates of the raster."""
+    tiles: dict[tuple[int, int, int], list[Solid]] = {}
+    for box in boxes:
+        ((x, y), (far_x, far_y)) = (
+            raster.ground.low + raster.ground.step * (np.array([column, row]) - 0.5)
+            for column, row in zip(box.columns, box.rows, strict=True)
+        )
+        side, cap = MATERIALS[box.kind]
+        corners = np.array(
+            [[a, b, z] for z in (box.low, box.top) for a, b in ((x, y), (far_x, y), (far_x, far_y), (x, far_y))]
+        )
+        key = (box.kind, int(x // TILE), int(y // TILE))
+        tiles.setdefault(key, []).append(Solid(corners, _BOX, (*[side] * 4, cap, side)))
+    for (kind, _, _), found in sorted(tiles.items()):
+        yield KINDS[kind], join(*found)
+
+
+_BOX = ((0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7), (4, 5, 6, 7), (3, 2, 1, 0))
+
+
+def _neighbours(there: Boolean) -> NDArray[np.int64]:
+    """Return how many of the eight cells around each are there."""
+    padded = np.pad(there.astype(np.int64), 1)
+    rows, columns = there.shape
+    around = [padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3) if (i, j) != (1, 1)]
+    total: NDArray[np.int64] = np.sum(around, axis=0)
+    return total

@@ -1,0 +1,106 @@
+"""Junctions: their area, by their id or name, and by where they are."""
+
+import difflib
+from collections.abc import Iterable
+
+import shapely
+from shapely import Point
+from shapely.geometry.base import BaseGeometry
+
+from ...errors import SeipError
+from ...geometry.plan import closed
+from .lanes import LaneSurface
+from .road_map import Junction, RoadMap
+
+STREETS = " / "
+"""Between the names of streets that meet at a junction."""
+_MAX_GAP = 0.005  # metres
+_MAX_END_DISTANCE = 0.5  # metres from a junction to the end of a lane that leads to it
+
+
+def junction_area(surfaces: Iterable[LaneSurface], junction_id: str) -> BaseGeometry:
+    """Return the union of all lanes of a junction in plan, map coordinates; empty if it has none."""
+    lanes = [surface.polygon for surface in surfaces if surface.junction_id == junction_id]
+    # Neighbouring lanes of different roads meet to within rounding: hairline cracks are closed.
+    return closed(shapely.union_all(lanes), _MAX_GAP)
+
+
+def find_junction(road_map: RoadMap, surfaces: Iterable[LaneSurface], id_or_name: str) -> Junction:
+    """Return the junction with an id or, failing that, the only one with a name, or where streets meet.
+
+    Streets are given as ``High Street / Mill Lane``; of several junctions of both the first counts.
+
+    Parameters
+    ----------
+    surfaces : iterable of LaneSurface
+        The lanes of the map; a junction without any is no place to work on.
+
+    Raises
+    ------
+    SeipError
+        There is no such junction (close ones are named), the name is not unique, or the junction has no lanes.
+    """
+    surfaces = tuple(surfaces)
+    of_id = [junction for junction in road_map.junctions if junction.id == id_or_name]
+    found = of_id or [junction for junction in road_map.junctions if junction.name == id_or_name]
+    found = found or _by_streets(road_map, surfaces, id_or_name)[:1]
+    if not found:
+        raise SeipError(f"no junction {id_or_name!r} in map {road_map.name!r}; {_close(road_map, id_or_name)}")
+    if len(found) > 1:
+        ids = ", ".join(junction.id for junction in found)
+        raise SeipError(f"several junctions are called {id_or_name!r}; choose one by its id: {ids}")
+    if not any(surface.junction_id == found[0].id for surface in surfaces):
+        raise SeipError(f"junction {id_or_name!r} has no lanes; choose another junction or a place on the map")
+    return found[0]
+
+
+def streets_of_junctions(road_map: RoadMap, surfaces: Iterable[LaneSurface]) -> dict[str, tuple[str, ...]]:
+    """Return the names of the streets that meet at each junction, by its id, in the order of the file."""
+    names = {road.id: road.name for road in road_map.roads if road.name}
+    areas: dict[str, list[BaseGeometry]] = {}
+    ends, of_end = [], []
+    for surface in surfaces:
+        if surface.junction_id is not None:
+            areas.setdefault(surface.junction_id, []).append(surface.polygon)
+        elif surface.road_id in names:
+            for row in (0, -1):
+                ends.append(Point((surface.left[row, :2] + surface.right[row, :2]) / 2))
+                of_end.append(names[surface.road_id])
+    tree = shapely.STRtree(ends)
+    found = {}
+    for number, parts in areas.items():
+        touching = tree.query(shapely.union_all(parts), predicate="dwithin", distance=_MAX_END_DISTANCE)
+        found[number] = tuple(dict.fromkeys(of_end[index] for index in sorted(touching.tolist())))
+    return found
+
+
+def _by_streets(road_map: RoadMap, surfaces: Iterable[LaneSurface], name: str) -> list[Junction]:
+    """Return the junctions at which all the streets of a name such as ``High Street / Mill Lane`` meet."""
+    wanted = [part.strip().casefold() for part in name.split(STREETS) if part.strip()]
+    if len(wanted) < 2:
+        return []
+    meeting = streets_of_junctions(road_map, surfaces)
+    there = {number: {street.casefold() for street in streets} for number, streets in meeting.items()}
+    return [junction for junction in road_map.junctions if there.get(junction.id, set()).issuperset(wanted)]
+
+
+def nearest_junctions(
+    road_map: RoadMap, surfaces: Iterable[LaneSurface], x: float, y: float, k: int
+) -> tuple[tuple[Junction, float], ...]:
+    """Return the ``k`` junctions nearest to a place in map coordinates, and their distances in metres."""
+    place = Point(x, y)
+    distances: dict[str, float] = {}
+    for surface in surfaces:
+        if surface.junction_id is not None:
+            nearest = distances.get(surface.junction_id, float("inf"))
+            distances[surface.junction_id] = min(nearest, float(surface.polygon.distance(place)))
+    found = [(junction, distances[junction.id]) for junction in road_map.junctions if junction.id in distances]
+    return tuple(sorted(found, key=lambda pair: pair[1])[:k])
+
+
+def _close(road_map: RoadMap, asked: str) -> str:
+    known = [text for junction in road_map.junctions for text in (junction.id, junction.name) if text]
+    if not known:
+        return "the map has no junctions, choose a place by its coordinates"
+    close = difflib.get_close_matches(asked, known, n=5, cutoff=0.4) or known[:5]
+    return f"the closest: {', '.join(dict.fromkeys(close))}"

@@ -1,0 +1,172 @@
+"""The surfaces of lanes as strips between a left and a right edge."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+import shapely
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Float
+from ...errors import SeipError
+from ...limits import ELEVATION
+from .road_map import Lane, LaneSection, Road, RoadFrame
+from .sampling import sample
+
+_MIN_TRIANGLE_AREA = 1e-9  # square metres
+_MAX_HEIGHT, _MAX_WIDTH = ELEVATION.most, 1_000.0  # metres; beyond them a number of the map has slipped
+
+
+@dataclass(frozen=True, eq=False)
+class LaneSurface:
+    """The surface of a lane over one lane section.
+
+    Parameters
+    ----------
+    section : int
+        Number of the lane section along the road, from 0.
+    lane_id : int
+        Positive to the left of the centre lane, negative to the right.
+    lane_type : str
+        As in the file: ``driving``, ``shoulder``, ``sidewalk``, ``parking``, ...
+    s : (n,) float64, metres
+        Where along the road the points of the edges are.
+    left, right : (n, 3) float64, metres
+        Edges in map coordinates, as seen along the reference line.
+    """
+
+    road_id: str
+    junction_id: str | None
+    section: int
+    lane_id: int
+    lane_type: str
+    keeps_left: bool
+    s: Float
+    left: Float
+    right: Float
+
+    @cached_property
+    def triangles(self) -> Float:
+        """The surface as (m, 3, 3) float64 triangles in map coordinates, normals up, none without area."""
+        left, right = self.left, self.right
+        near_right = np.stack([right[:-1], right[1:], left[1:]], axis=1)
+        near_left = np.stack([right[:-1], left[1:], left[:-1]], axis=1)
+        triangles = np.stack([near_right, near_left], axis=1).reshape(-1, 3, 3)
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        # Inside a bend tighter than the lane is far from the reference line a strip turns over.
+        upward = np.where((normals[:, 2] < 0.0)[:, None, None], triangles[:, ::-1], triangles)
+        return np.asarray(upward[np.linalg.norm(normals, axis=1) > 2.0 * _MIN_TRIANGLE_AREA])
+
+    @cached_property
+    def polygon(self) -> BaseGeometry:
+        """The surface in plan; several polygons where it narrows to nothing in between."""
+        outline = Polygon(np.concatenate([self.left[:, :2], self.right[::-1, :2]]))
+        if outline.is_valid:
+            return outline
+        faces = shapely.polygons(self.triangles[:, :, :2])
+        return shapely.union_all(faces[shapely.is_valid(faces)])
+
+
+def lane_surfaces(road: Road, tolerance: float = 0.02) -> tuple[LaneSurface, ...]:
+    """Return the surfaces of all lanes of a road that have an area.
+
+    Elevation, superelevation, crossfall, shape, level lanes and lane heights are part of them; across, a lane is
+    straight from edge to edge. Lane sections shorter than a micrometre are left out.
+
+    Parameters
+    ----------
+    tolerance : float, metres
+        Greatest distance between a true edge and the straight lines that stand for it.
+
+    Returns
+    -------
+    tuple of LaneSurface
+        Sections along the road, lanes from left to right.
+
+    Raises
+    ------
+    SeipError
+        The road cannot be followed within the tolerance.
+    """
+    surfaces = []
+    for number, section in enumerate(road.sections):
+        lanes, place = (*section.left[::-1], *section.right), f"road {road.id}, lane section at s={section.start:g}"
+        if not lanes:
+            continue
+        s, points = sample(partial(_edges, road, section), _knots(road, section), tolerance, place)
+        points = points.reshape(-1, len(lanes), 2, 3)
+        _check_size(points, place)
+        for lane, edges in zip(lanes, np.moveaxis(points, 1, 0), strict=True):
+            of_road = (road.id, road.junction_id, number, lane.id, lane.type, road.keeps_left)
+            surfaces.append(LaneSurface(*of_road, s, edges[:, 0], edges[:, 1]))
+    return tuple(surface for surface in surfaces if len(surface.triangles))
+
+
+def _check_size(points: Float, place: str) -> None:
+    """Raise an error where edges of lanes, (k, lanes, 2, 3), are where no road is."""
+    highest = float(np.abs(points[..., 2]).max(initial=0.0))
+    if highest > _MAX_HEIGHT:
+        raise SeipError(f"{place}: it lies at {highest:,.0f} m above or below zero; correct the elevation in the map")
+    widest = float(np.linalg.norm(points[:, :, 0] - points[:, :, 1], axis=-1).max(initial=0.0))
+    if widest > _MAX_WIDTH:
+        raise SeipError(f"{place}: a lane is {widest:,.0f} m wide; correct its width in the map")
+
+
+def _knots(road: Road, section: LaneSection) -> list[float]:
+    """Return the section's ends and the places between them where some record begins or a width comes to nothing."""
+    lanes = (*section.left, *section.right)
+    profiles = (
+        *(road.elevation, road.superelevation, road.left_crossfall, road.right_crossfall, road.lane_offset),
+        *(of_lane for lane in lanes for of_lane in (lane.width, lane.border, lane.inner_height, lane.outer_height)),
+    )
+    vanishing = (lane.width.zeros(section.end) for lane in lanes)
+    starts = np.concatenate([road.reference_line.s, road.shape.s, *(p.start for p in profiles), *vanishing])
+    inside = starts[(starts > section.start) & (starts < section.end)]
+    return [section.start, *inside.tolist(), section.end]
+
+
+def _edges(road: Road, section: LaneSection, s: Float) -> Float:
+    """Return the left and right edge of each lane, lanes from left to right, (k, 2 · lanes, 3) metres."""
+    frame = road.frame(s)
+    left = [edges[::-1] for edges in _side_edges(road, frame, section.left, s, 1.0)][::-1]
+    right = _side_edges(road, frame, section.right, s, -1.0)
+    return np.stack([edge for edges in (*left, *right) for edge in edges], axis=1)
+
+
+def _side_edges(
+    road: Road, frame: RoadFrame, lanes: tuple[Lane, ...], s: Float, side: float
+) -> Iterator[tuple[Float, Float]]:
+    """Yield the inner and outer edge, (k, 3) each, of the lanes of one side from the centre outwards."""
+    centre = t = road.lane_offset(s)
+    left_slope, right_slope = -np.tan(road.left_crossfall(s)), np.tan(road.right_crossfall(s))
+
+    def rise(t: Float) -> Float:
+        return np.asarray(t * np.where(t > 0.0, left_slope, right_slope) + road.shape(s, t))
+
+    point = frame.origin + t[:, None] * frame.left + rise(t)[:, None] * frame.up
+    for lane in lanes:
+        width = _width(lane, s, np.abs(t - centre))
+        outer_t = t + side * width
+        if lane.level:
+            step = (side * width)[:, None] * frame.level_left
+        else:
+            step = (outer_t - t)[:, None] * frame.left + (rise(outer_t) - rise(t))[:, None] * frame.up
+        yield _raised(point, lane.inner_height(s)), _raised(point + step, lane.outer_height(s))
+        point, t = point + step, outer_t
+
+
+def _width(lane: Lane, s: Float, inner: Float) -> Float:
+    """Return the width, (k,) metres, of a lane whose inner edge is ``inner`` away from the centre."""
+    if len(lane.width) or not len(lane.border):
+        return np.maximum(lane.width(s), 0.0)
+    # Some exporters give the borders of right lanes as t, some as distances: the side is known anyway.
+    return np.maximum(np.abs(lane.border(s)) - inner, 0.0)
+
+
+def _raised(points: Float, height: Float) -> Float:
+    """Return points lifted straight up, so that a kerb leaves no gap in plan."""
+    raised = points.copy()
+    raised[:, 2] += height
+    return raised

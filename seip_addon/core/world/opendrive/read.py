@@ -1,0 +1,332 @@
+"""Read an OpenDRIVE file into a `RoadMap`.
+
+Written after ASAM OpenDRIVE 1.4 to 1.8; attributes that a file leaves out have the standard's defaults.
+"""
+
+import math
+import os
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from ... import limits
+from ...errors import SeipError
+from .document import Node, read_document
+from .profile import ZERO_PROFILE, Profile, lateral_shape, profile
+from .reference_line import Clothoid, Piece, ReferenceLine, param_poly3, poly3
+from .road_map import (
+    Corner,
+    Junction,
+    Lane,
+    LaneSection,
+    ObjectOutline,
+    Repeat,
+    Road,
+    RoadLink,
+    RoadMap,
+    RoadObject,
+    RoadSignal,
+)
+
+_OTHER_FORMATS = {
+    "osm": " as extracts of OpenStreetMap do (let its name end in .osm)",
+    "net": " as networks of SUMO do (netconvert --opendrive-output makes a map of them)",
+    "CityModel": " as CityGML does",
+    "OpenSCENARIO": " as OpenSCENARIO does",
+    "kml": " as KML does",
+}
+ATTRIBUTION = "attribution"
+"""Code of the header's ``<userData>`` whose value is a credit."""
+
+_MAX_ROAD_LENGTH = limits.ROAD_LENGTH.most
+_MAX_OBJECT_DISTANCE = limits.SITE_RADIUS.most  # metres that an object reaches, and stands from its road
+_MAX_OBJECT_HEIGHT = limits.ABOVE_GROUND.most
+_MAX_TURN = 200.0 * math.pi  # radians within one geometry; a hundred turns
+
+
+def read_map(path: str | os.PathLike[str]) -> RoadMap:
+    """Read an OpenDRIVE file.
+
+    Raises
+    ------
+    SeipError
+        There is no such file, it is no well-formed or harmless XML, no OpenDRIVE, has no roads, or a number in it makes
+        no sense; the message names the road and the element.
+    """
+    root = read_document(path)
+    if root.tag != "OpenDRIVE":
+        other = _OTHER_FORMATS.get(root.tag, "")
+        raise SeipError(f"{root.place} is not OpenDRIVE: it begins with <{root.tag}>{other}; choose an .xodr file")
+    roads = tuple(_road(node.within(f"road {node.text('id')}")) for node in root.children("road"))
+    if not roads:
+        raise SeipError(f"{root.place} has no roads; choose an OpenDRIVE map with at least one <road>")
+    header = root.child("header")
+    offset, reference = (header and header.child(name) for name in ("offset", "geoReference"))
+    return RoadMap(
+        name=(header.text("name", "") if header else "") or Path(path).stem,
+        header_offset=np.array([offset.number(name, 0.0) for name in ("x", "y", "z", "hdg")])
+        if offset
+        else np.zeros(4),
+        geo_reference=((reference.element.text or "").strip() or None) if reference else None,
+        roads=roads,
+        junctions=tuple(Junction(node.text("id"), node.text("name", "")) for node in root.children("junction")),
+        attribution=tuple(
+            node.text("value", "")
+            for node in (header.children("userData") if header else ())
+            if node.text("code", "") == ATTRIBUTION and node.text("value", "")
+        ),
+    )
+
+
+def with_attribution(text: str, attribution: Iterable[str]) -> str:
+    """Return the text of a map with credits in its header, which `read_map` reads again."""
+    elements = "".join(f"<userData code={quoteattr(ATTRIBUTION)} value={quoteattr(one)}/>" for one in attribution)
+    return text.replace("</header>", f"{elements}</header>", 1)
+
+
+def _road(node: Node) -> Road:
+    line = _reference_line(node)
+    junction = node.text("junction", "-1")
+    return Road(
+        id=node.text("id"),
+        name=node.text("name", ""),
+        junction_id=None if junction in ("-1", "") else junction,
+        keeps_left=node.text("rule", "RHT").upper() == "LHT",
+        reference_line=line,
+        elevation=_profile(node, "elevationProfile", "elevation"),
+        superelevation=_profile(node, "lateralProfile", "superelevation"),
+        left_crossfall=_crossfall(node, "left"),
+        right_crossfall=_crossfall(node, "right"),
+        shape=lateral_shape(
+            [(each.number("s"), each.number("t"), _cubic(each)) for each in node.children("lateralProfile", "shape")]
+        ),
+        lane_offset=_profile(node, "lanes", "laneOffset"),
+        sections=_sections(node, line.end),
+        objects=tuple(
+            _object(child.within(f"object {child.text('id', '')}")) for child in node.children("objects", "object")
+        ),
+        signals=tuple(
+            _signal(child.within(f"signal {child.text('id', '')}"), node.text("id"))
+            for child in node.children("signals", "signal")
+        ),
+        predecessor=_link(node, "predecessor"),
+        successor=_link(node, "successor"),
+    )
+
+
+def _link(road: Node, end: str) -> RoadLink | None:
+    node = road.child("link", end)
+    if node is None:
+        return None
+    return RoadLink(node.text("elementType", ""), node.text("elementId", ""), node.text("contactPoint", ""))
+
+
+def _reference_line(road: Node) -> ReferenceLine:
+    if road.text("length", ""):
+        road.length("length")
+    nodes = sorted(road.children("planView", "geometry"), key=lambda node: node.number("s"))
+    if not nodes:
+        raise SeipError(f"{road.place} has no <geometry> in its <planView>; correct or remove the road")
+    line = ReferenceLine(
+        s=np.array([node.number("s") for node in nodes]),
+        length=np.array([node.length("length") for node in nodes]),
+        start=np.array([[node.number(name) for name in ("x", "y", "hdg")] for node in nodes]),
+        pieces=tuple(_piece(node) for node in nodes),
+    )
+    if line.end > _MAX_ROAD_LENGTH:
+        raise SeipError(f"{road.place}: its <geometry> reaches {line.end:g} m; no road is that long, correct the map")
+    return line
+
+
+def _piece(geometry: Node) -> Piece:
+    length = geometry.length("length")
+    for node in (Node(element, geometry.place) for element in geometry.element):
+        match node.tag:
+            case "line":
+                return Clothoid(0.0, 0.0)
+            case "arc":
+                curvature = node.number("curvature")
+                return _clothoid(node, curvature, curvature, length)
+            case "spiral":
+                return _clothoid(node, node.number("curvStart"), node.number("curvEnd"), length)
+            case "poly3":
+                return poly3((node.number("a"), node.number("b"), node.number("c"), node.number("d")), length)
+            case "paramPoly3":
+                return _param_poly3(node, length)
+    raise SeipError(
+        f"{geometry.place}: a <geometry> at s={geometry.number('s'):g} holds no line, arc, spiral, poly3 or "
+        "paramPoly3; correct the map"
+    )
+
+
+def _clothoid(node: Node, first: float, last: float, length: float) -> Clothoid:
+    curve = Clothoid(first, (last - first) / length)
+    if curve.turn(length) > _MAX_TURN:
+        raise SeipError(
+            f"{node.place}: a <{node.tag}> of {length:g} m turns more than a hundred times; correct its curvature"
+        )
+    return curve
+
+
+def _param_poly3(node: Node, length: float) -> Piece:
+    u, v = ((node.number(f"a{x}"), node.number(f"b{x}"), node.number(f"c{x}"), node.number(f"d{x}")) for x in "UV")
+    # Without a pRange the standard takes p from 0 to 1.
+    curve = param_poly3(u, v, length if node.text("pRange", "normalized") == "arcLength" else 1.0, length)
+    if not (math.isfinite(curve.stretch) and curve.stretch > 0.0):
+        raise SeipError(f"{node.place}: a <paramPoly3> has no extent; correct its coefficients")
+    return curve
+
+
+def _profile(road: Node, *path: str) -> Profile:
+    return profile([(node.number("s"), _cubic(node)) for node in road.children(*path)])
+
+
+def _crossfall(road: Node, side: str) -> Profile:
+    nodes = road.children("lateralProfile", "crossfall")
+    return profile([(node.number("s"), _cubic(node)) for node in nodes if node.text("side", "both") in (side, "both")])
+
+
+def _cubic(node: Node) -> tuple[float, float, float, float]:
+    return node.number("a", 0.0), node.number("b", 0.0), node.number("c", 0.0), node.number("d", 0.0)
+
+
+def _sections(road: Node, end: float) -> tuple[LaneSection, ...]:
+    """Return the lane sections; a side that a one-sided section does not carry goes on as it was before."""
+    nodes = sorted(road.children("lanes", "laneSection"), key=lambda node: node.number("s"))
+    starts = [max(node.number("s"), 0.0) for node in nodes]
+    sections = []
+    left: tuple[Lane, ...] = ()
+    right: tuple[Lane, ...] = ()
+    for node, start, stop in zip(nodes, starts, [*starts, end][1:], strict=True):
+        one_sided = node.flag("singleSide")
+        left = _side(node, "left", start) or (left if one_sided else ())
+        right = _side(node, "right", start) or (right if one_sided else ())
+        if start < min(stop, end):
+            sections.append(LaneSection(start, min(stop, end), left, right))
+    return tuple(sections)
+
+
+def _side(section: Node, side: str, start: float) -> tuple[Lane, ...]:
+    """Return the lanes of one side, from the centre outwards."""
+    lanes = (_lane(node, start) for node in section.children(side, "lane"))
+    return tuple(sorted(lanes, key=lambda lane: abs(lane.id)))
+
+
+def _lane(node: Node, start: float) -> Lane:
+    number = node.whole_number("id")
+    node = node.within(f"lane {number}")
+    return Lane(
+        id=number,
+        type=node.text("type", "none"),
+        level=node.flag("level"),
+        width=_lane_profile(node, "width", start),
+        border=_lane_profile(node, "border", start),
+        inner_height=_height(node, "inner", start),
+        outer_height=_height(node, "outer", start),
+    )
+
+
+def _lane_profile(lane: Node, name: str, start: float) -> Profile:
+    return profile([(start + node.number("sOffset", 0.0), _cubic(node)) for node in lane.children(name)])
+
+
+def _height(lane: Node, edge: str, start: float) -> Profile:
+    """Return the height of an edge, which ramps from each record to the next."""
+    nodes = sorted(lane.children("height"), key=lambda node: node.number("sOffset", 0.0))
+    if not nodes:
+        return ZERO_PROFILE
+    s = [start + node.number("sOffset", 0.0) for node in nodes]
+    heights = [node.number(edge, 0.0) for node in nodes]
+    rises = [
+        (following - height) / (stop - begin) if stop > begin else 0.0
+        for height, following, begin, stop in zip(heights, heights[1:], s, s[1:], strict=False)
+    ]
+    return profile([(at, (height, rise, 0.0, 0.0)) for at, height, rise in zip(s, heights, [*rises, 0.0], strict=True)])
+
+
+def _object(node: Node) -> RoadObject:
+    outlines = (*node.children("outline"), *node.children("outlines", "outline"))
+    obj = RoadObject(
+        id=node.text("id", ""),
+        name=node.text("name", ""),
+        kind=node.text("type", "none").lower(),
+        s=node.number("s"),
+        t=node.number("t", most=_MAX_OBJECT_DISTANCE),
+        z_offset=node.number("zOffset", 0.0, most=_MAX_OBJECT_HEIGHT),
+        heading=node.number("hdg", 0.0),
+        pitch=node.number("pitch", 0.0),
+        roll=node.number("roll", 0.0),
+        length=node.number("length", 0.0, most=_MAX_OBJECT_DISTANCE),
+        width=node.number("width", 0.0, most=_MAX_OBJECT_DISTANCE),
+        height=node.number("height", 0.0, most=_MAX_OBJECT_HEIGHT),
+        radius=node.number("radius", 0.0, most=_MAX_OBJECT_DISTANCE),
+        outlines=tuple(filter(lambda outline: outline.corners, map(_outline, outlines))),
+        repeats=(),
+    )
+    return replace(obj, repeats=tuple(_repeat(child, obj) for child in node.children("repeat")))
+
+
+def _outline(node: Node) -> ObjectOutline:
+    corners = (Node(element, node.place) for element in node.element)
+    return ObjectOutline(
+        tuple(_corner(corner) for corner in corners if corner.tag in ("cornerRoad", "cornerLocal")),
+        node.flag("closed", default=True),
+    )
+
+
+def _corner(node: Node) -> Corner:
+    on_road = node.tag == "cornerRoad"
+    along, aside, up = ("s", "t", "dz") if on_road else ("u", "v", "z")
+    return Corner(
+        on_road,
+        node.number(along) if on_road else node.number(along, most=_MAX_OBJECT_DISTANCE),
+        node.number(aside, most=_MAX_OBJECT_DISTANCE),
+        node.number(up, 0.0, most=_MAX_OBJECT_HEIGHT),
+        node.number("height", most=_MAX_OBJECT_HEIGHT) if "height" in node.element.attrib else None,
+    )
+
+
+def _repeat(node: Node, obj: RoadObject) -> Repeat:
+    distance = node.number("distance", 0.0)
+    if distance < 0.0:
+        raise SeipError(f"{node.place}: distance={distance:g} of <repeat> is below zero; correct it in the map")
+
+    def pair(name: str, own: float, most: float = _MAX_OBJECT_DISTANCE) -> tuple[float, float]:
+        start = node.number(f"{name}Start", own, most=most)
+        return start, node.number(f"{name}End", start, most=most)
+
+    return Repeat(
+        s=node.number("s", obj.s),
+        length=node.number("length", 0.0),
+        distance=distance,
+        t=pair("t", obj.t),
+        z_offset=pair("zOffset", obj.z_offset, _MAX_OBJECT_HEIGHT),
+        height=pair("height", obj.height, _MAX_OBJECT_HEIGHT),
+        width=pair("width", obj.width),
+        object_length=pair("length", obj.length),
+        radius=pair("radius", obj.radius),
+    )
+
+
+def _signal(node: Node, road_id: str) -> RoadSignal:
+    turned = math.pi if node.text("orientation", "none") == "-" else 0.0
+    on_map = node.child("positionInertial")
+    elsewhere = None if on_map else node.child("positionRoad")
+    stands = elsewhere or node
+    return RoadSignal(
+        road_id=elsewhere.text("roadId") if elsewhere else road_id,
+        id=node.text("id", ""),
+        name=node.text("name", ""),
+        kind=node.text("type", ""),
+        dynamic=node.flag("dynamic"),
+        s=stands.number("s"),
+        t=stands.number("t"),
+        z_offset=stands.number("zOffset", 0.0),
+        heading=turned + stands.number("hOffset", 0.0),
+        place=None
+        if on_map is None
+        else (on_map.number("x"), on_map.number("y"), on_map.number("z"), on_map.number("hdg", 0.0)),
+    )

@@ -1,0 +1,186 @@
+"""The reference line of a road in plan: lines, arcs, clothoids and cubic curves.
+
+All follow ASAM OpenDRIVE 1.8, section "Geometry". A piece of any kind is
+evaluated at distances along itself, to well below a nanometre.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ...arrays import Float
+
+_ROOTS, _ROOT_WEIGHTS = np.polynomial.legendre.leggauss(16)  # type: ignore[no-untyped-call]  # numpy 1.26 has no types here
+# On the unit interval, where 16 nodes integrate every polynomial up to degree 31 exactly.
+_NODES: Float = (_ROOTS + 1.0) / 2.0
+_WEIGHTS: Float = _ROOT_WEIGHTS / 2.0
+_CUBIC_PANELS = 64
+
+
+class Piece(Protocol):
+    """One ``<geometry>``: a curve that starts at the origin and is evaluated along its length."""
+
+    def __call__(self, distance: Float) -> tuple[Float, Float, Float]:
+        """Return local x, y and heading, (k,) each, at distances (k,) from the start."""
+
+
+@dataclass(frozen=True)
+class Clothoid:
+    """Curve whose curvature changes linearly with its length; lines and arcs are such curves too.
+
+    Parameters
+    ----------
+    curvature : float, 1/m
+        At the start, positive to the left.
+    rate : float, 1/m²
+        Change of the curvature per metre.
+    """
+
+    curvature: float
+    rate: float
+
+    def __call__(self, distance: Float) -> tuple[Float, Float, Float]:
+        """Return local x, y and heading, (k,) each, at distances (k,) from the start."""
+        heading = distance * (self.curvature + distance * self.rate / 2.0)
+        if self.rate == 0.0:
+            # The chord of an arc points half as far round, and np.sinc keeps the straight line exact.
+            chord = distance * np.sinc(heading / (2.0 * np.pi))
+            return chord * np.cos(heading / 2.0), chord * np.sin(heading / 2.0), heading
+        farthest = float(np.max(distance, initial=0.0))
+        panels = 1 + int(self.turn(farthest))
+        size = farthest / panels or 1.0
+        knots = size * np.arange(panels)
+        panel = np.minimum(distance // size, panels - 1).astype(np.int64)
+        whole = self._displacement(knots, np.full(panels, size))
+        before = np.cumsum(whole, axis=1) - whole
+        x, y = before[:, panel] + self._displacement(knots[panel], distance - knots[panel])
+        return x, y, heading
+
+    def _displacement(self, start: Float, length: Float) -> Float:
+        """Return x and y, (2, k) metres, by which the curve moves on over lengths of at most a radian's turn."""
+        along = start[:, None] + length[:, None] * _NODES
+        heading = along * (self.curvature + along * self.rate / 2.0)
+        return np.stack([length * (np.cos(heading) @ _WEIGHTS), length * (np.sin(heading) @ _WEIGHTS)])
+
+    def turn(self, length: float) -> float:
+        """Return an upper bound of the angle, in radians, that the curve turns through over a length."""
+        return length * max(abs(self.curvature), abs(self.curvature + length * self.rate))
+
+
+@dataclass(frozen=True, eq=False)
+class Cubic:
+    """Plane curve ``(u(p), v(p))`` of two cubic polynomials, found by the distance along it.
+
+    Parameters
+    ----------
+    u, v : (4,) float64
+        Coefficients of 1, p, p², p³.
+    parameters : (m,) float64
+        Knots on the range of p.
+    distances : (m,) float64, metres
+        Arc length from the start to each knot.
+    stretch : float
+        Metres of arc per metre of road.
+    """
+
+    u: Float
+    v: Float
+    parameters: Float
+    distances: Float
+    stretch: float
+
+    def __call__(self, distance: Float) -> tuple[Float, Float, Float]:
+        """Return local x, y and heading, (k,) each, at distances (k,) from the start."""
+        p = self._parameter(np.clip(distance * self.stretch, 0.0, self.distances[-1]))
+        powers = p[:, None] ** np.arange(4)
+        du, dv = _derivative(self.u, p), _derivative(self.v, p)
+        return powers @ self.u, powers @ self.v, np.arctan2(dv, du)
+
+    def _parameter(self, arc: Float) -> Float:
+        """Invert the arc length by Newton's method, held between the knots by bisection."""
+        panel = np.clip(np.searchsorted(self.distances, arc, side="right") - 1, 0, len(self.distances) - 2)
+        low, high = self.parameters[panel], self.parameters[panel + 1]
+        first, base = low, self.distances[panel]
+        p = np.interp(arc, self.distances, self.parameters)
+        for _ in range(60):
+            excess = base + _arc_length(self.u, self.v, first, p) - arc
+            low, high = np.where(excess <= 0.0, p, low), np.where(excess >= 0.0, p, high)
+            speed = np.hypot(_derivative(self.u, p), _derivative(self.v, p))
+            step = p - np.divide(excess, speed, out=np.full_like(p, np.inf), where=speed > 0.0)
+            following = np.where((step >= low) & (step <= high), step, (low + high) / 2.0)
+            if np.all(np.abs(following - p) <= 1e-15 * self.parameters[-1]):
+                return following
+            p = following
+        return p
+
+
+def poly3(coefficients: tuple[float, float, float, float], length: float) -> Cubic:
+    """Return the curve ``v = a + b·u + c·u² + d·u³`` from u = 0 over a length."""
+    # The arc is never shorter than its projection: u stays within the length.
+    return _cubic(np.array([0.0, 1.0, 0.0, 0.0]), np.array(coefficients), length)
+
+
+def param_poly3(
+    u: tuple[float, float, float, float], v: tuple[float, float, float, float], end: float, length: float
+) -> Cubic:
+    """Return the parametric cubic with p from 0 to ``end`` (1 or the length) over a length of road.
+
+    The standard ties p to s at both ends alone; in between s is the distance
+    along the curve. Where the arc and the stated length differ, s is stretched.
+    """
+    curve = _cubic(np.array(u), np.array(v), end)
+    return Cubic(curve.u, curve.v, curve.parameters, curve.distances, float(curve.distances[-1]) / length)
+
+
+def _cubic(u: Float, v: Float, end: float) -> Cubic:
+    parameters = np.linspace(0.0, end, _CUBIC_PANELS + 1)
+    lengths = _arc_length(u, v, parameters[:-1], parameters[1:])
+    return Cubic(u, v, parameters, np.concatenate([[0.0], np.cumsum(lengths)]), 1.0)
+
+
+def _derivative(polynomial: Float, p: Float) -> Float:
+    return np.asarray(polynomial[1] + p * (2.0 * polynomial[2] + p * 3.0 * polynomial[3]))
+
+
+def _arc_length(u: Float, v: Float, start: Float, end: Float) -> Float:
+    p = start[:, None] + (end - start)[:, None] * _NODES
+    return np.asarray((end - start) * (np.hypot(_derivative(u, p), _derivative(v, p)) @ _WEIGHTS))
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceLine:
+    """Pieces in a row, each with its own start in map coordinates.
+
+    Parameters
+    ----------
+    s : (n,) float64, metres
+        Where each piece begins along the road, ascending.
+    length : (n,) float64, metres
+        Length of each piece.
+    start : (n, 3) float64
+        x, y in metres and heading in radians of each piece's start.
+    """
+
+    s: Float
+    length: Float
+    start: Float
+    pieces: tuple[Piece, ...]
+
+    @property
+    def end(self) -> float:
+        """End of the last piece, metres along the road."""
+        return float(self.s[-1] + self.length[-1])
+
+    def __call__(self, s: Float) -> tuple[Float, Float, Float]:
+        """Return x, y and heading, (k,) each, at ``s``, (k,) metres along the road."""
+        x, y, heading = np.empty_like(s), np.empty_like(s), np.empty_like(s)
+        index = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 1)
+        for i in np.unique(index):
+            here = index == i
+            x0, y0, turned = self.start[i]
+            along, aside, heading[here] = self.pieces[i](np.clip(s[here] - self.s[i], 0.0, self.length[i]))
+            x[here] = x0 + along * np.cos(turned) - aside * np.sin(turned)
+            y[here] = y0 + along * np.sin(turned) + aside * np.cos(turned)
+            heading[here] += turned
+        return x, y, heading

@@ -1,0 +1,298 @@
+"""A map as it is read: roads with their profiles, lanes, objects and signals, and junctions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Float
+from .profile import LateralShape, Profile
+from .reference_line import ReferenceLine
+
+MIDDLE_STEP = 10.0  # metres along a road between the places that may be a map's middle
+
+
+@dataclass(frozen=True)
+class Junction:
+    """A junction by its ``id`` and its ``name``, which may be empty."""
+
+    id: str
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class Lane:
+    """One lane record of a lane section.
+
+    Parameters
+    ----------
+    id : int
+        Positive to the left of the centre lane, negative to the right.
+    type : str
+        As in the file: ``driving``, ``sidewalk``, ...
+    level : bool
+        Whether the lane keeps level instead of following superelevation and crossfall.
+    width, border : Profile
+        Over metres along the road. A border is the offset of the outer edge
+        from the centre lane and counts where there is no width.
+    inner_height, outer_height : Profile
+        How far the edges stand above the road surface, over metres along the road.
+    """
+
+    id: int
+    type: str
+    level: bool
+    width: Profile
+    border: Profile
+    inner_height: Profile
+    outer_height: Profile
+
+
+@dataclass(frozen=True, eq=False)
+class LaneSection:
+    """Lanes from ``start`` to ``end``, metres along the road, each side from the centre outwards."""
+
+    start: float
+    end: float
+    left: tuple[Lane, ...]
+    right: tuple[Lane, ...]
+
+
+@dataclass(frozen=True)
+class Corner:
+    """A corner of an object's outline.
+
+    ``along`` and ``aside`` are s and t of the road (`on_road`) or u and v of the object, ``up`` is dz or z, all in
+    metres; ``height`` is None where the file does not say.
+    """
+
+    on_road: bool
+    along: float
+    aside: float
+    up: float
+    height: float | None
+
+
+@dataclass(frozen=True)
+class ObjectOutline:
+    """Corners of an outline in their order, and whether it closes."""
+
+    corners: tuple[Corner, ...]
+    closed: bool
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """A row of copies of an object, or a continuous strip where ``distance`` is zero.
+
+    Each pair holds the values at the start and the end of the row, in metres.
+    """
+
+    s: float
+    length: float
+    distance: float
+    t: tuple[float, float]
+    z_offset: tuple[float, float]
+    height: tuple[float, float]
+    width: tuple[float, float]
+    object_length: tuple[float, float]
+    radius: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class RoadObject:
+    """An object as the file gives it, in road coordinates (metres, radians)."""
+
+    id: str
+    name: str
+    kind: str
+    s: float
+    t: float
+    z_offset: float
+    heading: float
+    pitch: float
+    roll: float
+    length: float
+    width: float
+    height: float
+    radius: float
+    outlines: tuple[ObjectOutline, ...]
+    repeats: tuple[Repeat, ...]
+
+
+@dataclass(frozen=True)
+class RoadSignal:
+    """A signal as the file gives it, in the coordinates of the road on which it stands (metres, radians).
+
+    Parameters
+    ----------
+    road_id : str
+        The road on which it stands, which need not be the one that it applies to.
+    place : (x, y, z, heading) or None
+        Where it stands, if the file says that in map coordinates.
+    """
+
+    road_id: str
+    id: str
+    name: str
+    kind: str
+    dynamic: bool
+    s: float
+    t: float
+    z_offset: float
+    heading: float
+    place: tuple[float, float, float, float] | None
+
+
+@dataclass(frozen=True)
+class RoadLink:
+    """What follows at an end of a road: a ``junction``, or the ``start`` or ``end`` of a ``road``, by its id."""
+
+    kind: str
+    id: str
+    contact: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Road:
+    """A road: its reference line in plan, the profiles along it and what stands beside it.
+
+    Parameters
+    ----------
+    id, name : str
+        As in the file; the name may be empty.
+    elevation, lane_offset : Profile
+        Metres over metres along the road.
+    superelevation, left_crossfall, right_crossfall : Profile
+        Radians over metres along the road. A road with superelevation above
+        zero falls to the right; crossfall above zero falls outwards.
+    shape : LateralShape
+        Height of the surface above the plane that these make.
+    sections : tuple of LaneSection
+        In order along the road.
+    predecessor, successor : RoadLink or None
+        What follows at its start and at its end.
+    """
+
+    id: str
+    name: str
+    junction_id: str | None
+    keeps_left: bool
+    reference_line: ReferenceLine
+    elevation: Profile
+    superelevation: Profile
+    left_crossfall: Profile
+    right_crossfall: Profile
+    shape: LateralShape
+    lane_offset: Profile
+    sections: tuple[LaneSection, ...]
+    objects: tuple[RoadObject, ...]
+    signals: tuple[RoadSignal, ...]
+    predecessor: RoadLink | None = None
+    successor: RoadLink | None = None
+
+    @property
+    def length(self) -> float:
+        """Length of the reference line in plan, metres."""
+        return self.reference_line.end
+
+    def frame(self, s: Float) -> RoadFrame:
+        """Return the axes of the road at ``s``, (k,) metres along it; beyond an end those of the end."""
+        s = np.clip(s, 0.0, self.length)
+        x, y, heading = self.reference_line(s)
+        return RoadFrame(
+            origin=np.stack([x, y, self.elevation(s)], axis=-1),
+            heading=heading,
+            pitch=np.arctan(self.elevation.slope(s)),
+            roll=self.superelevation(s),
+        )
+
+    def place(self, s: Float, t: Float) -> Float:
+        """Return the points, (k, 3) metres, at ``s`` along and ``t`` to the left of the road, (k,) metres each."""
+        frame = self.frame(s)
+        return frame.origin + t[:, None] * frame.left
+
+
+@dataclass(frozen=True, eq=False)
+class RoadFrame:
+    """The moving axes of a road at k places.
+
+    Superelevation turns the road about its reference line, which itself climbs at the pitch of the elevation profile.
+
+    Parameters
+    ----------
+    origin : (k, 3) float64, metres
+        Points of the reference line in map coordinates.
+    heading, pitch, roll : (k,) float64, radians
+        Counter-clockwise from +x; positive uphill; positive falling to the right.
+    """
+
+    origin: Float
+    heading: Float
+    pitch: Float
+    roll: Float
+
+    @property
+    def level_left(self) -> Float:
+        """Unit vectors to the left of the road that stay level, (k, 3)."""
+        return np.stack([-np.sin(self.heading), np.cos(self.heading), np.zeros_like(self.heading)], axis=-1)
+
+    @property
+    def left(self) -> Float:
+        """Unit vectors to the left within the road surface, (k, 3)."""
+        roll = self.roll[:, None]
+        return np.asarray(np.cos(roll) * self.level_left + np.sin(roll) * self._unrolled_up)
+
+    @property
+    def up(self) -> Float:
+        """Unit normals of the road surface, (k, 3)."""
+        roll = self.roll[:, None]
+        return np.asarray(np.cos(roll) * self._unrolled_up - np.sin(roll) * self.level_left)
+
+    @property
+    def _unrolled_up(self) -> Float:
+        back = -np.sin(self.pitch)
+        return np.stack([back * np.cos(self.heading), back * np.sin(self.heading), np.cos(self.pitch)], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class RoadMap:
+    """All that is read of an OpenDRIVE file.
+
+    Parameters
+    ----------
+    name : str
+        Name in the header, or else the name of the file.
+    header_offset : (4,) float64
+        x, y, z in metres and heading in radians of the header's ``<offset>``.
+        It is not applied: map coordinates are the file's own.
+    geo_reference : str or None
+        As in the file, valid or not.
+    roads : tuple of Road
+        In the order of the file.
+    junctions : tuple of Junction
+        In the order of the file.
+    attribution : tuple of str
+        Credits in the header's ``<userData code="attribution">``.
+    """
+
+    name: str
+    header_offset: Float
+    geo_reference: str | None
+    roads: tuple[Road, ...]
+    junctions: tuple[Junction, ...]
+    attribution: tuple[str, ...] = ()
+
+    def junctions_with_roads(self) -> tuple[Junction, ...]:
+        """Return the junctions that some road belongs to, in the order of the file: others are no place to work on."""
+        used = {road.junction_id for road in self.roads}
+        return tuple(junction for junction in self.junctions if junction.id in used)
+
+    def middle(self) -> tuple[float, float]:
+        """Return the place on a reference line, x and y in metres, that is nearest to the middle of the map."""
+        lines = [road.frame(np.linspace(0.0, road.length, 2 + int(road.length / MIDDLE_STEP))) for road in self.roads]
+        plan = np.concatenate([line.origin[:, :2] for line in lines])
+        from_middle = plan - (plan.min(axis=0) + plan.max(axis=0)) / 2
+        x, y = plan[np.argmin(np.hypot(*from_middle.T))].tolist()
+        return x, y

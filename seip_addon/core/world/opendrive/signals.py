@@ -1,0 +1,69 @@
+"""Signals of the map in map coordinates."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from shapely import Point
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Float
+from ...errors import SeipError
+from .road_map import Road, RoadMap, RoadSignal
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedSignal:
+    """A signal in map coordinates.
+
+    Maps disagree on what is given, the foot of the post or the lamp above the carriageway.
+
+    Parameters
+    ----------
+    road_id : str
+        The road that its place is given on, not always the one that it applies to;
+        where the place is given in map coordinates, the one that it applies to.
+    id, name, kind : str
+        As in the file; ``kind`` is its type.
+    dynamic : bool
+        Whether it changes, as a traffic light does.
+    position : (3,) float64, metres
+        In map coordinates.
+    yaw : float, radians
+        By the standard the direction of the traffic that it is meant for,
+        counter-clockwise from +x; some exporters give the one it faces.
+    """
+
+    road_id: str
+    id: str
+    name: str
+    kind: str
+    dynamic: bool
+    position: Float
+    yaw: float
+
+
+def placed_signals(road_map: RoadMap, *, area: BaseGeometry | None = None) -> tuple[PlacedSignal, ...]:
+    """Return the signals of a map, those in an area of the plan (map coordinates) if one is given.
+
+    Raises
+    ------
+    SeipError
+        A signal stands on a road that the map does not have.
+    """
+    roads = {road.id: road for road in road_map.roads}
+    signals = (_placed(road, signal, roads) for road in road_map.roads for signal in road.signals)
+    return tuple(signal for signal in signals if area is None or Point(signal.position[:2]).intersects(area))
+
+
+def _placed(owner: Road, signal: RoadSignal, roads: dict[str, Road]) -> PlacedSignal:
+    if signal.road_id not in roads:
+        raise SeipError(
+            f"road {owner.id}: signal {signal.id} stands on road {signal.road_id}, which is not there; correct the map"
+        )
+    if signal.place is not None:
+        position, yaw = np.array(signal.place[:3]), signal.place[3]
+    else:
+        road, s = roads[signal.road_id], np.array([signal.s])
+        position = road.place(s, np.array([signal.t]))[0] + np.array([0.0, 0.0, signal.z_offset])
+        yaw = float(road.frame(s).heading[0]) + signal.heading
+    return PlacedSignal(signal.road_id, signal.id, signal.name, signal.kind, signal.dynamic, position, yaw)

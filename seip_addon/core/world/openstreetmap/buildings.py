@@ -1,0 +1,201 @@
+"""Buildings of an extract: footprints, parts, heights and roofs.
+
+Heights and roofs are read as Simple 3D Buildings of the OpenStreetMap wiki asks: ``height`` is that of the ridge,
+``min_height`` where the walls begin, and parts stand in place of the outline that they lie in.
+"""
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ...geometry.plan import without
+from ...site.scene_geometry import FROM_EXTRACT
+from ..streetscape.clearing import CLEARANCE
+from ..streetscape.description import Building
+from ..streetscape.roofs import FLAT, RIDGED, SLOPED, Roof
+from .extract import Relation, Tags, Way
+from .plan_shapes import DRAWN_TWICE, PlanShapes, polygons
+from .quantities import count, metres
+
+STOREY = 3.0  # metres
+MAX_HEIGHT, MAX_LEVELS = 900.0, 200.0
+LOW_BUILDINGS = {
+    **dict.fromkeys(("garage", "garages", "carport", "shed", "hut", "kiosk", "service", "container", "cabin"), 2.8),
+    **dict.fromkeys(("roof", "canopy"), 4.5),
+    **dict.fromkeys(("house", "detached", "semidetached_house", "bungalow", "terrace", "farm"), 7.0),
+    **dict.fromkeys(("greenhouse", "toilets", "transformer_tower", "static_caravan"), 3.0),
+}
+"""Heights (metres) that are assumed for kinds of buildings that are alike everywhere."""
+USUAL_HEIGHT = 9.0  # metres that other buildings without a height are assumed to have where too few others are known
+MIN_KNOWN = 5  # buildings of known height in an extract from which on their median is assumed for others
+NO_BUILDINGS = {"no", "none", "proposed", "construction", "ruins", "demolished", "razed", "abandoned:building"}
+NO_PARTS = {"no", "balcony", "steps", "ramp", "base"}
+SLAB = 0.4  # metres: thickness of a roof that stands on posts
+USUAL_ROOF = 2.5  # metres: height of a roof without one, and at most half of the building's
+PASSAGE_REACH = 8.0  # metres from the middle of a street through a building to the edge of its carriageway at most
+FULLY_PARTED = 0.1  # share of an outline that may lie beside its parts before the rest is a building of its own
+_NOWHERE = shapely.Polygon()
+
+
+@dataclass(frozen=True, eq=False)
+class _Footprint:
+    area: BaseGeometry
+    tags: Tags
+    is_part: bool
+
+
+def buildings(shapes: PlanShapes, area: BaseGeometry, passages: BaseGeometry = _NOWHERE) -> list[Building]:
+    """Return the buildings that reach into an area.
+
+    Parameters
+    ----------
+    area, passages : shapely geometry
+        In map coordinates; passages are roads over which buildings begin at `CLEARANCE`.
+    """
+    found = [one for one in _footprints(shapes) if one.area.intersects(area)]
+    usual = _usual_height([one.tags for one in found])
+    parts = [one for one in found if one.is_part]
+    tree = shapely.STRtree([part.area for part in parts])
+    solids = []
+    for one in found:
+        body = one.area
+        if not one.is_part and parts:
+            within = [
+                parts[index].area
+                for index in tree.query(one.area, predicate="intersects")
+                if parts[index].area.intersection(one.area).area > 0.5 * parts[index].area.area
+            ]
+            if within:
+                body = one.area.difference(shapely.union_all(within))
+                if body.area < FULLY_PARTED * one.area.area:
+                    continue
+        above = body.intersection(passages)
+        for piece, least in ((body if above.is_empty else without(body, passages), 0.0), (above, CLEARANCE)):
+            solids += [_building(part, one.tags, usual, least, is_part=one.is_part) for part in polygons(piece)]
+    return [solid for solid in solids if solid is not None]
+
+
+def passages(shapes: PlanShapes, carriageway: BaseGeometry) -> BaseGeometry:
+    """Return where the carriageway leads through buildings."""
+    lines = [
+        shapes.line(way)
+        for way in shapes.extract.ways.values()
+        if "highway" in way.tags and way.tags.get("tunnel") == "building_passage"
+    ]
+    bands = [shapely.LineString(line).buffer(PASSAGE_REACH, cap_style="square") for line in lines if len(line) > 1]
+    return carriageway.intersection(shapely.union_all(bands))
+
+
+def _footprints(shapes: PlanShapes) -> Iterator[_Footprint]:
+    extract = shapes.extract
+    drawn: set[int] = set()  # ways that are the outlines of relations
+    known: set[tuple[str, bytes]] = set()
+    everything: list[Mapping[int, Way | Relation]] = [extract.relations, extract.ways]
+    for elements in everything:
+        for number, element in elements.items():
+            kind = _kind(element.tags)
+            if kind is None or (number in drawn and isinstance(element, Way)):
+                continue
+            if isinstance(element, Relation) and element.tags.get("type") != "multipolygon":
+                continue
+            area = shapes.footprint(element)
+            if area is None:
+                continue
+            if isinstance(element, Relation):
+                drawn |= {ref for member, ref, role in element.members if member == "way" and role != "inner"}
+            same = (kind, area.normalize().wkb)
+            if same in known:
+                shapes.dropped[DRAWN_TWICE] += 1
+                continue
+            known.add(same)
+            yield _Footprint(area, element.tags, kind == "part")
+
+
+def _kind(tags: Tags) -> str | None:
+    """Return ``building`` or ``part``, None for what is neither or lies underground."""
+    if tags.get("location") == "underground" or re.fullmatch(r"-[1-9]\d*", tags.get("layer", "")):
+        return None
+    if tags.get("building:part", "no") not in NO_PARTS:
+        return "part"
+    return "building" if tags.get("building", "no") not in NO_BUILDINGS else None
+
+
+def known_height(tags: Tags) -> float | None:
+    """Return the height of a building's ridge over the ground that its tags give, metres."""
+    height = metres(tags.get("height", tags.get("building:height")), MAX_HEIGHT)
+    if height is not None:
+        return height
+    levels = count(tags.get("building:levels"), MAX_LEVELS)
+    if not levels:
+        return None
+    return levels * STOREY + (_roof_height(tags) or USUAL_ROOF if _is_roofed(tags) else 0.0)
+
+
+def _usual_height(tags: Sequence[Tags]) -> float:
+    known = [height for one in tags if _low(one) is None and (height := known_height(one)) is not None]
+    return float(np.median(known)) if len(known) >= MIN_KNOWN else USUAL_HEIGHT
+
+
+def _low(tags: Tags) -> float | None:
+    return LOW_BUILDINGS.get(tags.get("building", tags.get("building:part", "")))
+
+
+def _building(outline: shapely.Polygon, tags: Tags, usual: float, least: float, *, is_part: bool) -> Building | None:
+    """Return a building, or a part of one, that begins at ``least`` metres; None where nothing of it is above."""
+    height, is_known = known_height(tags), True
+    base = metres(tags.get("min_height", tags.get("building:min_height")), MAX_HEIGHT)
+    if base is None:
+        base = STOREY * (count(tags.get("building:min_level"), MAX_LEVELS) or 0.0)
+    if height is None:
+        is_known, height = False, _low(tags) or usual
+    canopy = "roof" in (tags.get("building"), tags.get("building:part")) or tags.get("building") == "carport"
+    if canopy and base == 0.0:
+        base = max(height - SLAB, 0.0)
+    base = max(base, least)
+    if base >= height:
+        if not is_part or least:
+            return None
+        base, height = 0.0, max(base, height)
+    roof = 0.0
+    if _is_roofed(tags) and not canopy:
+        roof = min(_roof_height(tags) or min(USUAL_ROOF, (height - base) / 2), height - base)
+    return Building(
+        outline,
+        height - base,
+        base,
+        roof=Roof(tags["roof:shape"], roof, _heading(tags), tags.get("roof:orientation") == "across") if roof else FLAT,
+        source=FROM_EXTRACT,
+        height_assumed=not is_known,
+    )
+
+
+def _is_roofed(tags: Tags) -> bool:
+    return tags.get("roof:shape", "flat") in RIDGED | SLOPED
+
+
+def _roof_height(tags: Tags) -> float | None:
+    """Return the height of a roof that tags give, metres."""
+    own = metres(tags.get("roof:height"), MAX_HEIGHT)
+    levels = count(tags.get("roof:levels"), MAX_LEVELS)
+    return own or (levels * STOREY if levels else None)
+
+
+_POINTS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
+
+
+def _heading(tags: Tags) -> float | None:
+    """Return the direction in which a roof falls, radians counter-clockwise from east; None where it is not said."""
+    text = tags.get("roof:direction", "").upper()
+    if text in _POINTS:
+        bearing = 22.5 * _POINTS.index(text)
+    else:
+        given = count(text, 360.0)
+        if given is None:
+            return None
+        bearing = given
+    return math.radians(90.0 - bearing)

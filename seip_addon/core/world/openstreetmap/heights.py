@@ -1,0 +1,533 @@
+"""Heights of the streets of an extract: on the ground, on bridges with their ramps, and in underpasses.
+
+A map of OpenStreetMap says which street leads over which, and not how high. Each street on a bridge is raised by what
+it needs over what it crosses; the streets next to it lead up to it at a realistic grade, and are raised no more than
+that. With grades as limits between neighbouring places, and needed heights at crossings, these are the smallest heights
+``h ≥ ground`` that satisfy
+
+    |h[u] − h[v]| ≤ grade · distance(u, v)    for places u, v next to each other
+    h[u] ≥ h[v] + rise                        where the street at u crosses above the one at v
+
+The smallest solution is a longest path from the ground (difference constraints): raise each crossing in turn and spread
+each height over the streets by a search as Dijkstra's, highest first. Each round settles one more crossing of the path,
+so that more rounds than crossings mean that there is no solution. Underpasses are the same upside down, and come first.
+"""
+
+import heapq
+import itertools
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Boolean, Float, Integer
+from ..elevation.raised_map import Profiles
+from ..opendrive.lanes import LaneSurface
+from ..opendrive.road_map import Road, RoadLink, RoadMap
+from ..streetscape.road_surface import CARRIAGEWAY, in_groups
+from .bridges import Crossing, Structures, corridors
+from .extract import Tags, Way
+from .plan_shapes import PlanShapes
+from .streets import StreetFile
+
+STEP = 5.0  # metres along a street between places whose heights are computed, at most
+GRADE, LINK_GRADE = 0.06, 0.08
+"""Steepest grades of streets, and of slip roads and ramps, where the ground is not steeper."""
+MAX_RISE = 30.0  # metres that a street lies above or below the ground at most
+SAME_SURFACE = 3.0  # metres between places of streets whose lanes lie on each other
+SAME_LINE = 2.0  # metres between the lines of both directions of a street at most
+PARALLEL = math.radians(35.0)  # by which a street turns at most from the way that it was made of
+BANK = 8.0  # metres beyond the end of a bridge, where smoothed ground is as high as the bank that carries it
+NEAR_CROSSING = 40.0  # metres from a crossing in which the ends of streets tell the height of a junction
+_TOLERANCE = 1e-6  # metres
+
+
+@dataclass(frozen=True, eq=False)
+class StreetHeights:
+    """Heights along the roads of a map.
+
+    Parameters
+    ----------
+    above_ground : Profiles
+        Of all roads, above the ground of the map; on bridges above the straight line between their ends.
+    profiles : Profiles
+        Of all roads, on that ground.
+    bridges : frozenset of str
+        Ids of the roads on bridges.
+    notes : tuple of str
+        Crossings that could not be separated.
+    """
+
+    above_ground: Profiles
+    profiles: Profiles
+    bridges: frozenset[str]
+    notes: tuple[str, ...]
+
+
+Ground = Callable[[Float], Float]
+"""Heights (n,) of the ground at places (n, 2) of a map, metres."""
+
+
+def street_heights(
+    road_map: RoadMap,
+    lanes: Mapping[str, Sequence[LaneSurface]],
+    sources: Mapping[str, str],
+    streets: StreetFile,
+    shapes: PlanShapes,
+    ground: Ground | None = None,
+) -> StreetHeights:
+    """Return the heights of streets that are laid on the ground and cross each other on bridges.
+
+    Parameters
+    ----------
+    road_map : RoadMap
+        As netconvert makes it.
+    lanes : mapping of str to sequence of LaneSurface
+        Of each of its roads.
+    sources : mapping of str to str
+        Of which way each of its roads was made, as `netconvert.convert` returns it.
+    streets : StreetFile
+        The streets, with their bridges and underpasses.
+    ground : callable, optional
+        How far the ground lies above the map's own heights; by default it does not.
+    """
+    if not streets.structures.crossings and ground is None:
+        return StreetHeights({}, {}, frozenset(), ())
+    network = _Network(road_map, lanes, sources, streets.ways, streets.structures, ground)
+    heights, flat = _separated(network, _crossing_places(network, shapes))
+    above = network.above_ground(heights)
+    profiles = {road.id: network.on_ground(road, *above[road.id]) for road in road_map.roads}
+    bridges = frozenset(road.id for one in network.strands if one.is_bridge for road, _ in one.roads)
+    return StreetHeights(above, profiles, bridges, tuple(_flat_notes(flat)))
+
+
+def has_heights(road_map: RoadMap) -> bool:
+    """Return whether a map has heights of its own."""
+    return any(road.elevation.coefficients.any() for road in road_map.roads)
+
+
+@dataclass(frozen=True, eq=False)
+class _Strand:
+    """A street between two junctions: both of its directions, whose heights are the same.
+
+    Parameters
+    ----------
+    nodes : (n,) int64
+        Its places, in the order of the first road.
+    roads : tuple of (Road, bool)
+        And whether a road leads the other way.
+    """
+
+    nodes: Integer
+    roads: tuple[tuple[Road, bool], ...]
+    layer: int
+    is_bridge: bool
+    grade: float
+    street: int
+
+    def node_at(self, road: str, contact: str) -> int:
+        """Return the place at the start or end of one of its roads."""
+        back = next(back for one, back in self.roads if one.id == road)
+        return int(self.nodes[-1 if (contact == "end") != back else 0])
+
+
+@dataclass(eq=False)
+class _Network:
+    """Places along streets, and the difference in height that is allowed between those next to each other."""
+
+    road_map: RoadMap
+    lanes: Mapping[str, Sequence[LaneSurface]]
+    sources: Mapping[str, str]
+    ways: Mapping[int, Way]
+    structures: Structures
+    ground: Ground | None
+    strands: list[_Strand] = field(default_factory=list)
+    strand_of: dict[str, _Strand] = field(default_factory=dict)
+    xy: Float = field(default_factory=lambda: np.empty((0, 2)))
+    heading: Float = field(default_factory=lambda: np.empty(0))
+    rise: Float = field(default_factory=lambda: np.empty(0))
+    """Heights of the ground, straight between the ends of bridges, (n,) metres."""
+    start: Float = field(default_factory=lambda: np.empty(0))
+    """Heights of the map on that ground, (n,) metres."""
+    banks: Float = field(default_factory=lambda: np.empty(0))
+    """Heights of bridges between their banks, (n,) metres; elsewhere minus infinity."""
+    layers: Integer = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    streets: Integer = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    limits: list[list[tuple[int, float]]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        own = [road for road in self.road_map.roads if road.junction_id is None]
+        places, headings, grounds = [np.empty((0, 2))], [np.empty(0)], [np.empty(0)]
+        count = 0
+        for roads in _both_directions(own, self.sources):
+            road = roads[0][0]
+            along = _stations(road.length)
+            x, y, heading = road.reference_line(along)
+            strand = self._strand(count + np.arange(len(along)), roads)
+            self.strands.append(strand)
+            self.strand_of |= {one.id: strand for one, _ in roads}
+            places.append(np.column_stack([x, y]))
+            headings.append(heading)
+            grounds.append(road.elevation(along))
+            count += len(along)
+        self.xy, self.heading = np.concatenate(places), np.concatenate(headings)
+        self.rise = self._rise(self.xy)
+        self.banks = np.full(count, -np.inf)
+        of_strand = np.repeat(np.arange(len(self.strands)), [len(one.nodes) for one in self.strands])
+        self.layers = np.array([one.layer for one in self.strands], dtype=np.int64)[of_strand]
+        self.streets = np.array([one.street for one in self.strands], dtype=np.int64)[of_strand]
+        for strand in self.strands:
+            if strand.is_bridge:
+                ends = strand.nodes[[0, -1]]
+                self.rise[strand.nodes] = _straight(self.rise[ends], len(strand.nodes))
+                if self.ground is not None:
+                    self.banks[strand.nodes] = _straight(self._rise(self._outside(ends)), len(strand.nodes))
+        self.start = np.concatenate(grounds) + self.rise
+        self.limits = [[] for _ in range(count)]
+        on_bank = self._on_bank()
+        for one, other, limit in self._pairs():
+            natural = 0.0 if on_bank[one] and on_bank[other] else abs(float(self.start[one] - self.start[other]))
+            allowed = max(limit, natural)
+            self.limits[one].append((other, allowed))
+            self.limits[other].append((one, allowed))
+
+    def _strand(self, nodes: Integer, roads: tuple[tuple[Road, bool], ...]) -> _Strand:
+        number = _way_id(self.sources.get(roads[0][0].id, ""))
+        way = self.ways.get(number)
+        tags: Tags = way.tags if way is not None else {}
+        grade = LINK_GRADE if tags.get("highway", "").endswith("_link") else GRADE
+        layer = self.structures.layers.get(number, 0)
+        return _Strand(nodes, roads, layer, number in self.structures.bridges, grade, number)
+
+    def _rise(self, xy: Float) -> Float:
+        return np.zeros(len(xy)) if self.ground is None else self.ground(xy)
+
+    def _outside(self, ends: Integer) -> Float:
+        """Return places (2, 2) beyond both ends of a bridge."""
+        along = np.column_stack([np.cos(self.heading[ends]), np.sin(self.heading[ends])])
+        outside: Float = self.xy[ends] + BANK * along * [[-1.0], [1.0]]
+        return outside
+
+    def _on_bank(self) -> Boolean:
+        """Return which places are on a bridge or next to its end: the ground does not tell their heights."""
+        on_bank: Boolean = np.isfinite(self.banks)
+        if on_bank.any():
+            tree = shapely.STRtree(shapely.points(self.xy[on_bank]))
+            on_bank[tree.query(shapely.points(self.xy), predicate="dwithin", distance=BANK)[0]] = True
+        return on_bank
+
+    def _pairs(self) -> Iterator[tuple[int, int, float]]:
+        """Yield places next to each other, and by how much their heights may differ, metres."""
+        for strand in self.strands:
+            steps = np.min([self._steps(road, len(strand.nodes), back=back) for road, back in strand.roads], axis=0)
+            for one, other, length in zip(strand.nodes[:-1].tolist(), strand.nodes[1:].tolist(), steps, strict=True):
+                yield one, other, strand.grade * float(length)
+        for ends in self.meeting.values():
+            for one, other in itertools.combinations(sorted(ends), 2):
+                yield one, other, GRADE * float(np.hypot(*(self.xy[other] - self.xy[one])))
+        for road in self.road_map.roads:
+            start, end = self._end(road.predecessor), self._end(road.successor)
+            if road.junction_id is not None and start is not None and end is not None:
+                yield start, end, GRADE * float(self._steps(road, 2, back=False)[0])
+        points = shapely.points(self.xy)
+        first, second = shapely.STRtree(points).query(points, predicate="dwithin", distance=SAME_SURFACE)
+        known = {node: number for number, strand in enumerate(self.strands) for node in strand.nodes.tolist()}
+        for one, other in zip(first.tolist(), second.tolist(), strict=True):
+            if one < other and known[one] != known[other] and self.layers[one] == self.layers[other]:
+                yield one, other, GRADE * float(np.hypot(*(self.xy[other] - self.xy[one])))
+
+    def _steps(self, road: Road, places: int, *, back: bool) -> Float:
+        """Return the lengths in plan between places along a road, (n - 1,) metres, of the shortest lane."""
+        along = np.linspace(0.0, road.length, places)
+        lengths = [np.diff(along)]
+        for lane in in_groups(self.lanes[road.id], CARRIAGEWAY):
+            if lane.s[0] < _TOLERANCE and lane.s[-1] > road.length - _TOLERANCE:
+                middle = (lane.left + lane.right)[:, :2] / 2
+                x, y = (np.interp(along, lane.s, middle[:, axis]) for axis in (0, 1))
+                lengths.append(np.hypot(np.diff(x), np.diff(y)))
+        shortest: Float = np.min(lengths, axis=0)
+        return shortest[::-1] if back else shortest
+
+    def _end(self, link: RoadLink | None) -> int | None:
+        """Return the place at the end of a road."""
+        if link is None or link.id not in self.strand_of:
+            return None
+        return self.strand_of[link.id].node_at(link.id, link.contact)
+
+    @cached_property
+    def meeting(self) -> dict[str, set[int]]:
+        """Return the places at which streets end at each junction; where one leads into another likewise."""
+        meeting: dict[str, set[int]] = {}
+        for strand in self.strands:
+            for road, _ in strand.roads:
+                for link, contact in ((road.predecessor, "start"), (road.successor, "end")):
+                    if link is not None:
+                        node = strand.node_at(road.id, contact)
+                        if link.kind == "junction":
+                            meeting.setdefault(link.id, set()).add(node)
+                        elif (other := self._end(link)) is not None:
+                            meeting[f"{min(node, other)} {max(node, other)}"] = {node, other}
+        return meeting
+
+    def cells(self) -> list[shapely.Polygon]:
+        """Return the area in plan of the lanes about each place."""
+        found: list[list[Float]] = [[] for _ in range(len(self.xy))]
+        for strand in self.strands:
+            for road, back in strand.roads:
+                lanes = self.lanes[road.id]
+                nodes = strand.nodes[::-1] if back else strand.nodes
+                along = np.linspace(0.0, road.length, len(nodes))
+                half = along[1] / 2
+                for node, s in zip(nodes.tolist(), along.tolist(), strict=True):
+                    found[node] += _across(lanes, np.clip([s - half, s, s + half], 0.0, road.length))
+        return [shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *one]))) for one in found]
+
+    def of_way(self, nodes: Integer, ids: Sequence[int], layer: int, heading: float) -> Integer:
+        """Return the places of a way, by its ids; where its roads have those of others by layer and direction."""
+        named: Integer = nodes[np.isin(self.streets[nodes], ids)]
+        alike: Integer = nodes[(self.layers[nodes] == layer) & self._is_parallel(nodes, heading)]
+        return named if len(named) else alike
+
+    def leads_on(self, nodes: Integer, street: int, heading: float) -> Integer:
+        """Return which places are those of streets that go on straight where a street ends."""
+        ends = {node for one in self.strands if one.street == street for node in one.nodes[[0, -1]].tolist()}
+        met = set().union(*(nodes_there for nodes_there in self.meeting.values() if nodes_there & ends))
+        streets = [one.street for one in self.strands if met & set(one.nodes[[0, -1]].tolist())]
+        following: Integer = nodes[np.isin(self.streets[nodes], streets) & self._is_parallel(nodes, heading)]
+        return following
+
+    def _is_parallel(self, nodes: Integer, heading: float) -> Boolean:
+        turned = np.remainder(self.heading[nodes] - heading + np.pi / 2, np.pi) - np.pi / 2
+        parallel: Boolean = np.abs(turned) < PARALLEL
+        return parallel
+
+    def above_ground(self, heights: Float) -> Profiles:
+        """Return places along all roads, and how high these are above the ground, from heights (n,) of streets."""
+        above = heights - self.rise
+        found: dict[str, tuple[Float, Float]] = {}
+        for strand in self.strands:
+            for road, back in strand.roads:
+                nodes = strand.nodes[::-1] if back else strand.nodes
+                found[road.id] = np.linspace(0.0, road.length, len(nodes)), above[nodes]
+        for road in self.road_map.roads:
+            if road.id not in found:
+                along = _stations(road.length)
+                own = road.elevation(along)
+                ends = [self._linked(link, found) for link in (road.predecessor, road.successor)]
+                known = [end for end in ends if end is not None]
+                if known:
+                    own += np.interp(along, [0.0, road.length], [known[0] - own[0], known[-1] - own[-1]])
+                found[road.id] = along, own
+        return found
+
+    def on_ground(self, road: Road, along: Float, above: Float) -> tuple[Float, Float]:
+        """Return places (n,) along a road and the heights there, from those above the ground."""
+        x, y, _ = road.reference_line(along)
+        rise = self._rise(np.column_stack([x, y]))
+        if road.id in self.strand_of and self.strand_of[road.id].is_bridge:
+            rise = np.linspace(rise[0], rise[-1], len(rise))
+        return along, above + rise
+
+    def _linked(self, link: RoadLink | None, found: Profiles) -> float | None:
+        """Return the height of the end of a road, metres."""
+        if link is None or link.id not in found:
+            return None
+        return float(found[link.id][1][-1 if link.contact == "end" else 0])
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Where a street crosses something.
+
+    Parameters
+    ----------
+    own : (n,) int64
+        Places of the street on the bridge or in the underpass.
+    others : (m,) int64
+        Places of the street that it crosses; none where that is not a street.
+    ground : float, metres
+        Height of what is not a street.
+    """
+
+    crossing: Crossing
+    own: Integer
+    others: Integer
+    ground: float
+
+    @property
+    def upper(self) -> Integer:
+        """Places of the upper street."""
+        return self.own if self.crossing.is_bridge else self.others
+
+    @property
+    def lower(self) -> Integer:
+        """Places of the lower street."""
+        return self.others if self.crossing.is_bridge else self.own
+
+
+def _crossing_places(network: _Network, shapes: PlanShapes) -> list[_Place]:
+    """Return where streets cross on bridges and in underpasses."""
+    crossings = network.structures.crossings
+    if not crossings:
+        return []
+    cells = network.cells()
+    tree = shapely.STRtree(cells)
+    numbers: dict[int, list[int]] = {}
+    for number, way in network.ways.items():
+        numbers.setdefault(id(way.tags), []).append(number)  # pieces of one way share their tags
+    found = []
+    for crossing in crossings:
+        ids = numbers.get(id(crossing.other.tags), [])
+        if not ids and has_heights(network.road_map):
+            continue  # heights of the extract are those of its bridges, too
+        own, other = shapes.line(crossing.way), shapes.line(crossing.other)
+        for street_area, other_area in corridors(crossing, own, other):
+            common = street_area.intersection(other_area)
+            if common.is_empty:
+                continue
+            middle = shapely.get_coordinates(common.centroid)
+            others = _places_of(network, tree, common, ids, crossing.layers[1], _heading(other, middle[0]))
+            crossed = shapely.union_all([other_area, *(cells[node] for node in others.tolist())])
+            near = np.sort(tree.query(crossed, predicate="intersects"))
+            mine = near[network.streets[near] == crossing.street]
+            if len(mine):
+                leads_on = network.leads_on(near, crossing.street, _heading(own, middle[0]))
+                mine = np.union1d(mine, np.setdiff1d(leads_on, others))
+                ground = 0.0 if network.ground is None else float(network.ground(middle)[0])
+                found.append(_Place(crossing, mine, others, ground))
+    return found
+
+
+def _places_of(
+    network: _Network, tree: shapely.STRtree, common: BaseGeometry, ids: Sequence[int], layer: int, heading: float
+) -> Integer:
+    """Return the places of a street in an area where it is crossed, or those next to a junction there."""
+    for area in (common, common.centroid.buffer(NEAR_CROSSING)):
+        near = np.sort(tree.query(area, predicate="intersects"))
+        found = network.of_way(near, ids, layer, heading) if ids else near[:0]
+        if len(found):
+            break
+    return found
+
+
+def _heading(line: Float, place: Float) -> float:
+    """Return the direction of a line (n, 2) next to a place (2,), radians."""
+    pieces = shapely.linestrings(np.stack([line[:-1], line[1:]], axis=1))
+    x, y = np.diff(line, axis=0)[int(np.argmin(shapely.distance(pieces, shapely.Point(place))))]
+    return math.atan2(y, x)
+
+
+def _separated(network: _Network, places: Sequence[_Place]) -> tuple[Float, list[Crossing]]:
+    """Return the heights (n,) of all places, and the crossings that no grade allows to separate.
+
+    Each bridge is settled in turn: one that makes the task impossible stays as it was.
+    """
+    banks = {node: float(network.banks[node]) for node in np.flatnonzero(np.isfinite(network.banks)).tolist()}
+    heights, flat, settled = _spread(network.limits, network.start, banks), [], list[_Place]()
+    for down in (True, False):
+        streets: dict[int, list[_Place]] = {}
+        for one in places:
+            if one.crossing.is_bridge != down:
+                streets.setdefault(one.crossing.street, []).append(one)
+        for group in streets.values():
+            tried = _settled(network, heights, [*settled, *group], down=down)
+            if tried is None:
+                flat += list(dict.fromkeys(one.crossing for one in group))
+            else:
+                heights, settled = tried, [*settled, *group]
+    return heights, flat
+
+
+def _settled(network: _Network, heights: Float, places: Sequence[_Place], *, down: bool) -> Float | None:
+    """Return heights (n,) from which all crossings are separated, None where no grade allows it."""
+    sign = -1.0 if down else 1.0
+    heights = sign * heights
+    for _ in range(len(places) + 1):
+        wanted: dict[int, float] = {}
+        for place in places:
+            moved, still = (place.lower, place.upper) if down else (place.upper, place.lower)
+            if len(moved) and (place.crossing.is_bridge != down or len(still)):
+                other = float(heights[still].max()) if len(still) else sign * place.ground
+                for node in moved.tolist():
+                    least = other + place.crossing.rise
+                    if heights[node] < least - _TOLERANCE:
+                        wanted[node] = max(least, wanted.get(node, -math.inf))
+        if not wanted:
+            return sign * heights
+        heights = _spread(network.limits, heights, wanted)
+        if np.abs(sign * heights - network.start).max() > MAX_RISE:
+            return None
+    return None
+
+
+def _spread(limits: Sequence[Sequence[tuple[int, float]]], heights: Float, wanted: Mapping[int, float]) -> Float:
+    """Return the least heights (n,) that are no lower than before, nor than wanted, and within the limits."""
+    heights = heights.copy()
+    waiting = [(-height, node) for node, height in wanted.items()]
+    heapq.heapify(waiting)
+    while waiting:
+        negative, node = heapq.heappop(waiting)
+        if -negative > heights[node]:
+            heights[node] = -negative
+            for other, allowed in limits[node]:
+                if -negative - allowed > heights[other] + _TOLERANCE:
+                    heapq.heappush(waiting, (negative + allowed, other))
+    return heights
+
+
+def _flat_notes(crossings: Iterable[Crossing]) -> Iterator[str]:
+    """Yield a note for each crossing that is built on one level."""
+    for text in dict.fromkeys(map(str, crossings)):
+        yield (
+            f"{text} is built flat: the streets that join both are too short to climb there at {GRADE:.0%} "
+            f"({LINK_GRADE:.0%} on ramps)"
+        )
+
+
+def _both_directions(roads: Sequence[Road], sources: Mapping[str, str]) -> list[tuple[tuple[Road, bool], ...]]:
+    """Return roads, both directions of a street together, and whether each leads the other way than the first."""
+    found: dict[str, list[tuple[Road, bool]]] = {}
+    for road in roads:
+        source = sources.get(road.id, f"road {road.id}")
+        key = source.removeprefix("-")
+        if key in found and _is_other_direction(found[key][0][0], road):
+            found[key].append((road, True))
+        else:
+            found.setdefault(key if key not in found else f"{key} {road.id}", []).append((road, False))
+    return [tuple(one) for one in found.values()]
+
+
+def _is_other_direction(one: Road, other: Road) -> bool:
+    places = [np.column_stack(road.reference_line(np.linspace(0.0, road.length, 9))[:2]) for road in (one, other)]
+    return bool(np.hypot(*(places[0] - places[1][::-1]).T).max() < SAME_LINE)
+
+
+def _stations(length: float) -> Float:
+    return np.linspace(0.0, length, max(math.ceil(length / STEP), 1) + 1)
+
+
+def _straight(ends: Float, places: int) -> Float:
+    """Return heights (n,) at places of a straight line between two heights (2,)."""
+    return np.linspace(float(ends[0]), float(ends[1]), places)
+
+
+def _across(lanes: Sequence[LaneSurface], along: Float) -> list[Float]:
+    """Return corners of lanes at places along their road, (n, 2) each."""
+    found = []
+    for lane in lanes:
+        inside = along[(along >= lane.s[0] - _TOLERANCE) & (along <= lane.s[-1] + _TOLERANCE)]
+        found += [
+            np.column_stack([np.interp(inside, lane.s, edge[:, axis]) for axis in (0, 1)])
+            for edge in (lane.left, lane.right)
+        ]
+    return found
+
+
+def _way_id(source: str) -> int:
+    """Return the id of the way that a road was made of, 0 where it is unknown."""
+    digits = "".join(itertools.takewhile(str.isdigit, source.removeprefix("-")))
+    return int(digits) if digits else 0

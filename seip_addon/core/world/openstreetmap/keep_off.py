@@ -1,0 +1,154 @@
+"""Ground beside the streets of an extract that new posts keep off: ways, crossing landings, private ground."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Float
+from ...geometry.plan import united
+from ...site.post_rules import RULES, KeepOffArea, RuleName
+from ..streetscape.description import SideWay, Wall
+from ..streetscape.map_furniture import LANDING_DEPTH
+from .extract import Relation, Tags, Way
+from .plan_shapes import PlanShapes
+from .quantities import metres
+from .streets import is_street
+
+CROSSING_WIDTH, MAX_CROSSING_WIDTH = 4.0, 15.0  # metres: of a crossing without a width, and of any
+CROSSING_REACH = 8.0  # metres by which a mapped crossing may end before the kerb, or beyond it
+MAX_CROSSING_LENGTH = 30.0
+PUBLIC = {"yes", "public", "permissive", "designated"}
+PUBLIC_GARDENS = {"botanical", "community", "public"}
+NOT_PUBLIC = {"private", "no", "customers", "permit", "residents", "delivery"}
+"""Values of ``access`` of ground that the public may use, and may not."""
+PRIVATE_KINDS = {
+    ("leisure", "garden"),
+    ("leisure", "swimming_pool"),
+    ("landuse", "allotments"),
+    ("landuse", "construction"),
+    ("landuse", "military"),
+    ("amenity", "parking"),
+    ("amenity", "fuel"),
+}
+"""Areas that are private ground unless they are said to be public."""
+AREA_KINDS = ("leisure", "landuse", "amenity", "natural", "surface", "place")
+"""Keys of areas of ground that ``access`` may make private."""
+BOUNDARIES = {"Wall", "Fence", "Hedge", "Wire fence", "City wall", "Noise barrier"}
+"""Barriers behind which the ground is private."""
+MIN_PUBLIC_STRIP, BEHIND = 1.0, 5.0
+"""Metres between carriageway and a barrier that leave room for a post in front, and depth of the ground behind."""
+STEP = 2.0  # metres of a barrier whose far side is found at once
+
+
+def keep_off_areas(
+    shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeometry, ways: Sequence[SideWay], walls: Sequence[Wall]
+) -> Iterator[KeepOffArea]:
+    """Yield the areas about a place that rules keep new posts off, map coordinates.
+
+    Parameters
+    ----------
+    area : shapely geometry
+        The surroundings of the place, prepared.
+    carriageway : shapely geometry
+        Of the map.
+    ways : sequence of SideWay
+        Ways beside the road, of which some have a rule.
+    walls : sequence of Wall
+        Barriers.
+    """
+    found: dict[RuleName, list[BaseGeometry]] = {rule: [] for rule in RULES}
+    for way in ways:
+        if way.keep_off is not None:
+            found[way.keep_off].append(way.area)
+    found["landings"] += _landings(shapes, area, carriageway)
+    found["private"] += [*_private_areas(shapes, area), *_behind_barriers(walls, carriageway)]
+    for rule, areas in found.items():
+        if areas:
+            yield KeepOffArea(RULES[rule].title, united(areas), rule)
+
+
+def _landings(shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeometry) -> Iterator[BaseGeometry]:
+    """Yield the ground in front of crossings: mapped ones, and those that are a mere point of a street."""
+    kerbside = carriageway.buffer(LANDING_DEPTH).difference(carriageway)
+    shapely.prepare(kerbside)
+    crossed: set[int] = set()
+    for key in ("footway", "cycleway", "path"):
+        for way, line in shapes.lines(area, key, {"crossing"}):
+            crossed.update(way.nodes)
+            if not carriageway.intersects(shapely.LineString(line)):
+                continue  # it crosses a driveway
+            yield _corridor(_extended(line), way.tags).intersection(kerbside)
+    for way, line in shapes.lines(area, "highway", None):
+        if not is_street(way.tags, service=True) or len(line) != len(way.nodes):
+            continue
+        for index, number in enumerate(way.nodes):
+            tags = shapes.extract.nodes[number].tags
+            if tags.get("highway") != "crossing" or tags.get("crossing") == "no" or number in crossed:
+                continue
+            before, after = line[max(index - 1, 0)], line[min(index + 1, len(line) - 1)]
+            along = (after - before) / (np.hypot(*(after - before)) or 1.0)
+            aside = MAX_CROSSING_LENGTH / 2 * np.array([-along[1], along[0]])
+            across = _corridor(np.array([line[index] - aside, line[index] + aside]), tags)
+            reached = across.intersection(carriageway.buffer(LANDING_DEPTH))
+            here = shapely.Point(line[index])
+            yield from (
+                part.intersection(kerbside) for part in shapely.get_parts(reached) if part.dwithin(here, LANDING_DEPTH)
+            )
+
+
+def _extended(line: Float) -> Float:
+    """Return a line (n, 2) that goes on straight at both ends."""
+
+    def beyond(end: Float, before: Float) -> Float:
+        way = end - before
+        point: Float = end + CROSSING_REACH * way / (np.hypot(*way) or 1.0)
+        return point
+
+    return np.array([beyond(line[0], line[1]), *line, beyond(line[-1], line[-2])])
+
+
+def _corridor(line: Float, tags: Tags) -> BaseGeometry:
+    width = metres(tags.get("width"), MAX_CROSSING_WIDTH) or CROSSING_WIDTH
+    return shapely.LineString(line).buffer(width / 2, cap_style="flat")
+
+
+def _private_areas(shapes: PlanShapes, area: BaseGeometry) -> Iterator[BaseGeometry]:
+    elements: list[Way | Relation] = [*shapes.extract.ways.values(), *shapes.extract.relations.values()]
+    for element in elements:
+        if _is_private(element.tags):
+            outline = shapes.footprint(element)
+            if outline is not None and area.intersects(outline):
+                yield outline
+
+
+def _is_private(tags: Tags) -> bool:
+    """Return whether an area is ground that the public may not use."""
+    if "building" in tags or "highway" in tags:
+        return False
+    access = tags.get("access")
+    if any(tags.get(key) == value for key, value in PRIVATE_KINDS):
+        return access not in PUBLIC and tags.get("garden:type") not in PUBLIC_GARDENS
+    return access in NOT_PUBLIC and any(key in tags for key in AREA_KINDS)
+
+
+def _behind_barriers(walls: Sequence[Wall], carriageway: BaseGeometry) -> Iterator[BaseGeometry]:
+    """Yield the ground behind walls, fences and hedges, as seen from the carriageway.
+
+    A barrier at the kerb itself protects a pavement and has public ground behind it.
+    """
+    lines = [shapely.LineString(wall.line) for wall in walls if wall.name in BOUNDARIES]
+    if not lines or carriageway.is_empty:
+        return
+    pieces = [shapely.get_coordinates(line) for line in shapely.segmentize(lines, STEP)]
+    start, stop = (np.concatenate([piece[cut] for piece in pieces]) for cut in (slice(-1), slice(1, None)))
+    middle = (start + stop) / 2
+    ways = shapely.shortest_line(carriageway, shapely.points(middle))
+    outwards = middle - shapely.get_coordinates(ways)[::2]
+    distance = np.hypot(*outwards.T)
+    near = (distance >= MIN_PUBLIC_STRIP) & (distance <= 2 * BEHIND)
+    outwards = BEHIND * outwards[near] / distance[near, None]
+    corners = np.stack([start[near], stop[near], stop[near] + outwards, start[near] + outwards], axis=1)
+    behind = shapely.convex_hull(shapely.multipoints(corners))
+    yield from behind[~shapely.intersects(carriageway, behind)]

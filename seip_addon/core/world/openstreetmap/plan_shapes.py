@@ -1,0 +1,148 @@
+"""Footprints and lines of an extract in metres of a map: mended where that can be, else left out and counted."""
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Float
+from ...geometry.geo_reference import TransverseMercator
+from .extract import Extract, Node, Relation, Way, rings
+
+MIN_FOOTPRINT = 0.5  # square metres below which an outline is none
+OUTER_ROLES, INNER_ROLES = {"outer", "outline", "part", ""}, {"inner"}
+
+# what is counted in `PlanShapes.dropped`: one of it, and several
+MENDED = ("outline that crosses itself was mended", "outlines that cross themselves were mended")
+NOT_CLOSED = (
+    "outline that is not closed, or is cut off by the extract, was closed",
+    "outlines that are not closed, or are cut off by the extract, were closed",
+)
+TOO_LITTLE = (
+    "outline of which the extract has too little was left out",
+    "outlines of which the extract has too little were left out",
+)
+PIECES = ("piece of an outline that does not close was left out", "pieces of outlines that do not close were left out")
+DRAWN_TWICE = ("outline that is drawn twice counts once", "outlines that are drawn twice count once")
+
+
+class PlanShapes:
+    """Shapes of an extract in map coordinates.
+
+    Parameters
+    ----------
+    to_map : TransverseMercator
+        Projection of the map.
+    offset : (2,) float64, metres
+        What the map's header subtracts from projected coordinates.
+    """
+
+    def __init__(self, extract: Extract, to_map: TransverseMercator, offset: Float) -> None:
+        self.extract = extract
+        self._to_map, self._offset = to_map, offset
+        self._known: dict[int, tuple[float, float]] = {}
+        self.dropped: Counter[tuple[str, str]] = Counter()
+        """What was left out or mended, by reason."""
+
+    def point(self, node: Node) -> Float:
+        """Return where a node is, (2,) metres."""
+        place: Float = np.array(self._to_map(math.radians(node.latitude), math.radians(node.longitude))) - self._offset
+        return place
+
+    def line(self, way: Way) -> Float:
+        """Return the nodes (n, 2) of a way that the extract holds, metres, without repeats one after the other."""
+        points = [self._place(number) for number in way.nodes if number in self.extract.nodes]
+        kept = [point for place, point in enumerate(points) if place == 0 or point != points[place - 1]]
+        return np.array(kept).reshape(-1, 2)
+
+    def lines(self, area: BaseGeometry, key: str, values: set[str] | None) -> Iterator[tuple[Way, Float]]:
+        """Yield the ways with a tag that reach into an area, with their lines (n, 2).
+
+        Parameters
+        ----------
+        area : shapely geometry
+            Prepared.
+        values : set of str or None
+            Of the tag; None: any.
+        """
+        for way in self.extract.ways.values():
+            if key in way.tags and (values is None or way.tags[key] in values):
+                line = self.line(way)
+                if len(line) > 1 and area.intersects(shapely.LineString(line)):
+                    yield way, line
+
+    def footprint(self, element: Way | Relation) -> BaseGeometry | None:
+        """Return the area of a closed way or of a multipolygon relation, None where there is none.
+
+        A way that the extract cuts off, and one that is not closed, are closed by a straight line where three corners
+        are left; an outline that crosses itself is made valid.
+        """
+        area = self._of_way(element) if isinstance(element, Way) else self._of_relation(element)
+        if area is None or area.is_empty:
+            return None
+        if not area.is_valid:
+            self.dropped[MENDED] += 1
+            area = shapely.make_valid(area)
+        parts = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon" and part.area >= MIN_FOOTPRINT]
+        return shapely.union_all(parts) if parts else None
+
+    def _of_way(self, way: Way) -> BaseGeometry | None:
+        line = self.line(way)
+        if way.nodes[:1] != way.nodes[-1:] or len(line) < len(way.nodes):
+            if len(line) < 3 or not _is_nearly_whole(way, line):
+                self.dropped[TOO_LITTLE] += 1
+                return None
+            self.dropped[NOT_CLOSED] += line[0].tolist() != line[-1].tolist()
+        if len(np.unique(line, axis=0)) < 3:
+            return None
+        return shapely.Polygon(line)
+
+    def _of_relation(self, relation: Relation) -> BaseGeometry | None:
+        outer = self._joined(relation, OUTER_ROLES)
+        if not outer:
+            return None
+        inner = self._joined(relation, INNER_ROLES)
+        area = shapely.union_all([shapely.make_valid(ring) for ring in outer])
+        return area.difference(shapely.union_all([shapely.make_valid(ring) for ring in inner]))
+
+    def _joined(self, relation: Relation, roles: set[str]) -> list[shapely.Polygon]:
+        ways = [
+            self.extract.ways[ref]
+            for kind, ref, role in relation.members
+            if kind == "way" and role in roles and ref in self.extract.ways
+        ]
+        found, left = rings(ways)
+        self.dropped[PIECES] += left
+        closed = []
+        for ring in found:
+            line = np.array([self._place(number) for number in ring if number in self.extract.nodes]).reshape(-1, 2)
+            if len(np.unique(line, axis=0)) >= 3:
+                closed.append(shapely.Polygon(line))
+        return closed
+
+    def _place(self, number: int) -> tuple[float, float]:
+        if number not in self._known:
+            x, y = self.point(self.extract.nodes[number])
+            self._known[number] = (float(x), float(y))
+        return self._known[number]
+
+
+def _is_nearly_whole(way: Way, line: Float) -> bool:
+    """Return whether an outline has at least half of its nodes."""
+    return 2 * len(line) >= len(way.nodes)
+
+
+def polygons(area: BaseGeometry) -> Iterator[shapely.Polygon]:
+    """Yield the polygons of an area."""
+    return (part for part in shapely.get_parts(area) if part.geom_type == "Polygon" and not part.is_empty)
+
+
+def spaced(line: Float, spacing: float) -> Float:
+    """Return points (n, 2) along a line (k, 2): its ends, and between them at about a spacing, metres."""
+    path = shapely.LineString(line)
+    gaps = max(round(path.length / spacing), 1)
+    points = shapely.line_interpolate_point(path, np.linspace(0.0, path.length, gaps + 1))
+    return np.asarray(shapely.get_coordinates(points))

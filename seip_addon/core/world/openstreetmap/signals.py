@@ -1,0 +1,113 @@
+"""Traffic signals of an extract, matched to the junctions that they control.
+
+Many are mapped where traffic stops, some metres before the junction: there netconvert drops them. They are written at
+the junction that the traffic there comes to first.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from ...arrays import Float
+from .extract import Extract, Tags, Way
+
+SIGNAL_REACH = 40.0  # metres from a stop line to the junction that its signals control, at most
+CROSSING_REACH = 15.0  # metres from signals of a pedestrian crossing, which need not be those of a junction
+BEHIND_REACH = 15.0  # metres from signals back to the junction that they stand behind, at most
+_REVERSED = ("-1", "reverse")
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Signals of the streets of an extract.
+
+    Parameters
+    ----------
+    junctions : frozenset of int
+        Nodes of the junctions that signals are mapped in front of.
+    moved : frozenset of int
+        Nodes of those signals.
+    unmatched : tuple of int
+        Nodes of signals that no junction follows.
+    """
+
+    junctions: frozenset[int]
+    moved: frozenset[int]
+    unmatched: tuple[int, ...]
+
+
+def matched_signals(extract: Extract, streets: Sequence[Way], lines: Mapping[int, Float]) -> Signals:
+    """Match the traffic signals on streets with junctions.
+
+    Parameters
+    ----------
+    streets : sequence of Way
+    lines : mapping of int to (2,) float64, metres
+        Where the nodes are, by their ids.
+    """
+    beside: dict[int, list[int]] = {}
+    found: dict[int, list[tuple[Way, int]]] = {}
+    for way in streets:
+        for place, node in enumerate(way.nodes):
+            beside.setdefault(node, [])
+            beside[node] += way.nodes[max(place - 1, 0) : place] + way.nodes[place + 1 : place + 2]
+            if extract.nodes[node].tags.get("highway") == "traffic_signals":
+                found.setdefault(node, []).append((way, place))
+    junctions, moved, unmatched = set(), set(), []
+    for node, places in found.items():
+        if _is_junction(beside[node]):
+            continue
+        tags = extract.nodes[node].tags
+        reach = SIGNAL_REACH
+        if tags.get("crossing", "no") != "no" and _direction(tags) is None:
+            reach = CROSSING_REACH
+        ahead = {following for way, place in places for following in _ahead(way, place, tags)}
+        ends = [end for following in sorted(ahead) for end in _first_junction(node, following, beside, lines, reach)]
+        if not ends:  # where the signals themselves stand: behind the junction
+            behind = set(beside[node]) - ahead
+            ends = [end for one in sorted(behind) for end in _first_junction(node, one, beside, lines, BEHIND_REACH)]
+        if ends:
+            junctions.add(min(ends)[1])
+            moved.add(node)
+        else:
+            unmatched.append(node)
+    return Signals(frozenset(junctions), frozenset(moved), tuple(unmatched))
+
+
+def _is_junction(neighbours: Sequence[int]) -> bool:
+    return len(set(neighbours)) > 2
+
+
+def _direction(tags: Tags) -> str | None:
+    """Return for which direction of a way signals are: ``forward`` or ``backward``, None where for both."""
+    given = tags.get("traffic_signals:direction", tags.get("direction"))
+    return given if given in ("forward", "backward") else None
+
+
+def _ahead(way: Way, place: int, tags: Tags) -> Iterator[int]:
+    """Yield the nodes next to signals to which their traffic goes."""
+    oneway = way.tags.get("oneway", "no")
+    direction = _direction(tags)
+    one_way = oneway in ("yes", "true", "1") or way.tags.get("junction") in ("roundabout", "circular")
+    if place + 1 < len(way.nodes) and oneway not in _REVERSED and direction != "backward":
+        yield way.nodes[place + 1]
+    if place > 0 and not one_way and direction != "forward":
+        yield way.nodes[place - 1]
+
+
+def _first_junction(
+    node: int, following: int, beside: Mapping[int, Sequence[int]], lines: Mapping[int, Float], reach: float
+) -> Iterator[tuple[float, int]]:
+    """Yield distance and node of the junction that a street comes to first within reach, metres."""
+    away = 0.0
+    while True:
+        away += math.dist(lines[node], lines[following])
+        if away > reach:
+            return
+        if _is_junction(beside[following]):
+            yield away, following
+            return
+        onward = sorted(set(beside[following]) - {node})
+        if not onward:
+            return
+        node, following = following, onward[0]

@@ -1,0 +1,624 @@
+"""From an extract of OpenStreetMap to a map of its streets and a description of what stands beside them."""
+
+import difflib
+import itertools
+import math
+from collections import defaultdict
+from collections.abc import Collection, Generator, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Float
+from ...counts import counted
+from ...errors import SeipError
+from ...geometry.geo_reference import TransverseMercator, projection
+from ...progress import Progress
+from ...site.scene_geometry import FROM_EXTRACT
+from ..elevation.raised_map import raised_map, raised_text
+from ..opendrive.junctions import STREETS, nearest_junctions, streets_of_junctions
+from ..opendrive.lanes import LaneSurface, lane_surfaces
+from ..opendrive.read import read_map
+from ..opendrive.road_map import RoadMap
+from ..streetscape import road_surface
+from ..streetscape.description import DEFAULT_RADIUS, SiteDescription
+from ..streetscape.intersections import SAME_DIRECTION, TOUCH, intersection, without_plain_joints
+from ..streetscape.levels import UNNAMED_ROAD
+from ..streetscape.named_places import street_names
+from ..streetscape.place import SCENE_MARGIN
+from ..streetscape.terrain import FlatLand
+from .extract import EARTH_RADIUS, MAX_LATITUDE, Extract, Node, Way, cropped, read_extract, window
+from .heights import StreetHeights, has_heights, street_heights
+from .mapped_crossings import guessed_crossings, with_mapped_crossings
+from .netconvert import convert
+from .plan_shapes import PlanShapes
+from .signals import SIGNAL_REACH
+from .street_objects import surroundings
+from .streets import (
+    CLASSES,
+    StreetFile,
+    has_lane_count,
+    has_widths,
+    implausible_lanes,
+    is_street,
+    is_tunnel,
+    lane_counts,
+    shown_name,
+    usual_lanes,
+    write_streets,
+)
+
+EXTRACT_SUFFIXES = (".osm", ".osm.gz", ".osm.xml")
+STREET_REACH = 450.0  # metres beyond the region within which streets are laid out: traffic comes from there
+MAX_JUNCTION_DISTANCE = 60.0  # metres from a place to the junction that is meant at most
+NAMES = ("name", "name:en", "alt_name", "ref")
+"""Tags that name a street."""
+RANKS = (*(kind for kind in CLASSES if not kind.endswith("_link")), "service", *CLASSES)
+"""Classes of streets, the highest first, and slip roads last."""
+MAX_ROUNDABOUT = 200.0  # metres across which a roundabout is one place at most
+MIN_RAMP = 0.05  # metres by which a bridge or ramp moves a street that a note names
+MAX_NAMED = 6  # streets that a note names
+MAX_SHOWN = 12  # letters of a tag's value that a note shows
+STANDS_AROUND = 20.0  # metres beyond the scene within which what stands there counts
+
+
+@dataclass(frozen=True)
+class ExtractPlace:
+    """Which place of an extract is studied.
+
+    Parameters
+    ----------
+    near : (latitude, longitude) or None, degrees
+    streets : tuple of str
+        Names of two streets, or more, that meet there, in place of ``near``.
+    radius, approaches : float or None, metres
+        As of a `SiteDescription`; without either the region follows the approaches of the junction.
+    service : bool
+        Whether driveways and aisles are streets.
+    left_hand : bool or None
+        On which side traffic keeps; None: as the extract shows.
+    level : tuple of str
+        Names of streets on the level that is studied.
+    """
+
+    near: tuple[float, float] | None = None
+    streets: tuple[str, ...] = ()
+    radius: float | None = None
+    approaches: float | None = None
+    service: bool = False
+    left_hand: bool | None = None
+    level: tuple[str, ...] = ()
+
+    @property
+    def reach(self) -> float:
+        """How far the region may reach from the place, metres."""
+        return self.radius or self.along + MAX_JUNCTION_DISTANCE
+
+    @property
+    def along(self) -> float:
+        """How far the region follows the approaches of a junction, metres."""
+        return self.approaches or DEFAULT_RADIUS
+
+
+def is_extract(path: Path) -> bool:
+    """Return whether a file is an extract by its name."""
+    return path.name.lower().endswith((*EXTRACT_SUFFIXES, ".pbf"))
+
+
+@dataclass(frozen=True, eq=False)
+class ExtractSite:
+    """The streets of an extract about a place, and what stands there.
+
+    Parameters
+    ----------
+    road_map : RoadMap
+        The streets as netconvert lays them out: flat, unless the extract has heights.
+    map_text : str
+        The same as text.
+    description : SiteDescription
+    notes : tuple of str
+        What was assumed or left out.
+    streets : StreetFile
+    sources : mapping of str to str
+        Of which way each road was made, as `netconvert.convert` returns it.
+    shapes : PlanShapes
+        The extract on the map.
+    lanes : mapping of str to tuple of LaneSurface
+        Of each road of the map.
+    area : shapely geometry
+        What notes tell of: about as far as the region of interest reaches, map coordinates.
+    """
+
+    road_map: RoadMap
+    map_text: str
+    description: SiteDescription
+    notes: tuple[str, ...]
+    streets: StreetFile
+    sources: Mapping[str, str]
+    shapes: PlanShapes
+    lanes: Mapping[str, tuple[LaneSurface, ...]]
+    area: BaseGeometry
+
+    def on_ground(self) -> "ExtractSite":
+        """Return the streets on the ground of the description, on bridges and in underpasses."""
+        relief = self.description.relief
+        ground = None if relief is None else relief.rise
+        heights = street_heights(self.road_map, self.lanes, self.sources, self.streets, self.shapes, ground)
+        raised = replace(self, notes=(*self.notes, *heights.notes, *self._ramp_notes(heights)))
+        is_raised = any(along_road.any() for _, along_road in heights.profiles.values())
+        if is_raised:
+            raised = replace(
+                raised,
+                road_map=raised_map(self.road_map, heights.above_ground),
+                map_text=raised_text(self.map_text, self.road_map, heights.profiles),
+            )
+        if relief is not None:
+            relief = replace(relief, bridges=heights.bridges)
+            return replace(raised, description=replace(self.description, relief=relief))
+        if is_raised and not has_heights(self.road_map):
+            land = FlatLand(0.0, heights.bridges)
+            return replace(raised, description=replace(self.description, flat_land=land))
+        return raised
+
+    def _ramp_notes(self, heights: StreetHeights) -> Iterator[str]:
+        """Yield a note on streets in the area whose heights are assumed: bridges, underpasses and their ramps."""
+        names = street_names(self.road_map)
+        moved: dict[str, float] = {}
+        for number, (along, above) in heights.above_ground.items():
+            if not np.abs(above).max() >= MIN_RAMP:
+                continue
+            (road,) = (road for road in self.road_map.roads if road.id == number)
+            places = shapely.points(road.frame(along).origin[:, :2])
+            near = above[shapely.intersects(self.area, places)]
+            if len(near) and np.abs(near).max() >= MIN_RAMP and road.junction_id is None:
+                most = float(near[np.argmax(np.abs(near))])
+                name = names.get(number, UNNAMED_ROAD)
+                moved[name] = max(moved.get(name, 0.0), most, key=abs)
+        if moved:
+            listed = ", ".join(
+                f"{name} by up to {abs(most):.2f} m {'upwards' if most > 0 else 'downwards'}"
+                for name, most in sorted(moved.items(), key=lambda one: (-abs(one[1]), one[0]))[:MAX_NAMED]
+            )
+            yield (
+                f"the heights of bridges, underpasses and their ramps are assumed: they move {listed}; junctions on "
+                "ramps may have a hump that the place does not have"
+            )
+
+
+def site_of_extract(path: Path, place: ExtractPlace, map_path: Path) -> Generator[Progress, None, ExtractSite]:
+    """Lay out the streets of an extract about a place, and describe what stands there.
+
+    Parameters
+    ----------
+    map_path : Path
+        Where the map of the streets is written (.xodr); its folder takes a file in between.
+
+    Raises
+    ------
+    SeipError
+        The extract cannot be read or holds no such place or no street there, or SUMO is missing.
+    """
+    if place.near is None and not place.streets:
+        raise SeipError(f'{path.name} needs a place: --near-latlon LAT LON, or --junction "One Street" "Other Street"')
+    _check(place)
+    most = place.reach + STREET_REACH + 200.0
+    extract = yield from read_extract(path, None if place.near is None else window(*place.near, most))
+    near, place_notes = (place.near, ()) if place.near else _meeting_place(extract, place.streets)
+    extract = cropped(extract, window(*near, most))
+    streets_path = map_path.with_suffix(".streets.osm")
+    streets = write_streets(
+        extract,
+        streets_path,
+        window(*near, place.reach + STREET_REACH),
+        service=place.service,
+        left_hand=place.left_hand,
+    )
+    try:
+        if streets.streets == 0:
+            raise _no_street(extract, near, place.reach + STREET_REACH)
+        sources = yield from convert(streets, streets_path, map_path)
+    finally:
+        streets_path.unlink(missing_ok=True)
+    road_map = read_map(map_path)
+    shapes, middle = _shapes(extract, road_map, near)
+    surfaces = {road.id: lane_surfaces(road) for road in road_map.roads}
+    map_text = map_path.read_text(encoding="utf-8")
+    lanes = without_plain_joints(list(itertools.chain(*surfaces.values())))
+    meeting = {lane.junction_id for lane in lanes}
+    joints = {junction.name for junction in road_map.junctions if junction.id not in meeting}
+    road_map, map_text = with_mapped_crossings(road_map, map_text, surfaces, streets, shapes, joints)
+    junction = nearest_junctions(road_map, lanes, float(middle[0]), float(middle[1]), 1)
+    if (not junction or junction[0][1] > MAX_JUNCTION_DISTANCE) and place.radius is None:
+        raise SeipError(
+            f"no junction within {MAX_JUNCTION_DISTANCE:g} m of {near[0]:.5f}, {near[1]:.5f}: give --radius for a "
+            "place between junctions, or --service-roads where driveways or aisles are streets too"
+        )
+    roundabouts = _roundabouts(road_map, streets, extract)
+    together = intersection(lanes, junction[0][0].id, roundabouts) if junction else frozenset[str]()
+    reach = place.reach if place.radius else max(place.reach, _reach(lanes, together, middle) + place.along)
+    carriageway = _carriageway(lanes, middle, reach)
+    area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
+    beside = surroundings(shapes, area, carriageway)
+    seen = shapely.Point(middle).buffer(place.radius or _reach(lanes, together, middle) + place.along)
+    tunnels = _tunnels(extract, shapes, seen, place.level)
+    _check_level(place.level, tunnels, road_map)
+    names = [_spelt(extract, name) for name in place.streets]
+    if not names:
+        title_place = replace(place, level=()) if tunnels else place
+        names = _title(road_map, lanes, title_place, middle, roundabouts, _ranks(streets.ways.values()))
+    is_junction = bool(junction) and junction[0][1] <= (place.radius or math.inf)
+    near_streets = [way for way in streets.ways.values() if seen.intersects(_path(shapes, way))]
+    description = replace(
+        beside,
+        name=STREETS.join(names) or f"{'Junction' if is_junction else 'Street'} at {near[0]:.5f}, {near[1]:.5f}",
+        near=None if place.radius is None else (float(middle[0]), float(middle[1])),
+        junction=junction[0][0].id if place.radius is None else None,
+        radius=place.radius,
+        approaches=place.approaches,
+        from_centre_lines=True,
+        roundabouts=roundabouts,
+        map_source=FROM_EXTRACT,
+        widths_assumed=_assumed_widths(near_streets),
+        attribution=(extract.attribution,),
+    )
+    dropped = [counted(number, *reason) for reason, number in shapes.dropped.items() if number]
+    lone = [extract.nodes[number] for number in streets.lone_signals]
+    lone = [node for node in lone if seen.intersects(shapely.Point(shapes.point(node)))]
+    assumed = _assumed_lanes(near_streets)
+    return ExtractSite(
+        road_map,
+        map_text,
+        description,
+        (
+            *place_notes,
+            *extract.notes,
+            *streets.notes,
+            *assumed,
+            *_implausible_lanes(near_streets),
+            *_tunnel_notes(tunnels),
+            *_assumed_crossings(guessed_crossings(road_map, seen)),
+            *dropped,
+            *_lone_signals(lone),
+        ),
+        streets,
+        sources,
+        shapes,
+        surfaces,
+        seen,
+    )
+
+
+def _lone_signals(nodes: Sequence[Node]) -> Iterator[str]:
+    """Yield a note on traffic signals that have no post."""
+    if nodes:
+        places = " and ".join(f"{node.latitude:.5f}, {node.longitude:.5f}" for node in nodes[:3])
+        yield (
+            f"traffic signals that belong to no junction within {SIGNAL_REACH:g} m have no post: {len(nodes)}, "
+            f"at {places}{' and elsewhere' if len(nodes) > 3 else ''}; describe a signal_pole where one stands"
+        )
+
+
+def _path(shapes: PlanShapes, way: Way) -> BaseGeometry:
+    """Return the line of a way, map coordinates; an empty one where the extract has less than two of its nodes."""
+    line = shapes.line(way)
+    return shapely.LineString(line if len(line) > 1 else None)
+
+
+def _assumed_widths(ways: Iterable[Way]) -> frozenset[str]:
+    """Return the groups of lanes whose widths the extract does not give for some streets: always those of pavements."""
+    known = all(has_widths(way.tags) for way in ways if "highway" in way.tags)
+    return frozenset({"sidewalk", "biking"}) if known else frozenset({"sidewalk", "biking", "driving"})
+
+
+def _assumed_lanes(ways: Iterable[Way]) -> Iterator[str]:
+    """Yield notes on streets whose number of lanes the extract does not give."""
+    streets: dict[int, list[str]] = {}
+    for way in ways:
+        if "highway" in way.tags and not has_lane_count(way.tags) and not implausible_lanes(way.tags):
+            name = {**way.tags, **shown_name(way.tags)}.get("name", "streets without a name")
+            streets.setdefault(usual_lanes(way.tags), []).append(name)
+    for lanes, names in sorted(streets.items()):
+        known = list(dict.fromkeys(sorted(names, key=lambda name: (name == "streets without a name", name))))
+        listed = ", ".join(known[:MAX_NAMED]) + (f" and {len(known) - MAX_NAMED} more" * (len(known) > MAX_NAMED))
+        each = "one lane is" if lanes == 1 else f"{lanes} lanes are"
+        yield f"{each} assumed in each direction of streets without a number of lanes in the extract: {listed}"
+
+
+def _implausible_lanes(ways: Iterable[Way]) -> Iterator[str]:
+    """Yield a note on each street whose tags give a number of lanes that cannot be."""
+    notes = []
+    for way in ways:
+        given = implausible_lanes(way.tags) if "highway" in way.tags else {}
+        if given:
+            name = {**way.tags, **shown_name(way.tags)}.get("name") or UNNAMED_ROAD
+            said = ", ".join(
+                f"{key}={value[:MAX_SHOWN]}{'…' * (len(value) > MAX_SHOWN)}" for key, value in given.items()
+            )
+            lanes = sum(lane_counts(way.tags).values())
+            are = counted(lanes, "lane in all is", "lanes in all are")
+            notes.append(f"the extract gives {name} {said}, which is not a plausible number of lanes: {are} assumed")
+    yield from dict.fromkeys(notes)
+
+
+def _tunnels(extract: Extract, shapes: PlanShapes, seen: BaseGeometry, level: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of streets of the level that lie in tunnels in an area, as the extract spells them."""
+    wanted = {name.strip().casefold() for name in level}
+    found = (
+        next(way.tags[key] for key in NAMES if way.tags.get(key, "").casefold() in wanted)
+        for way in extract.ways.values()
+        if is_tunnel(way.tags)
+        and wanted & {way.tags[key].casefold() for key in NAMES if key in way.tags}
+        and seen.intersects(_path(shapes, way))
+    )
+    return tuple(dict.fromkeys(found))
+
+
+def _check_level(level: Sequence[str], tunnels: Sequence[str], road_map: RoadMap) -> None:
+    """Refuse a level whose street lies in a tunnel as a whole."""
+    known = {text.casefold() for road in road_map.roads for text in (road.id, road.name)}
+    hidden = [name for name in tunnels if name.casefold() not in known]
+    if hidden and not any(name.strip().casefold() in known for name in level):
+        raise SeipError(
+            f"{hidden[0]} lies in a tunnel at this place, and scenes leave tunnels out: choose a street on the "
+            "surface by --level, or none"
+        )
+
+
+def _tunnel_notes(tunnels: Sequence[str]) -> Iterator[str]:
+    """Yield a note on streets of the level that lie in tunnels."""
+    for name in tunnels:
+        yield (
+            f"{name} lies in a tunnel at this place: scenes leave tunnels out, so that the streets above are studied, "
+            f"and {name} only where it is in the open"
+        )
+
+
+def _assumed_crossings(number: int) -> Iterator[str]:
+    """Yield a note on crossings that the extract does not map."""
+    if number:
+        are = counted(number, "crossing of pedestrians at junctions is", "crossings of pedestrians at junctions are")
+        yield f"{are} assumed: the extract maps none there"
+
+
+def _check(place: ExtractPlace) -> None:
+    for name, length in (("radius", place.radius), ("approaches", place.approaches)):
+        if length is not None and not 0.0 < length < math.inf:
+            raise SeipError(f"--{name} {length:g} is no length: give metres above zero")
+    if place.near is not None and not (abs(place.near[0]) <= MAX_LATITUDE and abs(place.near[1]) <= 180.0):
+        raise SeipError(
+            f"--near-latlon {place.near[0]:g} {place.near[1]:g} is no place with streets: give degrees, the latitude "
+            f"first, up to {MAX_LATITUDE:g}, then the longitude, up to 180"
+        )
+    if place.near is None and len({name.strip().casefold() for name in place.streets} - {""}) < len(place.streets):
+        raise SeipError('--junction takes the names of two different streets: --junction "One Street" "Other Street"')
+
+
+def surroundings_of_map(
+    path: Path, road_map: RoadMap, description: SiteDescription, middle: Float, reach: float
+) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...]]]:
+    """Add to a description what an extract says of the surroundings of a place on a map.
+
+    Parameters
+    ----------
+    middle : (2,) float64, metres
+        Of the place, map coordinates.
+    reach : float, metres
+        How far the region may reach from it.
+
+    Raises
+    ------
+    SeipError
+        The extract cannot be read, or the map names no projection that places it.
+    """
+    extract = yield from read_extract(path)
+    shapes = PlanShapes(extract, _projection(road_map), road_map.header_offset[:2])
+    lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
+    area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
+    found = surroundings(shapes, area, _carriageway(lanes, middle, reach))
+    if not found.has_objects:
+        raise SeipError(f"{path.name} has nothing that stands at the place: take the extract of the map's own place")
+    dropped = [counted(number, *reason) for reason, number in shapes.dropped.items() if number]
+    found = replace(found, attribution=(extract.attribution,))
+    return description.with_objects_of(found), (*extract.notes, *dropped)
+
+
+def place_on_map(road_map: RoadMap, near: tuple[float, float]) -> tuple[float, float]:
+    """Return where a place of latitude and longitude (degrees) is on a map, x and y in metres.
+
+    Raises
+    ------
+    SeipError
+        The map names no projection that is known.
+    """
+    east, north = _projection(road_map)(math.radians(near[0]), math.radians(near[1]))
+    return east - float(road_map.header_offset[0]), north - float(road_map.header_offset[1])
+
+
+def _projection(road_map: RoadMap) -> TransverseMercator:
+    to_map = projection(road_map.geo_reference)
+    if to_map is None or road_map.header_offset[3]:
+        raise SeipError(
+            f"map {road_map.name!r} names no projection that latitudes and longitudes can be laid on it with: "
+            "its <geoReference> must be a UTM zone or a transverse Mercator projection"
+        )
+    return to_map
+
+
+def _shapes(extract: Extract, road_map: RoadMap, near: tuple[float, float]) -> tuple[PlanShapes, Float]:
+    """Return the shapes of an extract on a map, and where the place is there, (2,) metres."""
+    shapes = PlanShapes(extract, _projection(road_map), road_map.header_offset[:2])
+    return shapes, np.array(place_on_map(road_map, near))
+
+
+def _carriageway(lanes: Sequence[LaneSurface], middle: Float, reach: float) -> BaseGeometry:
+    near = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND)
+    driving = road_surface.in_groups(lanes, ["driving"])
+    return shapely.union_all([shapely.make_valid(lane.polygon) for lane in driving if road_surface.is_near(lane, near)])
+
+
+def _roundabouts(road_map: RoadMap, streets: StreetFile, extract: Extract) -> tuple[frozenset[str], ...]:
+    """Return the ids of the junctions of each roundabout; of one that is a whole quarter each stays its own."""
+    by_node = {junction.name: junction.id for junction in road_map.junctions}
+    found = []
+    for nodes in streets.roundabouts:
+        latitudes = [extract.nodes[number].latitude for number in nodes]
+        if max(latitudes) - min(latitudes) < math.degrees(MAX_ROUNDABOUT / EARTH_RADIUS):
+            found.append(frozenset(by_node[str(number)] for number in nodes if str(number) in by_node))
+    return tuple(found)
+
+
+def _reach(lanes: Sequence[LaneSurface], junctions: Collection[str], middle: Float) -> float:
+    """Return how far junctions reach from a place, metres."""
+    corners = [lane.left[:, :2] - middle for lane in lanes if lane.junction_id in junctions]
+    return float(np.hypot(*np.concatenate([np.zeros((1, 2)), *corners]).T).max())
+
+
+def _title(
+    road_map: RoadMap,
+    lanes: Sequence[LaneSurface],
+    place: ExtractPlace,
+    middle: Float,
+    roundabouts: Sequence[frozenset[str]],
+    ranks: Mapping[str, int],
+) -> list[str]:
+    """Return the names of the streets that a place is titled by.
+
+    With a radius these are the streets of the nearest junction within it, of a level only where its streets meet; where
+    there is none, the level's streets, or the nearest street.
+    """
+    near = nearest_junctions(road_map, lanes, float(middle[0]), float(middle[1]), len(road_map.junctions))
+    on_level = {name.strip().casefold() for name in place.level}
+    level = list(dict.fromkeys(r.name for r in road_map.roads if on_level & {r.name.casefold(), r.id} and r.name))
+    for junction, away in near:
+        if place.radius is not None and away > place.radius:
+            break
+        together = intersection(lanes, junction.id, roundabouts)
+        meeting = _street_names(road_map, lanes, junction.id, together)
+        if place.radius is None or not level or set(level) & set(meeting):
+            return _crossing_pair(sorted(meeting, key=ranks.__getitem__), _headings(road_map, lanes, together))
+    if level:
+        return level[:2]
+    names = {road.id: road.name for road in road_map.roads}
+    driving = [lane for lane in road_surface.in_groups(lanes, ["driving"]) if names[lane.road_id]]
+    here = shapely.Point(middle)
+    nearest = min(driving, key=lambda lane: float(lane.polygon.distance(here)), default=None)
+    return [] if nearest is None or nearest.polygon.distance(here) > (place.radius or 0.0) else [names[nearest.road_id]]
+
+
+def _street_names(
+    road_map: RoadMap, lanes: Sequence[LaneSurface], junction_id: str, together: Collection[str]
+) -> tuple[str, ...]:
+    """Return the names of the streets that meet at junctions that are one, first those of the one in the middle."""
+    meeting = streets_of_junctions(road_map, lanes)
+    numbers = sorted(together, key=lambda number: (number != junction_id, number))
+    return tuple(dict.fromkeys(name for number in numbers for name in meeting.get(number, ())))
+
+
+def _ranks(ways: Iterable[Way]) -> defaultdict[str, int]:
+    """Return the rank of each street by its name: that of its highest class, slip roads last."""
+    ranks: defaultdict[str, int] = defaultdict(lambda: len(RANKS))
+    for way in ways:
+        name = {**way.tags, **shown_name(way.tags)}.get("name", "")
+        kind = way.tags.get("highway", "")
+        ranks[name] = min(ranks[name], RANKS.index(kind) if kind in RANKS else len(RANKS))
+    return ranks
+
+
+def _headings(
+    road_map: RoadMap, lanes: Sequence[LaneSurface], junctions: Collection[str]
+) -> defaultdict[str, list[float]]:
+    """Return the directions, radians, of each street that meets junctions, by its name."""
+    area = shapely.union_all([lane.polygon for lane in lanes if lane.junction_id in junctions])
+    names = {road.id: road.name for road in road_map.roads}
+    headings: defaultdict[str, list[float]] = defaultdict(list)
+    for lane in lanes:
+        if lane.junction_id is None and area.distance(lane.polygon) < TOUCH:
+            x, y = (lane.left[-1] - lane.left[0])[:2].tolist()
+            headings[names[lane.road_id]].append(math.atan2(y, x))
+    return headings
+
+
+def _crossing_pair(names: Sequence[str], headings: Mapping[str, Sequence[float]]) -> list[str]:
+    """Return the first of names, and the first of the others whose street does not go on from that one's."""
+
+    def crosses(name: str) -> bool:
+        pairs = itertools.product(headings.get(names[0], ()), headings.get(name, ()))
+        return any(abs(math.remainder(one - other, math.pi)) > SAME_DIRECTION for one, other in pairs)
+
+    others = sorted(names[1:], key=lambda name: not crosses(name))
+    return [*names[:1], *others[:1]]
+
+
+def _spelt(extract: Extract, name: str) -> str:
+    """Return the name of a street, in whatever letters it was asked for, as the extract spells it."""
+    wanted = name.strip().casefold()
+    for way in _streets_called(extract, name):
+        shown = {**way.tags, **shown_name(way.tags)}
+        for key in NAMES:
+            if way.tags.get(key, "").casefold() == wanted:
+                return shown.get(key, "") or name
+    return name.strip()
+
+
+def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[tuple[float, float], tuple[str, ...]]:
+    """Return latitude and longitude of where streets meet, and a note where they meet in several places.
+
+    It is the mean of the nodes that they share and that lie together; the most nodes count.
+    """
+    named = {name: _streets_called(extract, name) for name in names}
+    for name, ways in named.items():
+        if not ways:
+            raise SeipError(f"{extract.name} has no street called {name!r}; {_alike(extract, name)}")
+    nodes = [{number for way in ways for number in way.nodes} for ways in named.values()]
+    shared = sorted(set.intersection(*nodes) & extract.nodes.keys())
+    if not shared:
+        both = " and ".join(map(repr, names))
+        raise SeipError(f"{both} do not meet in {extract.name}: name streets that share a node")
+    groups: list[list[Node]] = []
+    for node in (extract.nodes[number] for number in shared):
+        met = [group for group in groups if any(_distance(node, other) < MAX_JUNCTION_DISTANCE for other in group)]
+        groups = [*(group for group in groups if group not in met), [node, *itertools.chain(*met)]]
+    places = [
+        (sum(node.latitude for node in group) / len(group), sum(node.longitude for node in group) / len(group))
+        for group in sorted(groups, key=len, reverse=True)
+    ]
+    if len(places) == 1:
+        return places[0], ()
+    first, *others = [f"{latitude:.5f} {longitude:.5f}" for latitude, longitude in places[:4]]
+    note = (
+        f"{' and '.join(names)} meet in {len(places)} places, of which the one at {first} counts: for another give "
+        f"--near-latlon {' or '.join(others)}"
+    )
+    return places[0], (note,)
+
+
+def _distance(one: Node, other: Node) -> float:
+    """Return the distance between two nodes that are not far from each other, metres."""
+    north = math.radians(one.latitude - other.latitude)
+    east = math.radians(one.longitude - other.longitude) * math.cos(math.radians(one.latitude))
+    return EARTH_RADIUS * math.hypot(north, east)
+
+
+def _streets_called(extract: Extract, name: str) -> list[Way]:
+    wanted = name.strip().casefold()
+    return [
+        way
+        for way in extract.ways.values()
+        if is_street(way.tags, service=True) and wanted in {way.tags.get(key, "").casefold() for key in NAMES}
+    ]
+
+
+def _alike(extract: Extract, name: str) -> str:
+    known = sorted({way.tags["name"] for way in extract.ways.values() if "name" in way.tags and is_street(way.tags)})
+    close = difflib.get_close_matches(name, known, n=4, cutoff=0.4) or known[:5]
+    return f"the closest: {', '.join(close)}" if close else "its streets have no names"
+
+
+def _no_street(extract: Extract, near: tuple[float, float], reach: float) -> SeipError:
+    return SeipError(
+        f"{extract.name} has no street within {reach:,.0f} m of {near[0]:.5f}, {near[1]:.5f}: give a place on one of "
+        "its streets, latitude before longitude, or --service-roads where driveways or aisles are streets too"
+    )

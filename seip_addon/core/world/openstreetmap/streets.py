@@ -1,0 +1,477 @@
+"""Streets of an extract, chosen and made explicit for SUMO's netconvert: what counts as a street, lanes, pavements."""
+
+import itertools
+import math
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+import shapely
+
+from ...arrays import Float
+from .bridges import Structures, structures
+from .extract import Extract, Node, Tags, Way
+from .handedness import drives_on_the_left
+from .quantities import count, metres
+from .signals import Signals, matched_signals
+
+CLASSES = (
+    *("motorway", "trunk", "primary", "secondary", "tertiary"),
+    *("motorway_link", "trunk_link", "primary_link", "secondary_link", "tertiary_link"),
+    *("unclassified", "residential", "living_street", "road", "busway"),
+)
+"""Values of ``highway`` that are streets; ``service`` (driveways, aisles, alleys) is one where it is asked for."""
+TRACKS = {"tram", "light_rail"}
+"""Values of ``railway`` whose tracks may lie in a street."""
+PAVED_CLASSES = {"primary", "secondary", "tertiary", "unclassified", "residential", "living_street", "road"}
+"""Streets that have a pavement on both sides where the map says nothing of pavements."""
+WIDE_CLASSES = {"motorway", "trunk"}
+"""Streets whose one-way carriageways usually have two lanes."""
+ONE_WAY = {"yes", "true", "1", "-1", "reverse"}
+COPIED = (
+    *("highway", "railway", "name", "oneway", "junction", "maxspeed"),
+    *("turn:lanes", "turn:lanes:forward", "turn:lanes:backward", "access", "area"),
+)
+"""Tags of a street that netconvert reads as they are."""
+MAX_LANES, MAX_STREET_WIDTH = 12, 60.0
+LANE_WIDTHS = (2.25, 6.0)
+"""Widths (metres) of a lane that a width of the street may mean."""
+CYCLE_LANES = {"lane", "track", "opposite_lane", "opposite_track", "shared_busway"}
+CYCLE_LANE_WIDTH, SIDEWALK_WIDTH = 1.5, 2.5  # metres
+_SIDES = {(True, True): "both", (True, False): "left", (False, True): "right", (False, False): "none"}
+_FIRST_OTHER = "\u0900"  # from here on (Devanagari, Thai, Chinese …) the font of the pictures has no letters
+MAX_MEDIAN = 35.0  # metres between the middles of two carriageways of one street
+JOIN_DISTANCE = 20.0  # metres between nodes that are one junction
+MIN_ELEVATED = 0.8  # share of a street network's nodes that must have an elevation for it to be used
+
+
+@dataclass(frozen=True)
+class StreetFile:
+    """What was written for netconvert.
+
+    Parameters
+    ----------
+    streets : int
+        Number of ways that are streets.
+    elevated : bool
+        Whether its nodes have elevations.
+    left_hand : bool
+        Whether traffic keeps to the left.
+    roundabouts : tuple of frozenset of int
+        Nodes of each roundabout: where streets meet it is a junction of its own.
+    slip_ends : tuple of int
+        Nodes where a slip lane leaves or joins a street, apart from other nodes where streets meet.
+    ways : mapping of int to Way
+        The streets, by the ids that they are written with.
+    structures : Structures
+        Streets on bridges and in underpasses.
+    lone_signals : tuple of int
+        Nodes of traffic signals that no junction follows.
+    notes : tuple of str
+        What was assumed.
+    """
+
+    streets: int
+    elevated: bool
+    left_hand: bool
+    roundabouts: tuple[frozenset[int], ...]
+    slip_ends: tuple[int, ...]
+    ways: Mapping[int, Way]
+    structures: Structures
+    lone_signals: tuple[int, ...]
+    notes: tuple[str, ...]
+
+
+def is_street(tags: Tags, *, service: bool = False) -> bool:
+    """Return whether a way is a street on the surface, or a track of trams or light rail; driveways on request."""
+    if tags.get("area") == "yes" or _is_underground(tags):
+        return False
+    if tags.get("railway") in TRACKS:
+        return True
+    highway = tags.get("highway")
+    return highway in CLASSES or (service and highway == "service")
+
+
+def is_tunnel(tags: Tags) -> bool:
+    """Return whether a way is a street in a tunnel, which is left out."""
+    return tags.get("highway") in CLASSES and _is_underground(tags)
+
+
+def _is_underground(tags: Tags) -> bool:
+    return tags.get("tunnel", "no") not in ("no", "building_passage")
+
+
+def write_streets(
+    extract: Extract,
+    path: Path,
+    window: tuple[float, float, float, float],
+    *,
+    service: bool = False,
+    left_hand: bool | None = None,
+) -> StreetFile:
+    """Write the streets within a window as an extract of their own.
+
+    Parameters
+    ----------
+    window : (4,) float, degrees
+        South, west, north, east.
+    service : bool
+        Whether driveways, aisles and alleys (``highway=service``) are streets.
+    left_hand : bool, optional
+        Whether traffic keeps to the left; by default what the extract and its place say.
+    """
+    pieces = list(_pieces(extract, window, service=service))
+    used = list(dict.fromkeys(number for _, way in pieces for number in way.nodes))
+    notes: list[str] = []
+    if left_hand is None:
+        left_hand, reason = drives_on_the_left(extract)
+        notes.append(f"traffic keeps to the {'left' if left_hand else 'right'}: {reason}")
+    heights = [elevation(extract.nodes[number]) for number in used]
+    elevated = bool(used) and sum(height is not None for height in heights) >= MIN_ELEVATED * len(used)
+    medians = _Medians(extract, [way for _, way in pieces])
+    places = dict(zip(extract.nodes, _in_metres(extract, list(extract.nodes.values())), strict=True))
+    signals = matched_signals(extract, [way for _, way in pieces], places)
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<osm version="0.6">']
+    for number, height in zip(used, heights, strict=True):
+        lines += _node(number, extract.nodes[number], height if elevated else None, signals)
+    for number, way in pieces:
+        lines += _way(number, way.nodes, _tags(way, medians, left_hand=left_hand))
+    lines += _restrictions(extract, {number for number, _ in pieces})
+    path.write_text(os.linesep.join([*lines, "</osm>", ""]), encoding="utf-8")
+    roundabouts = _joined(way.nodes for _, way in pieces if is_roundabout(way.tags))
+    slip_ends = tuple(_slip_ends(extract, [way for _, way in pieces]))
+    crossed = structures(extract, pieces, places)
+    return StreetFile(
+        len(pieces), elevated, left_hand, roundabouts, slip_ends, dict(pieces), crossed, signals.unmatched, tuple(notes)
+    )
+
+
+def _slip_ends(extract: Extract, ways: Sequence[Way]) -> Iterator[int]:
+    """Yield the ends of one-way links that lie farther than `JOIN_DISTANCE` from any other node where streets meet."""
+    beside: dict[int, set[int]] = {}
+    for way in ways:
+        for one, other in itertools.pairwise(way.nodes):
+            beside.setdefault(one, set()).add(other)
+            beside.setdefault(other, set()).add(one)
+    meeting = [number for number, others in beside.items() if len(others) > 2]
+    places = _in_metres(extract, [extract.nodes[number] for number in meeting])
+    links = {
+        end for way in ways if _is_link(way.tags) and is_one_way(way.tags) for end in (way.nodes[0], way.nodes[-1])
+    }
+    for number, place in zip(meeting, places, strict=True):
+        if number in links and np.sort(np.hypot(*(places - place).T))[1:2].min(initial=math.inf) > JOIN_DISTANCE:
+            yield number
+
+
+def _in_metres(extract: Extract, nodes: Sequence[Node]) -> Float:
+    """Return where nodes are (n, 2), metres about the extract's first node."""
+    first = next(iter(extract.nodes.values()))
+    east = 111_320.0 * math.cos(math.radians(first.latitude))
+    return np.array(
+        [((node.longitude - first.longitude) * east, (node.latitude - first.latitude) * 110_574.0) for node in nodes]
+    ).reshape(-1, 2)
+
+
+def _joined(ways: Iterable[tuple[int, ...]]) -> tuple[frozenset[int], ...]:
+    """Return the nodes of ways, of those together that share one."""
+    found: list[frozenset[int]] = []
+    for nodes in ways:
+        met = [one for one in found if not one.isdisjoint(nodes)]
+        found = [*(one for one in found if one not in met), frozenset(nodes).union(*met)]
+    return tuple(found)
+
+
+def elevation(node: Node) -> float | None:
+    """Return the elevation that a node has, metres."""
+    try:
+        value = float(node.tags.get("ele", ""))
+    except ValueError:
+        return None
+    return value if -500.0 < value < 9000.0 else None
+
+
+def _pieces(extract: Extract, window: tuple[float, float, float, float], *, service: bool) -> Iterator[tuple[int, Way]]:
+    """Yield the streets within a window; one that leaves it in between comes in pieces, with ids of their own."""
+    south, west, north, east = window
+    fresh = max(extract.ways, default=0)
+    for number, way in extract.ways.items():
+        if not is_street(way.tags, service=service):
+            continue
+        inside = [
+            (node := extract.nodes.get(one)) is not None
+            and south <= node.latitude <= north
+            and west <= node.longitude <= east
+            for one in way.nodes
+        ]
+        for place, (first, last) in enumerate(_runs(inside)):
+            nodes = way.nodes[max(first - 1, 0) : last + 1]  # one node beyond, where the extract has it
+            held = tuple(one for one in nodes if one in extract.nodes)
+            if len(held) < 2:
+                continue
+            fresh += place > 0
+            yield (number if place == 0 else fresh), Way(held, way.tags)
+
+
+def _runs(inside: list[bool]) -> Iterator[tuple[int, int]]:
+    """Yield first index and index after the last of each run of nodes inside."""
+    start = None
+    for place, held in enumerate([*inside, False]):
+        if held and start is None:
+            start = place
+        elif not held and start is not None:
+            yield start, place
+            start = None
+
+
+def _node(number: int, node: Node, height: float | None, signals: Signals) -> list[str]:
+    longitude = math.remainder(node.longitude, 360.0)
+    place = f'<node id="{number}" lat="{node.latitude:.9f}" lon="{longitude:.9f}"'
+    tags = {key: node.tags[key] for key in ("highway", "crossing", "railway") if key in node.tags}
+    if number in signals.moved:
+        tags = {key: value for key, value in tags.items() if key != "highway"}
+    if number in signals.junctions:
+        tags["highway"] = "traffic_signals"
+    if height is not None:
+        tags["ele"] = f"{height:.3f}"
+    return [f"{place}/>"] if not tags else [f"{place}>", *_tag_lines(tags), "</node>"]
+
+
+def _way(number: int, nodes: Iterable[int], tags: Mapping[str, str]) -> list[str]:
+    return [f'<way id="{number}">', *(f'<nd ref="{one}"/>' for one in nodes), *_tag_lines(tags), "</way>"]
+
+
+def _tag_lines(tags: Mapping[str, str]) -> list[str]:
+    return [f"<tag k={quoteattr(key)} v={quoteattr(value)}/>" for key, value in tags.items()]
+
+
+def _restrictions(extract: Extract, streets: set[int]) -> Iterator[str]:
+    for number, relation in extract.relations.items():
+        ways = [ref for kind, ref, _ in relation.members if kind == "way"]
+        if relation.tags.get("type") == "restriction" and ways and streets.issuperset(ways):
+            yield f'<relation id="{number}">'
+            for kind, ref, role in relation.members:
+                yield f'<member type={quoteattr(kind)} ref="{ref}" role={quoteattr(role)}/>'
+            yield from _tag_lines(relation.tags)
+            yield "</relation>"
+
+
+def _tags(way: Way, medians: "_Medians", *, left_hand: bool) -> dict[str, str]:
+    """Return the tags of a street that netconvert is to read: lanes, widths, pavements and cycle lanes explicit."""
+    given = way.tags
+    tags = {key: given[key] for key in COPIED if key in given} | shown_name(given)
+    if given.get("railway") in TRACKS and "highway" not in given:
+        return tags
+    tags |= _lane_tags(given)
+    near, far = ("left", "right") if left_hand else ("right", "left")
+    cycle = {"right": _cycle_lane(given, near), "left": _cycle_lane(given, far)}
+    walked = dict(zip(("left", "right"), _sidewalks(way, medians, left_hand=left_hand), strict=True))
+    paved = {"right": walked[near], "left": walked[far]}
+    tags |= {f"cycleway:{side}": kind for side, kind in cycle.items() if kind is not None}
+    tags["sidewalk"] = _SIDES[paved["left"], paved["right"]]
+    beside = {
+        side: [CYCLE_LANE_WIDTH] * (cycle[side] is not None) + [SIDEWALK_WIDTH] * paved[side]
+        for side in ("right", "left")
+    }
+    return tags | _widths(given, beside)
+
+
+def _lane_tags(tags: Tags) -> dict[str, str]:
+    """Return the number of lanes in the tags that netconvert reads: its own defaults by class of street differ."""
+    lanes = lane_counts(tags)
+    own = {} if is_one_way(tags) else {f"lanes:{way}": str(number) for way, number in lanes.items()}
+    return {"lanes": str(sum(lanes.values()))} | own
+
+
+def _cycle_lane(tags: Tags, side: str) -> str | None:
+    kind = tags.get(f"cycleway:{side}", tags.get("cycleway:both", tags.get("cycleway", "no")))
+    if kind not in CYCLE_LANES or kind == "shared_busway":
+        return None
+    return "track" if "track" in kind else "lane"
+
+
+def _widths(tags: Tags, beside: Mapping[str, list[float]]) -> dict[str, str]:
+    """Return the widths of all lanes, left to right as one drives, nothing where the map gives no width.
+
+    Parameters
+    ----------
+    beside : dict
+        Widths (metres) of cycle lane and pavement on the ``right`` and ``left``, where they are; the right is where
+        traffic keeps.
+    """
+    lanes = lane_counts(tags)
+    widths = {way: _lane_widths(tags, way, number) for way, number in lanes.items()}
+    if not any(widths.values()):
+        return {}
+    named = {"forward": "" if is_one_way(tags) else ":forward", "backward": ":backward"}
+    side = {"forward": "right", "backward": "left"}
+    return {
+        f"width:lanes{named[way]}": "|".join(f"{one:.2f}" for one in [*each, *beside[side[way]]])
+        for way, each in widths.items()
+        if each
+    }
+
+
+def lane_counts(tags: Tags) -> dict[str, int]:
+    """Return the number of lanes of a street in each direction: ``forward`` and, for two-way streets, ``backward``.
+
+    Without a number a direction has `usual_lanes`. One lane of a two-way street serves both directions: the street is
+    laid out with one lane each.
+    """
+    whole = int(count(tags.get("lanes"), MAX_LANES) or 0)
+    if is_one_way(tags):
+        return {"forward": whole or _listed_lanes(tags, "") or usual_lanes(tags)}
+    own = {
+        way: int(count(tags.get(f"lanes:{way}"), MAX_LANES) or 0) or _listed_lanes(tags, f":{way}")
+        for way in ("forward", "backward")
+    }
+    total = max(whole, sum(number or 1 for number in own.values()))
+    backward = own["backward"] or (total - own["forward"] if own["forward"] else total // 2)
+    return {"forward": total - backward, "backward": backward}
+
+
+def usual_lanes(tags: Tags) -> int:
+    """Return the number of lanes that each direction of a street has where the map does not say it."""
+    return 2 if is_one_way(tags) and tags.get("highway") in WIDE_CLASSES else 1
+
+
+def has_lane_count(tags: Tags) -> bool:
+    """Return whether the map gives the number of lanes of a street."""
+    ways = ("",) if is_one_way(tags) else (":forward", ":backward")
+    whole = count(tags.get("lanes"), MAX_LANES) or 0
+    return whole >= 1 or all(
+        (count(tags.get(f"lanes{way}"), MAX_LANES) or 0) >= 1 or _listed_lanes(tags, way) > 0 for way in ways
+    )
+
+
+def implausible_lanes(tags: Tags) -> dict[str, str]:
+    """Return the tags that give a street's number of lanes and cannot be right."""
+    keys = ("lanes", "lanes:forward", "lanes:backward")
+    return {key: tags[key] for key in keys if key in tags and (count(tags[key], MAX_LANES) or 0.0) <= 0.0}
+
+
+def has_widths(tags: Tags) -> bool:
+    """Return whether the map gives the width of a street's lanes."""
+    return all(_lane_widths(tags, way, number) for way, number in lane_counts(tags).items())
+
+
+def _listed_lanes(tags: Tags, way: str) -> int:
+    """Return the number of lanes that ``turn:lanes`` of a direction lists, 0 where there is no list."""
+    listed = tags.get(f"turn:lanes{way}", "")
+    number = listed.count("|") + 1
+    return number if listed and number <= MAX_LANES else 0
+
+
+def _lane_widths(tags: Tags, way: str, lanes: int) -> list[float]:
+    """Return the widths of the driving lanes of one direction, metres, none where the map does not say."""
+    low, high = LANE_WIDTHS
+    key = "width:lanes" if is_one_way(tags) else f"width:lanes:{way}"
+    given = [metres(one, MAX_STREET_WIDTH) for one in tags.get(key, "").split("|")]
+    if len(given) == lanes and all(given):
+        return [min(max(one, low), high) for one in given if one]
+    width = metres(tags.get("width", tags.get("width:carriageway")), MAX_STREET_WIDTH)
+    if width is None:
+        return []
+    cycle_lanes = sum(_cycle_lane(tags, side) is not None for side in ("left", "right"))
+    each = (width - cycle_lanes * CYCLE_LANE_WIDTH) / sum(lane_counts(tags).values())
+    return [min(max(each, low), high)] * lanes
+
+
+def shown_name(tags: Tags) -> dict[str, str]:
+    """Return the name of a street that pictures can show, where it is not as given.
+
+    It is in English where its own has no letters for the pictures, and the number of a road that has none.
+    """
+    name = tags.get("name", "")
+    english = tags.get("name:en")
+    if not name:
+        return {"name": tags["ref"]} if tags.get("ref") else {}
+    return {"name": english} if english and any(character >= _FIRST_OTHER for character in name) else {}
+
+
+def is_one_way(tags: Tags) -> bool:
+    """Return whether traffic goes along a street in one direction only."""
+    motorway = tags.get("highway", "").startswith("motorway")
+    return tags.get("oneway", "yes" if motorway or is_roundabout(tags) else "no") in ONE_WAY
+
+
+def _sidewalks(way: Way, medians: "_Medians", *, left_hand: bool) -> tuple[bool, bool]:
+    """Return whether a pavement lies on the left and on the right of a street."""
+    left, right = (_sidewalk_tag(way.tags, side) for side in ("left", "right"))
+    if left is None or right is None:
+        kind = way.tags.get("highway", "")
+        usual_left = usual_right = kind in PAVED_CLASSES
+        if is_roundabout(way.tags):
+            usual_left, usual_right = (True, False) if left_hand else (False, True)
+        elif kind.endswith("_link") and kind not in ("motorway_link", "trunk_link"):
+            usual_left, usual_right = left_hand, not left_hand
+        elif usual_left and is_one_way(way.tags):
+            beside_left, beside_right = medians.beside(way)
+            usual_left, usual_right = not beside_left, not beside_right
+        left = usual_left if left is None else left
+        right = usual_right if right is None else right
+    return left, right
+
+
+def _sidewalk_tag(tags: Tags, side: str) -> bool | None:
+    """Return what tags say of the pavement on one side, None where they say nothing."""
+    own = tags.get(f"sidewalk:{side}", tags.get("sidewalk:both"))
+    if own is not None:
+        return own not in ("no", "none")
+    whole = tags.get("sidewalk")
+    if whole is None:
+        return None
+    return whole in ("both", "yes", "separate", side)
+
+
+class _Medians:
+    """The one-way streets of an extract, to tell on which side of one its other carriageway lies."""
+
+    def __init__(self, extract: Extract, ways: Iterable[Way]) -> None:
+        self._extract = extract
+        starts, stops, names = [], [], []
+        for way in ways:
+            if is_one_way(way.tags) and way.tags.get("junction") is None and not _is_link(way.tags):
+                line = self._line(way)
+                starts.append(line[:-1])
+                stops.append(line[1:])
+                names += [way.tags.get("name", "")] * (len(line) - 1)
+        empty = np.empty((0, 2))
+        self._start, self._stop = (np.concatenate([empty, *points]) for points in (starts, stops))
+        self._names = np.array(names, dtype=object)
+        lines = shapely.linestrings(np.stack([self._start, self._stop], axis=1))
+        self._tree = shapely.STRtree(list(lines))
+
+    def beside(self, way: Way) -> tuple[bool, bool]:
+        """Return whether the other carriageway of a one-way street lies to its left, and to its right."""
+        line = self._line(way)
+        steps = np.diff(line, axis=0)
+        if not len(steps):
+            return False, False
+        longest = int(np.argmax(np.hypot(*steps.T)))
+        middle, along = (line[longest] + line[longest + 1]) / 2, steps[longest] / (np.hypot(*steps[longest]) or 1.0)
+        aside = np.array([-along[1], along[0]])
+        found = [False, False]
+        for side, sign in enumerate((1.0, -1.0)):
+            ray = shapely.linestrings(np.stack([middle + 2.0 * sign * aside, middle + MAX_MEDIAN * sign * aside]))
+            for index in self._tree.query(ray, predicate="intersects"):
+                ahead = self._stop[index] - self._start[index]
+                opposite = float(ahead @ along) < -0.8 * float(np.hypot(*ahead))
+                found[side] |= opposite and self._names[index] == way.tags.get("name", "")
+        return found[0], found[1]
+
+    def _line(self, way: Way) -> Float:
+        """Return a way (n, 2) in metres about the extract's first node, in the direction of its traffic."""
+        line = _in_metres(self._extract, self._extract.line(way))
+        return line[::-1] if way.tags.get("oneway") in ("-1", "reverse") else line
+
+
+def is_roundabout(tags: Tags) -> bool:
+    """Return whether a way is a piece of a roundabout."""
+    return tags.get("junction") in ("roundabout", "circular")
+
+
+def _is_link(tags: Tags) -> bool:
+    return tags.get("highway", "").endswith("_link")

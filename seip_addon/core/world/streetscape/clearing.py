@@ -1,0 +1,119 @@
+"""What an extract puts on the carriageway, as that is laid out: moved or cut, for there it would hide the road."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ...geometry.plan import without
+from ...site.scene_geometry import DESCRIBED
+from .description import Building, Poles, SiteDescription, Slab, Trees, Wall
+
+CLEARANCE = 4.5  # metres above the road from which on something may hang over it
+NEAR_EDGE = 3.0  # metres inside the carriageway up to which trees and posts are moved to its edge
+SETBACK = 0.2  # metres that they then stand from it
+MAX_IN_LANE = 0.5  # metres inside the carriageway up to which a post is taken to stand at its edge
+MIN_OVERLAP, MIN_REST = 0.1, 2.0  # square metres on the carriageway that do not count, and of what is left that does
+
+_CLIPPED = "buildings cut off at the edge of the carriageway, on to which they reached"
+_MOVED = f"trees and posts moved to the edge of the carriageway, up to {NEAR_EDGE:g} m inside which they stood"
+_IN_LANE = f"posts that carry no sensor, since the map has them in a lane, more than {MAX_IN_LANE:g} m from its edge"
+_DROPPED = "trees and posts left out, since they stood in the middle of the carriageway"
+_CUT = "walls, fences and shelters cut off at the edge of the carriageway, which they crossed"
+
+Row = TypeVar("Row", Trees, Poles)
+Solid = TypeVar("Solid", Building, Slab)
+
+
+def clear(
+    description: SiteDescription, carriageway: BaseGeometry, mouths: BaseGeometry
+) -> tuple[SiteDescription, tuple[str, ...]]:
+    """Return a description of which nothing stands on the carriageway but what a site file puts there, and notes.
+
+    Parameters
+    ----------
+    carriageway, mouths : shapely geometry
+        On the level that is studied, and lines across it where the road goes on; map coordinates.
+    """
+    shapely.prepare(carriageway)
+    lanes = carriageway.buffer(-MAX_IN_LANE)
+    edge = without(shapely.boundary(carriageway), mouths.buffer(SETBACK))
+    counted = Counter[str]()
+
+    def beside(rows: Sequence[Row]) -> tuple[Row, ...]:
+        return tuple(_beside(row, carriageway, edge, counted) for row in rows)
+
+    def posts(rows: Sequence[Poles]) -> tuple[Poles, ...]:
+        return beside(tuple(_split_at_lanes(rows, lanes, counted)))
+
+    cleared = replace(
+        description,
+        buildings=tuple(_clipped(description.buildings, carriageway, counted, _CLIPPED)),
+        trees=beside(description.trees),
+        walls=tuple(_cut(description.walls, carriageway, counted)),
+        street_lights=posts(description.street_lights),
+        signal_poles=posts(description.signal_poles),
+        slabs=tuple(_clipped(description.slabs, carriageway, counted, _CUT)),
+        posts=posts(description.posts),
+    )
+    return cleared, tuple(
+        f"{reason}: {counted[reason]}" for reason in (_CLIPPED, _CUT, _MOVED, _IN_LANE, _DROPPED) if counted[reason]
+    )
+
+
+def _split_at_lanes(rows: Sequence[Poles], lanes: BaseGeometry, counted: Counter[str]) -> Iterator[Poles]:
+    """Yield posts; those in a lane come as rows that carry no sensors, since where they stand is not known."""
+    for row in rows:
+        inside = shapely.intersects_xy(lanes, row.positions)
+        if row.source == DESCRIBED or not inside.any():
+            yield row
+            continue
+        counted[_IN_LANE] += int(inside.sum())
+        yield replace(row, positions=row.positions[inside], carries=False)
+        yield replace(row, positions=row.positions[~inside])
+
+
+def _beside(row: Row, carriageway: BaseGeometry, edge: BaseGeometry, counted: Counter[str]) -> Row:
+    """Return a row of trees or posts with those on the carriageway at its edge, or left out."""
+    inside = shapely.intersects_xy(carriageway, row.positions)
+    if row.source == DESCRIBED or not inside.any():
+        return row
+    places = row.positions.copy()
+    found = shapely.shortest_line(shapely.points(places[inside]), edge)
+    ways = shapely.get_coordinates(found).reshape(-1, 2, 2)
+    outwards = ways[:, 1] - ways[:, 0]
+    depth = np.hypot(*outwards.T)
+    places[inside] += outwards * (1.0 + SETBACK / np.maximum(depth, SETBACK))[:, None]
+    lost = inside.copy()
+    lost[inside] = depth > NEAR_EDGE
+    counted[_DROPPED] += int(lost.sum())
+    counted[_MOVED] += int((inside & ~lost).sum())
+    return replace(row, positions=places[~lost])
+
+
+def _clipped(solids: Sequence[Solid], carriageway: BaseGeometry, counted: Counter[str], reason: str) -> Iterator[Solid]:
+    for solid in solids:
+        on_road = solid.base < CLEARANCE and carriageway.intersects(solid.outline)
+        if solid.source == DESCRIBED or not on_road or carriageway.intersection(solid.outline).area < MIN_OVERLAP:
+            yield solid
+            continue
+        counted[reason] += 1
+        for rest in shapely.get_parts(without(solid.outline, carriageway)):
+            if rest.geom_type == "Polygon" and rest.area >= MIN_REST:
+                yield replace(solid, outline=rest)
+
+
+def _cut(walls: Sequence[Wall], carriageway: BaseGeometry, counted: Counter[str]) -> Iterator[Wall]:
+    for wall in walls:
+        line = shapely.LineString(wall.line)
+        if wall.source == DESCRIBED or not carriageway.intersects(line):
+            yield wall
+            continue
+        counted[_CUT] += 1
+        for rest in shapely.get_parts(without(line, carriageway)):
+            if rest.length > SETBACK:
+                yield replace(wall, line=shapely.get_coordinates(rest))

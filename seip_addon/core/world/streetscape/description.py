@@ -1,0 +1,551 @@
+"""The site description: what a map does not say about a place, read from a small TOML file.
+
+The keys are explained in docs/site-description.md. Coordinates are map
+coordinates in metres; headings are degrees in the file and radians here.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.validation import explain_validity
+
+from ... import limits
+from ...arrays import Float
+from ...errors import SeipError
+from ...geometry.plan import covered_share
+from ...geometry.solids import Solid
+from ...site.post_rules import KeepOffArea, RuleName
+from ...site.scene_geometry import DEFAULT_WEIGHT, DESCRIBED, FROM_EXTRACT, FROM_MAP
+from ...storage.toml_table import Key, Reader, is_number, number, parse_toml, read_table, text
+from .roofs import FLAT, Roof
+from .terrain import FlatLand, Relief
+
+DEFAULT_RADIUS = 80.0
+DESCRIPTION_SUFFIX = ".toml"
+
+MAX_SIZE, MAX_HEIGHT, MAX_RADIUS = limits.SIZE.most, limits.HEIGHT.most, limits.SITE_RADIUS.most  # metres
+MIN_AREA = 1e-4  # square metres below which an outline encloses nothing
+MAX_COVERED = 0.5  # share of a building's outline from which on another source's building stands for it
+MAX_ROW_LENGTH = 10_000  # limit on the trees or lights of a row
+
+
+@dataclass(frozen=True, eq=False)
+class Area:
+    """A named area in plan, map coordinates."""
+
+    name: str
+    polygon: Polygon
+
+
+@dataclass(frozen=True, eq=False)
+class WeightedRegion:
+    """A region whose targets count ``weight`` times: a polygon, or the central box of a junction."""
+
+    name: str
+    weight: float
+    polygon: Polygon | None = None
+    junction: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Building:
+    """A building: ``height`` metres from ``base`` metres above the ground to the ridge.
+
+    Parameters
+    ----------
+    outline : Polygon
+        In plan; courtyards are its holes.
+    roof : Roof
+        Part of the height.
+    source : str
+        Who says that it stands there, as in `scene_geometry.Pole`.
+    height_assumed : bool
+        Whether that source does not give its height.
+    """
+
+    outline: Polygon
+    height: float
+    base: float = 0.0
+    roof: Roof = FLAT
+    source: str = DESCRIBED
+    height_assumed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Trees:
+    """Trees of one size at ``positions`` (n, 2); ``source`` and ``height_assumed`` as of a `Building`."""
+
+    positions: Float
+    height: float
+    crown_diameter: float
+    source: str = DESCRIBED
+    height_assumed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """A wall along ``line`` (n, 2), of a material and with a name; the rest as of a `Building`."""
+
+    line: Float
+    height: float
+    thickness: float
+    base: float = 0.0
+    name: str = "Wall"
+    material: str = "wall"
+    source: str = DESCRIBED
+    height_assumed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Poles:
+    """Posts of one kind at ``positions`` (n, 2).
+
+    Parameters
+    ----------
+    positions : (n, 2) float64, metres
+        Feet of the posts, map coordinates.
+    height, arm : float, metres
+        Of the post, and of the arm it carries.
+    heading : float or None, radians
+        Where the arm points, counter-clockwise from map x (east). None: to the nearest carriageway.
+    source, height_assumed
+        As of a `Building`.
+    name : str
+        Kind of the posts, for those that are neither street lights nor signals.
+    keep_off : str or None
+        Rule that keeps sensors off the posts, unless it is allowed.
+    carries : bool
+        Whether the posts may carry sensors at all.
+    """
+
+    positions: Float
+    height: float
+    arm: float
+    heading: float | None
+    source: str = DESCRIBED
+    height_assumed: bool = False
+    name: str = "Post"
+    keep_off: RuleName | None = None
+    carries: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Slab:
+    """A plate over ``outline`` from ``base`` to ``top`` metres above the ground: a canopy, a shelter, a hedge."""
+
+    outline: Polygon
+    base: float
+    top: float
+    name: str
+    material: str = "roof"
+    source: str = DESCRIBED
+    height_assumed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedSolid:
+    """A solid out of a file of its own.
+
+    Parameters
+    ----------
+    name : str
+        What it is, such as ``Building``.
+    solid : Solid
+        In plan map coordinates; its heights count from the ground under it, or are the map's.
+    outline : shapely geometry
+        In plan, map coordinates.
+    source : str
+        As of a `Building`.
+    on_ground : bool
+        Whether its heights count from the lowest ground under its outline.
+    is_building : bool
+        Whether the map's buildings, and an extract's, give way to it.
+    """
+
+    name: str
+    solid: Solid
+    outline: BaseGeometry
+    source: str
+    on_ground: bool = True
+    is_building: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class SideWay:
+    """A footway, cycle track or driveway that is no part of the road.
+
+    Parameters
+    ----------
+    area : shapely geometry
+        In plan, map coordinates.
+    material, name : str
+    keep_off : str or None
+        Rule that keeps new posts off it.
+    line : (n, 2) float64, metres, or None
+        Middle line of a footway, which may run beside a pavement of the street and stand for the same; None for others.
+    width : float, metres
+        Width of the footway along that line.
+    """
+
+    area: BaseGeometry
+    material: str
+    name: str
+    keep_off: RuleName | None = None
+    line: Float | None = None
+    width: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class SiteDescription:
+    """A place to study and what stands there.
+
+    Parameters
+    ----------
+    name : str
+        Title of the place; empty: the map's name.
+    near : (x, y) or None
+        Middle of the place, map coordinates.
+    junction : str or None
+        Id or name of the junction that is the middle of the place.
+    radius : float or None, metres
+        The region of interest is the driving surface this near to the middle.
+    approaches : float or None, metres
+        Instead of the radius: the driving surface of the junction, and of its approaches this far along the roads.
+        Without either a junction has approaches of `DEFAULT_RADIUS`, and another place that radius.
+    region : shapely geometry or None
+        Instead of both: the driving surface within this area.
+    level : tuple of str
+        Names of streets, or ids of roads, on the level to study, where roads lie above each other.
+    weighted_regions, buildings, trees, walls, street_lights, signal_poles, forbidden_areas, mandatory_areas : tuple
+        What the file lists.
+    slabs, posts, ways : tuple
+        What an extract adds: plates, plain posts, and ways beside the road.
+    solids : tuple of PlacedSolid
+        What a city model or a survey adds; where these are buildings the map's own give way to them.
+    keep_off_areas : tuple of KeepOffArea
+        Where rules keep new posts off, map coordinates.
+    relief : Relief or None
+        Ground that the map, which is flat, is laid on.
+    flat_land : FlatLand or None
+        Level land beside the map's ramps and underpasses; None where the map does not tell the height of the land.
+    from_centre_lines : bool
+        Whether the map was made of the middle lines of streets: then junctions within `JUNCTION_REACH` metres of each
+        other are one, and holes between their lanes no islands.
+    roundabouts : tuple of frozenset of str
+        Ids of junctions that are one roundabout each, in a map made of middle lines.
+    map_source : str
+        Who says where the roads are.
+    widths_assumed : frozenset of str
+        Groups of lanes (`road_surface.GROUPS`) of which the map has some whose width nobody gives.
+    attribution : tuple of str
+        Credits that the sources of the site demand.
+    """
+
+    name: str = ""
+    map: Path | None = None
+    near: tuple[float, float] | None = None
+    junction: str | None = None
+    radius: float | None = None
+    approaches: float | None = None
+    region: MultiPolygon | None = None
+    level: tuple[str, ...] = ()
+    weighted_regions: tuple[WeightedRegion, ...] = ()
+    buildings: tuple[Building, ...] = ()
+    trees: tuple[Trees, ...] = ()
+    walls: tuple[Wall, ...] = ()
+    street_lights: tuple[Poles, ...] = ()
+    signal_poles: tuple[Poles, ...] = ()
+    forbidden_areas: tuple[Area, ...] = ()
+    mandatory_areas: tuple[Area, ...] = ()
+    slabs: tuple[Slab, ...] = ()
+    posts: tuple[Poles, ...] = ()
+    ways: tuple[SideWay, ...] = ()
+    solids: tuple[PlacedSolid, ...] = ()
+    keep_off_areas: tuple[KeepOffArea, ...] = ()
+    relief: Relief | None = None
+    flat_land: FlatLand | None = None
+    from_centre_lines: bool = False
+    roundabouts: tuple[frozenset[str], ...] = ()
+    map_source: str = FROM_MAP
+    widths_assumed: frozenset[str] = frozenset()
+    attribution: tuple[str, ...] = ()
+
+    @property
+    def has_objects(self) -> bool:
+        """Whether anything stands there."""
+        standing = (self.buildings, self.trees, self.walls, self.street_lights, self.signal_poles)
+        return any((*standing, self.slabs, self.posts, self.solids))
+
+    def with_objects_of(self, other: "SiteDescription") -> "SiteDescription":
+        """Return this description with what stands there, and what ways lie there, by another one too."""
+        return replace(
+            self,
+            buildings=(*self.buildings, *other.buildings),
+            trees=(*self.trees, *other.trees),
+            walls=(*self.walls, *other.walls),
+            street_lights=(*self.street_lights, *other.street_lights),
+            signal_poles=(*self.signal_poles, *other.signal_poles),
+            slabs=(*self.slabs, *other.slabs),
+            posts=(*self.posts, *other.posts),
+            ways=(*self.ways, *other.ways),
+            solids=(*self.solids, *other.solids),
+            attribution=tuple(dict.fromkeys((*self.attribution, *other.attribution))),
+            keep_off_areas=(*self.keep_off_areas, *other.keep_off_areas),
+        )
+
+    def with_attribution(self, credit: str) -> "SiteDescription":
+        """Return this description with one more credit, if it is not empty."""
+        return replace(self, attribution=(*self.attribution, credit)) if credit else self
+
+    @property
+    def along(self) -> float | None:
+        """Length of the approaches in the region, metres; None where the region is a circle or an area."""
+        if self.junction is None or self.region is not None or self.radius is not None:
+            return None
+        return DEFAULT_RADIUS if self.approaches is None else self.approaches
+
+
+def without_covered_buildings(
+    description: SiteDescription, solids: Sequence[PlacedSolid]
+) -> tuple[SiteDescription, int]:
+    """Return a description without the buildings of an extract that others cover, and how many these are."""
+    tree = shapely.STRtree([one.outline for one in solids if one.is_building])
+    kept = tuple(
+        one
+        for one in description.buildings
+        if one.source != FROM_EXTRACT or covered_share(one.outline, tree) <= MAX_COVERED
+    )
+    return replace(description, buildings=kept), len(description.buildings) - len(kept)
+
+
+def read_site_description(path: Path) -> SiteDescription:
+    """Read a site description.
+
+    Parameters
+    ----------
+    path : Path
+        The TOML file. A map that it names is looked for beside it.
+
+    Raises
+    ------
+    SeipError
+        No such file, broken TOML, an unknown key (close ones are offered), a
+        value of the wrong kind, or a shape that is none.
+    """
+    try:
+        written = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is no UTF-8 text"
+        raise SeipError(f"cannot read the site description {path}: {reason}") from error
+    keys = _PLACE | {name: Key(_tables(name), ()) for name in _LISTED}
+    values = read_table(parse_toml(written, str(path)), str(path), keys)
+    for name, (make, own) in _LISTED.items():
+        numbered = enumerate(values.pop(name), start=1)
+        values[f"{name}s"] = tuple(_listed(table, f"{path}, {name} {number}", make, own) for number, table in numbered)
+    if values["map"] is not None:
+        values["map"] = path.parent / values["map"]
+    description = SiteDescription(**values)
+    if description.near is not None and description.junction is not None:
+        raise SeipError(f"{path}: give either near or junction, not both")
+    if description.radius is not None and description.approaches is not None:
+        raise SeipError(f"{path}: give either radius or approaches, not both")
+    return description
+
+
+def describe_place(
+    source: Path,
+    *,
+    site: Path | None = None,
+    near: tuple[float, float] | None = None,
+    junction: str | None = None,
+    radius: float | None = None,
+    approaches: float | None = None,
+) -> tuple[Path, SiteDescription]:
+    """Return a place's map and description, what is given here in place of what a file says.
+
+    Parameters
+    ----------
+    source : Path
+        The map, or a site description that names it.
+    site : Path, optional
+        Site description to go with a map.
+    near, junction, radius, approaches
+        As in `SiteDescription`.
+
+    Raises
+    ------
+    SeipError
+        As for `read_site_description`; no map is named, or a number makes no sense.
+    """
+    described = _described(source, site)
+    map_path = described.map
+    if map_path is None:
+        raise SeipError(f'{source} names no map: add map = "file.xodr" to it, or give the map and the description')
+    if near is not None or junction is not None:
+        if near is not None and not all(map(math.isfinite, near)):
+            raise SeipError("the middle of the place must be two finite numbers, x and y in metres")
+        along = None if junction is None else described.approaches
+        described = replace(described, near=near, junction=junction, region=None, approaches=along)
+    for name, length in (("radius", radius), ("length of the approaches", approaches)):
+        if length is not None and not limits.SITE_RADIUS.allow(length):
+            raise SeipError(f"the {name} must be {limits.SITE_RADIUS}, not {length:g}")
+    if radius is not None or approaches is not None:
+        described = replace(described, radius=radius, approaches=approaches, region=None)
+    if described.approaches is not None and described.junction is None:
+        raise SeipError("the approaches are those of a junction: name one, or give a radius")
+    return map_path, described
+
+
+def _described(source: Path, site: Path | None) -> SiteDescription:
+    """Return what files say of a place."""
+    if source.suffix.lower() == DESCRIPTION_SUFFIX:
+        if site is not None:
+            raise SeipError(f"{source} is a site description already; leave the other one, {site}, out")
+        return read_site_description(source)
+    return replace(SiteDescription() if site is None else read_site_description(site), map=source)
+
+
+def _listed(table: dict[str, Any], where: str, make: Callable[..., Any], keys: Mapping[str, Key]) -> Any:  # noqa: ANN401
+    values = read_table(table, where, keys)
+    try:
+        return make(**values)
+    except ValueError as error:
+        raise SeipError(f"{where}: {error}") from error
+
+
+def _tables(key: str) -> Reader:
+    def read(value: Any) -> list[dict[str, Any]]:  # noqa: ANN401  # TOML holds values of any kind
+        if not isinstance(value, list) or not all(isinstance(row, dict) for row in value):
+            raise ValueError(f"must be tables, each of which begins with [[{key}]]")
+        return value
+
+    return read
+
+
+def _texts(value: object) -> tuple[str, ...]:
+    values = value if isinstance(value, list) else [value]
+    if not all(isinstance(one, str) and one for one in values):
+        raise ValueError("must be a text in quotes, or a list of them")
+    return tuple(values)
+
+
+def _is_point(value: object) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(map(is_number, value))
+
+
+def _point(value: Any) -> tuple[float, float]:  # noqa: ANN401  # TOML holds values of any kind
+    if not _is_point(value):
+        raise ValueError("must be a point [x, y]")
+    return float(value[0]), float(value[1])
+
+
+def _line(value: object) -> Float:
+    if not isinstance(value, list) or len(value) < 2 or not all(map(_is_point, value)):
+        raise ValueError("must be a list of at least two points [[x, y], [x, y]]")
+    return np.array(value, dtype=np.float64)
+
+
+def _outline(value: object) -> Polygon:
+    if not isinstance(value, list) or len(value) < 3 or not all(map(_is_point, value)):
+        raise ValueError("must be a list of at least three points [[x, y], [x, y], [x, y]]")
+    polygon = Polygon(value)
+    if not polygon.is_valid or polygon.area < MIN_AREA:
+        reason = explain_validity(polygon) if not polygon.is_valid else "no area"
+        raise ValueError(f"must be the outline of an area that does not cross itself ({reason})")
+    if polygon.length > MAX_SIZE:
+        raise ValueError(f"must be an outline of at most {MAX_SIZE:g} m, not {polygon.length:.3g} m")
+    return polygon
+
+
+def _region(value: object) -> MultiPolygon:
+    rings = value if isinstance(value, list) and value and not _is_point(value[0]) else [value]
+    region = MultiPolygon([_outline(ring) for ring in rings])
+    low_x, low_y, high_x, high_y = region.bounds
+    if max(high_x - low_x, high_y - low_y) > 2 * MAX_RADIUS:
+        raise ValueError(f"must be at most {2 * MAX_RADIUS:g} m across")
+    return region
+
+
+def _weighted_region(name: str | None, weight: float, polygon: Polygon | None, junction: str | None) -> WeightedRegion:
+    if (polygon is None) == (junction is None):
+        raise ValueError("give either polygon or junction")
+    usual = f"Junction {junction}" if junction is not None else "Weighted region"
+    return WeightedRegion(name or usual, weight, polygon, junction)
+
+
+def _trees(height: float, crown_diameter: float | None, **row: Any) -> Trees:  # noqa: ANN401  # `_ROW`
+    crown_diameter = 0.6 * height if crown_diameter is None else crown_diameter
+    return Trees(_positions(row), height, crown_diameter)
+
+
+def _poles(height: float, arm: float, heading: float | None, **row: Any) -> Poles:  # noqa: ANN401  # `_ROW`
+    return Poles(_positions(row), height, arm, None if heading is None else math.radians(heading))
+
+
+def _positions(row: Mapping[str, Any]) -> Float:
+    """Return (n, 2) positions: one, or a row from one point to another at a spacing."""
+    given = {key for key, value in row.items() if value is not None}
+    if given == {"position"}:
+        return np.array([row["position"]])
+    if given != {"from", "to", "spacing"}:
+        raise ValueError("give either position = [x, y] or a row with from, to and spacing")
+    ends, spacing = np.array([row["from"], row["to"]]), row["spacing"]
+    length = float(np.hypot(*(ends[1] - ends[0])))
+    if length / spacing > MAX_ROW_LENGTH:
+        raise ValueError(f"this row has {length / spacing:.3g} places; make it {MAX_ROW_LENGTH:,} at most")
+    gaps = int(length / spacing + 1e-9)  # a row ends on its last whole step in spite of rounding
+    along = np.arange(gaps + 1) * (spacing / length if length > 0 else 0.0)
+    positions: Float = ends[0] + along[:, None] * (ends[1] - ends[0])
+    return positions
+
+
+_SIZE = number(limits.SIZE)
+_HEIGHT = number(limits.HEIGHT)
+_EXTENT = Key(number(limits.SITE_RADIUS), None)
+_ROW = {"position": Key(_point, None), "from": Key(_point, None), "to": Key(_point, None), "spacing": Key(_SIZE, None)}
+_POLE = _ROW | {"heading": Key(number(limits.DEGREES), None)}
+_ARM = number(limits.DISTANCE)
+_AREA = {"name": Key(text, "Area"), "polygon": Key(_outline)}
+
+_PLACE = {
+    "name": Key(text, ""),
+    "map": Key(text, None),
+    "near": Key(_point, None),
+    "junction": Key(text, None),
+    "radius": _EXTENT,
+    "approaches": _EXTENT,
+    "region": Key(_region, None),
+    "level": Key(_texts, ()),
+    "attribution": Key(_texts, ()),
+}
+"""Keys of the file itself."""
+
+_LISTED: Mapping[str, tuple[Callable[..., Any], Mapping[str, Key]]] = {
+    "weighted_region": (
+        _weighted_region,
+        {
+            "name": Key(text, None),
+            "weight": Key(number(limits.CHOSEN_WEIGHT), DEFAULT_WEIGHT),
+            "polygon": Key(_outline, None),
+            "junction": Key(text, None),
+        },
+    ),
+    "building": (
+        Building,
+        {"outline": Key(_outline), "height": Key(_HEIGHT), "base": Key(number(limits.ABOVE_GROUND), 0.0)},
+    ),
+    "tree": (_trees, _ROW | {"height": Key(_HEIGHT, 8.0), "crown_diameter": Key(_SIZE, None)}),
+    "wall": (Wall, {"line": Key(_line), "height": Key(_HEIGHT, 2.0), "thickness": Key(_SIZE, 0.25)}),
+    "street_light": (_poles, _POLE | {"height": Key(_HEIGHT, 8.0), "arm": Key(_ARM, 1.5)}),
+    "signal_pole": (_poles, _POLE | {"height": Key(_HEIGHT, 6.0), "arm": Key(_ARM, 5.0)}),
+    "forbidden_area": (Area, _AREA),
+    "mandatory_area": (Area, _AREA),
+}
+"""What is made of each kind of table in the file, and the keys of such a table; ``buildings`` holds all of them."""

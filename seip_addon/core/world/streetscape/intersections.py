@@ -1,0 +1,247 @@
+"""Intersections of maps that were made of the middle lines of streets, where one comes as several junctions.
+
+SUMO's netconvert makes a junction wherever two ways meet or a lane begins, and several where the carriageways of two
+wide streets cross.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from shapely.affinity import rotate
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Float
+from ...geometry.plan import closed, united
+from ..opendrive.junctions import junction_area
+from ..opendrive.lanes import LaneSurface
+from ..opendrive.road_map import Road
+
+FOOTPATHS = {"sidewalk", "walking", "none"}
+MIN_ARMS = 3  # arms of a junction; where fewer meet, a street goes on
+ARM_GAP = 2.0  # metres between two ends of roads of one arm at most
+SAME_DIRECTION = math.radians(40.0)  # roads whose ends differ by less lead the same way
+TOUCH = 0.5  # metres between a junction and the end of a road that meets it at most
+JUNCTION_REACH = 20.0  # metres between two junctions of one intersection at most
+PARALLEL = math.radians(15.0)  # by which the other carriageway of a street turns from it at most
+MAX_MEDIAN = 22.0  # metres between the middles of lanes of two carriageways of one street at most
+MAX_INTERSECTION = 45.0  # metres from the junction in the middle to the farthest of an intersection at most
+
+
+def without_plain_joints(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, ...]:
+    """Return lanes of which those are in no junction that lie where no more than two arms meet.
+
+    A pavement that is a road of its own, as netconvert makes of one on the left of a one-way street, is no arm.
+    """
+    areas = _areas(surfaces)
+    streets = {lane.road_id for lane in surfaces if lane.lane_type not in FOOTPATHS}
+    ends, outwards, roads = [], [], []
+    for lane in surfaces:
+        if lane.junction_id is None and lane.road_id in streets:
+            for row, next_row in ((0, 1), (-1, -2)):
+                roads.append((lane.road_id if lane.lane_type == "driving" else None, row))
+                ends.append(shapely.LineString([lane.left[row, :2], lane.right[row, :2]]))
+                outwards.append(lane.left[next_row, :2] - lane.left[row, :2])
+    tree = shapely.STRtree(ends)
+    joints = set()
+    for number, area in areas.items():
+        touching = tree.query(area, predicate="dwithin", distance=TOUCH)
+        arms = shapely.union_all([ends[index].buffer(ARM_GAP / 2) for index in touching])
+        meeting = (
+            len(shapely.get_parts(arms)),
+            _directions([outwards[index] for index in touching]),
+            _two_way_streets({roads[index] for index in touching}),
+        )
+        if max(meeting) < MIN_ARMS:
+            joints.add(number)
+    return tuple(replace(lane, junction_id=None) if lane.junction_id in joints else lane for lane in surfaces)
+
+
+def _two_way_streets(ends: Iterable[tuple[str | None, int]]) -> int:
+    """Return how many two-way streets at most have ends of their roads, which are of one way each, in one place."""
+    rows = [row for road, row in ends if road is not None]
+    return min(rows.count(0), rows.count(-1))
+
+
+def _directions(vectors: Sequence[Float]) -> int:
+    """Return in how many directions vectors (2,) point that differ by more than `SAME_DIRECTION`."""
+    found: list[float] = []
+    for x, y in vectors:
+        heading = math.atan2(y, x)
+        if (x or y) and all(abs(math.remainder(heading - other, math.tau)) > SAME_DIRECTION for other in found):
+            found.append(heading)
+    return len(found)
+
+
+def intersection(
+    surfaces: Sequence[LaneSurface], junction_id: str, roundabouts: Iterable[frozenset[str]] = ()
+) -> frozenset[str]:
+    """Return the ids of the junctions that are one intersection with a junction.
+
+    Parameters
+    ----------
+    roundabouts : iterable of frozenset of str
+        Ids of junctions that are one roundabout each.
+    """
+    areas = _areas(surfaces)
+    if junction_id not in areas:
+        return frozenset({junction_id})
+    found = {junction_id}.union(*(one & areas.keys() for one in roundabouts if junction_id in one))
+    middle = shapely.union_all([areas[number] for number in found]).centroid
+    away = max(areas[number].centroid.distance(middle) for number in found)
+    most = max(MAX_INTERSECTION, away + JUNCTION_REACH)
+    waiting = sorted(found)
+    while waiting:
+        area = areas[waiting.pop()]
+        near = {
+            number
+            for number, other in areas.items()
+            if number not in found
+            and area.distance(other) <= JUNCTION_REACH
+            and other.centroid.distance(middle) <= most
+        }
+        found |= near
+        waiting += sorted(near)
+    return frozenset(found)
+
+
+def ring_roads(
+    roads: Iterable[Road], junctions: frozenset[str], roundabouts: Iterable[frozenset[str]]
+) -> frozenset[str]:
+    """Return the ids of the roads that lead around the roundabouts of an intersection, between their arms.
+
+    Parameters
+    ----------
+    junctions : frozenset of str
+        Ids of the junctions of the intersection.
+    roundabouts : iterable of frozenset of str
+        Ids of the junctions that are one roundabout each.
+    """
+    rings = [one for one in roundabouts if one & junctions]
+
+    def in_ring(road: Road, ring: frozenset[str]) -> bool:
+        ends = (road.predecessor, road.successor)
+        return road.junction_id in ring or all(end is not None and end.id in ring for end in ends)
+
+    return frozenset(road.id for road in roads if any(in_ring(road, ring) for ring in rings))
+
+
+def with_other_carriageways(
+    lanes: Sequence[LaneSurface], surfaces: Sequence[LaneSurface], names: Mapping[str, str]
+) -> BaseGeometry:
+    """Return the area of lanes, and of what lies beside them of the same streets: the other carriageway of each.
+
+    A street with both directions beside each other is no carriageway of another one, and a street with a name of its
+    own that runs along them is no link between them.
+
+    Parameters
+    ----------
+    lanes : sequence of LaneSurface
+        Some driving lanes.
+    surfaces : sequence of LaneSurface
+        All driving lanes.
+    names : mapping of str to str
+        Of the streets, by the ids of their roads.
+    """
+    area = united(lane.polygon for lane in lanes)
+    bands: dict[str, list[tuple[BaseGeometry, float]]] = {}
+    for lane in lanes:
+        middle = (lane.left[:, :2] + lane.right[:, :2]) / 2
+        if names.get(lane.road_id) and lane.junction_id is None and np.ptp(middle, axis=0).max() > 0:
+            band = shapely.LineString(middle).buffer(MAX_MEDIAN, cap_style="flat")
+            bands.setdefault(names[lane.road_id], []).append((band, _heading(lane)))
+    two_way = _two_way_roads(surfaces)
+    sides = {name: closed(united(band for band, _ in own), JUNCTION_REACH) for name, own in bands.items()}
+    others = [
+        shapely.make_valid(lane.polygon).intersection(sides[names[lane.road_id]])
+        for lane in surfaces
+        if lane.road_id not in two_way
+        and any(
+            abs(math.remainder(_heading(lane) - heading, math.pi)) < PARALLEL and band.intersects(lane.polygon)
+            for band, heading in bands.get(names.get(lane.road_id, ""), ())
+        )
+    ]
+    streets = united([area, *others])
+    headings = [heading for own in bands.values() for _, heading in own]
+    links = [
+        lane.polygon
+        for lane in surfaces
+        if names.get(lane.road_id) not in bands
+        and not (names.get(lane.road_id) and _runs_along(lane, headings))
+        and _leads_between(lane, streets)
+    ]
+    return united([streets, united(links).intersection(united(sides.values()))])
+
+
+def _two_way_roads(surfaces: Sequence[LaneSurface]) -> frozenset[str]:
+    """Return the ids of roads, each of one direction, whose inner edge is that of a road of the other direction."""
+    innermost: dict[str, LaneSurface] = {}
+    for lane in surfaces:
+        found = innermost.get(lane.road_id)
+        if lane.junction_id is None and (found is None or abs(lane.lane_id) < abs(found.lane_id)):
+            innermost[lane.road_id] = lane
+    edges = [shapely.LineString((lane.right if lane.lane_id > 0 else lane.left)[:, :2]) for lane in innermost.values()]
+    roads = list(innermost)
+    middles = [edge.interpolate(0.5, normalized=True) for edge in edges]
+    one, other = shapely.STRtree(edges).query(middles, predicate="dwithin", distance=TOUCH)
+    return frozenset(
+        roads[a]
+        for a, b in zip(one.tolist(), other.tolist(), strict=True)
+        if a != b
+        and abs(math.remainder(_heading(innermost[roads[a]]) - _heading(innermost[roads[b]]), math.tau)) > math.pi / 2
+    )
+
+
+def _runs_along(lane: LaneSurface, headings: Iterable[float]) -> bool:
+    """Return whether a lane is longer than the way across a median, and as good as parallel to some heading."""
+    length = float(np.hypot(*(lane.left[-1] - lane.left[0])[:2]))
+    own = _heading(lane)
+    alike = any(abs(math.remainder(own - heading, math.pi)) < SAME_DIRECTION for heading in headings)
+    return length > MAX_MEDIAN and alike
+
+
+def box_along(area: BaseGeometry, lanes: Iterable[LaneSurface]) -> BaseGeometry:
+    """Return the smallest rectangle around a junction's area that lies along one of the roads that meet there."""
+    meeting = [
+        lane
+        for lane in lanes
+        if lane.junction_id is None and lane.polygon.distance(area) < TOUCH and not _leads_between(lane, area)
+    ]
+    boxes = [
+        rotate(shapely.envelope(rotate(area, -heading, (0, 0), use_radians=True)), heading, (0, 0), use_radians=True)
+        for heading in map(_heading, meeting)
+    ]
+    return min(boxes, key=lambda box: float(box.area), default=shapely.minimum_rotated_rectangle(area))
+
+
+def _leads_between(lane: LaneSurface, area: BaseGeometry) -> bool:
+    """Return whether a lane begins and ends at an area."""
+    ends = [shapely.Point((lane.left[row, :2] + lane.right[row, :2]) / 2) for row in (0, -1)]
+    return all(area.distance(end) < TOUCH for end in ends)
+
+
+def _heading(lane: LaneSurface) -> float:
+    """Return the direction from the start of a lane to its end, radians."""
+    x, y = (lane.left[-1] + lane.right[-1] - lane.left[0] - lane.right[0])[:2].tolist()
+    return math.atan2(y, x)
+
+
+def filled(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
+    """Return the area of a junction's lanes with the holes between them, and narrow gaps at its edge, filled."""
+    area = closed(united(lane.polygon for lane in surfaces), 0.5)
+    return united(shapely.Polygon(part.exterior) for part in _polygons(area))
+
+
+def _polygons(area: BaseGeometry) -> list[shapely.Polygon]:
+    return [part for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
+
+
+def _areas(surfaces: Sequence[LaneSurface]) -> dict[str, BaseGeometry]:
+    """Return the area of each junction, by its id."""
+    lanes: dict[str, list[LaneSurface]] = {}
+    for lane in surfaces:
+        if lane.junction_id is not None:
+            lanes.setdefault(lane.junction_id, []).append(lane)
+    return {number: junction_area(own, number) for number, own in lanes.items()}

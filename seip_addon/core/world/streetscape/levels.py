@@ -1,0 +1,341 @@
+"""Grade separation: the roads on the studied level of a place, from their connections and heights."""
+
+import heapq
+import math
+import shlex
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Float
+from ...errors import SeipError
+from ..opendrive.lanes import LaneSurface
+from .road_surface import MAX_SEAM, by_road, group, is_near
+from .terrain import Terrain
+
+MAX_JOINT_STEP = 1.0  # roads that meet within so many metres of height lead into each other
+MIN_LEVEL_HEIGHT = 2.0  # a road that lies more than this (metres) above another one crosses it on a level of its own
+MIN_LEAD = 10.0  # metres along the roads by which one of two roads as many joints away is the nearer one
+UNNAMED_ROAD = "a street without a name"
+MIN_OVERLAP = 1.0  # square metres in plan: roads that overlap less do not cross
+
+
+class UnclearLevelError(SeipError):
+    """Roads cross in the middle of a place, and nothing tells which is studied."""
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """A road above another one, and where, in map coordinates.
+
+    Parameters
+    ----------
+    above, below : str
+        Ids of the roads.
+    height : float, metres
+    place : (x, y), metres
+    streets : (str, str)
+        Names of the streets above and below, where they have names.
+    """
+
+    above: str
+    below: str
+    height: float
+    place: tuple[float, float]
+    streets: tuple[str, str] = ("", "")
+
+    @property
+    def levels(self) -> tuple[str, str]:
+        """What names the upper and the lower level."""
+        upper, lower = (name or road for name, road in zip(self.streets, (self.above, self.below), strict=True))
+        return (self.above, self.below) if upper.casefold() == lower.casefold() else (upper, lower)
+
+    def called(self, road: str) -> str:
+        """Return what a message calls one of the two roads: by the name of its street, where the map has names."""
+        name, other = self.streets if road == self.above else self.streets[::-1]
+        if not name:
+            return UNNAMED_ROAD if other else f"road {road}"
+        return name if name.casefold() != other.casefold() else f"{name} (road {road})"
+
+    def __str__(self) -> str:
+        x, y = (round(value) + 0 for value in self.place)
+        return f"{self.called(self.above)} lies {self.height:.1f} m above {self.called(self.below)} at ({x}, {y})"
+
+
+@dataclass(frozen=True, eq=False)
+class Levels:
+    """The lanes of a place on the level that is studied, and on others.
+
+    Parameters
+    ----------
+    studied, others : tuple of LaneSurface
+        In map coordinates.
+    crossings : tuple of Crossing
+        Why there are others.
+    """
+
+    studied: tuple[LaneSurface, ...]
+    others: tuple[LaneSurface, ...]
+    crossings: tuple[Crossing, ...]
+
+    def other_roads(self) -> frozenset[str]:
+        """Return the ids of the roads on other levels."""
+        return frozenset(lane.road_id for lane in self.others)
+
+
+def split_levels(
+    surfaces: Sequence[LaneSurface],
+    around: BaseGeometry,
+    anchors: Iterable[str],
+    level: Sequence[str] = (),
+    names: Mapping[str, str] | None = None,
+) -> Levels:
+    """Divide lanes into those on the level of a place and those that cross above or below.
+
+    Of two crossing roads the one that is fewer joints away from the anchors in the graph of roads is on the studied
+    level; of as many, the nearer one along the roads. Each other road takes the level of the crossing road that is
+    fewer joints away; ties are decided by height. A road that shares its surface with a studied one is studied too, as
+    where a street that leads to the other level branches off.
+
+    Parameters
+    ----------
+    surfaces : sequence of LaneSurface
+        All lanes of the map, map coordinates.
+    around : shapely geometry
+        The place, map coordinates. What lies beyond it counts as studied.
+    anchors : iterable of str
+        Ids of the roads in the middle of the place.
+    level : sequence of str
+        Streets that are on the level, in place of the anchors: their names, or ids of roads.
+    names : mapping of str to str, optional
+        Names of the streets by the ids of their roads.
+
+    Raises
+    ------
+    UnclearLevelError
+        Roads cross and neither is nearer to the place (both are named).
+    SeipError
+        A road of ``level`` is not here.
+    """
+    shapely.prepare(around)
+    near = [lane for lane in surfaces if group(lane) and is_near(lane, around)]
+    roads = _roads(near, around)
+    names = names or {}
+    on_level = _on_level(level, roads, names)
+    crossings = _crossings(roads, names) if roads else ()
+    if not crossings:
+        return Levels(tuple(surfaces), (), ())
+    joined = _joined(roads)
+    start = (on_level or set(anchors)) & roads.keys()
+    others = _roads_farther_off(crossings, joined, roads, start)
+    winners = {road for crossing in crossings for road in (crossing.above, crossing.below)} | start
+    to_level, to_others = _hops(joined, winners - others), _hops(joined, others)
+    even = {road for road in roads if to_others[road] == to_level[road] < math.inf}
+    others |= {road for road in roads if to_others[road] < to_level[road]}
+    others |= {road for road in even - start if _lies_with_others(roads[road], roads, crossings, others)}
+    apart = {road for road in roads if to_others[road] == to_level[road] == math.inf}
+    others |= {road for road in sorted(apart) if _next_to(road, roads, roads.keys() - apart) in others}
+    for crossing in crossings:
+        if not {crossing.above, crossing.below} & others:
+            raise _ambiguous(crossing)
+    others -= _on_studied_surface(roads, others - winners, roads.keys() - others)
+    away = {id(lane) for lane in near if lane.road_id in others}
+    return Levels(
+        tuple(lane for lane in surfaces if id(lane) not in away),
+        tuple(lane for lane in near if lane.road_id in others),
+        crossings,
+    )
+
+
+def _on_level(level: Sequence[str], roads: Mapping[str, object], names: Mapping[str, str]) -> set[str]:
+    """Return the roads here that ids and names of streets stand for."""
+    found = set()
+    for asked in level:
+        named = {road for road in roads if names.get(road, "").casefold() == asked.strip().casefold()}
+        if asked not in roads and not named:
+            known = ", ".join(sorted({names[road] for road in roads if names.get(road)}))
+            raise SeipError(
+                f"no road {asked!r} at this place: name a street that lies on the level{known and ': '}{known}"
+            )
+        found |= {asked} if asked in roads else named
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _RoadArea:
+    """A road within the place: its outline in plan and its heights, (low, high) and everywhere."""
+
+    outline: BaseGeometry
+    heights: tuple[float, float]
+    terrain: Terrain
+
+    @property
+    def middle(self) -> float:
+        """Half-way between the lowest and the highest place, metres."""
+        return sum(self.heights) / 2
+
+
+def _roads(lanes: Sequence[LaneSurface], around: BaseGeometry) -> dict[str, _RoadArea]:
+    roads = {}
+    for road, own in by_road(lanes).items():
+        outline = shapely.union_all([shapely.make_valid(lane.polygon) for lane in own]).intersection(around)
+        if outline.area > 0:
+            triangles = np.concatenate([lane.triangles for lane in own])
+            heights = (float(triangles[:, :, 2].min()), float(triangles[:, :, 2].max()))
+            roads[road] = _RoadArea(outline, heights, Terrain(triangles))
+    return roads
+
+
+def _pairs(roads: Mapping[str, _RoadArea], distance: float) -> list[tuple[str, str]]:
+    """Return the pairs of roads that come so near to each other in plan, metres."""
+    names = list(roads)
+    outlines = [roads[name].outline for name in names]
+    first, second = shapely.STRtree(outlines).query(outlines, predicate="dwithin", distance=distance)
+    return [(names[a], names[b]) for a, b in zip(first.tolist(), second.tolist(), strict=True) if a < b]
+
+
+def _crossings(roads: Mapping[str, _RoadArea], names: Mapping[str, str]) -> tuple[Crossing, ...]:
+    """Return where roads lie above each other, the greatest overlap of each two."""
+    found = []
+    for one, other in _pairs(roads, 0.0):
+        first, second = roads[one], roads[other]
+        if max(first.heights[1] - second.heights[0], second.heights[1] - first.heights[0]) < MIN_LEVEL_HEIGHT:
+            continue
+        for part in shapely.get_parts(first.outline.intersection(second.outline)):
+            if part.area < MIN_OVERLAP:
+                continue
+            points = _points_in(part)
+            rise = first.terrain.height(points) - second.terrain.height(points)
+            if np.abs(rise).min() > MIN_LEVEL_HEIGHT:
+                above, below = (one, other) if rise[0] > 0 else (other, one)
+                x, y = part.centroid.coords[0]
+                streets = (names.get(above, ""), names.get(below, ""))
+                found.append(Crossing(above, below, float(np.abs(rise).min()), (x, y), streets))
+    return tuple(sorted(found, key=lambda one: (one.above, one.below, one.place)))
+
+
+def _joined(roads: Mapping[str, _RoadArea]) -> dict[str, set[str]]:
+    """Return for each road those that meet it in plan and in height."""
+    joined: dict[str, set[str]] = {road: set() for road in roads}
+    for one, other in _pairs(roads, MAX_SEAM):
+        first, second = roads[one], roads[other]
+        common = first.outline.buffer(MAX_SEAM).intersection(second.outline.buffer(MAX_SEAM))
+        points = np.concatenate([np.empty((0, 2)), *map(_points_in, shapely.get_parts(common))])
+        rise = np.abs(first.terrain.height(points) - second.terrain.height(points))
+        if rise.min(initial=math.inf) < MAX_JOINT_STEP:
+            joined[one].add(other)
+            joined[other].add(one)
+    return joined
+
+
+def _points_in(part: BaseGeometry) -> Float:
+    """Return points (n, 2) of a polygon: one in it, and its corners."""
+    return np.concatenate([shapely.get_coordinates(part.representative_point()), shapely.get_coordinates(part)])
+
+
+def _hops(joined: Mapping[str, set[str]], start: Iterable[str]) -> dict[str, float]:
+    """Return over how many joints each road is reached; infinity where it is not."""
+    hops = dict.fromkeys(joined, math.inf)
+    waiting = deque(start)
+    hops.update(dict.fromkeys(waiting, 0.0))
+    while waiting:
+        road = waiting.popleft()
+        for following in sorted(joined[road]):
+            if hops[following] == math.inf:
+                hops[following] = hops[road] + 1
+                waiting.append(following)
+    return hops
+
+
+def _lies_with_others(
+    plan: _RoadArea, roads: Mapping[str, _RoadArea], crossings: Iterable[Crossing], others: set[str]
+) -> bool:
+    """Return whether a road lies nearer in height to the other road of the nearest crossing than to the studied one."""
+    crossing = min(crossings, key=lambda one: float(plan.outline.distance(shapely.Point(one.place))))
+    away = {road: abs(roads[road].middle - plan.middle) for road in (crossing.above, crossing.below)}
+    return min(away, key=lambda road: away[road]) in others
+
+
+def _on_studied_surface(roads: Mapping[str, _RoadArea], others: set[str], studied: Iterable[str]) -> set[str]:
+    """Return the other roads that share the surface of a studied one, where neither of the two climbs to a level."""
+    level = {road for road, own in roads.items() if own.heights[1] - own.heights[0] < MIN_LEVEL_HEIGHT}
+    others, known = others & level, level.intersection(studied)
+    pairs = _pairs({road: own for road, own in roads.items() if road in others | known}, 0.0)
+    return {
+        road
+        for pair in pairs
+        for road, other in (pair, pair[::-1])
+        if road in others and other in known and _share_surface(roads[road], roads[other])
+    }
+
+
+def _share_surface(one: _RoadArea, other: _RoadArea) -> bool:
+    """Return whether roads overlap, nowhere farther apart in height than roads that lead into each other."""
+    parts = shapely.get_parts(one.outline.intersection(other.outline))
+    points = [_points_in(part) for part in parts if part.area >= MIN_OVERLAP]
+    return bool(points) and all(
+        np.abs(one.terrain.height(each) - other.terrain.height(each)).max() < MAX_JOINT_STEP for each in points
+    )
+
+
+def _next_to(road: str, roads: Mapping[str, _RoadArea], reached: Iterable[str]) -> str:
+    """Return the nearest road at about the height of one that is joined to none here; empty where there is none."""
+    own = roads[road]
+    for other in sorted(reached, key=lambda name: (float(own.outline.distance(roads[name].outline)), name)):
+        ends = shapely.get_coordinates(shapely.shortest_line(own.outline, roads[other].outline))
+        rise = own.terrain.height(ends[:1]) - roads[other].terrain.height(ends[1:])
+        if abs(float(rise[0])) < MIN_LEVEL_HEIGHT:
+            return other
+    return ""
+
+
+def _roads_farther_off(
+    crossings: Iterable[Crossing], joined: Mapping[str, set[str]], roads: Mapping[str, _RoadArea], start: set[str]
+) -> set[str]:
+    """Return of each two roads that cross the one that more joints part from the place; of as many, the farther one.
+
+    Where no joint leads to either, both are on other levels, or next to a road that tells their level.
+    """
+    hops = _hops(joined, start)
+    metres = _metres_away(joined, roads, start)
+    losers = set()
+    for crossing in crossings:
+        above, below = hops[crossing.above], hops[crossing.below]
+        if above == below == math.inf:
+            continue
+        lead = metres[crossing.above] - metres[crossing.below] if above == below else above - below
+        if above == below and abs(lead) < MIN_LEAD:
+            raise _ambiguous(crossing)
+        losers.add(crossing.above if lead > 0 else crossing.below)
+    return losers
+
+
+def _metres_away(
+    joined: Mapping[str, set[str]], roads: Mapping[str, _RoadArea], start: Iterable[str]
+) -> dict[str, float]:
+    """Return the length of the shortest way to each road, metres along the roads between; infinity where none leads."""
+    away = dict.fromkeys(joined, math.inf)
+    waiting = [(0.0, road) for road in sorted(start)]
+    away.update({road: 0.0 for _, road in waiting})
+    while waiting:
+        travelled, road = heapq.heappop(waiting)
+        if travelled > away[road]:
+            continue
+        onwards = travelled + float(roads[road].outline.length) / 2
+        for following in sorted(joined[road]):
+            if onwards < away[following]:
+                away[following] = onwards
+                heapq.heappush(waiting, (onwards, following))
+    return away
+
+
+def _ambiguous(crossing: Crossing) -> UnclearLevelError:
+    upper, lower = map(shlex.quote, crossing.levels)
+    return UnclearLevelError(
+        f"{crossing}, and a scene has one level: choose it by a road that lies on it, --level {upper} or "
+        f"--level {lower}"
+    )

@@ -1,0 +1,897 @@
+"""From a map and a site description to the parts of a scene, in local axes."""
+
+from collections import Counter
+from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Float
+from ...counts import counted
+from ...errors import SeipError
+from ...geometry.plan import covered_share, outline, signed_area, united, without
+from ...geometry.solids import Solid, fence, from_faces
+from ...progress import Progress
+from ...site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
+from ...site.post_rules import RULES
+from ...site.roles import AREA_OVERLAYS, Role
+from ...site.scene_geometry import ASSUMED, DESCRIBED, OTHER_LEVELS, NamedArea
+from ...site.sources import SourceCount, count_sources
+from ..opendrive.lanes import LaneSurface, lane_surfaces
+from ..opendrive.objects import PlacedObject, placed_objects
+from ..opendrive.road_map import Road, RoadMap
+from ..opendrive.signals import placed_signals
+from . import road_surface, street_furniture
+from .clearing import MAX_IN_LANE, clear
+from .description import MAX_COVERED, Building, PlacedSolid, Poles, SiteDescription, Slab, Trees, Wall
+from .folds import without_folds
+from .footways import without_doubles
+from .geographic_position import in_metres
+from .intersections import without_plain_joints
+from .levels import MIN_LEVEL_HEIGHT, Levels
+from .map_furniture import (
+    CROWN_SHARE,
+    POLE_HEIGHT,
+    POST_RADIUS,
+    arm_heading,
+    building_parts,
+    facade,
+    footprint,
+    is_trunk,
+    landings,
+    local_objects,
+    object_parts,
+    pole_part,
+    tree_part,
+)
+from .named_places import named_places, street_names
+from .object_kinds import Kind, kind_of
+from .parts import Part
+from .place import SCENE_MARGIN, Place, shifted
+from .road_checks import road_warnings
+from .road_surface import Roadside, SurfaceLayers, without_crumbs
+from .roofs import house
+from .signal_posts import signal_parts, split_posts
+from .tapers import with_tapers
+from .terrain import Embankments, FlatLand, Relief, Terrain, cut, embankment_width
+
+STAGES = 6  # pieces of work that a model is made in once the map's lanes are known
+ROADS_PER_STEP = 20
+MIN_HOLE = 0.01  # square metres: smaller holes of a carriageway are rounding
+CANDIDATE_MARGIN = 15.0  # how far outside the region of interest (metres) a new post may stand
+VERGE_STRIP = (0.8, 2.3)  # where new posts may stand beside a road without pavements: metres from the carriageway
+VERGE_BELOW = 0.03
+GROUND_MARGIN = 5.0  # how far the ground goes on around what stands outside the extent (metres)
+MAX_GROUND_DISTANCE = 300.0  # how far from the extent (metres) it goes on at most: a wall may run along the whole map
+VERGE_SPACING = 12.0
+KERB_STEP, RELIEF_SPACING = 2.5, 6.0  # metres: as ground on which nothing is farther off than some centimetres needs
+OVERLAY_SPACING = 4.0  # as the surface of junctions: coarser veils would rise through the coverage on curved roads
+MIN_BRIDGE_HEIGHT = 1.0  # metres above the land from which a road on a bridge is in the air
+MIN_RAMP_HEIGHT = 1.0  # metres above the nearest studied road from which a ramp of another level is in the way
+MIN_WALL = 0.02  # metres of height, of both ends together, from which a gap beside a road below has a wall
+UNNAMED_STREET = "Unnamed street"
+OVERLAY_STEP = 0.001  # metres of height between areas of one role that may overlap
+
+SURFACES = {
+    "driving": ("Driving lanes", "asphalt", Role.ROADS),
+    "shoulder": ("Shoulders", "asphalt shoulder", Role.ROADS),
+    "parking": ("Parking lanes", "asphalt parking", Role.ROADS),
+    "biking": ("Cycle lanes", "asphalt cycle", Role.ROADS),
+    "track": ("Tracks", "asphalt shoulder", Role.ROADS),
+    "border": ("Borders", "verge", Role.GROUND),
+    "median": ("Medians", "median", Role.GROUND),
+}
+"""Name, material and role of the surface of each group of lanes but the pavements."""
+PART_NAMES = {group: (name,) for group, (name, _, _) in SURFACES.items()} | {
+    "sidewalk": ("Pavements", "Pavements beyond", "Kerbs")
+}
+"""Names of the parts that are as wide as the lanes of a group."""
+
+
+@dataclass(frozen=True, eq=False)
+class SiteModel:
+    """A site as the parts of a scene.
+
+    Parameters
+    ----------
+    origin : (3,) float64, metres
+        Map coordinates of the local origin, whole metres.
+    geo_reference : str or None
+        Projection of the map, as the map gives it.
+    header_offset : (4,) float64
+        Of the map: x, y, z in metres and heading in radians.
+    region : shapely geometry
+        Region of interest in plan, local axes.
+    notes : tuple of str
+        What was assumed because the map does not say it, a sentence each.
+    warnings : tuple of str
+        Reasons to distrust results of the scene, one sentence each.
+    places : tuple of NamedArea
+        Streets and crossings of the map in the region, local axes.
+    attribution : tuple of str
+        Credits that the sources of the site demand.
+    """
+
+    name: str
+    origin: Float
+    geo_reference: str | None
+    header_offset: Float
+    parts: tuple[Part, ...]
+    region: BaseGeometry
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+    places: tuple[NamedArea, ...] = ()
+    attribution: tuple[str, ...] = ()
+
+    def sources(self) -> tuple[SourceCount, ...]:
+        """Count what is there by kind and source; what is there to be looked at alone does not count."""
+        return count_sources(
+            (part.name, part.source, part.height_assumed or part.width_assumed or part.source == ASSUMED)
+            for part in self.parts
+            if part.source and set(part.roles) != {Role.DRESSING}
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _OtherLevels:
+    """Roads on other levels, and what carries roads that cross each other, in local axes.
+
+    Parameters
+    ----------
+    lanes : tuple of LaneSurface
+        Of the roads on other levels.
+    above, below : (n, 3, 3) float64, metres
+        Surfaces of these roads, all, that are in the way of the studied level, and of the others.
+    on_ground : (n, 3, 3) float64, metres
+        Those of them that lie on the ground.
+    decks : shapely geometry
+        Where roads of the studied level are in the air: the ground goes on below them.
+    """
+
+    lanes: tuple[LaneSurface, ...]
+    above: Float
+    below: Float
+    on_ground: Float
+    decks: BaseGeometry
+
+    @cached_property
+    def area(self) -> BaseGeometry:
+        """Area in plan of the roads on the ground."""
+        return outline(self.on_ground, road_surface.SNAP_GRID)
+
+    @cached_property
+    def off_posts(self) -> BaseGeometry:
+        """Area in plan next to which no post stands on the verge."""
+        return self.area.union(self.decks)
+
+
+@dataclass(frozen=True, eq=False)
+class _Surroundings:
+    """Ground, roadside and region that the parts of a site are placed by, in local axes.
+
+    Parameters
+    ----------
+    terrain : Terrain
+        Height of the studied roads, and of the ground next to them.
+    ground : Terrain
+        Height of the ground, below bridges too.
+    """
+
+    origin: Float
+    lanes: tuple[LaneSurface, ...]
+    region: BaseGeometry
+    extent: BaseGeometry
+    roadside: Roadside
+    terrain: Terrain
+    ground: Terrain
+    relief: Relief | None
+    land: Relief | FlatLand | None
+    crossing: "_OtherLevels"
+
+    @cached_property
+    def lane_interiors(self) -> BaseGeometry:
+        """Driving lanes without a strip along their edges, in which a post is taken to stand beside the road."""
+        driving = road_surface.lane_outline(road_surface.in_groups(self.lanes, ["driving"]))
+        return driving.buffer(-MAX_IN_LANE)
+
+
+def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Progress, None, SiteModel]:
+    """Model a place of a map.
+
+    Parameters
+    ----------
+    description : SiteDescription
+        Which place, and what stands there besides what the map has.
+
+    Yields
+    ------
+    Progress
+        Roads of the map laid out, then stages of the model, of all.
+
+    Raises
+    ------
+    SeipError
+        No such junction, no road at the place, or an empty region of interest.
+    """
+    surfaces = yield from _all_lanes(road_map)
+    if not surfaces:
+        raise SeipError(f"map {road_map.name!r} has no lane with an area; give its lanes widths, or take another map")
+    description, place_notes = in_metres(description, road_map, surfaces)
+    if description.from_centre_lines:
+        jointless = without_plain_joints(surfaces)
+        joints = {
+            lane.road_id: lane.junction_id
+            for lane, kept in zip(surfaces, jointless, strict=True)
+            if lane.junction_id is not None and kept.junction_id is None
+        }
+        surfaces = without_folds(with_tapers(jointless, joints))
+    stages = (Progress(done, STAGES, "streets", counted=False) for done in range(STAGES + 1))
+    yield next(stages)
+    place = Place(road_map, surfaces, description)
+    levels = place.levels()
+    place = replace(place, surfaces=levels.studied)
+    region = place.region()
+    origin = _origin(place, description.relief)
+    yield next(stages)
+    street = _surroundings(levels, place.surfaces, origin, shifted(region, -origin), description)
+    yield next(stages)
+    on_map = (shifted(area, origin) for area in (street.roadside.carriageway, street.roadside.mouths))
+    description, clear_notes = clear(description, *on_map)
+    around = shifted(street.extent, origin)
+    placed = tuple(_risen(one, description.relief) for one in placed_objects(road_map, area=around))
+    placed = local_objects(placed, origin)
+    away = levels.other_roads()
+    local_signals = [
+        replace(one, position=_risen_place(one.position, description.relief) - origin)
+        for one in placed_signals(road_map, area=around)
+        if one.road_id not in away
+    ]
+    placed, covered_notes = _without_covered(placed, description, origin)
+    others, lights = split_posts(placed, local_signals, street.roadside)
+    signals = [_checked_pole(part, street) for part in signal_parts(lights, street.roadside, street.terrain)]
+    objects = [_checked_pole(part, street) for part in object_parts(others, street.roadside.carriageway)]
+    other_levels = _other_level_parts(street)
+    furniture = [*objects, *signals, *_described_parts(description, street)]
+    yield next(stages)
+    layers = SurfaceLayers(street.lanes, street.extent, fill=description.from_centre_lines)
+    carriageway = _surface_parts(street, layers, fill=description.from_centre_lines)
+    yield next(stages)
+    pavement, notes = _pavement_parts(street, layers, off_lanes=description.from_centre_lines)
+    beside, side_notes = _side_way_parts(description, street, layers)
+    yield next(stages)
+    weighted = place.weighted_areas()
+    parts = [
+        *carriageway,
+        *pavement,
+        *beside,
+        _verge_part(
+            street, furniture, [*carriageway, *pavement, *beside], from_centre_lines=description.from_centre_lines
+        ),
+        *other_levels,
+        _marking_part(street, stop_lines=bool(signals or description.signal_poles)),
+        *furniture,
+        _area_part("Region of interest", street.region, Role.REGION, street),
+        *_weighted_parts(weighted, street, described=bool(description.weighted_regions)),
+        *_area_parts(description, street),
+        *_keep_off_parts(description, placed, street),
+    ]
+    occluders = [part for part in (*furniture, *other_levels) if Role.OCCLUDERS in part.roles]
+    names = street_names(road_map)
+    seen = _sight_area(region, origin, parts)
+    bare = () if any(_hides(part, seen) for part in occluders) else (NO_OBSTACLES_MESSAGE,)
+    warnings = road_warnings(road_map, (*street.lanes, *street.crossing.lanes), names, origin)
+    yield next(stages)
+    return SiteModel(
+        name=description.name or road_map.name,
+        origin=origin,
+        geo_reference=road_map.geo_reference,
+        header_offset=road_map.header_offset,
+        parts=tuple(_with_source(part, description) for part in parts if part.solid.faces),
+        region=street.region,
+        notes=(
+            *place_notes,
+            *covered_notes,
+            *_level_notes(levels),
+            *clear_notes,
+            *notes,
+            *side_notes,
+            *_furniture_notes(placed, signals),
+        ),
+        warnings=(*bare, *warnings),
+        places=named_places(
+            street.lanes,
+            names,
+            placed,
+            street.region,
+            unnamed=UNNAMED_STREET if description.from_centre_lines else "",
+            rings=_ring_roads(road_map, description.roundabouts),
+        ),
+        attribution=tuple(dict.fromkeys((*road_map.attribution, *description.attribution))),
+    )
+
+
+def _ring_roads(road_map: RoadMap, roundabouts: Sequence[frozenset[str]]) -> frozenset[str]:
+    """Return the ids of the roads that lead from one junction of a roundabout to another one of it."""
+
+    def is_ring(road: Road) -> bool:
+        ends = {link.id for link in (road.predecessor, road.successor) if link is not None and link.kind == "junction"}
+        return len(ends) == 2 and any(ends <= one for one in roundabouts)
+
+    return frozenset(road.id for road in road_map.roads if road.junction_id is None and is_ring(road))
+
+
+def _sight_area(region: BaseGeometry, origin: Float, parts: Sequence[Part]) -> BaseGeometry:
+    """Return the area in plan, local axes, that lies between places for sensors and the region of interest."""
+    posts = [part.foot[:2] for part in parts if Role.POLES in part.roles]
+    return shapely.union_all([shifted(region, -origin).buffer(CANDIDATE_MARGIN), shapely.MultiPoint(posts)]).convex_hull
+
+
+def _hides(part: Part, area: BaseGeometry) -> bool:
+    """Return whether a part is large enough to hide something in an area, and reaches into it."""
+    plan = shapely.MultiPoint(part.solid.vertices[:, :2] + part.foot[:2]).convex_hull
+    return can_hide(part.solid.vertices) and bool(area.intersects(plan))
+
+
+def _without_covered(
+    placed: tuple[PlacedObject, ...], description: SiteDescription, origin: Float
+) -> tuple[tuple[PlacedObject, ...], tuple[str, ...]]:
+    """Return the objects of a map without the buildings that a city model or a survey has, and a note on them."""
+    modelled = [shifted(one.outline, -origin) for one in description.solids if one.is_building]
+    if not modelled:
+        return placed, ()
+    tree = shapely.STRtree(modelled)
+    kept = tuple(one for one in placed if kind_of(one) is not Kind.BUILDING or not _is_covered(one, tree))
+    count = len(placed) - len(kept)
+    note = f"{counted(count, 'building')} of the map gave way to the city model's or the survey's"
+    return kept, (note,) if count else ()
+
+
+def _is_covered(placed: PlacedObject, modelled: shapely.STRtree) -> bool:
+    rings = [outline.base for outline in placed.outlines if len(outline.base) >= 3]
+    rings = rings or [footprint(placed) + placed.position]
+    area = shapely.union_all([shapely.make_valid(shapely.Polygon(ring[:, :2])) for ring in rings])
+    return covered_share(area, modelled) > MAX_COVERED
+
+
+def _with_source(part: Part, description: SiteDescription) -> Part:
+    """Return a part of which somebody says that it is there; what only means an area needs nobody."""
+    if part.source or AREA_OVERLAYS.keys() >= set(part.roles):
+        return part
+    assumed = any(part.name in PART_NAMES.get(group, ()) for group in description.widths_assumed)
+    return replace(part, source=description.map_source, width_assumed=assumed)
+
+
+def _furniture_notes(placed: Sequence[PlacedObject], signals: Sequence[Part]) -> Iterator[str]:
+    """Return notes on posts and tree crowns that are assumed, since the map does not give them."""
+    assumed = sum(part.source == ASSUMED for part in signals)
+    if assumed:
+        posts = counted(assumed, "post of traffic lights is", "posts of traffic lights are")
+        yield f"{posts} assumed, since the map has none there: no sensor hangs there unless assumed poles are asked for"
+    trunks = sum(map(is_trunk, placed))
+    if trunks:
+        trees = counted(trunks, "tree")
+        yield f"the map gives {trees} the width of a trunk: the crown is taken as {CROWN_SHARE:g} times the height"
+
+
+def _all_lanes(road_map: RoadMap) -> Generator[Progress, None, tuple[LaneSurface, ...]]:
+    """Return the lanes of all roads."""
+    surfaces: list[LaneSurface] = []
+    for number, road in enumerate(road_map.roads):
+        if number % ROADS_PER_STEP == 0:
+            yield Progress(number, len(road_map.roads), "roads")
+        surfaces += lane_surfaces(road)
+    return tuple(surfaces)
+
+
+def _level_notes(levels: Levels) -> Iterator[str]:
+    roads = levels.other_roads()
+    told = set()  # the carriageways of one street cross another one each, which is one crossing to a person
+    for crossing in levels.crossings:
+        streets = (crossing.called(crossing.above), crossing.called(crossing.below), crossing.above in roads)
+        if streets not in told:
+            told.add(streets)
+            away = "upper" if crossing.above in roads else "lower"
+            yield f"{crossing}: the {away} one is on another level, in the way but not studied"
+
+
+def _other_level_parts(street: _Surroundings) -> list[Part]:
+    """Return the roads of other levels, above and below."""
+    above, below = street.crossing.above, street.crossing.below
+    return [
+        Part("Roads above", _solid(above, "asphalt"), (Role.OCCLUDERS,)),
+        Part(OTHER_LEVELS, _solid(below, "asphalt"), (Role.GROUND,)),
+        Part("Retaining walls", _solid(_retaining_walls(street), "wall"), (Role.GROUND,)),
+    ]
+
+
+def _retaining_walls(street: _Surroundings) -> Float:
+    """Return (n, 3, 3) upright triangles that close the gap between roads on other levels and higher ground."""
+    sides = shapely.boundary(street.crossing.area)
+    quads = [np.empty((0, 4, 3))]
+    on_ground = street.crossing.on_ground
+    roads = Terrain(on_ground) if len(on_ground) else street.ground
+    for line in shapely.get_parts(shapely.segmentize(sides, KERB_STEP)):
+        plan = shapely.get_coordinates(line)
+        low, high = roads.height(plan), street.ground.height(plan)
+        corners = np.stack([np.column_stack([plan, low]), np.column_stack([plan, np.maximum(high, low)])], axis=1)
+        walled = (high - low)[:-1] + (high - low)[1:] > MIN_WALL
+        quads.append(np.stack([corners[:-1, 0], corners[1:, 0], corners[1:, 1], corners[:-1, 1]], axis=1)[walled])
+    faces = np.concatenate(quads)
+    return np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
+
+
+def _checked_pole(part: Part, street: _Surroundings) -> Part:
+    """Return a part of the map; a pole on another level, or in a lane, carries no sensor."""
+    if Role.POLES not in part.roles:
+        return part
+    x, y, z = part.foot
+    away = abs(z - float(street.terrain.height(np.array([[x, y]]))[0])) > MIN_LEVEL_HEIGHT
+    in_lane = shapely.intersects_xy(street.lane_interiors, x, y)
+    return replace(part, roles=(Role.OCCLUDERS,), source="") if away or in_lane else part
+
+
+def _origin(place: Place, relief: Relief | None) -> Float:
+    """Return the local origin: the middle and the road's height nearest to it, in whole metres."""
+    points = np.concatenate([np.concatenate([lane.left, lane.right]) for lane in place.surfaces])
+    nearest = points[np.argmin(np.hypot(*(points[:, :2] - place.centre).T))]
+    return np.round([*place.centre, _risen_place(nearest, relief)[2]])
+
+
+def _risen_place(points: Float, relief: Relief | None) -> Float:
+    """Return places (3,) or (n, 3) of a map on the ground that it is laid on."""
+    if relief is None:
+        return points
+    risen = np.atleast_2d(points) + 0.0
+    risen[:, 2] += relief.rise(risen[:, :2])
+    return risen.reshape(points.shape)
+
+
+def _risen(placed: PlacedObject, relief: Relief | None) -> PlacedObject:
+    """Return an object on the ground that the map is laid on, raised as a whole."""
+    if relief is None:
+        return placed
+    position = _risen_place(placed.position, relief)
+    rise = position - placed.position
+    outlines = tuple(replace(one, base=one.base + rise) for one in placed.outlines)
+    return replace(placed, position=position, outlines=outlines)
+
+
+def _strips(
+    surfaces: Sequence[LaneSurface], origin: Float, area: BaseGeometry, relief: Relief | None, *, kerbs: bool = True
+) -> tuple[LaneSurface, ...]:
+    """Return the lanes near an area in local axes, on the ground that the map is laid on."""
+    if relief is None:
+        return road_surface.local_strips(surfaces, origin, area, kerbs=kerbs)
+    surfaces = [_bridged(lane, relief) if lane.road_id in relief.bridges else lane for lane in surfaces]
+    lanes = road_surface.local_strips(surfaces, origin * [1, 1, 0], area, kerbs=kerbs)
+    shift, height = origin * [1, 1, 0], origin * [0, 0, 1]
+
+    def risen(edge: Float) -> Float:
+        moved: Float = _risen_place(edge + shift, relief) - shift - height
+        return moved
+
+    def lowered(edge: Float) -> Float:
+        moved: Float = edge - height
+        return moved
+
+    raised = ((lane, lowered if lane.road_id in relief.bridges else risen) for lane in lanes)
+    return tuple(replace(lane, left=move(lane.left), right=move(lane.right)) for lane, move in raised)
+
+
+def _bridged(lane: LaneSurface, relief: Relief) -> LaneSurface:
+    """Return a lane of a bridge, map coordinates, on the ground at its ends and straight in between."""
+
+    def risen(edge: Float) -> Float:
+        ends = relief.rise(edge[[0, -1], :2])
+        along = np.interp(lane.s, lane.s[[0, -1]], ends)
+        moved: Float = edge + along[:, None] * [0, 0, 1]
+        return moved
+
+    return replace(lane, left=risen(lane.left), right=risen(lane.right))
+
+
+def _surroundings(
+    levels: Levels,
+    surfaces: Sequence[LaneSurface],
+    origin: Float,
+    region: BaseGeometry,
+    description: SiteDescription,
+) -> _Surroundings:
+    extent, relief = region.convex_hull.buffer(SCENE_MARGIN, quad_segs=16), description.relief
+    lanes = _strips(surfaces, origin, extent, relief)
+    if description.from_centre_lines:
+        lanes = road_surface.without_loose_ends(lanes, region, extent)
+    others = _strips(levels.others, origin, extent, relief, kerbs=False)
+    roadside = road_surface.roadside(lanes)
+    shapely.prepare(roadside.carriageway)
+    land = description.relief or description.flat_land
+    terrain, ground, crossing = _ground(levels, lanes, others, origin, land)
+    beyond = shapely.box(*extent.buffer(10 * road_surface.MAX_STEP).bounds).difference(extent)
+    above, below, on_ground = (cut(part, beyond) for part in (crossing.above, crossing.below, crossing.on_ground))
+    crossing = replace(crossing, above=above, below=below, on_ground=on_ground)
+    return _Surroundings(origin, lanes, region, extent, roadside, terrain, ground, relief, land, crossing)
+
+
+def _ground(
+    levels: Levels,
+    lanes: tuple[LaneSurface, ...],
+    others: tuple[LaneSurface, ...],
+    origin: Float,
+    land: Relief | FlatLand | None,
+) -> tuple[Terrain, Terrain, _OtherLevels]:
+    """Return the terrain of the studied roads, the ground beside and below them, and the roads of other levels.
+
+    Where the height of the land is not known it is that of the nearest studied road: one that lies lower is in a
+    cutting between walls. Otherwise roads lie on embankments and in cuttings with slopes.
+    """
+    studied, away = _triangles(lanes), _triangles(others)
+    if land is None:
+        terrain = Terrain(studied)
+        above = _rise(away, terrain) > 0.0
+        return terrain, terrain, _OtherLevels(others, away[above], away[~above], away[~above], shapely.Polygon())
+
+    def height(xy: Float) -> Float:
+        local: Float = land.at(xy + origin[:2]) - origin[2]
+        return local
+
+    bridges = frozenset(
+        lane.road_id
+        for lane in (*lanes, *others)
+        if lane.road_id in land.bridges and (lane.left[:, 2] - height(lane.left[:, :2])).max() > MIN_BRIDGE_HEIGHT
+    )
+    spans = tuple(_spans(levels, (*lanes, *others), origin))
+    on_ground, in_air = _lifted(lanes, bridges, spans)
+    others_on_ground, others_in_air = _lifted(others, bridges, spans)
+    embankments = Embankments(np.concatenate([on_ground, others_on_ground]), height)
+    ground = Terrain(np.concatenate([on_ground, others_on_ground]), embankments.height, embankments.steep)
+    decks = without(outline(in_air, road_surface.SNAP_GRID), outline(on_ground, road_surface.SNAP_GRID))
+    high = _rise(others_on_ground, Terrain(studied)) > MIN_RAMP_HEIGHT
+    in_way = np.concatenate([others_in_air, others_on_ground[high]])
+    return (
+        Terrain(studied, embankments.height, embankments.steep),
+        ground,
+        _OtherLevels(others, in_way, others_on_ground[~high], others_on_ground, decks),
+    )
+
+
+def _rise(triangles: Float, terrain: Terrain) -> Float:
+    """Return how far triangles (n, 3, 3) lie above a terrain, (n,) metres at their middles."""
+    middles: Float = triangles.mean(axis=1)
+    rise: Float = middles[:, 2] - terrain.height(middles[:, :2])
+    return rise
+
+
+def _triangles(lanes: Sequence[LaneSurface]) -> Float:
+    return np.concatenate([np.empty((0, 3, 3)), *(lane.triangles for lane in lanes)])
+
+
+def _spans(levels: Levels, lanes: Sequence[LaneSurface], origin: Float) -> Iterator[tuple[BaseGeometry, float]]:
+    """Yield where roads cross others, with room for slopes below, and the height above which they are in the air."""
+    roads = road_surface.by_road(lanes)
+    for crossing in levels.crossings:
+        above, below = (_triangles(roads.get(road, [])) for road in (crossing.above, crossing.below))
+        place = shapely.Point(np.array(crossing.place) - origin[:2])
+        common = outline(above, road_surface.SNAP_GRID).intersection(outline(below, road_surface.SNAP_GRID))
+        part = min(shapely.get_parts(common), key=place.distance, default=None)
+        if part is not None:
+            low = float(Terrain(below).height(shapely.get_coordinates(part)).max())
+            yield part.buffer(float(embankment_width(np.array(crossing.height)))), low + MIN_LEVEL_HEIGHT
+
+
+def _lifted(
+    lanes: Sequence[LaneSurface], bridges: Collection[str], spans: Iterable[tuple[BaseGeometry, float]]
+) -> tuple[Float, Float]:
+    """Return the surfaces of lanes (n, 3, 3) that lie on the ground, and those in the air, on bridges."""
+    on_ground = _triangles([lane for lane in lanes if lane.road_id not in bridges])
+    in_air = [_triangles([lane for lane in lanes if lane.road_id in bridges])]
+    for area, low in spans:
+        high = on_ground[:, :, 2].min(axis=1) > low
+        outside = shapely.box(*area.buffer(SCENE_MARGIN).bounds).difference(area)
+        near = high & shapely.intersects(area, shapely.polygons(on_ground[:, :, :2]))
+        in_air.append(cut(on_ground[near], outside))
+        on_ground = np.concatenate([on_ground[~near], cut(on_ground[near], area)])
+    return on_ground, np.concatenate(in_air)
+
+
+def _surface_parts(street: _Surroundings, layers: SurfaceLayers, *, fill: bool) -> list[Part]:
+    """Return the surfaces of lanes by group; the driving lanes have no small holes."""
+    groups = {road_surface.group(lane) for lane in street.lanes}
+    laid = {group: layers.lay_group(group) for group in SURFACES if group in groups}
+    if "driving" in laid:
+        whole = road_surface.without_gaps(street.roadside, street.lanes, fill=fill).intersection(street.extent)
+        gaps = without_crumbs(without(whole, layers.area), least=MIN_HOLE)
+        level = Terrain(np.concatenate(list(laid.values())))  # not that of pavements, which are a kerb higher
+        filling = layers.lay(level.drape(gaps, spacing=OVERLAY_SPACING), gaps)
+        laid["driving"] = np.concatenate([laid["driving"], filling])
+    return [
+        Part(
+            name,
+            _solid(laid[group], material),
+            (role,),
+            keep_off="cycle-tracks" if group == "biking" else None,
+        )
+        for group, (name, material, role) in SURFACES.items()
+        if group in laid
+    ]
+
+
+def _pavement_parts(
+    street: _Surroundings, layers: SurfaceLayers, *, off_lanes: bool
+) -> tuple[list[Part], tuple[str, ...]]:
+    """Return pavements near the region (where posts may stand), those beyond, their kerbs, verges, and notes.
+
+    With ``off_lanes`` they give way to the carriageway where both lie on each other.
+    """
+    own = layers.lay_group("sidewalk")
+    if off_lanes:
+        own = cut(own, street.roadside.carriageway)
+    if len(own) == 0:
+        verge = _verge_strip(street, street.roadside.sides())
+        return [verge], ("the map has no pavements: new posts may stand on a strip of verge",)
+    corners = road_surface.corner_pavements(own, street.lanes, street.roadside.carriageway)
+    corners = layers.lay(corners, outline(corners, road_surface.SNAP_GRID))
+    triangles = np.concatenate([own, corners])
+    if off_lanes:
+        notches = road_surface.notch_pavements(triangles, street.roadside.carriageway)
+        notches = layers.lay(notches, outline(notches, road_surface.SNAP_GRID))
+        triangles = np.concatenate([triangles, notches])
+        triangles = cut(triangles, road_surface.slivers(triangles))
+    plan = shapely.polygons(triangles[:, :, :2])
+    near = shapely.distance(street.region, plan) <= CANDIDATE_MARGIN
+    kerbs = road_surface.kerb_faces(triangles, None if street.land is None else KERB_STEP)
+    parts = [
+        Part("Pavements", _solid(triangles[near], "pavement"), (Role.GROUND, Role.CANDIDATE_AREAS)),
+        Part("Pavements beyond", _solid(triangles[~near], "pavement"), (Role.GROUND,)),
+        Part("Kerbs", _solid(kerbs, "kerb"), (Role.GROUND,)),
+    ]
+    notes = []
+    if len(corners):
+        added, had = (float(np.abs(signed_area(faces)).sum()) for faces in (corners, own))
+        notes.append(
+            f"the pavements are closed round the corners of junctions, where the map leaves gaps: {added:,.0f} m² are "
+            f"added to its {had:,.0f} m²"
+        )
+    bare = road_surface.bare_sides(street.roadside, shapely.union_all(plan, grid_size=road_surface.SNAP_GRID))
+    verge = _verge_strip(street, bare)
+    if verge.solid.faces:
+        parts.append(verge)
+        length = bare.intersection(street.region.buffer(CANDIDATE_MARGIN)).length
+        if length >= 1.0:
+            notes.append(f"{length:,.0f} m of roadside have no pavement: new posts may stand on a strip of verge there")
+    return parts, tuple(notes)
+
+
+def _verge_strip(street: _Surroundings, sides: BaseGeometry) -> Part:
+    """Return the verge along sides of the carriageway.
+
+    There is none where the map ends and the road goes on, nor beside a bridge.
+    """
+    inner, outer = VERGE_STRIP
+    strip = without(sides.buffer(outer, cap_style="flat"), street.roadside.filled.buffer(inner))
+    strip = without(strip, street.crossing.off_posts.buffer(outer))
+    near = strip.intersection(street.region.buffer(CANDIDATE_MARGIN))
+    return _area_part("Verge strip", near, Role.CANDIDATE_AREAS, street)
+
+
+def _verge_part(
+    street: _Surroundings,
+    furniture: Sequence[Part],
+    surfaces: Sequence[Part],
+    *,
+    from_centre_lines: bool,
+) -> Part:
+    """Return the ground beside all lanes and under all furniture, a little below the lanes and under their seams.
+
+    Parameters
+    ----------
+    surfaces : sequence of Part
+        What else is laid on the ground.
+    """
+    corners = [part.solid.vertices[:, :2] + part.foot[:2] for part in furniture]
+    built_up = shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *corners])))
+    gardens = built_up.buffer(GROUND_MARGIN).intersection(street.extent.buffer(MAX_GROUND_DISTANCE))
+    ground = street.extent if built_up.is_empty else street.extent.union(gardens).convex_hull
+    covered = road_surface.lane_outline(street.lanes).intersection(street.extent)
+    roads = united([covered, street.crossing.area])
+    lanes = roads.buffer(-road_surface.MAX_SEAM, join_style="mitre")
+    laid = united([_plan(part) for part in surfaces if {Role.ROADS, Role.GROUND} & set(part.roles)])
+    if from_centre_lines:  # strips of pavement that were too narrow are ground
+        bare = without(covered, laid.buffer(road_surface.MAX_SEAM)).buffer(2 * road_surface.MAX_SEAM)
+        lanes = without(lanes, bare)
+    others = without(laid, covered).buffer(-road_surface.MAX_SEAM)
+    lanes = lanes if others.is_empty else lanes.union(others)
+    lanes = without(lanes, street.crossing.decks.buffer(road_surface.MAX_SEAM, join_style="mitre"))
+    beside = road_surface.without_crumbs(without(ground, lanes))
+    spacing = VERGE_SPACING if street.relief is None else RELIEF_SPACING
+    triangles = street.ground.drape(beside, spacing=spacing, above=-VERGE_BELOW)
+    return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
+
+
+def _plan(part: Part) -> BaseGeometry:
+    """Return the area in plan of a part of triangles that stands at the origin."""
+    return outline(
+        part.solid.vertices[np.array(part.solid.faces, dtype=np.int64).reshape(-1, 3)], road_surface.SNAP_GRID
+    )
+
+
+def _marking_part(street: _Surroundings, *, stop_lines: bool) -> Part:
+    quads = road_surface.markings(street.lanes, street.extent)
+    if stop_lines:
+        lines = road_surface.stop_lines(street.lanes)
+        lines = lines[shapely.contains_xy(street.extent, lines[:, :, :2].mean(axis=1))]
+        quads = np.concatenate([quads, lines])
+    return Part("Lane markings", _solid(quads, "marking"), (Role.DRESSING,))
+
+
+def _weighted_parts(
+    areas: Sequence[tuple[str, BaseGeometry, float]], street: _Surroundings, *, described: bool
+) -> Iterator[Part]:
+    for name, area, weight in areas:
+        local = shifted(area, -street.origin)
+        if local.intersects(street.region):
+            yield _area_part(name, local, Role.WEIGHTED_REGIONS, street, weight=weight)
+        elif described:
+            raise SeipError(
+                f"the weighted region {name!r} lies outside the region of interest; move it or widen the region"
+            )
+
+
+def _area_parts(description: SiteDescription, street: _Surroundings) -> list[Part]:
+    kinds = ((description.forbidden_areas, Role.FORBIDDEN_AREAS), (description.mandatory_areas, Role.MANDATORY_AREAS))
+    return [
+        _area_part(area.name, shifted(area.polygon, -street.origin), role, street)
+        for areas, role in kinds
+        for area in areas
+    ]
+
+
+def _keep_off_parts(
+    description: SiteDescription, placed: Sequence[PlacedObject], street: _Surroundings
+) -> Iterator[Part]:
+    """Yield the areas that rules keep new posts off, as far as new posts might stand there.
+
+    A map that was not made of middle lines has its crossings where they are; netconvert's are guessed.
+    """
+    areas = [(one.rule, shifted(one.polygon, -street.origin)) for one in description.keep_off_areas]
+    if not description.from_centre_lines:
+        areas += [("landings", landing) for landing in landings(placed)]
+    near = without(street.region.buffer(CANDIDATE_MARGIN), street.roadside.carriageway)
+    for number, (rule, about) in enumerate(RULES.items()):
+        area = without_crumbs(united(area for name, area in areas if name == rule).intersection(near))
+        part = _area_part(f"No new posts: {about.title.lower()}", area, Role.FORBIDDEN_AREAS, street, step=number)
+        yield replace(part, keep_off=rule)
+
+
+def _described_parts(description: SiteDescription, street: _Surroundings) -> list[Part]:
+    """Return what the site description adds, standing on the ground."""
+    parts: list[Part] = []
+    for number, building in enumerate(description.buildings, start=1):
+        parts += _building_parts(building, number, street)
+    names = Counter[str]()
+    parts += _solid_parts(description, street, len(description.buildings))
+    for wall in description.walls:
+        names[wall.name] += 1
+        foot = _on_ground(wall.line, street) + np.array([0.0, 0.0, wall.base])
+        panels = fence(foot, np.full(len(foot), wall.height), wall.thickness, side=wall.material)
+        parts.append(_told(Part(f"{wall.name} {names[wall.name]}", panels, (Role.OCCLUDERS,)), wall))
+    for slab in description.slabs:
+        names[slab.name] += 1
+        outline = shifted(slab.outline, -street.origin)
+        ground = float(street.terrain.height(shapely.get_coordinates(outline)).min())
+        plate = house(outline, ground + slab.base, ground + slab.top, side=slab.material)
+        parts.append(_told(Part(f"{slab.name} {names[slab.name]}", plate, (Role.OCCLUDERS,)), slab))
+    trees = [(foot, row) for row in description.trees for foot in _on_ground(row.positions, street)]
+    parts += [
+        _told(tree_part(f"Tree {number}", foot, row.height, row.crown_diameter, number), row)
+        for number, (foot, row) in enumerate(trees, start=1)
+    ]
+    parts += _pole_parts(description, street)
+    return parts
+
+
+def _building_parts(building: Building, number: int, street: _Surroundings) -> list[Part]:
+    outline = shifted(building.outline, -street.origin)
+    plan = shapely.get_coordinates(building.outline.exterior)[:-1] - street.origin[:2]
+    ground = float(street.terrain.height(plan).min()) + building.base
+    walls = building.height - building.roof.height
+    base = np.column_stack([plan, np.full(len(plan), ground)])
+    shape = None
+    if building.roof.height > 0.0 or building.outline.interiors:
+        shape = house(outline, ground, ground + walls, side=facade(number), roof=building.roof)
+    made = building_parts(f"Building {number}", base, np.full(len(plan), walls), number, shape)
+    return [_told(part, building) for part in made]
+
+
+def _solid_parts(description: SiteDescription, street: _Surroundings, buildings: int) -> Iterator[Part]:
+    """Yield what files of their own give, numbered on from the buildings that the site has."""
+    numbers = Counter({"Building": buildings})
+    for one in description.solids:
+        numbers[one.name] += 1
+        moved = one.solid.vertices - street.origin
+        if one.on_ground:
+            ground = float(street.terrain.height(shapely.get_coordinates(shifted(one.outline, -street.origin))).min())
+            moved[:, 2] = one.solid.vertices[:, 2] + ground
+        solid = replace(one.solid, vertices=moved)
+        yield Part(f"{one.name} {numbers[one.name]}", solid, (Role.OCCLUDERS,), source=one.source)
+
+
+def _told(part: Part, item: Building | Wall | Slab | Trees | Poles) -> Part:
+    """Return a part with its source, and a post with what it may carry."""
+    told = replace(part, source=item.source, height_assumed=item.height_assumed)
+    if isinstance(item, Poles):
+        return replace(told, keep_off=item.keep_off, roles=told.roles if item.carries else (Role.OCCLUDERS,))
+    return told
+
+
+def _side_way_parts(
+    description: SiteDescription, street: _Surroundings, layers: SurfaceLayers
+) -> tuple[list[Part], tuple[str, ...]]:
+    """Return ways beside the road, by kind, where no lane, building or other road lies, and notes."""
+    lanes = road_surface.lane_outline(street.lanes)
+    standing: list[Building | PlacedSolid] = [*description.buildings, *description.solids]
+    houses = shapely.union_all([shifted(one.outline, -street.origin) for one in standing])
+    covered = [lanes, street.roadside.filled, layers.area, houses, street.crossing.area]
+    taken = shapely.union_all(covered).buffer(road_surface.MAX_SEAM)
+    pavement = road_surface.lane_outline(road_surface.in_groups(street.lanes, ["sidewalk"]))
+    shapely.prepare(pavement)
+    parts, doubled = [], 0.0
+    for name, material in sorted({(way.name, way.material) for way in description.ways}):
+        areas = []
+        for way in description.ways:
+            if (way.name, way.material) == (name, material):
+                area = shifted(way.area, -street.origin)
+                if way.line is not None and not pavement.is_empty and area.intersects(street.extent):
+                    area, length = without_doubles(way.line - street.origin[:2], way.width, pavement)
+                    doubled += length
+                areas.append(area)
+        area = without(shapely.union_all(areas).intersection(street.extent), taken)
+        taken = taken.union(area)
+        triangles = street.terrain.drape(
+            road_surface.without_crumbs(area), spacing=VERGE_SPACING, above=-VERGE_BELOW / 2
+        )
+        parts.append(Part(name, _solid(triangles, material), (Role.GROUND,)))
+    note = f"{doubled:,.0f} m of footways beside a pavement of the street are left out: they are the same pavement"
+    return parts, (note,) if doubled else ()
+
+
+def _pole_parts(description: SiteDescription, street: _Surroundings) -> Iterator[Part]:
+    for number, (foot, heading, row) in enumerate(_pole_places(description.street_lights, street), start=1):
+        shape = street_furniture.street_light(row.height, row.arm)
+        yield _told(pole_part(f"Street light {number}", shape, foot, heading, row.source), row)
+    keeps_left = any(lane.keeps_left for lane in street.lanes)
+    for number, (foot, heading, row) in enumerate(_pole_places(description.signal_poles, street), start=1):
+        shape = street_furniture.signal_pole(row.height, row.arm, faces_left=not keeps_left)
+        whose = "the site file" if row.source == DESCRIBED else f"the {row.source}"
+        yield _told(pole_part(f"Signal pole {number} of {whose}", shape, foot, heading, row.source), row)
+    for number, (foot, heading, row) in enumerate(_pole_places(description.posts, street), start=1):
+        shape = street_furniture.post(row.height, POST_RADIUS)
+        pole = _told(pole_part(f"{row.name} {number}", shape, foot, heading, row.source), row)
+        yield pole if row.height >= POLE_HEIGHT else replace(pole, roles=(Role.OCCLUDERS,))
+
+
+def _pole_places(rows: Sequence[Poles], street: _Surroundings) -> Iterator[tuple[Float, float, Poles]]:
+    """Yield foot, heading of the arm and row of each post."""
+    for row in rows:
+        for foot in _on_ground(row.positions, street):
+            yield foot, arm_heading(foot[:2], street.roadside.carriageway) if row.heading is None else row.heading, row
+
+
+def _on_ground(plan: Float, street: _Surroundings) -> Float:
+    local = plan - street.origin[:2]
+    return np.column_stack([local, street.terrain.height(local)])
+
+
+def _area_part(
+    name: str, area: BaseGeometry, role: Role, street: _Surroundings, *, weight: float | None = None, step: int = 0
+) -> Part:
+    """Return an area in plan as an overlay on the ground; areas of one role that overlap have steps of their own."""
+    above, material = AREA_OVERLAYS[role]
+    triangles = street.terrain.drape(area, spacing=OVERLAY_SPACING, above=above + step * OVERLAY_STEP)
+    return Part(name, _solid(triangles, material), (role,), weight=weight)
+
+
+def _solid(faces: Float, material: str) -> Solid:
+    return from_faces(faces, material)

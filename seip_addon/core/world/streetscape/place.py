@@ -1,0 +1,214 @@
+"""The place of a map that is studied: its middle, its region of interest and its level, in map coordinates."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Float
+from ...errors import SeipError
+from ...geometry.plan import closed
+from ...site.scene_geometry import DEFAULT_WEIGHT
+from ..opendrive.junctions import find_junction, junction_area, nearest_junctions
+from ..opendrive.lanes import LaneSurface
+from ..opendrive.road_map import Junction, RoadMap
+from . import road_surface
+from .approaches import approach_lanes
+from .description import DEFAULT_RADIUS, SiteDescription
+from .geographic_position import looks_like_degrees
+from .intersections import JUNCTION_REACH, box_along, filled, intersection, ring_roads, with_other_carriageways
+from .levels import Levels, split_levels
+from .named_places import street_names
+
+MIN_SHARE_OF_JUNCTION = 0.5  # of a junction's area that a region holds from which on it holds all of it
+SCENE_MARGIN = 40.0  # metres that the scene extends beyond the region of interest, for occluders at its edge
+MAX_ROAD_DISTANCE = 10.0  # roads this near to the middle of the place (metres) may each be the one that is meant
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A place of a map as a site description names it.
+
+    Parameters
+    ----------
+    surfaces : tuple of LaneSurface
+        The lanes of the map that count, map coordinates.
+    """
+
+    road_map: RoadMap
+    surfaces: Sequence[LaneSurface]
+    description: SiteDescription
+
+    @cached_property
+    def centre(self) -> Float:
+        """Middle of the place, (2,) metres."""
+        description = self.description
+        if description.near is not None:
+            return np.array(description.near, dtype=np.float64)
+        if description.junction is not None:
+            middle = self._driving_area(self._junction).centroid
+        elif description.region is not None:
+            middle = description.region.centroid
+        else:
+            raise SeipError(
+                "no place is named: give --near X Y or --junction ID, or near, junction or region in the site file"
+            )
+        return np.array([middle.x, middle.y])
+
+    @cached_property
+    def within(self) -> BaseGeometry:
+        """Area in which the region of interest lies."""
+        if self.description.region is not None:
+            return self.description.region
+        if self.description.along is None:
+            return shapely.Point(self.centre).buffer(self.description.radius or DEFAULT_RADIUS, quad_segs=32)
+        lanes = self._approach_lanes()
+        if self.description.from_centre_lines:
+            driving = road_surface.in_groups(self.surfaces, ["driving"])
+            return with_other_carriageways(lanes, driving, self._names).convex_hull
+        return shapely.union_all([shapely.make_valid(lane.polygon) for lane in lanes]).convex_hull
+
+    def levels(self) -> Levels:
+        """Return the lanes on the level of the place, and those that cross above or below."""
+        around = self.within.convex_hull.buffer(SCENE_MARGIN, quad_segs=16)
+        if self.description.near is None and self.description.junction is not None:
+            anchors = {lane.road_id for lane in self.surfaces if lane.junction_id in self._junctions}
+        else:
+            driving = road_surface.in_groups(self.surfaces, ["driving"])
+            away = shapely.distance([lane.polygon for lane in driving], shapely.Point(self.centre))
+            least = max(away.min(initial=np.inf), MAX_ROAD_DISTANCE)
+            anchors = {lane.road_id for lane, distance in zip(driving, away, strict=True) if distance <= least}
+        return split_levels(self.surfaces, around, anchors, self.description.level, street_names(self.road_map))
+
+    def region(self) -> BaseGeometry:
+        """Return the region of interest."""
+        shift = np.array([*self.centre, 0.0])  # outlines need small coordinates for their grids
+        within = shifted(self.within, -shift)
+        lanes = self._lanes_of_region()
+        driving = road_surface.in_groups(lanes, ["driving"])
+        near = road_surface.local_strips(driving, shift, within) if driving else ()
+        if near:
+            outline = road_surface.without_small_holes(road_surface.lane_outline(near))
+            if self.description.from_centre_lines:
+                outline = self._whole_streets(near, shift)
+            region = road_surface.without_crumbs(outline.intersection(within))
+            if not region.is_empty:
+                return shifted(region, shift)
+        raise self._no_driving_lane()
+
+    def _whole_streets(self, lanes: Sequence[LaneSurface], shift: Float) -> BaseGeometry:
+        """Return the area of lanes, local axes, and their streets' other carriageways no holes in junctions."""
+        around = self.within.convex_hull.buffer(SCENE_MARGIN)
+        driving = road_surface.in_groups(self.surfaces, ["driving"])
+        nearby = road_surface.local_strips(driving, shift, shifted(around, -shift))
+        area = with_other_carriageways(lanes, nearby, self._names)
+        numbers = sorted({lane.junction_id for lane in nearby if lane.junction_id is not None})
+        junctions = [filled([lane for lane in nearby if lane.junction_id == number]) for number in numbers]
+        inside = [one for one in junctions if one.intersection(area).area > MIN_SHARE_OF_JUNCTION * one.area]
+        whole = closed(shapely.union_all([area, *inside]), road_surface.MAX_SEAM)
+        return road_surface.without_crumbs(whole, least=road_surface.MIN_ISLAND_AREA)
+
+    def weighted_areas(self) -> list[tuple[str, BaseGeometry, float]]:
+        """Return name, area and weight of the weighted regions.
+
+        Where none is described it is the box of the junction nearest to the middle.
+        """
+        described, (x, y) = self.description.weighted_regions, self.centre.tolist()
+        if not described:
+            nearest = nearest_junctions(self.road_map, self.surfaces, x, y, 1)
+            return [(self._title(found), self._central_box(found), DEFAULT_WEIGHT) for found, _ in nearest]
+        return [
+            (one.name, one.polygon or self._central_box(self._found(one.junction or "")), one.weight)
+            for one in described
+        ]
+
+    def _title(self, junction: Junction) -> str:
+        """Return what a junction is called: by its streets where the map was made of them, else by its id."""
+        name = self.description.name if self.description.from_centre_lines else ""
+        return name if name.startswith("Junction ") else f"Junction {name or junction.id}"
+
+    def _lanes_of_region(self) -> Sequence[LaneSurface]:
+        """Return the lanes that the region of interest may lie on.
+
+        In a map made of middle lines a circle about a junction holds no street that only passes by.
+        """
+        description = self.description
+        if description.along is not None:
+            return self._approach_lanes()
+        if description.from_centre_lines and description.near is not None:
+            nearest = nearest_junctions(self.road_map, self.surfaces, float(self.centre[0]), float(self.centre[1]), 1)
+            if nearest and nearest[0][1] <= JUNCTION_REACH:
+                junctions = self._one_place(nearest[0][0])
+                return approach_lanes(self.surfaces, junctions, description.radius or DEFAULT_RADIUS, self._names)
+        return self.surfaces
+
+    @cached_property
+    def _junction(self) -> Junction:
+        return self._found(self.description.junction or "")
+
+    @cached_property
+    def _junctions(self) -> frozenset[str]:
+        """Ids of the junctions in the middle of the place: one, or those of an intersection."""
+        return self._one_place(self._junction)
+
+    def _one_place(self, junction: Junction) -> frozenset[str]:
+        if not self.description.from_centre_lines:
+            return frozenset({junction.id})
+        return intersection(self.surfaces, junction.id, self.description.roundabouts)
+
+    def _found(self, id_or_name: str) -> Junction:
+        return find_junction(self.road_map, self.surfaces, id_or_name)
+
+    def _approach_lanes(self) -> tuple[LaneSurface, ...]:
+        names = self._names if self.description.from_centre_lines else None
+        return approach_lanes(self.surfaces, self._junctions, self.description.along or 0.0, names)
+
+    @cached_property
+    def _names(self) -> dict[str, str]:
+        """Names of the streets, by the ids of their roads."""
+        return {road.id: road.name for road in self.road_map.roads}
+
+    def _driving_area(self, junction: Junction) -> BaseGeometry:
+        driving = road_surface.in_groups(self.surfaces, ["driving"])
+        areas = [junction_area(driving, number) for number in sorted(self._one_place(junction))]
+        area = shapely.union_all(areas)
+        return junction_area(self.surfaces, junction.id) if area.is_empty else area
+
+    def _central_box(self, junction: Junction) -> BaseGeometry:
+        """Return the smallest rectangle around a junction's driving lanes; it lies along the roads' axes."""
+        if self.description.from_centre_lines:
+            driving = road_surface.in_groups(self.surfaces, ["driving"])
+            ring = ring_roads(self.road_map.roads, self._one_place(junction), self.description.roundabouts)
+            around = [shapely.make_valid(lane.polygon) for lane in driving if lane.road_id in ring]
+            return box_along(shapely.union_all([self._driving_area(junction), *around]), driving)
+        return shapely.minimum_rotated_rectangle(self._driving_area(junction))
+
+    def _no_driving_lane(self) -> SeipError:
+        description, (x, y) = self.description, self.centre.tolist()
+        where = f"within {description.radius or DEFAULT_RADIUS:g} m of ({x:g}, {y:g})"
+        if description.along is not None:
+            where = f"in junction {description.junction!r}"
+        elif description.region is not None:
+            where = "within the region"
+        given = description.near is not None and not (x.is_integer() and y.is_integer())
+        hint = " (give metres of the map, not latitude and longitude)" if given and looks_like_degrees((x, y)) else ""
+        return SeipError(f"there is no driving lane {where}{hint}{self._nearest()}")
+
+    def _nearest(self) -> str:
+        """Return the junctions next to the place, as the end of a sentence."""
+        names, (x, y) = [], self.centre.tolist()
+        for junction, _ in nearest_junctions(self.road_map, self.surfaces, x, y, 3):
+            middle = junction_area(self.surfaces, junction.id).centroid
+            names.append(f"{junction.id} at ({middle.x:.0f}, {middle.y:.0f})")
+        if names:
+            return f"; the nearest junctions are {', '.join(names)}"
+        x_low, y_low, x_high, y_high = shapely.total_bounds([lane.polygon for lane in self.surfaces])
+        return f"; the map's roads lie between ({x_low:.0f}, {y_low:.0f}) and ({x_high:.0f}, {y_high:.0f})"
+
+
+def shifted(area: BaseGeometry, by: Float) -> BaseGeometry:
+    """Return an area moved in plan by metres, (2,) or (3,)."""
+    return shapely.transform(area, lambda xy: xy + by[:2])

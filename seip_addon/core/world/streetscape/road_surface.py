@@ -1,0 +1,557 @@
+"""Lanes of a map as the surfaces of a street: carriageways, pavements, kerbs and lane markings."""
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+from shapely.geometry.polygon import orient
+
+from ...arrays import Float, Integer
+from ...geometry.plan import closed, outline, signed_area, united, without
+from ..opendrive.lanes import LaneSurface
+from .intersections import filled
+from .terrain import Terrain, cut
+
+GROUPS = {
+    "driving": "driving", "entry": "driving", "exit": "driving", "onRamp": "driving", "offRamp": "driving",
+    "connectingRamp": "driving", "slipLane": "driving", "bidirectional": "driving", "bus": "driving",
+    "taxi": "driving", "HOV": "driving", "mwyEntry": "driving", "mwyExit": "driving",
+    "shoulder": "shoulder", "stop": "shoulder", "restricted": "shoulder", "roadWorks": "shoulder",
+    "special1": "shoulder", "special2": "shoulder", "special3": "shoulder", "shared": "shoulder",
+    "parking": "parking",
+    "biking": "biking",
+    "border": "border", "curb": "border",
+    "sidewalk": "sidewalk", "walking": "sidewalk",
+    "median": "median",
+    "tram": "track", "rail": "track",
+}  # fmt: skip
+"""Group of each OpenDRIVE lane type (ASAM OpenDRIVE 1.8, table of e_laneType); ``none`` has no surface."""
+
+CARRIAGEWAY = ("driving", "shoulder", "parking", "biking", "track")
+NOT_DRIVEN = ("border", "sidewalk", "median")
+MAX_STEP = 10.0
+CORNER_NOTCH = 3.0  # notches up to twice this (metres) at the corners of a junction are pavement
+MAX_CORNER, MAX_ENDS = 40.0, 20.0
+"""A corner is no longer than this along the carriageway, and along the pavements at its two ends (metres)."""
+SMALL_NOTCH, MIN_NOTCH = 1.25, 0.01
+"""Notches in the edge of a pavement up to twice this (metres) are closed, from this area up (square metres)."""
+MIN_PAVEMENT_WIDTH = 0.6  # metres: narrower strips between lanes are rounding of a map made of middle lines
+JUNCTION_SPACING = 4.0
+KERB_HEIGHT = 0.12
+KERB_DEPTH = 0.35
+MARKING_WIDTH = 0.12
+MARKING_ABOVE = 0.012
+DASH_LENGTH, DASH_GAP = 3.0, 6.0
+MIN_PAINT, MAX_PAINTED_TWICE = 1e-9, 0.1  # square metres of paint that count, and share of it that may be painted twice
+STOP_LINE_WIDTH = 0.4
+STOP_LINE_SETBACK = 1.0
+SNAP_GRID = 1e-4  # grid (metres) that plans snap to when they are joined
+MIN_MARKED_WIDTH = 1.0  # lanes that are narrower than this (metres) somewhere are tapers; nothing is painted along them
+MIN_LOOSE_AREA = 400.0  # m²: pieces of streets, with pavements, that reach less into a scene are left out
+MAX_SEAM = 0.05  # gaps up to twice this (metres) between the lanes of two roads are closed in outlines
+MAX_OVERLAP = 0.002  # overlaps up to twice this wide (metres) are rounding of edges that meet
+MAX_FOLD = 0.1  # square metres of a road's lanes that may lie on each other, as rounding
+MIN_ISLAND_AREA = 15.0  # m²: smaller holes of a carriageway that was made of middle lines are no islands
+MAX_HOLE = 4.0  # m²: smaller holes between the lanes of other maps are none either
+MAX_ISLAND_AREA = 400.0  # holes of the carriageway smaller than this (m²) are islands, on which no post is assumed
+MAX_MEDIAN_WIDTH = 12.0  # holes narrower than this (metres) are medians: likewise
+MAX_OPEN_MEDIAN_WIDTH = 6.0  # narrower gaps (metres) between carriageways are medians though no junction closes them
+MAX_PAVEMENT_DISTANCE = 6.0  # a pavement within this (metres) of the carriageway lies beside it, whatever is between
+SIDE_STEP, MIN_SIDE_LENGTH = 2.0, 10.0  # metres: sampling step along sides of roads, and least side without pavement
+
+
+@dataclass(frozen=True, eq=False)
+class Roadside:
+    """The carriageway and where it ends at its sides, in local axes.
+
+    Parameters
+    ----------
+    carriageway : shapely geometry
+    filled : shapely geometry
+        The carriageway with its islands and medians: holes between the lanes of
+        a junction, small ones and narrow ones, and narrow gaps.
+    mouths : shapely geometry
+        Lines across the carriageway where lanes end and the road goes on.
+    """
+
+    carriageway: BaseGeometry
+    filled: BaseGeometry
+    mouths: BaseGeometry
+
+    def sides(self) -> BaseGeometry:
+        """Return the edges of the filled carriageway, as lines, without its mouths."""
+        edges = without(shapely.boundary(self.filled), self.mouths.buffer(2 * MAX_SEAM))
+        return shapely.line_merge(edges) if edges.geom_type == "MultiLineString" else edges
+
+
+def roadside(surfaces: Sequence[LaneSurface]) -> Roadside:
+    """Return the carriageway of lanes and its sides."""
+    paved = in_groups(surfaces, CARRIAGEWAY)
+    carriageway = lane_outline(paved)
+    junctions = sorted({lane.junction_id for lane in paved if lane.junction_id is not None})
+    inside = [lane_outline([lane for lane in paved if lane.junction_id == junction]) for junction in junctions]
+    whole = shapely.union_all([carriageway, *map(_without_holes, inside)])
+    medians = without(closed(whole, MAX_OPEN_MEDIAN_WIDTH / 2), whole)
+    filled = _without_holes(closed(whole.union(medians), MAX_SEAM), least=MAX_ISLAND_AREA, narrow=MAX_MEDIAN_WIDTH)
+    ends = [lane.left[[row], :2].tolist() + lane.right[[row], :2].tolist() for lane in paved for row in (0, -1)]
+    across = shapely.linestrings(np.array(ends).reshape(-1, 2, 2))
+    at_edge = shapely.length(shapely.intersection(across, shapely.boundary(filled).buffer(2 * MAX_SEAM)))
+    length = shapely.length(across)
+    return Roadside(carriageway, filled, shapely.union_all(across[(length > 2 * MAX_SEAM) & (at_edge > length / 2)]))
+
+
+def bare_sides(roadside: Roadside, pavement: BaseGeometry) -> BaseGeometry:
+    """Return the sides of the carriageway, as lines, along which no pavement lies."""
+    sides = roadside.sides()
+    if pavement.is_empty or sides.is_empty:
+        return sides
+    lines = [shapely.get_coordinates(line) for line in shapely.get_parts(shapely.segmentize(sides, SIDE_STEP))]
+    start, stop = (np.concatenate([line[cut] for line in lines]) for cut in (slice(-1), slice(1, None)))
+    along = (stop - start) / np.linalg.norm(stop - start, axis=1, keepdims=True)
+    aside = np.column_stack([-along[:, 1], along[:, 0]])
+    inner = shapely.contains_xy(roadside.filled, (start + stop) / 2 + 2 * MAX_SEAM * aside)
+    outwards = MAX_PAVEMENT_DISTANCE * np.where(inner[:, None], -aside, aside)
+    beside = shapely.polygons(np.stack([start, stop, stop + outwards, start + outwards], axis=1))
+    shapely.prepare(pavement)
+    is_bare = ~shapely.intersects(pavement, beside)
+    bare = shapely.line_merge(shapely.multilinestrings(np.stack([start, stop], axis=1)[is_bare]))
+    return shapely.union_all([line for line in shapely.get_parts(bare) if line.length >= MIN_SIDE_LENGTH])
+
+
+def without_small_holes(area: BaseGeometry) -> BaseGeometry:
+    """Return an area of a map's lanes without the holes that these leave between them in junctions."""
+    return _without_holes(area, least=MAX_HOLE)
+
+
+def without_gaps(roadside: Roadside, surfaces: Sequence[LaneSurface], *, fill: bool) -> BaseGeometry:
+    """Return the carriageway without the holes and seams that are too small for islands.
+
+    In a map that was made of middle lines (``fill``) they are where the number of lanes changes, and between lanes; in
+    others only holes count, where lanes that turn in a junction leave a gap that no lane of another kind covers.
+    """
+    if fill:
+        return _without_holes(roadside.carriageway, least=MIN_ISLAND_AREA)
+    holes = without(without_small_holes(roadside.carriageway), roadside.carriageway)
+    return holes if holes.is_empty else without(holes, _plan(in_groups(surfaces, NOT_DRIVEN)))
+
+
+def _is_corner(notch: BaseGeometry, kerb: BaseGeometry, walked: BaseGeometry) -> bool:
+    """Return whether a notch lies round a corner between the ends of pavements, and along neither for long."""
+    along = notch.buffer(2 * MAX_SEAM)
+    return bool(kerb.intersection(along).length <= MAX_CORNER and walked.intersection(along).length <= MAX_ENDS)
+
+
+def _without_holes(area: BaseGeometry, *, least: float = np.inf, narrow: float = 0.0) -> BaseGeometry:
+    """Return the area without its holes: all, or those smaller than ``least`` m² or narrower than ``narrow`` metres."""
+
+    def kept(hole: shapely.LinearRing) -> bool:
+        inside = shapely.Polygon(hole)
+        return bool(inside.area >= least and not inside.buffer(-narrow / 2).is_empty)
+
+    parts = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
+    return shapely.union_all([shapely.Polygon(part.exterior, list(filter(kept, part.interiors))) for part in parts])
+
+
+def local_strips(
+    surfaces: Iterable[LaneSurface], origin: Float, area: BaseGeometry, *, kerbs: bool = True
+) -> tuple[LaneSurface, ...]:
+    """Return the lanes near an area, in local axes, with a row of points at least each ten metres.
+
+    Parameters
+    ----------
+    surfaces : iterable of LaneSurface
+        In map coordinates.
+    origin : (3,) float64, metres
+        Map coordinates of the local origin.
+    area : shapely geometry
+        In local axes. Whole rows are kept: the lanes end a little beyond.
+    kerbs : bool
+        Whether pavements that the map leaves flush are raised.
+    """
+    shapely.prepare(area)
+    moved = (_moved(surface, origin) for surface in surfaces if surface.lane_type in GROUPS)
+    near = [surface for surface in moved if is_near(surface, area)]
+    trimmed = (_trimmed(_densified(surface), area) for surface in (_with_kerbs(near) if kerbs else near))
+    return tuple(surface for surface in trimmed if len(surface.left) > 1)
+
+
+def cut_along(surface: LaneSurface, low: float, high: float) -> LaneSurface | None:
+    """Return the part of a lane between two places along the road, metres; None where there is none."""
+    if high <= low:
+        return None
+    known = np.arange(len(surface.s))
+    inside = known[(surface.s > low) & (surface.s < high)]
+    ends = np.interp([low, high], surface.s, known)
+    return _at_rows(surface, np.concatenate([ends[:1], inside, ends[1:]]))
+
+
+def without_loose_ends(
+    surfaces: Sequence[LaneSurface], region: BaseGeometry, extent: BaseGeometry
+) -> tuple[LaneSurface, ...]:
+    """Return lanes without small pieces of roads that lead to none of a region within an extent."""
+    plan = [shapely.make_valid(surface.polygon) for surface in surfaces]
+    parts = shapely.get_parts(closed(shapely.union_all(plan, grid_size=SNAP_GRID), MAX_SEAM))
+    loose = [part for part in parts if not part.intersects(region) and part.intersection(extent).area < MIN_LOOSE_AREA]
+    away = shapely.union_all(loose)
+    shapely.prepare(away)
+    lost = shapely.covers(away.buffer(MAX_SEAM), plan)
+    return tuple(surface for surface, is_lost in zip(surfaces, lost, strict=True) if not is_lost)
+
+
+def with_rows_at(surface: LaneSurface, places: Float) -> LaneSurface:
+    """Return a lane with rows of points at more places (n,) along the road, metres, as far as it reaches there."""
+    known = np.arange(len(surface.s))
+    inside = places[(places > surface.s[0]) & (places < surface.s[-1])]
+    return _at_rows(surface, np.unique(np.concatenate([known, np.interp(inside, surface.s, known)])))
+
+
+def group(surface: LaneSurface) -> str | None:
+    """Return the group of a lane's type, None for one without a surface."""
+    return GROUPS.get(surface.lane_type)
+
+
+def in_groups(surfaces: Iterable[LaneSurface], groups: Sequence[str]) -> tuple[LaneSurface, ...]:
+    """Return the lanes of some groups."""
+    return tuple(surface for surface in surfaces if group(surface) in groups)
+
+
+def by_road(surfaces: Iterable[LaneSurface]) -> dict[str, list[LaneSurface]]:
+    """Return the lanes of each road, by its id."""
+    roads: dict[str, list[LaneSurface]] = {}
+    for surface in surfaces:
+        roads.setdefault(surface.road_id, []).append(surface)
+    return roads
+
+
+def is_near(surface: LaneSurface, area: BaseGeometry) -> bool:
+    """Return whether the bounding box of a lane meets an area in plan."""
+    points = np.concatenate([surface.left, surface.right])[:, :2]
+    return bool(area.intersects(shapely.box(*points.min(axis=0), *points.max(axis=0))))
+
+
+def lane_outline(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
+    """Return the area in plan that lanes cover, with seams and crumbs closed."""
+    return without_crumbs(closed(_plan(surfaces), MAX_SEAM).simplify(0.01))
+
+
+def without_crumbs(area: BaseGeometry, least: float = 0.5) -> BaseGeometry:
+    """Return the area without parts and holes smaller than ``least`` square metres."""
+    parts = [part for part in shapely.get_parts(area) if part.area >= least]
+    return _without_holes(shapely.geometrycollections(parts), least=least)
+
+
+class SurfaceLayers:
+    """Surfaces of lanes that are laid one after the other, each without what lies under an earlier one.
+
+    Lanes of a map overlap: in junctions, where roads merge, and where a map was made of middle lines. Two faces in one
+    place are drawn as black slivers, and both count in areas.
+
+    Parameters
+    ----------
+    surfaces : sequence of LaneSurface
+        All lanes, in local axes.
+    extent : shapely geometry
+        The surfaces end there.
+    fill : bool
+        Whether holes between the driving lanes of a junction are filled.
+    """
+
+    def __init__(self, surfaces: Sequence[LaneSurface], extent: BaseGeometry, *, fill: bool) -> None:
+        self._surfaces, self._fill = surfaces, fill
+        self._beyond = shapely.box(*extent.buffer(10 * MAX_STEP).bounds).difference(extent)
+        self._laid: list[BaseGeometry] = []
+
+    @property
+    def area(self) -> BaseGeometry:
+        """Area in plan that is covered."""
+        return united(self._laid)
+
+    def lay(self, triangles: Float, plan: BaseGeometry) -> Float:
+        """Lay triangles (n, 3, 3) whose outline in plan is known, and return what is not covered yet (m, 3, 3)."""
+        near = [area for area in self._laid if area.intersects(plan)]
+        if near:
+            covered = united(near)
+            if not shapely.intersection(covered, plan, grid_size=SNAP_GRID).buffer(-MAX_OVERLAP).is_empty:
+                triangles, plan = cut(triangles, covered), without(plan, covered)
+        if not plan.is_empty:
+            self._laid.append(plan)
+        return triangles
+
+    def lay_group(self, name: str) -> Float:
+        """Lay the lanes of one group and return their surface within the extent, (n, 3, 3).
+
+        Lanes that cross each other in a junction differ in height by some centimetres: there the group is laid anew as
+        one layer at their mean height, and groups other than driving lanes give way to these. Elsewhere lanes meet edge
+        to edge and stay as they are, unless they fold on to themselves in a narrow bend.
+        """
+        lanes = in_groups(self._surfaces, [name])
+        junctions = sorted({lane.junction_id for lane in lanes if lane.junction_id is not None})
+        inside = [self._lay_junction(name, [lane for lane in lanes if lane.junction_id == one]) for one in junctions]
+        roads = by_road([lane for lane in lanes if lane.junction_id is None])
+        outside = [self._lay_road(own) for own in roads.values()]
+        return cut(np.concatenate([np.empty((0, 3, 3)), *outside, *inside]), self._beyond)
+
+    def _lay_road(self, lanes: Sequence[LaneSurface]) -> Float:
+        triangles = np.concatenate([lane.triangles for lane in lanes])
+        plan = outline(triangles, SNAP_GRID)
+        if np.abs(signed_area(triangles)).sum() > plan.area + MAX_FOLD:
+            triangles = Terrain(triangles).drape(plan, spacing=JUNCTION_SPACING)
+        return self.lay(triangles, plan)
+
+    def _lay_junction(self, name: str, lanes: Sequence[LaneSurface]) -> Float:
+        area = lane_outline(lanes)
+        if name == "driving":
+            area = filled(lanes) if self._fill else area
+        else:
+            number = lanes[0].junction_id
+            driving = [lane for lane in in_groups(self._surfaces, ["driving"]) if lane.junction_id == number]
+            area = without_crumbs(without(area, filled(driving) if self._fill and driving else _plan(driving)))
+        terrain = Terrain(np.concatenate([lane.triangles for lane in lanes]))
+        return self.lay(terrain.drape(area, spacing=JUNCTION_SPACING), area)
+
+
+def kerb_faces(pavement: Float, step: float | None = None) -> Float:
+    """Return (n, 3, 3) upright triangles below the edge of a pavement's triangles (m, 3, 3).
+
+    With a ``step`` the edge follows their height at least each so many metres, without one at its corners in plan.
+    """
+    if len(pavement) == 0:
+        return pavement
+    plan = without_crumbs(closed(outline(pavement, SNAP_GRID), MAX_SEAM).simplify(0.01))
+    plan = plan if step is None else shapely.segmentize(plan, step)
+    terrain = Terrain(pavement)
+    parts = map(orient, shapely.get_parts(plan))
+    rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
+    return np.concatenate([_skirt(ring, terrain) for ring in rings])
+
+
+def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface], carriageway: BaseGeometry) -> Float:
+    """Return (n, 3, 3) triangles that close pavements (m, 3, 3) round the corners of junctions.
+
+    Many maps end the pavements where the junction begins. A notch between the ends of two pavements and the carriageway
+    is filled at the pavements' height, unless the map has a pavement of its own there: within the junction, or beside
+    the carriageway, beyond a verge. A median is no corner either.
+    """
+    inside = _plan([lane for lane in in_groups(surfaces, CARRIAGEWAY) if lane.junction_id is not None])
+    if inside.is_empty or len(pavement) == 0:
+        return np.empty((0, 3, 3))
+    walked = outline(pavement, SNAP_GRID)
+    own = _plan([lane for lane in in_groups(surfaces, ["sidewalk"]) if lane.junction_id is not None])
+    kerb = shapely.boundary(carriageway)
+    street = closed(_plan(surfaces).union(walked, grid_size=SNAP_GRID), MAX_SEAM)
+    notches = without(closed(street, CORNER_NOTCH), street)
+    corners = [
+        notch
+        for notch in shapely.get_parts(notches)
+        if notch.area > 1.0
+        and notch.distance(inside) < MAX_SEAM
+        and notch.distance(walked) < MAX_SEAM
+        and not notch.distance(own) < CORNER_NOTCH
+        and _is_corner(notch, kerb, shapely.boundary(walked))
+    ]
+    return Terrain(pavement).drape(shapely.union_all(corners), spacing=MAX_STEP)
+
+
+def notch_pavements(pavement: Float, carriageway: BaseGeometry) -> Float:
+    """Return (n, 3, 3) triangles that close small notches in the edge of pavements (m, 3, 3).
+
+    On the inside of a tight corner the outer edge of the pavement folds; what is left of it is a notch.
+    """
+    if len(pavement) == 0:
+        return pavement
+    walked = outline(pavement, SNAP_GRID)
+    street = closed(carriageway.union(walked, grid_size=SNAP_GRID), MAX_SEAM)
+    notches = shapely.get_parts(without(closed(street, SMALL_NOTCH), street))
+    found = [notch for notch in notches if notch.area > MIN_NOTCH and notch.distance(walked) < MAX_SEAM]
+    return Terrain(pavement).drape(shapely.union_all(found), spacing=MAX_STEP)
+
+
+def slivers(pavement: Float) -> BaseGeometry:
+    """Return the parts of pavements (n, 3, 3) in plan that are narrower than `MIN_PAVEMENT_WIDTH`."""
+    walked = outline(pavement, SNAP_GRID)
+    wide = walked.buffer(-MIN_PAVEMENT_WIDTH / 2, join_style="mitre").buffer(
+        MIN_PAVEMENT_WIDTH / 2 + MAX_SEAM, join_style="mitre"
+    )
+    return shapely.union_all([part for part in shapely.get_parts(without(walked, wide)) if part.area > 0.0])
+
+
+def markings(surfaces: Sequence[LaneSurface], extent: BaseGeometry) -> Float:
+    """Return (n, 4, 3) quads of lines between and beside the driving lanes, up to the stop lines of junctions.
+
+    Parameters
+    ----------
+    extent : shapely geometry
+        The lines end there, as the surfaces do.
+    """
+    lanes = {(lane.road_id, lane.section, lane.lane_id): lane for lane in surfaces if lane.junction_id is None}
+    painted = without(extent, _junctions(surfaces).buffer(STOP_LINE_SETBACK + STOP_LINE_WIDTH))
+    shapely.prepare(painted)
+    quads = [np.empty((0, 4, 3))]
+    for (road, section, number), lane in lanes.items():
+        if group(lane) != "driving" or _is_taper(lane):
+            continue
+        away = 1 if number > 0 else -1
+        inner = lanes.get((road, section, number - away if number != away else -away))
+        outer = lanes.get((road, section, number + away))
+        divides = inner is not None and group(inner) == "driving"
+        if number != -1 or not divides:  # the middle line is painted once, by lane 1
+            quads += _line(inner_edge(lane), painted, dashed=divides and number != away)
+        if outer is not None and group(outer) in ("shoulder", "biking", "parking", "border"):
+            quads += _line(outer_edge(lane), painted, dashed=False)
+    return _painted_once(np.concatenate(quads))
+
+
+def _painted_once(quads: Float) -> Float:
+    """Return quads (n, 4, 3) without those that lie on an earlier one.
+
+    The two directions of a street may be roads of their own whose edge is the same line.
+    """
+    plan = shapely.polygons(quads[:, :, :2])
+    plan = np.where(shapely.is_valid(plan), plan, shapely.convex_hull(plan))
+    later, earlier = shapely.STRtree(plan).query(plan, predicate="intersects")
+    later, earlier = later[earlier < later], earlier[earlier < later]
+    shared = shapely.area(shapely.intersection(plan[later], plan[earlier]))
+    covered = np.bincount(later, shared, minlength=len(quads)) / np.maximum(shapely.area(plan), MIN_PAINT)
+    kept: Float = quads[covered <= MAX_PAINTED_TWICE]
+    return kept
+
+
+def stop_lines(surfaces: Sequence[LaneSurface]) -> Float:
+    """Return (n, 4, 3) quads where driving lanes enter a junction."""
+    inside = _junctions(surfaces).buffer(0.3)
+    shapely.prepare(inside)
+    quads = [np.empty((0, 4, 3))]
+    for lane in in_groups(surfaces, ["driving"]):
+        forward = (lane.lane_id < 0) != lane.keeps_left
+        left, right = (lane.left, lane.right) if forward else (lane.right[::-1], lane.left[::-1])
+        end = shapely.Point((left[-1, :2] + right[-1, :2]) / 2)
+        if lane.junction_id is None and inside.contains(end) and not _is_taper(lane):
+            quads.append(_bar(left, right))
+    return np.concatenate(quads)
+
+
+def inner_edge(lane: LaneSurface) -> Float:
+    """Return the edge (n, 3) on the side of the reference line."""
+    return lane.right if lane.lane_id > 0 else lane.left
+
+
+def outer_edge(lane: LaneSurface) -> Float:
+    """Return the edge (n, 3) away from the reference line."""
+    return lane.left if lane.lane_id > 0 else lane.right
+
+
+def _with_kerbs(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, ...]:
+    """Return the lanes with pavements raised to kerb height, where the map leaves all pavements flush.
+
+    Maps without lane heights (the towns of CARLA are some) mean pavements
+    that are raised in the street; 0.12 m is the usual upstand of a kerb.
+    """
+    inner_neighbour = {
+        (lane.road_id, lane.section, lane.lane_id + (1 if lane.lane_id > 0 else -1)): lane for lane in surfaces
+    }
+    steps = [0.0]
+    for lane in in_groups(surfaces, ["sidewalk"]):
+        neighbour = inner_neighbour.get((lane.road_id, lane.section, lane.lane_id))
+        if neighbour is not None and len(neighbour.left) == len(lane.left):
+            steps.append(float(np.median(inner_edge(lane)[:, 2] - outer_edge(neighbour)[:, 2])))
+    if max(steps) > KERB_HEIGHT / 4:
+        return tuple(surfaces)
+    up = np.array([0.0, 0.0, KERB_HEIGHT])
+    return tuple(
+        dataclasses.replace(lane, left=lane.left + up, right=lane.right + up) if group(lane) == "sidewalk" else lane
+        for lane in surfaces
+    )
+
+
+def _plan(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
+    return shapely.union_all([shapely.make_valid(surface.polygon) for surface in surfaces], grid_size=SNAP_GRID)
+
+
+def _moved(surface: LaneSurface, origin: Float) -> LaneSurface:
+    return dataclasses.replace(surface, left=surface.left - origin, right=surface.right - origin)
+
+
+def _densified(surface: LaneSurface) -> LaneSurface:
+    steps = np.hypot(*np.diff((surface.left + surface.right)[:, :2] / 2, axis=0).T)
+    pieces = np.maximum(1, np.ceil(steps / MAX_STEP).astype(int))
+    return _at_rows(surface, np.concatenate([[0.0], *(i + np.arange(1, k + 1) / k for i, k in enumerate(pieces))]))
+
+
+def _at_rows(surface: LaneSurface, rows: Float) -> LaneSurface:
+    known = np.arange(len(surface.s))
+    left, right = (_interpolated(rows, known, edge) for edge in (surface.left, surface.right))
+    return dataclasses.replace(surface, s=np.interp(rows, known, surface.s), left=left, right=right)
+
+
+def _interpolated(at: Float, known: Float | Integer, points: Float) -> Float:
+    """Return points (k, 3) between points (n, 3) that lie at ascending places (n,), at others (k,)."""
+    return np.column_stack([np.interp(at, known, points[:, axis]) for axis in range(3)])
+
+
+def _trimmed(surface: LaneSurface, area: BaseGeometry) -> LaneSurface:
+    left, right = surface.left[:, :2], surface.right[:, :2]
+    corners = np.stack([left[:-1], left[1:], right[1:], right[:-1]], axis=1)
+    hit = np.flatnonzero(shapely.intersects(area, shapely.convex_hull(shapely.multipoints(corners))))
+    rows = slice(hit[0], hit[-1] + 2) if len(hit) else slice(0, 0)
+    return dataclasses.replace(surface, s=surface.s[rows], left=surface.left[rows], right=surface.right[rows])
+
+
+def _skirt(ring: shapely.LinearRing, terrain: Terrain) -> Float:
+    """Return upright faces below a ring that has the area at its left; they face right."""
+    plan = np.asarray(ring.coords)[:, :2]
+    height = terrain.height(plan)
+    high, low = np.column_stack([plan, height]), np.column_stack([plan, height - KERB_DEPTH])
+    quads = np.stack([low[:-1], low[1:], high[1:], high[:-1]], axis=1)
+    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def _junctions(surfaces: Sequence[LaneSurface]) -> BaseGeometry:
+    return _plan([lane for lane in in_groups(surfaces, ["driving"]) if lane.junction_id is not None])
+
+
+def _is_taper(lane: LaneSurface) -> bool:
+    return bool(np.hypot(*(lane.left - lane.right)[:, :2].T).min() < MIN_MARKED_WIDTH)
+
+
+def _line(edge: Float, painted: BaseGeometry, *, dashed: bool) -> list[Float]:
+    """Return quads of a painted line along a lane's edge (n, 3) within an area."""
+    rest = shapely.line_merge(shapely.LineString(edge).intersection(painted))
+    parts = [part for part in shapely.get_parts(rest) if part.length > 0.0]
+    paths = [shapely.get_coordinates(part, include_z=True) for part in parts]
+    return [_ribbon(piece) for path in paths for piece in (_dashes(path) if dashed else [path])]
+
+
+def _dashes(path: Float) -> list[Float]:
+    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    begins = np.arange(0.0, travelled[-1] - DASH_LENGTH, DASH_LENGTH + DASH_GAP)
+    ends = np.stack([begins, begins + DASH_LENGTH], axis=1).reshape(-1)
+    return list(_interpolated(ends, travelled, path).reshape(-1, 2, 3))
+
+
+def _ribbon(path: Float) -> Float:
+    """Return quads of marking width along a path (n, 3)."""
+    path = path[np.concatenate([[True], np.hypot(*np.diff(path[:, :2], axis=0).T) > 1e-6])]
+    if len(path) < 2:
+        return np.empty((0, 4, 3))
+    along = np.gradient(path[:, :2], axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    aside = np.column_stack([-along[:, 1], along[:, 0], np.zeros(len(path))]) * (MARKING_WIDTH / 2)
+    left, right = path + aside + [0, 0, MARKING_ABOVE], path - aside + [0, 0, MARKING_ABOVE]
+    return np.stack([right[:-1], right[1:], left[1:], left[:-1]], axis=1)
+
+
+def _bar(left: Float, right: Float) -> Float:
+    """Return the stop line (1, 4, 3) before the end of a lane between two edges (n, 3)."""
+    near, far = STOP_LINE_SETBACK, STOP_LINE_SETBACK + STOP_LINE_WIDTH
+    corners = np.concatenate([_before_end(right, [far, near]), _before_end(left, [near, far])])
+    bar: Float = corners[None] + np.array([0.0, 0.0, MARKING_ABOVE])
+    return bar
+
+
+def _before_end(path: Float, distances: Sequence[float]) -> Float:
+    """Return points (k, 3) some metres before the end of a path (n, 3)."""
+    left_over = np.cumsum(np.linalg.norm(np.diff(path[::-1], axis=0), axis=1))
+    return _interpolated(np.array(distances), np.array([0.0, *left_over]), path[::-1])

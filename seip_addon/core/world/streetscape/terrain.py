@@ -1,0 +1,262 @@
+"""The height of the ground: looked up on triangles, and areas in plan laid on them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from ...arrays import Float
+from ...geometry.height_raster import HeightRaster
+from ...geometry.plan import plane_height, signed_area
+
+MIN_AREA = 1e-6  # triangles smaller than this in plan (m²) carry nothing and are left out
+SNAP_GRID = 1e-6  # grid (metres) that cut outlines snap to; without one slivers arise that cannot be triangulated
+ROADSIDE, MAX_ROADSIDE = 5.0, 15.0
+"""Width (metres) of the strip beside a road in which the ground changes from its height to that of the land."""
+EMBANKMENT_RUN = 2.2  # metres of that width for each metre of height between the two
+MIN_EMBANKMENT = 0.25  # metres of height from which the strip needs a finer grid than flat ground
+STEEP_SPACING = 2.0  # metres, about, between places where the ground is steep
+_TOUCHING = 1e-3  # metres from a road within which the ground has its height
+
+
+@dataclass(frozen=True, eq=False)
+class Relief:
+    """Heights of the ground that a flat map is laid on.
+
+    Parameters
+    ----------
+    raster : HeightRaster
+        Map coordinates.
+    level : float, metres
+        Height that the map gives the ground.
+    bridges : frozenset of str
+        Ids of the roads that lead straight from end to end, whatever the ground is between.
+    """
+
+    raster: HeightRaster
+    level: float
+    bridges: frozenset[str] = frozenset()
+
+    def rise(self, xy: Float) -> Float:
+        """Return how far the ground lies above the map's own (n,) at places (n, 2), metres."""
+        return self.raster.at(xy) - self.level
+
+    def at(self, xy: Float) -> Float:
+        """Return the heights of the land (n,) at places (n, 2), metres."""
+        return self.raster.at(xy)
+
+
+@dataclass(frozen=True)
+class FlatLand:
+    """Level land that the streets of a map rise above on ramps and bridges, or lie below in underpasses.
+
+    Parameters
+    ----------
+    level : float, metres
+        Height of the land, map coordinates.
+    bridges : frozenset of str
+        Ids of the roads on bridges.
+    """
+
+    level: float
+    bridges: frozenset[str] = frozenset()
+
+    def at(self, xy: Float) -> Float:
+        """Return the heights of the land (n,) at places (n, 2), metres."""
+        return np.full(len(xy), self.level)
+
+
+class Terrain:
+    """Heights on a set of triangles that overlap at most slightly in plan.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float64, metres
+        None of them upright.
+    beside : callable, optional
+        Heights (n,) of the ground at places (n, 2) on none of the triangles.
+    steep : shapely geometry, optional
+        Area in plan in which `drape` divides each cell of its grid further.
+    """
+
+    def __init__(
+        self, triangles: Float, beside: Callable[[Float], Float] | None = None, steep: BaseGeometry | None = None
+    ) -> None:
+        self._beside, self._steep = beside, steep
+        self._triangles = triangles[np.abs(signed_area(triangles)) > MIN_AREA]
+        self._plan = shapely.polygons(self._triangles[:, :, :2])
+        self._tree = shapely.STRtree(self._plan)
+
+    def height(self, xy: Float) -> Float:
+        """Return the height below or above points in plan.
+
+        Parameters
+        ----------
+        xy : (n, 2) float64, metres
+
+        Returns
+        -------
+        (n,) float64, metres
+            The mean of the triangles there; next to them that of the ground, or of the nearest point of a triangle.
+        """
+        points = shapely.points(xy)
+        point, triangle = self._tree.query(points, predicate="intersects")
+        found = np.bincount(point, minlength=len(xy))
+        total = np.bincount(point, plane_height(self._triangles[triangle], xy[point]), minlength=len(xy))
+        height: Float = total / np.maximum(found, 1)
+        off = found == 0
+        height[off] = self._nearest_height(points[off]) if self._beside is None else self._beside(xy[off])
+        return height
+
+    def _nearest_height(self, points: NDArray[np.object_]) -> Float:
+        """Return the heights (n,) of the nearest points of triangles."""
+        nearest = self._tree.nearest(points)
+        on_triangle = shapely.get_coordinates(shapely.shortest_line(self._plan[nearest], points))[::2]
+        return plane_height(self._triangles[nearest], on_triangle)
+
+    def drape(self, area: BaseGeometry, *, spacing: float, above: float = 0.0) -> Float:
+        """Return an area in plan as triangles that lie on the terrain at their corners, without cracks.
+
+        Parameters
+        ----------
+        area : shapely geometry
+        spacing : float, metres
+            Side of the square grid along which the area is divided; a fraction of it where the ground is steep.
+        above : float, metres
+            Height over the terrain.
+
+        Returns
+        -------
+        (n, 3, 3) float64, metres
+            Normals up.
+        """
+        plan = triangulate(_cells(area, spacing, self._steep))
+        corners = plan.reshape(-1, 2)
+        if len(corners) == 0:
+            return np.empty((0, 3, 3))
+        return _raised(corners, self.height(corners) + above)
+
+
+class Embankments:
+    r"""Heights of the ground next to roads: slopes lead from these to the land.
+
+    Next to a road the ground is as high as the road; from a width :math:`b` on it is as high as the land. A road at the
+    height :math:`h` above the land raises it at a distance :math:`d < b` by
+
+    .. math:: (1 - s) h, \qquad s = \frac{d^2}{d^2 + (b - d)^2}.
+
+    Several roads are near where one climbs next to another one. The ground is raised by the mean over their triangles
+    within the greatest width :math:`B`, weighted by :math:`((B - d) / (B d))^4` (after Franke and Little): at the
+    edge of each road it has that road's height, and no steps in between.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float64, metres
+        Roads that lie on the ground; no bridges.
+    land : callable
+        Heights (n,) of the land at places (n, 2).
+    """
+
+    def __init__(self, triangles: Float, land: Callable[[Float], Float]) -> None:
+        self._land = land
+        self._triangles = triangles[np.abs(signed_area(triangles)) > MIN_AREA]
+        self._plan = shapely.polygons(self._triangles[:, :, :2])
+        self._tree = shapely.STRtree(self._plan)
+        corners = self._triangles.reshape(-1, 3)
+        above = np.abs(corners[:, 2] - land(corners[:, :2])).reshape(-1, 3).max(axis=1)
+        width = embankment_width(above)
+        high = above > MIN_EMBANKMENT
+        self.steep = shapely.union_all(shapely.buffer(self._plan[high], width[high]))
+        self._reach = float(width.max(initial=ROADSIDE))
+
+    def height(self, xy: Float) -> Float:
+        """Return the heights of the ground (n,) at places (n, 2), metres."""
+        land = self._land(xy)
+        points = shapely.points(xy)
+        point, triangle = self._tree.query(points, predicate="dwithin", distance=self._reach)
+        nearest = shapely.get_coordinates(shapely.shortest_line(self._plan[triangle], points[point]))[::2]
+        away = np.hypot(*(xy[point] - nearest).T)
+        weight = (np.maximum(self._reach - away, 0.0) / (self._reach * np.maximum(away, _TOUCHING))) ** 4
+        above = plane_height(self._triangles[triangle], nearest) - land[point]
+        width = embankment_width(np.abs(above))
+        away = np.minimum(away, width)
+        raised = above * (1 - away**2 / (away**2 + (width - away) ** 2))
+        total = np.bincount(point, weight, minlength=len(xy))
+        mean = np.bincount(point, weight * raised, minlength=len(xy)) / np.where(total > 0.0, total, 1.0)
+        ground: Float = land + mean
+        return ground
+
+
+def embankment_width(height: Float) -> Float:
+    """Return the width (n,) of the strip beside roads at heights (n,) above or below the land, metres."""
+    width: Float = np.clip(EMBANKMENT_RUN * height, ROADSIDE, MAX_ROADSIDE)
+    return width
+
+
+def _cells(area: BaseGeometry, spacing: float, steep: BaseGeometry | None = None) -> NDArray[np.object_]:
+    """Return the polygons that a square grid through the origin divides an area into.
+
+    Cells that meet a steep area are divided into squares of about `STEEP_SPACING`.
+    """
+    if area.is_empty:
+        return np.array([], dtype=object)
+    low = np.floor(np.array(area.bounds[:2]) / spacing)
+    count = np.ceil(np.array(area.bounds[2:]) / spacing) - low
+    column, row = np.meshgrid(low[0] + np.arange(count[0]), low[1] + np.arange(count[1]), indexing="ij")
+    x, y = column.ravel() * spacing, row.ravel() * spacing
+    shapely.prepare(area)
+    squares = shapely.box(x, y, x + spacing, y + spacing)
+    met = squares[shapely.intersects(area, squares)]
+    if steep is not None and not steep.is_empty:
+        shapely.prepare(steep)
+        divided = shapely.intersects(steep, met)
+        low = shapely.bounds(met[divided])[:, :2]
+        divisions = max(round(spacing / STEEP_SPACING), 1)
+        side = spacing / divisions
+        offsets = side * np.stack(np.meshgrid(*[np.arange(divisions)] * 2), axis=-1).reshape(-1, 2)
+        x, y = (low[:, None] + offsets).reshape(-1, 2).T
+        whole = met[~divided]
+        # Cells next to them get the same corners along the common side, so that no cracks open between both.
+        border = shapely.segmentize(shapely.boundary(shapely.union_all(met[divided])), side)
+        beside = shapely.intersects(whole, border)
+        whole[beside] = shapely.snap(whole[beside], shapely.extract_unique_points(border), SNAP_GRID)
+        met = np.concatenate([whole, shapely.box(x, y, x + side, y + side)])
+    parts = shapely.get_parts(shapely.intersection(met, area, grid_size=SNAP_GRID))
+    kept: NDArray[np.object_] = parts[shapely.area(parts) > MIN_AREA]
+    return kept
+
+
+def triangulate(area: BaseGeometry | NDArray[np.object_]) -> Float:
+    """Return (n, 3, 2) counter-clockwise triangles that fill areas in plan, with no corners of their own."""
+    pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(area))
+    corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
+    area = signed_area(corners)
+    corners[area < 0] = corners[area < 0, ::-1]
+    kept: Float = corners[np.abs(area) > MIN_AREA]
+    return kept
+
+
+def cut(triangles: Float, away: BaseGeometry) -> Float:
+    """Return (n, 3, 3) triangles without what lies in an area in plan."""
+    if len(triangles) == 0:
+        return triangles
+    plan = shapely.polygons(triangles[:, :, :2])
+    shapely.prepare(away)
+    touched = shapely.intersects(away, plan)
+    rests = shapely.difference(plan[touched], away, grid_size=SNAP_GRID)
+    pieces = [triangles[~touched]]
+    for triangle, rest in zip(triangles[touched], rests, strict=True):
+        if rest.area > MIN_AREA:
+            corners = triangulate(rest)
+            flat = corners.reshape(-1, 2)
+            height = plane_height(np.broadcast_to(triangle, (len(flat), 3, 3)), flat)
+            pieces.append(_raised(flat, height))
+    return np.concatenate(pieces)
+
+
+def _raised(corners: Float, height: Float) -> Float:
+    """Return (n, 3, 3) triangles of their corners in plan (3 n, 2) and heights (3 n,)."""
+    return np.column_stack([corners, height]).reshape(-1, 3, 3)

@@ -1,0 +1,102 @@
+"""A goal becomes the problem that it states, or one sentence."""
+
+import numpy as np
+import pytest
+
+from seip_addon.core.choosing.placement.objective import (
+    Objective,
+    check_objective,
+    optimise,
+    placement_problem,
+    target_weights,
+)
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from tests.builders.small_junction import make_example
+
+
+@pytest.fixture(scope="module")
+def example():
+    return make_example()
+
+
+def problem(example, **goal):
+    return placement_problem(example.site, example.visible, example.models, Objective(**goal))
+
+
+def test_without_a_goal_four_sensors_are_sought(example):
+    assert problem(example).count == 4
+    assert problem(example, budget=50_000.0).count is None
+    assert problem(example, coverage=0.5).count is None
+
+
+def test_weights_count_in_the_weighted_problem_alone(example):
+    central = example.site.targets.central
+    assert set(target_weights(example.site, Objective())) == {1.0}
+    assert set(target_weights(example.site, Objective(central_weight="scene"))[central]) == {2.0}
+    weights = target_weights(example.site, Objective(central_weight=7.5))
+    assert set(weights[central]) == {7.5}
+    assert set(weights[~central]) == {1.0}
+
+
+def test_prices_come_from_the_catalogue(example):
+    stated = problem(example)
+    for price, key in zip(stated.prices, example.site.candidates.sensor, strict=True):
+        assert price == example.models[key].price
+
+
+def test_demands_by_name_are_met(example):
+    names = example.site.candidates.position_name.tolist()
+    goal = Objective(count=3, mandatory=(names[0],), forbidden=tuple(names[5:]))
+    placement = finish(optimise(example.site, example.visible, example.models, goal)).placement
+    chosen = {names[example.site.candidates.position_of[pose]] for pose in placement.chosen}
+    assert names[0] in chosen
+    assert chosen <= set(names[:5])
+
+
+def test_the_reverse_problem_reaches_its_coverage_at_the_least_price(example):
+    goal = Objective(coverage=0.6)
+    plan = finish(optimise(example.site, example.visible, example.models, goal))
+    assert plan.deployment.coverage >= 0.6
+    assert plan.greedy is None
+    cheaper = Objective(budget=plan.placement.price - 1)
+    other = finish(optimise(example.site, example.visible, example.models, cheaper))
+    assert other.deployment.coverage < 0.6
+
+
+def test_a_plan_tells_what_was_asked_and_what_greedy_finds(example):
+    plan = finish(optimise(example.site, example.visible, example.models, Objective()))
+    assert plan.objective.count == 4
+    assert plan.greedy.objective <= plan.placement.objective
+    assert plan.deployment.seen_by.tolist() == example.visible[plan.placement.chosen].sum(axis=0).tolist()
+
+
+@pytest.mark.parametrize(
+    ("goal", "sentence"),
+    [
+        ({"coverage": 0.0}, "share above 0 and at most 1"),
+        ({"coverage": 1.5}, "share above 0 and at most 1"),
+        ({"central_weight": -1.0}, "central weight must be 1e-06 to 1,000,000, not -1"),
+        ({"central_weight": float("nan")}, "central weight must be 1e-06 to 1,000,000, not nan"),
+        ({"central_weight": 1e308}, "central weight must be 1e-06 to 1,000,000"),
+        ({"budget": float("inf")}, "budget must be 0 to"),
+        ({"min_distance": -1.0}, "min distance must be 0 to 100,000 m"),
+        ({"forbidden": ("a",), "mandatory": ("a",)}, "'a' is both forbidden and mandatory"),
+        ({"mandatory": ("signal pole 9",)}, "did you mean 'signal pole"),
+        ({"forbidden": ("zzz",)}, "there is no position 'zzz'"),
+        ({"count": 0}, "asked for 0 sensors"),
+        ({"count": 10_000}, "asked for 10000 sensors, but"),
+        ({"budget": 10.0}, "below the cheapest sensor"),
+    ],
+)
+def test_each_fault_has_its_sentence(example, goal, sentence):
+    with pytest.raises(SeipError, match=sentence):
+        check_objective(example.site, example.models, Objective(**goal))
+
+
+def test_the_weighted_problem_needs_a_weighted_region(example):
+    site = example.site
+    targets = type(site.targets)(site.targets.xyz, site.targets.weight, np.zeros(len(site.targets), bool), 1.0)
+    bare = type(site)(site.name, site.origin, site.region, targets, site.candidates, site.triangles, site.reflectivity)
+    with pytest.raises(SeipError, match="needs a weighted region"):
+        target_weights(bare, Objective(central_weight=2.0))

@@ -1,0 +1,123 @@
+"""Bounds and searches that do not decide by themselves, against exhaustive search on the reduced problem."""
+
+import math
+from itertools import combinations
+
+from headless.studies.benchmark.street_visibility import street_problem
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from seip_addon.core.choosing.placement import bounds
+from seip_addon.core.choosing.placement.bounds import lagrangian_bound
+from seip_addon.core.choosing.placement.decomposition import decomposition_bound
+from seip_addon.core.choosing.placement.greedy import greedy
+from seip_addon.core.choosing.placement.local_search import composition_search
+from seip_addon.core.choosing.placement.reduced_problem import make_instance
+from seip_addon.core.choosing.placement.search_limits import Clock
+from seip_addon.core.choosing.placement.solver import Proof, lower_by_goals
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from tests.oracles.placement_oracle import small_problems
+from tests.oracles.random_cases import cases
+
+NONE = np.zeros(0, np.int64)  # no candidate chosen
+
+
+def forever():
+    return Clock(math.inf)
+
+
+def reduced(problem):
+    try:
+        return make_instance(problem)[0]
+    except SeipError:
+        return None
+
+
+def feasible(instance):
+    sizes = range(1, min(instance.count, len(instance)) + 1)
+    choices = [np.array(choice) for size in sizes for choice in combinations(range(len(instance)), size)]
+    return [choice for choice in choices if instance.feasible(choice)]
+
+
+@cases(150)
+@given(small_problems(), st.floats(0.0, 1.0))
+def test_no_placement_covers_more_than_the_districts_allow(problem, share):
+    instance = reduced(problem)
+    assume(instance is not None)
+    best = max(map(instance.value, feasible(instance)), default=0.0)
+    assert finish(decomposition_bound(instance, share * best, forever(), math.inf)) >= best - instance.slack
+
+
+@cases(150)
+@given(small_problems(), st.floats(0.0, 1.0))
+def test_every_placement_that_reaches_the_goal_is_left(problem, share):
+    instance = reduced(problem)
+    assume(instance is not None)
+    reaching = [choice for choice in feasible(instance) if instance.value(choice) >= share * instance.total]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bounds, "REDUCTION_INTERVAL", 2)
+        patch.setattr(bounds, "MAX_KEPT_SHARE", 1.0)
+        patch.setattr(bounds, "MAX_LISTED_CHOICES", 1)
+        keep, bound = finish(lagrangian_bound(instance, share * instance.total, forever()))
+    assert all(np.isin(choice, keep).all() for choice in reaching)
+    assert all(instance.value(choice) <= bound.value + instance.slack for choice in reaching)
+
+
+def test_a_descent_ends_where_the_relaxation_covers_everything():
+    instance = reduced(street_problem(99, 991))
+    goal = instance.value(greedy(instance, NONE))
+    clock, patient = forever(), forever()
+    _, bound = finish(lagrangian_bound(instance, goal, clock))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bounds, "MIN_BOUND_LEFT", -1.0)
+        _, least = finish(lagrangian_bound(instance, goal, patient))
+    assert clock.work < 0.5 * patient.work
+    assert min(bound.value, instance.total) <= least.value * (1 + 2 * bounds.MIN_BOUND_LEFT)
+
+
+@pytest.mark.parametrize("effort", [math.inf, 0.002])
+@cases(150)
+@given(small_problems())
+def test_goals_out_of_reach_bound_the_best_placement(effort, problem):
+    instance = reduced(problem)
+    assume(instance is not None)
+    best = max(map(instance.value, feasible(instance)), default=0.0)
+    chosen = min(feasible(instance), key=instance.value, default=None)
+    assume(chosen is not None)
+    keep, bound = finish(lagrangian_bound(instance, instance.value(chosen), forever()))
+    assume(np.isin(chosen, keep).all())
+    instance, chosen = instance.part(keep), np.searchsorted(keep, chosen)
+    known, clock = Proof(chosen, bound.value, optimal=False), Clock(math.inf, effort)
+    proof = finish(lower_by_goals(instance, bound, known, clock))
+    assert proof.bound >= best - instance.slack
+    assert instance.feasible(proof.chosen)
+    if proof.optimal:
+        assert instance.value(proof.chosen) >= best - instance.slack
+
+
+@cases(100)
+@given(small_problems())
+def test_tabu_search_keeps_the_constraints_and_never_ends_worse(problem):
+    instance = reduced(problem)
+    assume(instance is not None)
+    choices = feasible(instance)
+    assume(choices)
+    found = finish(composition_search(instance, choices[0], choices[0], forever()))
+    assert instance.feasible(found)
+    assert instance.value(found) >= instance.value(choices[0])
+
+
+@pytest.mark.slow
+def test_districts_and_exchanges_close_most_of_the_gap_of_many_sensors():
+    instance, _ = make_instance(street_problem(60, 800, blocks=2, count=7))
+    chosen = greedy(instance, NONE)
+    searched = finish(composition_search(instance, NONE, chosen, forever()))
+    _, bound = finish(lagrangian_bound(instance, instance.value(searched), forever()))
+    by_districts = finish(decomposition_bound(instance, instance.value(searched), forever(), math.inf))
+    assert instance.value(chosen) < instance.value(searched) <= by_districts < bound.value
+    again = finish(composition_search(instance, NONE, chosen, forever()))
+    np.testing.assert_array_equal(searched, again)

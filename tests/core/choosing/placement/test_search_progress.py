@@ -1,0 +1,60 @@
+"""A search may end at any step: its reports must not look like counted work, from which a time left would follow."""
+
+import math
+import re
+
+from headless.studies.benchmark.street_visibility import street_problem
+
+import numpy as np
+import pytest
+
+from seip_addon.core.choosing.placement.decomposition import decomposition_bound
+from seip_addon.core.choosing.placement.greedy import greedy
+from seip_addon.core.choosing.placement.local_search import composition_search
+from seip_addon.core.choosing.placement.reduced_problem import make_instance
+from seip_addon.core.choosing.placement.search_limits import Clock, SolverLimits
+from seip_addon.core.choosing.placement.solver import solve
+from seip_addon.core.progress import Pace, finish
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return street_problem(30, 300, count=5)
+
+
+def times_left(steps):
+    """Return the reports after which a time would be shown, one second apart."""
+    pace = Pace()
+    shown = []
+    for number, step in enumerate(steps):
+        pace.note(step, float(number))
+        shown += [step] * (pace.seconds_left is not None)
+    assert number > 2
+    return shown
+
+
+def test_placing_shows_no_time_left(problem):
+    steps = list(solve(problem, SolverLimits(effort=0.5)))
+    assert any(step.what.startswith("bounding what any placement can cover; covered so far: ") for step in steps)
+    assert times_left(steps) == []
+
+
+@pytest.mark.parametrize("search", ["tabu", "decomposition"])
+def test_searches_and_bounds_show_no_time_left(problem, search):
+    instance = make_instance(problem)[0]
+    clock = Clock(math.inf, math.inf)
+    chosen = greedy(instance, np.zeros(0, dtype=np.int64))
+    steps = (
+        composition_search(instance, chosen[:0], chosen, clock)
+        if search == "tabu"
+        else decomposition_bound(instance, instance.value(chosen), clock, math.inf)
+    )
+    assert times_left(steps) == []
+
+
+def test_the_first_steps_show_a_placement_and_its_gap_and_these_only_improve(problem):
+    shown = [re.search(r"covered so far: ([0-9,]+), gap ([0-9.]+)%", step.what) for step in solve(problem)]
+    figures = [(int(found[1].replace(",", "")), float(found[2])) for found in shown[:-1] if found]
+    assert shown[0] is not None
+    assert figures == sorted(figures, key=lambda figure: (figure[0], -figure[1]))
+    assert figures[-1][0] == finish(solve(problem)).covered

@@ -1,0 +1,197 @@
+"""Draws of pose errors, the estimates made of them, and what they do to a placement."""
+
+import math
+from dataclasses import replace
+
+from headless.studies.stability.robustness_rows import pose_rows
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from seip_addon.core.choosing.placement.deployment import deploy
+from seip_addon.core.choosing.placement.scenarios import ERROR_KINDS, PoseErrors
+from seip_addon.core.choosing.robustness.pose_errors import PoseDraws, draw_errors, out_of_objects
+from seip_addon.core.choosing.robustness.pose_study import PoseStudySettings, pose_study, pose_warnings
+from seip_addon.core.choosing.robustness.visibility_under_errors import draws_for, visibility_under_errors
+from seip_addon.core.errors import SeipError
+from seip_addon.core.estimates import mean_of, quantile_gain, quantile_of
+from seip_addon.core.progress import finish
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.scans.sensor import level_orientation
+from seip_addon.core.sensing.visibility.grid import compute_visibility
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.sensing.visibility.surroundings import Surroundings
+from seip_addon.core.site.scene_geometry import Mesh
+from tests.builders.synthetic_junction import junction_site, prism
+from tests.engines import ANY
+
+FEET = np.array([[0.0, 0, 0], [5, -3, 0.12], [-5, 3, 0.12], [5, -3, 0.12]])
+MODELS = load_catalogue()
+
+
+def test_a_position_errs_alike_whatever_hangs_there_and_whoever_else_is_asked():
+    together, alone = draw_errors(PoseErrors(), FEET, 20, 7), draw_errors(PoseErrors(), FEET[1:2], 50, 7)
+    for name in ("shift", "yaw", "pitch", "roll"):
+        drawn = getattr(together, name)
+        assert (drawn[:, 1] == drawn[:, 3]).all()
+        assert (drawn[:, 1] == getattr(alone, name)[:20, 0]).all()
+        assert (drawn[:, 1] != drawn[:, 2]).all()
+    assert (draw_errors(PoseErrors(), FEET, 20, 8).shift != together.shift).all()
+
+
+def test_they_are_as_wide_as_they_are_said_to_be():
+    errors = PoseErrors(position=0.5, height=0.1, yaw=0.2, tilt=0.03)
+    drawn = draw_errors(errors, np.column_stack([np.arange(50.0), np.zeros((50, 2))]), 2000, 1)
+    for values, scale in [
+        (drawn.shift[..., 0], 0.5),
+        (drawn.shift[..., 1], 0.5),
+        (drawn.shift[..., 2], 0.1),
+        (drawn.yaw, 0.2),
+        (drawn.pitch, 0.03),
+        (drawn.roll, 0.03),
+    ]:
+        assert stats.kstest(values.ravel() / scale, "norm").pvalue > 1e-3
+    assert abs(np.corrcoef(drawn.shift[:, 0, 0], drawn.shift[:, 1, 0])[0, 1]) < 0.1
+
+
+def test_a_kind_alone_is_the_same_draw():
+    whole = draw_errors(PoseErrors(), FEET, 5, 0)
+    tilt = draw_errors(PoseErrors().alone("tilt"), FEET, 5, 0)
+    assert (tilt.pitch == whole.pitch).all()
+    assert not tilt.shift.any()
+    assert not tilt.yaw.any()
+
+
+def turned(yaw, pitch, roll):
+    nod = np.array([[math.cos(pitch), 0, math.sin(pitch)], [0, 1, 0], [-math.sin(pitch), 0, math.cos(pitch)]])
+    lean = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
+    return level_orientation(yaw) @ nod @ lean
+
+
+@given(*(st.floats(-3, 3) for _ in range(5)))
+def test_orientations_are_yaw_then_pitch_then_roll(planned, tilt, yaw, pitch, roll):
+    draws = PoseDraws(np.zeros((1, 1, 3)), *(np.array([[angle]]) for angle in (yaw, pitch, roll)))
+    drawn = draws.orientations(np.array([planned]), np.array([tilt]))[0, 0]
+    assert drawn == pytest.approx(turned(planned + yaw, tilt + pitch, roll), abs=1e-12)
+
+
+def test_a_sensor_leaves_the_object_that_it_would_be_in():
+    post = Mesh("post", np.concatenate([prism((1.0, 0.0), 0.5, 9.0), prism((-1.0, 0.0), 0.5, 9.0)]))
+    floor = Mesh("one post", prism((1.0, 0.0), 0.5, 9.0))
+    shift = np.array([[[1.0, 0.0, 0.0]], [[0.2, 0.0, 0.0]]])
+    draws = PoseDraws(shift, *(np.zeros((2, 1)) for _ in range(3)))
+    where = np.array([[0.0, 0.0, 4.0]])
+    turned_about, blocked = out_of_objects(draws, where, [floor])
+    assert blocked.tolist() == [[True], [False]]
+    assert turned_about.shift[:, 0, 0].tolist() == [-1.0, 0.2]
+    assert out_of_objects(draws, where, [post])[0].shift[:, 0, 0].tolist() == [0.0, 0.2]
+
+
+def test_no_drawn_pose_of_a_site_is_inside_an_object(placed):
+    site, _ = placed
+    poses = np.array([0, 5])
+    at = site.candidates.xyz[poses]
+    walls = [Mesh("wall", prism((x + 0.6, y), 0.5, 9.0)) for x, y, _ in at]
+    free, _ = draws_for(around(site), poses, PoseErrors(), 50, 0)
+    kept_out, blocked = draws_for(replace(around(site), objects=walls), poses, PoseErrors(), 50, 0)
+    away = np.hypot(*np.moveaxis((free.shift - [0.6, 0.0, 0.0])[..., :2], 2, 0))
+    assert blocked[away < 0.49].all()
+    assert not blocked[away > 0.5].any()
+    assert blocked.any()
+    assert (kept_out.shift[blocked] != free.shift[blocked]).any(axis=1).all()
+
+
+@pytest.mark.parametrize("wrong", [{"position": -1.0}, {"tilt": 2.0}, {"yaw": math.nan}])
+def test_errors_that_cannot_be_meant_are_refused(wrong):
+    with pytest.raises(SeipError, match="error of"):
+        PoseErrors(**wrong)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5, 0.95])
+def test_a_quantile_is_in_its_interval_as_often_as_is_said(share):
+    rng, hits = np.random.default_rng(0), 0
+    for _ in range(600):
+        found = quantile_of(rng.standard_normal(200), share)
+        assert found.low <= found.value <= found.high
+        hits += found.low <= stats.norm.ppf(share) <= found.high
+    assert hits / 600 > 0.93
+
+
+def test_few_draws_leave_an_end_open():
+    assert quantile_of(np.arange(20.0), 0.05).low == -math.inf
+    assert quantile_of(np.arange(20.0), 0.95).high == math.inf
+    assert math.isfinite(quantile_of(np.arange(500.0), 0.05).low)
+
+
+@pytest.mark.slow
+def test_a_gain_is_in_its_interval_as_often_as_is_said():
+    rng, hits = np.random.default_rng(0), 0
+    for _ in range(120):
+        others = rng.standard_normal(300)
+        found = quantile_gain(others + 0.1 + 0.02 * rng.standard_normal(300), others, 0.05)
+        hits += found.low <= 0.1 <= found.high
+    assert hits / 120 > 0.88
+    assert quantile_gain(others, others, 0.05).describe() == "0.00% [0.00%, 0.00%]"
+
+
+@given(st.lists(st.floats(-5, 5), min_size=2, max_size=40))
+def test_a_mean_is_within_its_interval(values):
+    found = mean_of(np.array(values))
+    assert found.low <= found.value <= found.high
+
+
+@pytest.fixture(scope="module")
+def placed():
+    site = junction_site(positions=16, sensors=("type1",), heights=(5.4,), spacing=3.0)
+    grid = finish(compute_visibility(site, MODELS, VisibilitySettings(delta=2.0), ANY))
+    return site, deploy(site, MODELS, grid.visible, [0, 5])
+
+
+def study_of(placed, **changed):
+    site, deployment = placed
+    chosen = PoseStudySettings(**{"draws": 40, "draws_of_kind": 10} | changed)
+    return finish(pose_study(around(site), deployment, chosen))
+
+
+def around(site):
+    return Surroundings(site, MODELS, VisibilitySettings(delta=2.0), engine=ANY)
+
+
+def test_without_errors_every_draw_covers_what_was_planned(placed):
+    _, deployment = placed
+    study = study_of(placed, errors=PoseErrors(0.0, 0.0, 0.0, 0.0), draws=2)
+    assert study.planned.whole.tolist() == [deployment.coverage]
+    assert study.planned.central.tolist() == [deployment.central]
+    assert (study.together.whole == deployment.coverage).all()
+    assert study.by_kind == {}
+    assert not study.worst_sensor()[1]  # nothing is lost, so that no sensor's error stands out
+    assert pose_warnings(study) == ()
+
+
+@pytest.mark.slow
+def test_a_study_says_who_is_to_blame(placed):
+    study = study_of(placed, errors=PoseErrors(tilt=math.radians(8)))
+    assert set(study.by_kind) == set(ERROR_KINDS)
+    assert study.together.whole.shape == (40,)
+    losses = dict(zip(study.labels, study.loss_by_sensor(), strict=True))
+    assert study.worst_sensor()[0] == max(losses, key=lambda label: losses[label].value)
+    assert pose_warnings(study)
+    assert len(pose_rows(study)) == 3
+    assert study.is_converged()
+
+
+@pytest.mark.slow
+def test_sensor_alone_is_its_row_beside_the_planned_rows(placed):
+    site, deployment = placed
+    study = study_of(placed, draws=6)
+    poses = np.array([sensor.pose for sensor in deployment.sensors])
+    feet = site.candidates.position[site.candidates.position_of[poses]]
+    drawn = draw_errors(PoseErrors(), feet, 6, 0)
+    still = PoseDraws(*(getattr(drawn, name).copy() for name in ("shift", "yaw", "pitch", "roll")))
+    for name in ("shift", "yaw", "pitch", "roll"):
+        getattr(still, name)[:, 1] = 0.0
+    views = finish(visibility_under_errors(around(site), poses, still))
+    assert study.alone[0].whole.tolist() == [views.seen(draw).any(axis=0).mean() for draw in range(6)]

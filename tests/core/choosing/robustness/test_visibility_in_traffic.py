@@ -1,0 +1,237 @@
+"""What is seen between vehicles: against casting every ray at every triangle, and where the answer is plain."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.choosing.robustness.traffic_instants import (
+    BATCH_SECONDS,
+    NO_TRAFFIC,
+    WARM_UP,
+    check_runs,
+    obstacles_of,
+    spread_instants,
+)
+from seip_addon.core.choosing.robustness.visibility_in_traffic import LAYER_HEIGHT, visibility_in_traffic
+from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.orientation import rotated
+from seip_addon.core.progress import finish
+from seip_addon.core.sensing.lidar.beams import beam_directions
+from seip_addon.core.sensing.lidar.range_equation import RangeEquation
+from seip_addon.core.sensing.lidar.rosette import Rosette
+from seip_addon.core.sensing.traffic.trajectories import RoadUser
+from seip_addon.core.sensing.visibility.grid import compute_visibility
+from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+from seip_addon.core.sensing.visibility.scanning import ScanPosition
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.sensing.visibility.surroundings import Surroundings
+from seip_addon.core.sensing.visibility.visibility_model import seen_by_tilted_full_scan
+from tests.builders.synthetic_junction import junction_site, make_candidates
+from tests.builders.traffic_by_hand import make_model, make_trajectories, parked
+from tests.engines import ANY, each_engine, needs_any
+from tests.oracles.random_cases import cases
+
+pytestmark = needs_any
+
+DELTA = 1.5
+SIZES = {
+    "car": (4.5, 1.8, 1.5),
+    "truck": (9.0, 2.5, 3.6),
+    "bus": (12.0, 2.5, 3.1),
+    "bicycle": (1.8, 0.6, 1.7),
+    "pedestrian": (0.5, 0.6, 1.75),
+}
+MODELS = {
+    "coarse": make_model(key="coarse"),
+    "near-blind": make_model(
+        key="near-blind", min_range=6.0, max_range=45.0, azimuth_offsets=np.linspace(-0.1, 0.1, 7)
+    ),
+    "one-way": make_model(key="one-way", field_of_view=np.radians(140)),
+    "rosette": make_model(
+        key="rosette", points_per_second=30e3, rosette=Rosette((60.0, -43.0), (np.radians(25), np.radians(24)), 1.7)
+    ),
+}
+XYZ = np.array([[9.0, 9.0, 5.0], [-9.0, 12.0, 3.5], [0.0, -30.0, 6.0]])
+SITE = replace(
+    junction_site(spacing=2.0),
+    candidates=make_candidates(
+        np.concatenate([np.repeat(XYZ, 3, axis=0), XYZ[[0, 2]]]),
+        ["coarse", "near-blind", "one-way"] * 3 + ["rosette"] * 2,
+        np.append(np.repeat(XYZ[:, 2], 3), XYZ[[0, 2], 2]),
+        np.array([0.0, 0.7, -2.4, 2.0, -2.0, -0.8, 3.0, -0.4, 1.6, -2.3, 1.5]),
+        np.array([0.0, 0.0, 0.0, 0.0, 0.2, 0.15, 0.1, 0.0, 0.0, 0.0, 0.2]),
+    ),
+)
+POSES = np.arange(11)
+AROUND = Surroundings(SITE, MODELS, VisibilitySettings(delta=DELTA), engine=ANY)
+
+
+def crowd(poses, categories):
+    """The bodies of road users at (x, y, yaw)."""
+    users = [RoadUser(f"{n}", category, *SIZES[category]) for n, category in enumerate(categories)]
+    ways = [[(0.0, x, y, 0.0, yaw, 0.0), (10.0, x, y, 0.0, yaw, 0.0)] for x, y, yaw in poses]
+    runs = make_trajectories(*ways, users=users)
+    return obstacles_of(runs, runs.at(1.0))
+
+
+crowds = st.lists(
+    st.tuples(st.floats(-35, 35), st.floats(-7, 7), st.floats(-4, 4), st.booleans(), st.sampled_from(sorted(SIZES))),
+    max_size=10,
+).map(
+    lambda drawn: crowd(
+        [(y, x, yaw) if turned else (x, y, yaw) for x, y, yaw, turned, _ in drawn], [category for *_, category in drawn]
+    )
+)
+
+
+def views(instants, layer="road", around=AROUND):
+    seen = finish(visibility_in_traffic(around, POSES, instants, layer))
+    return np.array([seen.seen(instant) for instant in range(len(instants))])
+
+
+def place_of(pose, caster, around, reflectivity):
+    poses = SITE.candidates
+    model = around.models[str(poses.sensor[pose])]
+    return ScanPosition(caster, poses.xyz[pose], float(poses.yaw[pose]), [model], around.sight, reflectivity)
+
+
+def by_full_scan(bodies, engine=ANY, around=AROUND):
+    """Every ray at everything in one ray caster."""
+    caster = make_ray_caster(np.concatenate([SITE.triangles, bodies.triangles]), engine)
+    reflectivity = np.concatenate([SITE.reflectivity, bodies.reflectivity])
+    surfaces = near_surfaces(SITE.triangles, SITE.targets.xyz, around.sight.delta, SITE.reflectivity)
+    return np.concatenate(
+        [
+            seen_by_tilted_full_scan(place_of(pose, caster, around, reflectivity), tilt, surfaces)[0]
+            for pose, tilt in enumerate(SITE.candidates.tilt.tolist())
+        ]
+    )
+
+
+def beams_past(bodies, pose):
+    """Every beam, from the least range to its end, against every point above a target: its distance to each."""
+    caster = make_ray_caster(np.concatenate([SITE.triangles, bodies.triangles]), ANY)
+    place = place_of(pose, caster, AROUND, SITE.reflectivity)
+    (model,) = place.models
+    directions = beam_directions(model, place.yaw).reshape(-1, 3)
+    if SITE.candidates.tilt[pose] != 0:
+        directions = rotated(beam_directions(model).reshape(-1, 3), SITE.candidates.orientation(pose))
+    end = np.minimum(caster.cast(place.origin, directions, model.max_range)[0], model.max_range)
+    points = SITE.targets.xyz + np.array([0.0, 0.0, LAYER_HEIGHT])
+    passed = np.zeros(len(points), dtype=bool)
+    for number, point in enumerate(points):
+        ahead = directions @ (point - place.origin)
+        squared = ((point - place.origin) ** 2).sum() - ahead**2  # of the whole line
+        reach = np.sqrt(np.maximum(DELTA**2 - squared, 0.0))
+        passed[number] = ((squared < DELTA**2) & (ahead - reach < end) & (ahead + reach > model.min_range)).any()
+    return passed
+
+
+@pytest.mark.slow
+@each_engine
+@cases(15, 3)
+@given(bodies=crowds)
+def test_the_road_between_vehicles_is_that_of_a_full_scan(engine, bodies):
+    around = replace(AROUND, engine=engine)
+    assert (views([bodies], around=around)[0] == by_full_scan(bodies, engine, around)).all()
+
+
+@pytest.mark.slow
+@cases(5, 2)
+@given(bodies=crowds)
+def test_only_returns_that_are_strong_enough_count(bodies):
+    dropoff = replace(AROUND, sight=VisibilitySettings(delta=DELTA, min_intensity=0.3))
+    law = RangeEquation.of_ranges(12.0, 30.0)
+    physical = replace(AROUND, models={key: replace(model, law=law) for key, model in MODELS.items()})
+    for around in (dropoff, physical):
+        assert (views([bodies], around=around)[0] == by_full_scan(bodies, around=around)).all()
+
+
+@pytest.mark.slow
+@cases(5, 1)
+@given(bodies=crowds)
+def test_points_above_the_road_are_seen_by_beams_that_pass(bodies):
+    found = views([bodies], "height")[0]
+    for pose in POSES:
+        assert (found[pose] == beams_past(bodies, pose)).all()
+
+
+def test_the_empty_road_is_the_visibility_grid():
+    grid = finish(compute_visibility(SITE, MODELS, AROUND.sight, ANY))
+    assert (views([NO_TRAFFIC])[0] == grid.visible).all()
+
+
+@pytest.mark.slow
+@cases(10, 3)
+@given(bodies=crowds, more=crowds)
+def test_where_more_vehicles_stand_less_is_seen_above_the_road(bodies, more):
+    both = replace(
+        bodies,
+        triangles=np.concatenate([bodies.triangles, more.triangles]),
+        hulls=np.concatenate([bodies.hulls, more.hulls]),
+    )
+    nobody, some, all_of_them = views([NO_TRAFFIC, bodies, both], "height")
+    assert (all_of_them <= some).all()
+    assert (some <= nobody).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("layer", ["road", "height"])
+def test_neither_order_nor_company_of_instants_matters(layer):
+    instants = [
+        crowd([(12.0, 2.0, 0.0)], ["bus"]),
+        NO_TRAFFIC,
+        crowd([(2.0, 14.0, 1.5), (-20.0, 0.0, 0.2)], ["truck", "car"]),
+        crowd([(0.0, 0.0, 0.8)], ["truck"]),
+    ]
+    expected = views(instants, layer)
+    assert (views(instants, layer) == expected).all()
+    for order in itertools.islice(itertools.permutations(range(4)), 5, 24, 9):
+        assert (views([instants[number] for number in order], layer) == expected[list(order)]).all()
+    assert (views([instants[2]], layer)[0] == expected[2]).all()
+
+
+def test_a_truck_hides_the_lane_behind_it_and_shows_where_it_stands():
+    pose = 0  # at (9, 9, 5)
+    truck = crowd([(-4.0, 4.0, 0.0)], ["truck"])
+    nobody, before = views([NO_TRAFFIC, truck], "height")[:, pose]
+    x, y = SITE.targets.xyz[:, 0], SITE.targets.xyz[:, 1]
+    behind = (np.abs(x + 9.0) <= 2.0) & (np.abs(y - 2.0) <= 2.0)
+    assert (nobody & ~before)[behind].any()
+    away = x > 12.0
+    assert (nobody == before)[away].all()
+    road = views([NO_TRAFFIC, truck])[:, pose]
+    under = (np.abs(x + 4.0) < 4.5) & (np.abs(y - 4.0) < 1.25 + DELTA)
+    assert (road[1] & ~road[0])[under].any()
+    assert not (road[1] & ~road[0])[~(np.hypot(x + 4.0, y - 4.0) < 5.0 + DELTA)].any()
+
+
+def test_instants_are_spread_over_all_runs_and_follow_from_the_seed():
+    runs = [parked((0.0, 0.0, 0.0, 0.0, 0.0)), parked((1.0, 0.0, 0.0, 0.0, 0.0), (3.0, 0.0, 0.0, 0.0, 0.0))]
+    one, same, other = (spread_instants(runs, 32, seed) for seed in (3, 3, 4))
+    assert one.time.tobytes() == same.time.tobytes()
+    assert one.time.tobytes() != other.time.tobytes()
+    assert np.bincount(one.run).tolist() == [16, 16]
+    for run in (0, 1):
+        part = np.floor((one.time[one.run == run] - WARM_UP) / (10.0 - WARM_UP) * 16)
+        assert part.tolist() == list(range(16))
+    assert len(np.unique(one.batch)) == 2 * max(1, round((10.0 - WARM_UP) / BATCH_SECONDS))
+    assert [len(crowd.hulls) for crowd in one.obstacles()] == [1] * 16 + [2] * 16
+
+
+def test_traffic_that_is_of_no_use_is_refused():
+    here = parked((0.0, 0.0, 0.0, 0.0, 0.0))
+    check_runs([here], SITE.region)
+    with pytest.raises(SeipError, match="traffic of another place"):
+        check_runs([here, parked((5000.0, 0.0, 0.0, 0.0, 0.0))], SITE.region)
+    with pytest.raises(SeipError, match="simulate more traffic"):
+        spread_instants([here, make_trajectories([(0.0, 0, 0, 0, 0, 0), (1.5, 1, 0, 0, 0, 0)])], 4, 0)
+    with pytest.raises(SeipError, match="ask for one instant"):
+        spread_instants([here], 0, 0)

@@ -1,0 +1,181 @@
+"""The conversions of each format, against other ways to the same numbers."""
+
+import math
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.output.datasets import kitti, mmdetection3d, openpcdet, opv2v, pcd
+from seip_addon.core.output.datasets.label_files import read_labels
+from seip_addon.core.output.datasets.opv2v import left_handed_pose
+from seip_addon.core.output.datasets.sample import make_sample
+from tests.builders.scan_frames import make_frame, make_frames, make_run, make_sensors, rotation, write
+
+angles = st.floats(-math.pi, math.pi)
+places = st.tuples(*[st.floats(-500, 500)] * 3).map(np.array)
+KITTI_COLUMNS = 15
+
+
+def left_handed(roll, yaw, pitch):
+    """OpenCOOD's rotation from its three turns, degrees."""
+    (cr, sr), (cy, sy), (cp, sp) = ((math.cos(a), math.sin(a)) for a in map(math.radians, (roll, yaw, pitch)))
+    turn = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+    nod = np.array([[cp, 0, -sp], [0, 1, 0], [sp, 0, cp]])
+    lean = np.array([[1, 0, 0], [0, cr, sr], [0, -sr, cr]])
+    return turn @ nod @ lean
+
+
+@given(angles, st.one_of(st.floats(-math.pi / 2, math.pi / 2), st.sampled_from([-math.pi / 2, math.pi / 2])), angles)
+def test_a_left_handed_pose_puts_points_where_the_right_handed_one_does(yaw, pitch, roll):
+    xyz, own = np.array([3.0, -4.0, 6.0]), np.array([1.0, 2.0, 3.0])
+    turn = rotation(yaw, pitch, roll)
+    x, y, z, *degrees = left_handed_pose(xyz, turn)
+    mirror = np.array([1.0, -1.0, 1.0])
+    there = left_handed(*degrees) @ (own * mirror) + (x, y, z)
+    assert there * mirror == pytest.approx(turn @ own + xyz, abs=1e-7)
+
+
+def test_known_poses():
+    assert left_handed_pose(np.array([1.0, 2.0, 3.0]), np.eye(3)) == pytest.approx([1, -2, 3, 0, 0, 0])
+    # turned to the left here is turned by a negative yaw there; nose up is up in both
+    assert left_handed_pose(np.zeros(3), rotation(0.3)) == pytest.approx([0, 0, 0, 0, -math.degrees(0.3), 0])
+    assert left_handed_pose(np.zeros(3), rotation(0.0, 0.2)) == pytest.approx([0, 0, 0, 0, 0, math.degrees(0.2)])
+
+
+@given(st.lists(st.tuples(places, st.tuples(*[st.floats(0.1, 20)] * 3).map(np.array), angles), max_size=6))
+def test_the_range_holds_every_box_in_whole_pillars_and_voxels(found):
+    boxes = np.array([[*place, *size, yaw] for place, size, yaw in found]).reshape(-1, 7)
+    extent = openpcdet.point_cloud_range(boxes)
+    for place, size, yaw in found:
+        signs = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
+        corners = place + (signs * size) @ rotation(yaw).T
+        assert (corners > extent[:3]).all()
+        assert (corners < extent[3:]).all()
+    span = extent[3:] - extent[:3]
+    for pillar in (0.1, 0.2, 0.4):
+        cells = span[:2] / pillar
+        assert cells == pytest.approx(np.round(cells))
+        assert (np.round(cells) % 16 == 0).all()
+    assert span[2] / 40 / 0.05 == pytest.approx(round(span[2] / 40 / 0.05))
+
+
+def test_the_range_is_no_larger_than_it_must_be():
+    car = np.array([[10.0, -20.0, 0.75, 4.5, 1.8, 1.5, 0.0]])
+    assert openpcdet.point_cloud_range(car).tolist() == [6.8, -23.2, -0.5, 13.2, -16.8, 3.5]
+
+
+def test_openpcdet_configuration_is_yaml_with_the_range_of_the_labels(tmp_path):
+    write("openpcdet", make_frames(), make_run(), tmp_path)
+    found = yaml.safe_load((tmp_path / "custom_dataset.yaml").read_text())
+    boxes = [read_labels(path) for path in sorted((tmp_path / "labels").iterdir())]
+    assert found["POINT_CLOUD_RANGE"] == openpcdet.point_cloud_range(np.concatenate([box for box, _ in boxes])).tolist()
+    assert found["CLASS_NAMES"] == list(openpcdet.FORMAT.classes.values())
+    assert set(found["MAP_CLASS_TO_KITTI"]) == {*found["CLASS_NAMES"], "DontCare"}
+    low, high = np.array(found["POINT_CLOUD_RANGE"]).reshape(2, 3)
+    cells = (high - low) / found["DATA_PROCESSOR"][2]["VOXEL_SIZE"]
+    assert cells[:2] % 16 == pytest.approx([0, 0])
+    assert cells[2] == pytest.approx(1)
+
+
+@given(st.integers(0, 10_000))
+def test_kitti_labels_turn_back_into_the_boxes(seed):
+    frame = make_frame(seed)
+    sample = _sample(frame, kitti.FORMAT)
+    lines = kitti.sample_files(sample)["training/label_2/000000.txt"]().decode().splitlines()
+    assert len(lines) == max(1, len(sample.boxes))
+    for row, line in enumerate(lines if len(sample.boxes) else []):
+        words = line.split(" ")
+        assert len(words) == KITTI_COLUMNS
+        assert words[0] == sample.classes[row]
+        height, width, length, x, y, z, turn = map(float, words[8:])
+        assert [length, width, height] == sample.boxes.size[row].tolist()
+        assert (z, -x) == tuple(sample.boxes.centre[row, :2])
+        assert -y + height / 2 == pytest.approx(sample.boxes.centre[row, 2], abs=1e-14)
+        assert -math.pi <= turn < math.pi
+        assert _same_direction(-turn - math.pi / 2, sample.boxes.yaw[row])
+        # seen from the camera along its own ray, alpha is the turn
+        assert math.remainder(float(words[3]) + math.atan2(x, z) - turn, math.tau) == pytest.approx(0.0, abs=1e-6)
+        assert words[4:8] == ["0", "0", "100", "100"]
+
+
+@pytest.mark.parametrize(("visibility", "occluded"), [(1.0, "0"), (0.8, "0"), (0.79, "1"), (0.4, "1"), (0.39, "2")])
+def test_kitti_occlusion_follows_visibility(visibility, occluded):
+    frame = make_frame(1, users=1)
+    labels = replace(frame.labels, visibility=np.array([visibility]))
+    sample = _sample(replace(frame, labels=labels), kitti.FORMAT)
+    assert kitti.sample_files(sample)["training/label_2/000000.txt"]().split()[2].decode() == occluded
+
+
+def test_kitti_test_split_stands_apart(tmp_path):
+    write("kitti", make_frames(), make_run(split="test"), tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["ImageSets", "manifest.json", "testing"]
+
+
+@given(st.integers(0, 10_000))
+def test_text_labels_are_exact(seed):
+    sample = _sample(make_frame(seed), openpcdet.FORMAT)
+    boxes = sample.boxes
+    text = openpcdet.sample_files(sample)["labels/000000.txt"]().decode()
+    rows = [line.split() for line in text.splitlines() if not line.endswith("DontCare")]
+    assert [row[7] for row in rows] == list(sample.classes)
+    found = np.array([row[:7] for row in rows], dtype=float).reshape(-1, 7)
+    assert (found == np.column_stack([boxes.centre, boxes.size, boxes.yaw])).all()
+
+
+def test_mmdetection3d_numbers_its_classes_in_order(tmp_path):
+    write("mmdetection3d", make_frames(), make_run(), tmp_path)
+    info = pickle.loads((tmp_path / "custom_infos_train.pkl").read_bytes())  # noqa: S301  # written above
+    assert info["metainfo"]["categories"] == {
+        name: number for number, name in enumerate(mmdetection3d.FORMAT.classes.values())
+    }
+    assert info["metainfo"]["info_version"] == "1.1"
+
+
+def test_pcd_header():
+    points = np.zeros((3, 4), dtype="<f4").view(pcd.POINT_TYPE)[:, 0]
+    head, data = pcd.encode(points).split(b"DATA binary\n")
+    assert head.decode().splitlines()[1:] == [
+        "VERSION 0.7",
+        "FIELDS x y z intensity",
+        "SIZE 4 4 4 4",
+        "TYPE F F F F",
+        "COUNT 1 1 1 1",
+        "WIDTH 3",
+        "HEIGHT 1",
+        "VIEWPOINT 0 0 0 1 0 0 0",
+        "POINTS 3",
+    ]
+    assert len(data) == 3 * 16
+
+
+def test_opv2v_numbers_are_never_taken_for_text(tmp_path):
+    frame = make_frame(2, users=4)
+    tiny = replace(frame.labels, centre=frame.labels.centre * 1e-12, speed=np.full(4, 1e-9))
+    write("opv2v", [("0", replace(frame, labels=tiny))], make_run(), tmp_path, min_points=0)
+    found = yaml.safe_load((tmp_path / "train/a/0/0.yaml").read_text())
+    for vehicle in found["vehicles"].values():
+        numbers = [*vehicle["angle"], *vehicle["center"], *vehicle["extent"], *vehicle["location"], vehicle["speed"]]
+        assert all(isinstance(number, float) for number in numbers)
+
+
+def test_opv2v_notes_name_the_agents_that_would_be_left_out():
+    near = make_sensors(8)
+    assert opv2v.notes(make_run(sensors=near[:7])) == ()
+    assert "there are 8 agents" in opv2v.notes(make_run(sensors=near))[0]
+    far = replace(near[1], xyz=near[0].xyz + np.array([70.1, 0.0, 0.0]))
+    assert opv2v.notes(make_run(sensors=(near[0], far)))[0].startswith("S2: farther than 70 m from S1")
+    high = replace(near[1], xyz=near[0].xyz + np.array([69.9, 0.0, 50.0]))
+    assert opv2v.notes(make_run(sensors=(near[0], high))) == ()
+
+
+def _sample(frame, kind):
+    return make_sample((0, "000000"), make_run(), frame, kind.classes, 1)
+
+
+def _same_direction(one, other):
+    return math.remainder(one - other, 2 * math.pi) == pytest.approx(0.0, abs=1e-12)

@@ -1,0 +1,278 @@
+import math
+from dataclasses import replace
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import shapely
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+from matplotlib.patches import Rectangle, Wedge
+
+from seip_addon.core.choosing.placement.deployment import deploy
+from seip_addon.core.choosing.placement.returns_summary import ReturnsSummary
+from seip_addon.core.output.pictures.drawing import draw_title, markers_of, percent, summary
+from seip_addon.core.output.pictures.palette import SEEN_COLOURS
+from seip_addon.core.output.pictures.plan_legend import LEGEND_WIDTH
+from seip_addon.core.output.pictures.plan_style import OTHER_ROAD
+from seip_addon.core.output.pictures.plan_view import draw_plan, save_plan_view
+from seip_addon.core.site.scene_geometry import ASSUMED, OTHER_LEVELS, Mesh, Pole
+from tests.builders.small_junction import make_example
+
+
+@pytest.fixture(scope="module")
+def example():
+    return make_example()
+
+
+def pixel_at(figure, xy):
+    figure.canvas.draw()
+    pixels = np.asarray(figure.canvas.buffer_rgba())
+    column, row = figure.axes[0].transData.transform(xy)
+    return pixels[pixels.shape[0] - 1 - int(row), int(column), :3] / 255
+
+
+def test_every_target_is_painted_by_how_many_sensors_see_it(example):
+    """Where no marker, label or line lies on it, the picture has the class's colour at the target."""
+    figure = draw_plan(example.geometry, example.site, example.deployment)
+    figure.canvas.draw()
+    pixels = np.asarray(figure.canvas.buffer_rgba())[::-1, :, :3] / 255
+    where = figure.axes[0].transData.transform(example.site.targets.xyz[:, :2]).astype(int)
+    painted = pixels[where[:, 1], where[:, 0]]
+    wanted = np.array([to_rgb(SEEN_COLOURS[min(n, 2)]) for n in example.deployment.seen_by])
+    right = np.abs(painted - wanted).max(axis=1) < 0.02
+    assert right.mean() > 0.93
+    assert len(set(np.minimum(example.deployment.seen_by, 2))) == 3
+
+
+def test_buildings_are_darker_the_higher_they_are(example):
+    figure = draw_plan(example.geometry, example.site, example.deployment)
+    low, high = pixel_at(figure, (-20, 38)), pixel_at(figure, (38, 28))  # 9 m and 24 m
+    assert high.mean() < low.mean() - 0.1
+
+
+@pytest.mark.slow
+def test_the_same_placement_gives_the_same_bytes_whatever_the_users_style(example, tmp_path):
+    save_plan_view(tmp_path / "a.png", example.geometry, example.site, example.deployment)
+    save_plan_view(tmp_path / "b.png", example.geometry, example.site, example.deployment)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert b"Software" not in (tmp_path / "a.png").read_bytes()[:200]
+    assert imread(tmp_path / "a.png").shape[1] > 1500
+
+
+def test_no_global_state_of_matplotlib_is_touched(example, tmp_path):
+    before = dict(mpl.rcParams)
+    save_plan_view(tmp_path / "a.png", example.geometry, example.site, example.deployment)
+    assert dict(mpl.rcParams) == before
+
+
+def test_labels_of_sensors_do_not_touch_each_other(example):
+    figure = draw_plan(example.geometry, example.site, example.deployment)
+    figure.canvas.draw()
+    labels = [text.get_window_extent() for text in figure.axes[0].texts if " · " in text.get_text()]
+    assert len(labels) == 3
+    assert not any(a.overlaps(b) for i, a in enumerate(labels) for b in labels[:i])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [0, 1, 16, 45])
+def test_any_number_of_sensors_can_be_drawn(example, tmp_path, count):
+    deployment = deploy(example.site, example.models, example.visible, np.arange(0, 2 * count, 2))
+    save_plan_view(tmp_path / "plan.png", example.geometry, example.site, deployment)
+    figure = draw_plan(example.geometry, example.site, deployment)
+    panel = figure.axes[1]
+    assert all(panel.get_ylim()[1] <= text.get_position()[1] <= panel.get_ylim()[0] for text in panel.texts)
+
+
+LAST_NOTE = "This last note has to be read to its end."
+
+
+@pytest.mark.parametrize("count", [3, 24, 45])
+def test_on_a_wide_site_all_labelled_sensors_are_listed_and_no_note_is_cut_off(example, count):
+    site = replace(example.site, region=shapely.box(-300, -20, 300, 20))
+    deployment = deploy(site, example.models, example.visible, np.arange(count))
+    notes = [f"Note {number}: " + 30 * "words " for number in range(8)] + [LAST_NOTE]
+    figure = draw_plan(example.geometry, site, deployment, notes)
+    figure.canvas.draw()
+    legend = figure.axes[1].texts
+    words = [text.get_text() for text in legend]
+    assert [f"S{number}" for number in range(1, min(count, 40) + 1)] == [
+        one for one in words if one[:1] == "S" and one[1:].isdigit()
+    ]
+    assert ("and 5 more" in words) == (count == 45)
+    assert LAST_NOTE in words
+    page = figure.bbox
+    boxes = [text.get_window_extent() for text in legend]
+    assert all(page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1 for box in boxes)
+    columns = sorted(
+        {round(text.get_position()[0], 3) for text in legend if text.get_weight() == "bold" and text.get_size() == 11}
+    )
+    assert len(columns) == 1 or np.diff(columns).min() > LEGEND_WIDTH
+
+
+@pytest.mark.parametrize("size", [(600, 40), (100, 100), (40, 600)])
+def test_a_metre_is_as_long_across_as_upwards_and_the_whole_region_is_shown(example, size):
+    region = shapely.box(0, 0, *size)
+    site = type(example.site)(**{**vars(example.site), "region": region})
+    plan = draw_plan(example.geometry, site, example.deployment).axes[0]
+    box = plan.get_window_extent()
+    (left, right), (bottom, top) = plan.get_xlim(), plan.get_ylim()
+    assert box.width / (right - left) == pytest.approx(box.height / (top - bottom))
+    assert shapely.box(left, bottom, right, top).contains(region)
+
+
+@pytest.mark.parametrize("corners", [((0, 0), (100, 80)), ((0, 0), (100, 20)), ((0, 30), (45, 100))])
+def test_neither_scale_nor_north_arrow_hides_the_region(example, corners):
+    (left, bottom), (right, top) = corners
+    region = shapely.LineString([(left, bottom), (right, top)]).buffer(4.0, cap_style="flat")
+    site = type(example.site)(**{**vars(example.site), "region": region})
+    plan = draw_plan(example.geometry, site, example.deployment).axes[0]
+    papers = [patch for patch in plan.patches if isinstance(patch, Rectangle) and patch.get_alpha() == 0.9]
+    assert len(papers) == 2
+    for paper in papers:
+        assert not region.intersects(shapely.box(*paper.get_bbox().extents))
+
+
+def test_the_legend_gives_the_weight_of_an_area_whether_or_not_it_counted(example):
+    figure = draw_plan(example.geometry, example.site, example.deployment)
+    assert "central box (weight 2 where weights count)" in [text.get_text() for text in figure.axes[1].texts]
+
+
+def test_names_are_taken_as_they_are(example, tmp_path):
+    site = type(example.site)(**{**vars(example.site), "name": "Corner of $1 and $2_x"})
+    save_plan_view(tmp_path / "plan.png", example.geometry, site, example.deployment)
+
+
+def test_tilted_sensors_alone_show_where_they_look(example):
+    first, *others = example.deployment.sensors
+    tilted = replace(first, tilt=math.radians(15), yaw=math.radians(90))
+    figure = draw_plan(example.geometry, example.site, replace(example.deployment, sensors=(tilted, *others)))
+    (arrow,) = (text for text in figure.axes[0].texts if getattr(text, "arrow_patch", None))
+    assert arrow.xy[0] == pytest.approx(tilted.xyz[0])
+    assert arrow.xy[1] > tilted.xyz[1]
+    words = [text.get_text() for text in figure.axes[1].texts]
+    assert sum("tilted 15°" in text for text in words) == 1
+    upright = draw_plan(example.geometry, example.site, example.deployment)
+    assert not any(getattr(text, "arrow_patch", None) for text in upright.axes[0].texts)
+
+
+def test_sensors_that_do_not_look_all_round_show_which_way_they_look(example):
+    first, *others = example.deployment.sensors
+    one_way = replace(first, yaw=math.radians(90), model=replace(first.model, field_of_view=math.radians(100)))
+    figure = draw_plan(example.geometry, example.site, replace(example.deployment, sensors=(one_way, *others)))
+    (wedge,) = (patch for patch in figure.axes[0].patches if isinstance(patch, Wedge))
+    assert wedge.center == pytest.approx(tuple(one_way.xyz[:2]))
+    assert (wedge.theta1, wedge.theta2) == pytest.approx((40.0, 140.0))
+    assert sum(getattr(text, "arrow_patch", None) is not None for text in figure.axes[0].texts) == 1
+    assert sum("yaw 90°" in text.get_text() for text in figure.axes[1].texts) == 1
+
+
+def test_each_type_has_its_marker(example):
+    types = {sensor.model.key for sensor in example.deployment.sensors}
+    markers = markers_of(example.deployment)
+    assert set(markers) == types
+    assert len(set(markers.values())) == len(types)
+
+
+def test_only_all_is_a_hundred_per_cent_and_only_nothing_none():
+    shares = (0.0, 0.0001, 0.5, 0.9999, 1.0)
+    assert [percent(share) for share in shares] == ["0.0%", "<0.1%", "50.0%", "99.9%", "100.0%"]
+
+
+def test_the_summary_says_what_was_placed(example):
+    words = summary(example.deployment)
+    assert words.startswith("3 sensors see ")
+    assert f"${sum(sensor.model.price for sensor in example.deployment.sensors):,.0f}" in words
+
+
+def test_the_summary_and_the_plan_name_installed_prices(example):
+    assert "installed" not in summary(example.deployment)
+    paid = tuple(replace(sensor, installation=9_000.0) for sensor in example.deployment.sensors)
+    deployment = replace(example.deployment, sensors=paid, price=sum(sensor.price for sensor in paid))
+    assert f"price ${deployment.price:,.0f} installed" in summary(deployment)
+    words = [text.get_text() for text in draw_plan(example.geometry, example.site, deployment).texts]
+    assert any("installed" in text for text in words)
+
+
+def test_the_legend_counts_one_post_as_one(example):
+    candidates = example.site.candidates
+    (first, *others), words = np.flatnonzero(~candidates.on_pole), []
+    for kept in ([first], [first, others[0]]):
+        on_pole = np.ones(len(candidates.position), dtype=bool)
+        on_pole[kept] = False
+        site = replace(example.site, candidates=replace(candidates, on_pole=on_pole))
+        figure = draw_plan(example.geometry, site, example.deployment)
+        words.append({text.get_text() for text in figure.axes[1].texts})
+    assert "1 possible new post" in words[0]
+    assert "2 possible new posts" in words[1]
+
+
+def test_assumed_poles_have_a_mark_of_their_own(example):
+    """Those that carry nothing are drawn as well: they are in the way, and are not to be taken for the map's."""
+    pole = Pole("guess", np.array((-12.0, 9.0, 0.1)), source=ASSUMED)
+    geometry = replace(example.geometry, poles=(*example.geometry.poles, pole))
+    words = [text.get_text() for text in draw_plan(geometry, example.site, example.deployment).axes[1].texts]
+    assert "1 assumed pole, not used" in words
+    assert any(text.endswith("poles from the map") for text in words)
+    plain = draw_plan(example.geometry, example.site, example.deployment)
+    assert not any("assumed" in text.get_text() for text in plain.axes[1].texts)
+    marked = pixel_at(draw_plan(geometry, example.site, example.deployment), (-12.0, 9.0))
+    assert np.abs(marked - pixel_at(plain, (-12.0, 9.0))).max() > 0.05
+
+
+def test_the_map_carries_the_credits_of_its_sources(example):
+    sources = ("© OpenStreetMap contributors (ODbL)", "Surveyors $& Sons")
+    credited, plain = (
+        [text.get_text() for text in draw_plan(example.geometry, site, example.deployment).axes[0].texts]
+        for site in (replace(example.site, attribution=sources), example.site)
+    )
+    assert "\n".join(sources) in credited
+    assert not any("OpenStreetMap" in text for text in plain)
+
+
+@pytest.mark.parametrize("length", [10, 90, 400])
+def test_the_title_ends_on_the_page(example, length):
+    name = "Saint-Symphorien-de-Lay / " * (length // 26) + "Long Street"
+    figure = Figure((6.0, 4.0), dpi=100)
+    FigureCanvasAgg(figure)
+    draw_title(figure, replace(example.site, name=name), example.deployment, 0.3)
+    title = figure.texts[0].get_window_extent()
+    assert 29.0 <= title.x0 < title.x1 <= 571
+    words = figure.texts[0].get_text()
+    assert words == name if length < 50 else words.endswith("…")
+    assert name.startswith(words.removesuffix("…"))
+
+
+def test_roads_of_other_levels_are_drawn_in_a_colour_of_their_own(example):
+    corners = np.array([[-60, -34, -5], [60, -34, -5], [60, -26, -5], [-60, -26, -5]], dtype=float)
+    road = Mesh(f"{OTHER_LEVELS}.001", corners[[[0, 1, 2], [0, 2, 3]]])
+    geometry = replace(example.geometry, ground=(*example.geometry.ground, road))
+    plain, drawn = (draw_plan(one, example.site, example.deployment) for one in (example.geometry, geometry))
+    place = (13.0, -31.5)
+    assert np.abs(pixel_at(drawn, place) - to_rgb(OTHER_ROAD["facecolor"])).max() < 0.01
+    assert np.abs(pixel_at(plain, place) - pixel_at(drawn, place)).max() > 0.05
+    words = [[text.get_text() for text in figure.axes[1].texts] for figure in (plain, drawn)]
+    assert ["road on another level" in each for each in words] == [False, True]
+
+
+def test_the_summary_of_a_placement_by_returns_begins_with_them_and_fits_the_page(example):
+    returns = ReturnsSummary(98765.0, dict.fromkeys(("car", "cyclist", "pedestrian"), 98765.0), ())
+    deployment = replace(example.deployment, returns=returns)
+    assert summary(deployment).startswith("98,765 returns from a car, ")
+    figure = Figure((6.0, 4.0), dpi=100)
+    FigureCanvasAgg(figure)
+    draw_title(figure, example.site, deployment, 0.3)
+    line = figure.texts[-1].get_window_extent()
+    assert 29.9 <= line.x0 < line.x1 <= 571
+    assert figure.texts[-1].get_text() == summary(deployment)
+
+
+@pytest.mark.parametrize("width", np.linspace(4.5, 9.0, 19))
+def test_a_line_that_a_smaller_size_fits_is_not_cut_short(example, width):
+    figure = Figure((width, 4.0), dpi=160)
+    FigureCanvasAgg(figure)
+    draw_title(figure, example.site, example.deployment, 0.2)
+    assert figure.texts[1].get_text() == summary(example.deployment)
+    assert figure.texts[1].get_window_extent().x1 <= 160 * (width - 0.2) + 0.5

@@ -1,0 +1,79 @@
+"""The folder of a placement at the small junction, without Blender: for reports."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from seip_addon.core.choosing.placement.deployment import deploy
+from seip_addon.core.choosing.placement.objective import Objective, Solution, placement_problem
+from seip_addon.core.choosing.placement.problem import Placement, relative_gap
+from seip_addon.core.geometry.geo_reference import GeoReference
+from seip_addon.core.output.pictures.plan_view import save_plan_view
+from seip_addon.core.output.results.placement_record import Provenance, placement_record, save_placement_record
+from seip_addon.core.output.results.site_file import save_site_file
+from seip_addon.core.sensing.visibility.grid import VisibilityGrid
+from seip_addon.core.site.scene_geometry import NamedArea
+from seip_addon.core.storage.json_dataclass import as_json
+from tests.builders.small_junction import Example, make_example
+
+NAME = "Crossing <script>alert(1)</script> & “Ecke”"
+CREATED = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+UTM = GeoReference("EPSG:32632", (-4_500_000.0, 5_300_000.0, 400.0, 0.0))
+KEY = "ab" * 32
+
+
+def make_folder(folder: Path, *, goal: Objective | None = None, place: GeoReference = UTM, **found) -> Example:
+    """Write what `seip place` writes, but for what only Blender can, and return what it is about."""
+    example = make_example()
+    example = replace(
+        example,
+        site=replace(example.site, name=NAME, geo_reference=place),
+        geometry=replace(
+            example.geometry,
+            places=(
+                NamedArea("Mill Lane <i>", shapely.box(-55, -7, -7, 7)),
+                NamedArea("High Street", shapely.box(7, -7, 55, 7)),
+            ),
+        ),
+    )
+    goal = goal or Objective(count=3)
+    solution = make_solution(example, goal, **found)
+    settings = {
+        "grid_spacing_m": 2.0,
+        "candidates": {"sensors": ["type1", "type2"], "heights": [3.5, 5.4]},
+        "goal": as_json(goal),
+        "render": False,
+    }
+    record = placement_record(
+        example.site,
+        solution,
+        Provenance(CREATED, {"visibility": 1.0}, {"seip": "0.1.0", "python": "3.13.0"}),
+        settings=settings,
+        inputs={"visibility": KEY},
+        warnings=("type2: sees <far>",),
+    )
+    folder.mkdir(parents=True, exist_ok=True)
+    save_placement_record(folder / "placement.json", record)
+    problem = placement_problem(example.site, example.visible, example.models, goal)
+    save_site_file(folder / "site.npz", KEY, example.geometry, example.site, solution, problem)
+    VisibilityGrid(np.packbits(example.visible, axis=1), example.visible.shape, KEY, {}).save(folder / "visibility.npz")
+    save_plan_view(folder / "plan.png", example.geometry, example.site, example.deployment)
+    return example
+
+
+def make_solution(example: Example, goal: Objective, **found) -> Solution:
+    chosen = np.array([sensor.pose for sensor in example.deployment.sensors])
+    deployment = example.deployment
+    if "chosen" in found:
+        chosen = found.pop("chosen")
+        deployment = deploy(example.site, example.models, example.visible, chosen)
+    value = float(np.count_nonzero(deployment.seen_by))
+    values = {"objective": value, "bound": value, "status": "optimal", **found}
+    values.setdefault("gap", relative_gap(values["objective"], values["bound"]))
+    placement = Placement(chosen=chosen, solver="HiGHS", seconds=0.5, covered=value, price=deployment.price, **values)
+    return Solution(goal, placement, None, deployment)

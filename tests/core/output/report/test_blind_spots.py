@@ -1,0 +1,109 @@
+"""Blind spots, and what is seen of places: against counting by hand and a search that shares no code."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.output.report.blind_spots import blind_spots, seen_places
+from seip_addon.core.output.report.losses import failures
+from seip_addon.core.output.results.site_file import Area
+from seip_addon.core.site.targets import Targets
+
+
+def targets_at(places, spacing=2.0, central=()) -> Targets:
+    xyz = np.column_stack([spacing * np.asarray(places, dtype=float) + (100.0, -50.0), np.zeros(len(places))])
+    inside = np.isin(np.arange(len(xyz)), central)
+    return Targets(xyz, np.where(inside, 2.0, 1.0), inside, spacing)
+
+
+def flooded(places) -> list[set]:
+    """Return the connected parts of whole places, found by walking from neighbour to neighbour."""
+    left, parts = set(places), []
+    while left:
+        waiting, part = [left.pop()], set()
+        while waiting:
+            x, y = waiting.pop()
+            part.add((x, y))
+            for near in ((x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)):
+                if near in left:
+                    left.remove(near)
+                    waiting.append(near)
+        parts.append(part)
+    return parts
+
+
+@given(st.sets(st.tuples(st.integers(0, 9), st.integers(0, 9)), min_size=1), st.data())
+def test_parts_are_those_that_can_be_walked(places, data):
+    places = sorted(places)
+    seen = np.array([data.draw(st.booleans()) for _ in places])
+    targets = targets_at(places)
+    spots = blind_spots(targets, seen, ())
+    expected = flooded(place for place, one in zip(places, seen, strict=True) if not one)
+    assert sorted(sorted(places[t] for t in spot.targets) for spot in spots) == sorted(map(sorted, expected))
+    assert [spot.area for spot in spots] == sorted((4.0 * len(part) for part in expected), reverse=True)
+    for spot in spots:
+        assert any((spot.middle == targets.xyz[t]).all() for t in spot.targets)
+
+
+def test_a_blind_spot_is_named_after_the_place_that_holds_most_of_it():
+    targets = targets_at([(x, 0) for x in range(10)])
+    lane = Area("Mill Lane", "place", np.arange(10) < 4)
+    seen = np.isin(np.arange(10), (4, 5))
+    found = {spot.where: len(spot.targets) for spot in blind_spots(targets, seen, (lane,))}
+    assert found == {"Mill Lane, 7 m west of the centre of the road": 4, "5 m east of the centre of the road": 4}
+
+
+def test_places_are_counted_from_the_junction_and_not_from_the_middle_of_a_bounding_box():
+    """The junction is at the western end of a street: all that is unseen lies east of it, or in its centre."""
+    targets = targets_at([(x, y) for x in range(21) for y in (-1, 0, 1)], central=range(9))
+    box = Area("Central box", "weighted region", targets.central)
+    x, y = (targets.xyz[:, :2] - (102.0, -50.0)).T
+    unseen = (np.abs(y) < 1) & np.isin(x, (0.0, 8.0, 24.0, 26.0, 28.0))
+    found = [(spot.area, spot.where) for spot in blind_spots(targets, ~unseen, (box,))]
+    assert found == [
+        (12.0, "26 m east of the centre of Central box"),
+        (4.0, "Central box, at the centre of Central box"),
+        (4.0, "8 m east of the centre of Central box"),
+    ]
+
+
+def test_of_several_weighted_regions_the_nearest_is_counted_from():
+    targets = targets_at([(x, 0) for x in range(40)], central=(0, 1, 2, 30, 31, 32))
+    number = np.arange(40)
+    regions = {"A": (0, 1, 2), "B": (30, 31, 32)}
+    areas = [Area(name, "weighted region", np.isin(number, own)) for name, own in regions.items()]
+    found = [spot.where for spot in blind_spots(targets, ~np.isin(number, (5, 27, 35)), areas)]
+    assert found == ["8 m east of the centre of A", "8 m west of the centre of B", "8 m east of the centre of B"]
+    arms = {place.name for place in seen_places(targets, np.ones(40, dtype=int), areas)}
+    assert {"Road east of the centre of A", "Road west of the centre of B", "Road east of the centre of B"} <= arms
+
+
+def test_places_have_the_shares_that_counting_gives():
+    targets = targets_at([(x, 0) for x in range(8)])
+    seen_by = np.array([0, 1, 2, 3, 0, 0, 0, 1])
+    lane, none = Area("Lane", "place", np.arange(8) < 4), Area("Nowhere", "place", np.zeros(8, dtype=bool))
+    (found,) = seen_places(targets, seen_by, (lane, none))
+    assert (found.name, found.area, found.seen, found.seen_twice) == ("Lane", 16.0, 0.75, 0.5)
+
+
+def test_without_streets_the_road_is_listed_by_its_sides():
+    targets = targets_at([(-5, 0), (5, 0), (0, 5), (0, -5), (0, 0)], central=(4,))
+    middle = Area("box", "weighted region", targets.central)
+    found = seen_places(targets, np.array([1, 0, 0, 1, 1]), (middle,))
+    sides = (("east", 0.0), ("north", 0.0), ("west", 1.0), ("south", 1.0))
+    assert [(one.name, one.seen) for one in found] == [
+        ("box (weighted)", 1.0),
+        *((f"Road {side} of the centre of box", seen) for side, seen in sides),
+    ]
+
+
+@given(st.integers(1, 5), st.integers(1, 12), st.integers(0, 2**32 - 1))
+def test_what_a_failure_leaves_is_the_union_of_the_others(sensors, count, seed):
+    rows = np.random.default_rng(seed).random((sensors, count)) < 0.4
+    found = failures(rows)
+    expected = [np.delete(rows, one, axis=0).any(axis=0).mean() for one in range(sensors)]
+    assert found.left == pytest.approx(expected)
+    assert found.worst == pytest.approx(min(expected))
+    assert found.mean == pytest.approx(sum(expected) / sensors)
+    assert failures(rows[:0]) is None

@@ -1,0 +1,54 @@
+"""Two placements, target by target, and the text that a file keeps of them."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.choosing.placement.integer_program import check_solver, is_available, solver_name
+from seip_addon.core.errors import SeipError
+from seip_addon.core.output.results.comparison import (
+    BOTH,
+    GAINED,
+    LOST,
+    NEITHER,
+    compare,
+    packed_counts,
+    unpacked_counts,
+)
+from seip_addon.core.output.results.ranking import rank_added, rank_alone
+
+
+def test_each_target_is_in_one_class():
+    classes = compare(np.array([0, 2, 0, 1]), np.array([0, 1, 3, 0])).classes
+    assert classes.tolist() == [NEITHER, BOTH, GAINED, LOST]
+
+
+def test_other_targets_are_refused():
+    with pytest.raises(SeipError, match="on 2 and on 3 targets"):
+        compare(np.zeros(2, int), np.zeros(3, int))
+
+
+@given(st.lists(st.integers(0, 400), max_size=50))
+def test_counts_come_back_up_to_255(counts):
+    assert unpacked_counts(packed_counts(np.array(counts, dtype=np.int64))).tolist() == [min(n, 255) for n in counts]
+
+
+@pytest.mark.parametrize("text", ["?", "AAAA"])
+def test_damaged_counts_are_said(text):
+    with pytest.raises(SeipError, match="damaged"):
+        unpacked_counts(text)
+
+
+def test_ranks_leave_out_taken_positions_and_seen_targets():
+    visible = np.array([[1, 1, 0, 0], [1, 1, 1, 0], [0, 0, 1, 1], [0, 1, 0, 0]], dtype=bool)
+    weight = np.array([1.0, 1.0, 1.0, 3.0])
+    assert [one.pose for one in rank_alone(visible, weight, 3)] == [2, 1, 0]
+    added = rank_added(visible, weight, visible[1], np.array([False, False, True, True]), 9)
+    assert [(one.pose, one.share) for one in added] == [(2, 0.5), (3, 0.0)]
+
+
+def test_the_automatic_solver_is_one_that_runs():
+    assert is_available(solver_name("auto"))
+    assert check_solver("auto") == check_solver(solver_name("auto"))
+    assert solver_name("cbc") == "cbc"

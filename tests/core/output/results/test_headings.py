@@ -1,0 +1,23 @@
+import math
+
+import pytest
+
+from seip_addon.core.output.results.headings import clockwise_degrees, degrees
+
+
+def test_counter_clockwise_from_zero_to_below_a_full_turn():
+    assert degrees(-math.pi / 2) == 270.0
+    assert degrees(2 * math.pi - 1e-12) == 0.0
+    assert degrees(-1e-12) == 0.0
+
+
+def test_clockwise_from_minus_to_below_plus_half_a_turn():
+    assert clockwise_degrees(math.pi / 2) == -90.0
+    assert clockwise_degrees(math.pi) == -180.0
+    assert clockwise_degrees(-math.pi) == -180.0
+
+
+@pytest.mark.parametrize("write", [degrees, clockwise_degrees])
+def test_zero_has_no_sign(write):
+    assert math.copysign(1.0, write(-0.0)) == 1.0
+    assert math.copysign(1.0, write(0.0)) == 1.0

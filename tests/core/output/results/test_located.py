@@ -1,0 +1,189 @@
+"""Placements for maps and globes: GeoJSON as RFC 7946 has it, KML, and the table of targets and poses."""
+
+import json
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from shapely.geometry import shape
+
+from seip_addon.core.choosing.placement.objective import Objective, Solution, placement_problem
+from seip_addon.core.choosing.placement.problem import Placement
+from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.geo_reference import GeoReference
+from seip_addon.core.output.results import geojson
+from seip_addon.core.output.results.geojson import save_geojson
+from seip_addon.core.output.results.kml import NAMESPACE, save_kml
+from seip_addon.core.output.results.located import located, missing_sentence
+from seip_addon.core.output.results.site_file import load_site_file, save_site_file
+from seip_addon.core.site.scene_geometry import NamedArea
+from tests.builders.small_junction import Example, make_example
+
+OFFSET = (-4_500_000.0, 5_300_000.0, 400.0)
+NAMES = {"k": NAMESPACE}
+
+
+@pytest.fixture(scope="module")
+def example() -> Example:
+    made = make_example()
+    place = GeoReference("EPSG:32632", (*OFFSET, 0.0))
+    return replace(made, site=replace(made.site, geo_reference=place, name="Crossing <b> & \x01"))
+
+
+@pytest.fixture(scope="module")
+def placed(example):
+    return located(example.geometry, example.site, example.deployment)
+
+
+@pytest.fixture(scope="module")
+def features(placed, tmp_path_factory):
+    path = tmp_path_factory.mktemp("geo") / "placement.geojson"
+    save_geojson(path, placed)
+    collection = json.loads(path.read_text(encoding="utf-8"))
+    assert collection["type"] == "FeatureCollection"
+    assert set(collection) == {"type", "name", "features"}
+    return collection["features"]
+
+
+def of_kind(features, kind):
+    return [one for one in features if one["properties"]["kind"] == kind]
+
+
+def test_sensors_are_points_with_a_height(example, features):
+    found = of_kind(features, "sensor")
+    assert [one["properties"]["id"] for one in found] == [sensor.label for sensor in example.deployment.sensors]
+    mercator = example.site.geo_reference.mercator
+    for one, sensor in zip(found, example.deployment.sensors, strict=True):
+        longitude, latitude, height = one["geometry"]["coordinates"]
+        metres = mercator(np.radians(latitude), np.radians(longitude))
+        there = sensor.xyz + example.site.origin + OFFSET
+        np.testing.assert_allclose(metres, there[:2], atol=2e-3)
+        assert height == pytest.approx(there[2], abs=1e-3)
+        assert one["properties"]["price_usd"] == sensor.price
+        assert {"sensor", "height_m", "tilt_deg", "yaw_deg"} <= set(one["properties"])
+
+
+def test_every_ring_is_closed_and_outer_ones_turn_counter_clockwise(features):
+    areas = [shapely.get_parts(shape(one["geometry"])) for one in features if one["geometry"]["type"] != "Point"]
+    for polygon in np.concatenate(areas):
+        assert polygon.is_valid
+        assert polygon.exterior.is_ccw
+        assert not any(ring.is_ccw for ring in polygon.interiors)
+    assert all(one["geometry"]["coordinates"][0][0] == one["geometry"]["coordinates"][0][-1] for one in features[-9:])
+
+
+def test_cells_name_the_sensors_that_see_them(example, features):
+    cells = of_kind(features, "coverage cell")
+    assert len(cells) == len(example.site.targets)
+    assert [one["properties"]["times_seen"] for one in cells] == example.deployment.seen_by.tolist()
+    for target in (0, 100, len(cells) - 1):
+        expected = [s.label for s in example.deployment.sensors if example.visible[s.pose, target]]
+        assert cells[target]["properties"]["seen_by"] == expected
+    middle = shape(cells[5]["geometry"]).centroid
+    metres = example.site.geo_reference.mercator(np.radians(middle.y), np.radians(middle.x))
+    np.testing.assert_allclose(metres, (example.site.targets.xyz[5] + example.site.origin + OFFSET)[:2], atol=5e-3)
+
+
+def test_regions_are_there_by_name_and_weight(example, features):
+    (region,), (weighted,) = of_kind(features, "region of interest"), of_kind(features, "weighted region")
+    assert (weighted["properties"]["name"], weighted["properties"]["weight"]) == ("central box", 2.0)
+    assert shape(region["geometry"]).area > shape(weighted["geometry"]).area > 0
+
+
+def test_kml_is_xml_with_the_same_content(example, placed, tmp_path):
+    save_kml(tmp_path / "placement.kml", placed)
+    root = ET.parse(tmp_path / "placement.kml").getroot()  # noqa: S314  # our own
+    assert root.tag == f"{{{NAMESPACE}}}kml"
+    assert root.find("k:Document/k:name", NAMES).text == "Crossing <b> & �"
+    sensors, areas, coverage = root.findall("k:Document/k:Folder", NAMES)
+    for mark, sensor in zip(sensors.findall("k:Placemark", NAMES), example.deployment.sensors, strict=True):
+        assert mark.find("k:Point/k:altitudeMode", NAMES).text == "relativeToGround"
+        assert float(mark.find("k:Point/k:coordinates", NAMES).text.split(",")[2]) == pytest.approx(sensor.height)
+    assert len(areas.findall("k:Placemark", NAMES)) == 2
+    styles = {style.get("id") for style in root.iter(f"{{{NAMESPACE}}}Style")}
+    assert {link.text.removeprefix("#") for link in root.iter(f"{{{NAMESPACE}}}styleUrl")} <= styles
+    seen = {mark.find("k:name", NAMES).text for mark in coverage.findall("k:Placemark", NAMES)}
+    assert "Not seen" in seen
+    assert any(name.startswith("Seen by S1") for name in seen)
+
+
+def test_patches_cover_the_cells_once(example, placed):
+    squares = [shapely.Polygon(square) for square in placed.squares()]
+    patches = [shapely.union_all(polygons) for _, polygons in placed.patches()]
+    whole = sum(patch.area for patch in patches)
+    assert whole == pytest.approx(sum(square.area for square in squares), rel=1e-5)
+    assert sum(one.intersection(other).area for one in patches for other in patches if one is not other) < 1e-6 * whole
+
+
+def test_the_same_placement_gives_the_same_bytes(placed, tmp_path):
+    for save, name in ((save_geojson, "a.geojson"), (save_kml, "a.kml")):
+        save(tmp_path / name, placed)
+        save(tmp_path / f"again {name}", placed)
+        assert (tmp_path / name).read_bytes() == (tmp_path / f"again {name}").read_bytes()
+
+
+def test_of_many_targets_those_that_the_same_sensors_see_are_joined(placed, tmp_path, monkeypatch):
+    monkeypatch.setattr(geojson, "MOST_CELLS", 10)
+    save_geojson(tmp_path / "a.geojson", placed)
+    features = json.loads((tmp_path / "a.geojson").read_text(encoding="utf-8"))["features"]
+    patches = of_kind(features, "coverage patch")
+    assert len(patches) == len(list(placed.patches()))
+    assert not of_kind(features, "coverage cell")
+    assert all(shape(one["geometry"]).is_valid for one in patches)
+
+
+def test_without_a_projection_there_is_none_and_a_sentence_says_why(example):
+    bare = replace(example.site, geo_reference=GeoReference())
+    assert located(example.geometry, bare, example.deployment) is None
+    assert missing_sentence(bare, ("a.kml",)) == "a.kml is not written: the scene's map names no projection"
+    assert missing_sentence(example.site, ("a.kml",)) == ""
+
+
+def make_solution(example, goal) -> Solution:
+    chosen = np.array([sensor.pose for sensor in example.deployment.sensors])
+    placement = Placement(
+        chosen=chosen,
+        objective=1.0,
+        bound=1.0,
+        gap=0.0,
+        status="optimal",
+        solver="none",
+        seconds=0.0,
+        covered=1.0,
+        price=0.0,
+    )
+    return Solution(goal, placement, None, example.deployment)
+
+
+def test_the_site_file_holds_the_problem_as_it_was_solved(example, tmp_path):
+    goal = Objective(count=3, central_weight=2.5, forbidden=("signal pole 1",), mandatory=("signal pole 2",))
+    geometry = replace(example.geometry, places=(NamedArea("Mill Lane", shapely.box(-100, -7, 0, 7)),))
+    problem = placement_problem(example.site, example.visible, example.models, goal)
+    path = tmp_path / "site.npz"
+    save_site_file(path, "the key", geometry, example.site, make_solution(example, goal), problem)
+    found = load_site_file(path)
+    assert found.key == "the key"
+    assert [(area.name, area.kind) for area in found.areas] == [
+        ("central box", "weighted region"),
+        ("Mill Lane", "place"),
+    ]
+    central = shapely.intersects_xy(geometry.weighted_regions[0].polygon, *example.site.targets.xyz[:, :2].T)
+    np.testing.assert_array_equal(found.areas[0].within, central)
+    np.testing.assert_array_equal(found.seen, example.deployment.rows)
+    np.testing.assert_array_equal(found.targets.xyz, example.site.targets.xyz)
+    again = replace(found.problem, visible=example.visible)
+    for name in ("weights", "prices", "positions", "xyz", "labels", "mandatory_groups", "allowed"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(problem, name))
+    assert (again.count, again.budget, again.min_distance) == (3, None, 0.0)
+    assert again.group_names == problem.group_names
+
+
+def test_a_damaged_site_file_is_refused(tmp_path):
+    path = tmp_path / "site.npz"
+    with pytest.raises(SeipError, match="place the sensors again"):
+        load_site_file(path)
+    path.write_bytes(b"PK\x03\x04nothing")
+    with pytest.raises(SeipError, match="damaged"):
+        load_site_file(path)

@@ -1,0 +1,92 @@
+"""Rings are where the beams meet the road."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seip_addon.core.sensing.lidar.beams import BeamPattern
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.rings import RING_AZIMUTHS, beam_rings
+
+MODELS = load_catalogue()
+
+
+def rings_of(key="type1", height=5.0, gap=2.0, axes=None):
+    return beam_rings(MODELS[key], np.array((3.0, 4.0, height)), np.eye(3) if axes is None else axes, 0.0, gap)
+
+
+@pytest.mark.parametrize("key", [key for key, model in MODELS.items() if model.rosette is None])
+def test_a_level_sensor_draws_circles_of_height_over_tangent(key):
+    model = MODELS[key]
+    drawn = rings_of(key).rings
+    radii = np.unique(np.round(np.hypot(*(drawn[:, 0, :2] - (3.0, 4.0)).T), 6))
+    down = -model.elevations[model.elevations < 0]
+    meets = (5.0 / np.sin(down) <= model.max_range) & (5.0 / np.sin(down) > model.min_range)
+    assert radii == pytest.approx(np.unique(np.round(5.0 / np.tan(down[meets]), 6)), abs=2e-6)
+    assert np.allclose(drawn[..., 2], 0.0)
+
+
+def test_rings_farther_apart_than_the_gap_are_wide():
+    drawn = rings_of(gap=2.0)
+    radius = np.round(np.hypot(*(drawn.rings[:, 0, :2] - (3.0, 4.0)).T), 6)
+    known = np.unique(radius)
+    apart = np.diff(known, prepend=known[0])
+    assert (drawn.wide == (apart > 2.0)[np.searchsorted(known, radius)]).all()
+    assert drawn.wide.any()
+    assert not drawn.wide.all()
+
+
+def test_rings_of_a_tilted_sensor_lie_on_its_beams_and_on_the_road():
+    turn = math.radians(60.0)
+    axes = np.array(((math.cos(turn), 0, math.sin(turn)), (0, 1, 0), (-math.sin(turn), 0, math.cos(turn))))
+    ends = rings_of(axes=axes).rings.reshape(-1, 3)
+    own = (ends - (3.0, 4.0, 5.0)) @ axes
+    elevation = np.arcsin(own[:, 2] / np.linalg.norm(own, axis=1))
+    assert np.abs(elevation[:, None] - MODELS["type1"].elevations).min(axis=1).max() < 1e-9
+    assert np.allclose(ends[:, 2], 0.0)
+    assert np.median(ends[:, 0]) > 3.0
+
+
+def test_rings_and_cone_end_at_the_borders_of_a_limited_field_of_view():
+    model = replace(MODELS["type1"], field_of_view=math.radians(90))
+    drawn = beam_rings(model, np.array((0.0, 0.0, 5.0)), np.eye(3), 0.0, 2.0)
+    across = math.degrees(model.field_of_view - model.azimuth_step) / 2
+    for ends in (drawn.rings.reshape(-1, 3), drawn.cone[:, 1]):
+        azimuth = np.degrees(np.arctan2(ends[:, 1], ends[:, 0]))
+        assert (azimuth.min(), azimuth.max()) == pytest.approx((-across, across), abs=1e-9)
+    assert np.linalg.norm(np.diff(drawn.rings, axis=1), axis=-1).max() < 2.0
+
+
+def test_a_rosette_draws_its_line_and_its_rim():
+    model, place = MODELS["mid40"], np.array((3.0, 4.0, 8.0))
+    drawn = beam_rings(model, place, np.eye(3), 0.0, 2.0, resolved=30.0)
+    ways = BeamPattern(model).directions(np.arange(model.channels))
+    meets = (ways[:, 2] < 0) & (-ways[:, 2] * model.max_range > 8.0)
+    assert len(drawn.rings) == (meets[1:] & meets[:-1]).sum()
+    assert np.allclose(drawn.rings[..., 2], 0.0)
+    ends = drawn.rings[:, 1] - place
+    off = np.linalg.norm(np.cross(ends[:50], ways[1:][meets[1:] & meets[:-1]][:50]), axis=1)
+    assert off.max() < 1e-9 * np.linalg.norm(ends[:50], axis=1).max()
+    assert (drawn.wide == (np.hypot(*ends[:, :2].T) > 30.0)).all()
+    assert drawn.cone.shape == (12, 2, 3)
+    rim = drawn.cone[:, 1] - place
+    assert np.degrees(np.arctan2(np.hypot(rim[:, 1], rim[:, 2]), rim[:, 0])) == pytest.approx([19.196] * 12, abs=1e-3)
+
+
+def test_no_ring_lies_beyond_the_range():
+    assert np.linalg.norm(rings_of().rings - (3.0, 4.0, 5.0), axis=-1).max() <= MODELS["type1"].max_range + 1e-9
+
+
+def test_a_sensor_upside_down_below_the_road_draws_on_it_from_below():
+    below = beam_rings(MODELS["type1"], np.array((0.0, 0.0, -1.0)), np.eye(3), 0.0, 2.0)
+    assert np.allclose(below.rings[..., 2], 0.0)
+
+
+def test_the_cone_shows_the_lowest_and_the_highest_channel():
+    cone = rings_of().cone
+    ways = cone[:, 1] - cone[:, 0]
+    elevation = np.degrees(np.arcsin(ways[:, 2] / np.linalg.norm(ways, axis=1)))
+    assert sorted(set(np.round(elevation, 6))) == [-15.0, 15.0]
+    assert RING_AZIMUTHS % 12 == 0

@@ -1,0 +1,94 @@
+"""The range equation: ranges of the data sheet come out again, and probabilities follow the formula."""
+
+import math
+from statistics import NormalDist
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.sensing.lidar.range_equation import RangeEquation
+
+laws = st.builds(
+    RangeEquation,
+    threshold=st.floats(-16.0, -6.0),
+    spread=st.floats(0.2, 2.0),
+    ceiling=st.floats(0.8, 1.0),
+    extinction=st.floats(0.0, 0.05),
+)
+
+
+@given(at_10=st.floats(1.0, 200.0), more=st.floats(1.3, 4.0), probability=st.floats(0.05, 0.95))
+def test_ranges_of_the_data_sheet_come_out_again(at_10, more, probability):
+    law = RangeEquation.of_ranges(at_10, at_10 * more, probability)
+    assert law.reach(0.1, probability) == pytest.approx(at_10, rel=1e-9)
+    if more <= math.sqrt(8.0):  # else the ranges contradict 1/r², and the shorter one counts
+        assert law.reach(0.8, probability) == pytest.approx(at_10 * more, rel=1e-9)
+    else:
+        assert law.extinction == 0.0
+
+
+@given(law=laws, distance=st.floats(0.1, 500.0), cos=st.floats(-1.0, 1.0), reflectivity=st.floats(0.001, 1.0))
+def test_probability_is_the_formula(law, distance, cos, reflectivity):
+    found = law.chance(np.array([distance]), np.array([abs(cos) * reflectivity]))[0]
+    power = abs(cos) * reflectivity * math.exp(-2 * law.extinction * distance) / distance**2
+    exact = 0.0 if power == 0.0 else NormalDist(law.threshold, law.spread).cdf(math.log(power)) * law.ceiling
+    assert found == pytest.approx(exact, abs=2e-7)
+
+
+@given(law=laws, reflectivity=st.floats(0.01, 1.0), height=st.floats(0.1, 20.0), share=st.floats(0.01, 0.99))
+def test_within_reach_a_surface_is_detected_and_beyond_it_is_not(law, reflectivity, height, share):
+    probability = share * law.ceiling
+    least = law.least_strength(probability)
+    facing = law.reach(reflectivity, probability) * np.array([0.999, 1.001])
+    assert (law.strength(facing, np.full(2, reflectivity)) >= least).tolist() == [True, False]
+    level = law.reach_on_level(reflectivity, probability, height) * np.array([0.999, 1.001])
+    assert (law.strength(level, reflectivity * height / level) >= least).tolist() == [True, False]
+    bound = law.farthest_on_planes(np.array([reflectivity]), np.array([height]), least)[0]
+    assert level[0] <= bound
+
+
+def test_a_miss_is_never_detected_and_no_number_is_lost_at_no_distance():
+    law = RangeEquation.of_ranges(40.0, 120.0)
+    distance, reflected = np.array([np.inf, 0.0, 0.0]), np.array([0.5, 0.5, 0.0])
+    assert law.chance(distance, reflected).tolist() == [0.0, law.ceiling, 0.0]
+
+
+@given(law=laws, distance=st.floats(1.0, 200.0))
+def test_the_mean_over_surfaces_is_the_probability(law, distance):
+    deviation = np.array([NormalDist().inv_cdf((number + 0.5) / 4000) for number in range(4000)])
+    over = law.chance(np.full(4000, distance), np.full(4000, 0.2), deviation)
+    assert over.mean() == pytest.approx(law.chance(np.array([distance]), np.array([0.2]))[0], abs=1e-3)
+
+
+def test_light_lost_in_air_shortens_the_range():
+    clear = RangeEquation.of_ranges(40.0, 110.0)
+    assert clear.in_air(0.01).reach(0.1, 0.9) < 30.0 < clear.reach(0.1, 0.9)
+    assert clear.losing(0.5).chance(np.array([1.0]), np.array([1.0]))[0] == pytest.approx(clear.ceiling / 2)
+
+
+@given(law=laws)
+def test_the_drop_off_in_its_place_is_right_at_two_ranges(law):
+    near, far = (law.reach(0.2, share * law.ceiling) for share in (0.9, 0.5))
+    exact = law.chance(np.array([near, far]), np.full(2, 0.2))
+    dropoff = law.as_dropoff()
+    if dropoff.intensity_limit < 1.0:
+        # CARLA's own intensity knows the range alone
+        assert dropoff.chance(np.array([near, far]), np.ones(2)) == pytest.approx(exact, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("at_10", "at_80"),
+    [(0.0, 9.0), (9.0, 9.0), (9.0, 4.0), (9.0, 9.1), (math.nan, 1.0), (1.0, math.inf), (1e200, 1e250), (1e-9, 1.0)],
+)
+def test_ranges_that_contradict_each_other_are_refused(at_10, at_80):
+    with pytest.raises(SeipError, match="the range at 80 % reflectivity"):
+        RangeEquation.of_ranges(at_10, at_80)
+
+
+@pytest.mark.parametrize("probability", [0.0, 0.985, 1.0, -1.0, math.nan])
+def test_a_probability_that_no_return_reaches_is_refused(probability):
+    with pytest.raises(SeipError, match=r"must lie above 0 and below 0\.985"):
+        RangeEquation.of_ranges(40.0, 120.0, probability)

@@ -1,0 +1,278 @@
+"""Runs on disk: whole frames, the same whether stopped or not, and nothing else's."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.sensing.lidar.rosette import Rosette
+from seip_addon.core.sensing.scans.frame import FILE, Frame
+from seip_addon.core.sensing.scans.run_folder import (
+    Run,
+    content_hash,
+    frame_path,
+    load_frames,
+    load_manifest,
+    write_run,
+)
+from seip_addon.core.sensing.scans.simulation import ScanSettings, prepare
+from tests.builders import npz_by_hand as npz
+from tests.builders.traffic_by_hand import box_body, ground, make_sensor, make_static, parked
+from tests.engines import ANY, needs_any
+
+pytestmark = needs_any
+
+
+def make_run(**changes) -> Run:
+    cars = parked((10.0, 2.0, 0.0, 0.3, 0.0), (-8.0, 5.0, 0.0, 1.0, 0.0))
+    run = Run(
+        static=make_static(ground()),
+        origin=np.array([5e5, 4e6, 100.0]),
+        sensors=(make_sensor(), make_sensor((15.0, 15.0, 5.0), label="S2")),
+        trajectories=cars,
+        bodies=tuple(box_body(user) for user in cars.users),
+        times=np.arange(4) / 10,
+        settings=ScanSettings(seed=3, engine=ANY),
+        versions={"seip": "0.1.0"},
+    )
+    return replace(run, **changes)
+
+
+def steps(folder, run):
+    simulation = finish(prepare(run.static, run.sensors, run.trajectories, run.bodies, run.settings))
+    return write_run(folder, run, simulation)
+
+
+def contents(folder) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+def test_a_run_says_what_it_is_made_of_and_reads_back(tmp_path) -> None:
+    record = finish(steps(tmp_path / "run", make_run()))
+    assert record == load_manifest(tmp_path / "run")
+    assert (record["complete"], record["seeds"]) == (True, {"returns": 3})
+    assert [sensor["label"] for sensor in record["sensors"]] == ["S1", "S2"]
+    assert record["origin_m"] == [5e5, 4e6, 100.0]
+    frames = dict(load_frames(tmp_path / "run"))
+    assert list(frames) == ["000000", "000001", "000002", "000003"]
+    for entry in record["frames"]:
+        frame = frames[entry["name"]]
+        assert (entry["time_s"], entry["points"], entry["road_users"]) == (frame.time, len(frame), 2)
+        assert entry["sha256"] == content_hash(frame)
+        assert set(frame.sensor.tolist()) == {0, 1}
+
+
+def test_a_rosette_is_in_the_record_by_its_prisms_and_reads_back(tmp_path) -> None:
+    prisms = Rosette((60.0, -43.0), (0.3, 0.25), 1.5)
+    run = make_run(sensors=(make_sensor(points_per_second=5e3, rosette=prisms), make_sensor(label="S2")))
+    record = finish(steps(tmp_path / "run", run))
+    assert record == load_manifest(tmp_path / "run")
+    model = record["sensors"][0]["model"]
+    assert (model["elevations"], model["azimuth_offsets"]) == ([], [])
+    figures = {name: tuple(value) if isinstance(value, list) else value for name, value in model["rosette"].items()}
+    assert Rosette(**figures) == prisms
+    assert "rosette" not in record["sensors"][1]["model"]
+    other = Rosette((60.0, -44.0), (0.3, 0.25), 1.5)
+    assert replace(run, sensors=(make_sensor(points_per_second=5e3, rosette=other), run.sensors[1])).key != run.key
+
+
+def test_the_same_run_is_the_same_bytes_stopped_or_not(tmp_path) -> None:
+    finish(steps(tmp_path / "one", make_run()))
+    stopped = steps(tmp_path / "two", make_run())
+    list(islice(stopped, 3))
+    stopped.close()
+    assert len(list((tmp_path / "two" / "frames").iterdir())) == 2
+    with pytest.raises(SeipError, match="stopped half-way"):
+        next(load_frames(tmp_path / "two"))
+    before = frame_path(tmp_path / "two", 0).stat().st_mtime_ns
+    finish(steps(tmp_path / "two", make_run()))
+    assert contents(tmp_path / "one") == contents(tmp_path / "two")
+    assert frame_path(tmp_path / "two", 0).stat().st_mtime_ns == before
+
+
+def test_a_run_that_is_stopped_leaves_whole_frames(tmp_path, monkeypatch) -> None:
+    def interrupted(file, *_, **__):
+        file.write(b"half a frame")
+        raise KeyboardInterrupt
+
+    running = steps(tmp_path, make_run())
+    list(islice(running, 2))
+    monkeypatch.setattr(np, "savez", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        finish(running)
+    (left,) = (tmp_path / "frames").iterdir()
+    assert len(Frame.load(left)) > 0
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"settings": ScanSettings(seed=4, engine=ANY)},
+        {"times": np.arange(5) / 10},
+        {"static": make_static(ground(59.0))},
+        {"static": make_static(ground(), reflectivity=0.4)},
+        {"trajectories": parked((10.0, 2.0, 0.0, 0.3, 0.0), (-8.0, 5.0, 0.0, 1.1, 0.0))},
+        {"sensors": (make_sensor(max_range=50.0), make_sensor((15.0, 15.0, 5.0), label="S2"))},
+        {"versions": {"seip": "0.2.0"}},
+    ],
+    ids=["seed", "times", "scene", "reflectivity", "traffic", "sensor", "version"],
+)
+def test_a_folder_of_other_settings_is_left_alone(tmp_path, changes) -> None:
+    finish(steps(tmp_path, make_run()))
+    before = contents(tmp_path)
+    with pytest.raises(SeipError, match="another scene, traffic or settings"):
+        finish(steps(tmp_path, make_run(**changes)))
+    assert contents(tmp_path) == before
+
+
+def test_frames_of_nobody_knows_whom_are_refused(tmp_path) -> None:
+    finish(steps(tmp_path, make_run()))
+    (tmp_path / "manifest.json").unlink()
+    with pytest.raises(SeipError, match=r"frames without a manifest\.json"):
+        finish(steps(tmp_path, make_run()))
+    with pytest.raises(SeipError, match="holds no run"):
+        load_manifest(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"schema": "seip-run/1"}', b"\xff\xfe"])
+def test_a_damaged_manifest_has_its_sentence(tmp_path, text) -> None:
+    (tmp_path / "manifest.json").write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(SeipError, match="damaged"):
+        load_manifest(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("part", "value"),
+    [
+        (("frames", 1, "name"), "../000001"),
+        (("frames", 1, "name"), "000002"),
+        (("frames", 0, "sha256"), 7),
+        (("frames",), []),
+        (("complete",), "yes"),
+        (("sensors", 0, "local_m"), [1.0, 2.0]),
+        (("sensors", 0, "local_m"), [1.0, 2.0, float("nan")]),
+        (("sensors", 0, "sensor"), None),
+        (("trajectories",), []),
+        (("key",), None),
+    ],
+)
+def test_a_manifest_that_cannot_be_is_refused(tmp_path, part, value) -> None:
+    record = finish(steps(tmp_path, make_run()))
+    inner = record
+    for step in part[:-1]:
+        inner = inner[step]
+    inner[part[-1]] = value
+    (tmp_path / "manifest.json").write_text(json.dumps(record))
+    with pytest.raises(SeipError, match="is damaged: delete the folder and simulate again"):
+        load_manifest(tmp_path)
+
+
+def test_a_frame_of_another_run_is_noticed(tmp_path) -> None:
+    finish(steps(tmp_path / "one", make_run()))
+    finish(steps(tmp_path / "two", make_run(settings=ScanSettings(seed=4, engine=ANY))))
+    frame_path(tmp_path / "two", 2).replace(frame_path(tmp_path / "one", 2))
+    with pytest.raises(SeipError, match=r"000002\.npz is a frame of another run"):
+        list(load_frames(tmp_path / "one"))
+
+
+def _wrong_labels(arrays):
+    arrays["labels.category"][0] = "tank"
+
+
+def _twice(arrays):
+    arrays["labels.user"][:] = 0
+
+
+def _foreign(arrays):
+    arrays["instance"][0] = 99
+
+
+def _uncounted(arrays):
+    arrays["sensor"][0] = 7
+
+
+def _nowhere(arrays):
+    arrays["points"][0, 0] = np.nan
+
+
+def _dazzling(arrays):
+    arrays["intensity"][0] = 1e9
+
+
+def _miscounted(arrays):
+    arrays["labels.points"][0, 0] += 1
+
+
+def _rocket(arrays):
+    arrays["labels.speed"][0] = 1e30
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (_wrong_labels, "unknown category"),
+        (_twice, "labelled twice"),
+        (_foreign, "road users without a label"),
+        (_uncounted, "sensors that the labels do not count"),
+        (_nowhere, "points has the value nan"),
+        (_dazzling, "intensity has the value"),
+        (_miscounted, "the labels count other points than there are"),
+        (_rocket, "labels.speed has the value"),
+    ],
+)
+def test_a_frame_that_contradicts_itself_is_refused(tmp_path, change, sentence) -> None:
+    finish(steps(tmp_path, make_run()))
+    path = frame_path(tmp_path, 0)
+    header, arrays = npz.contents(path)
+    change(arrays)
+    FILE.save(path, header, arrays)
+    with pytest.raises(SeipError, match=sentence):
+        Frame.load(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda record: record["frames"][1].update(points=5), "contradicts 000001.npz"),
+        (lambda record: record["frames"][1].update(time_s=0.15), "contradicts 000001.npz"),
+        (lambda record: record["frames"][1].update(time_s=-3.0), "is damaged"),
+        (lambda record: record["frames"][1].update(time_s=1e300), "is damaged"),
+        (lambda record: record["frames"][1].update(points=-1), "is damaged"),
+        (lambda record: record["frames"][1].update(road_users=99), "is damaged"),
+        (lambda record: record["sensors"].append(record["sensors"][0]), "contradicts 000000.npz"),
+        (lambda record: record["sensors"][0].update(local_m=[1e30, 0.0, 0.0]), "is damaged"),
+    ],
+)
+def test_a_manifest_that_contradicts_its_frames_is_refused(tmp_path, change, sentence) -> None:
+    finish(steps(tmp_path, make_run()))
+    record = json.loads((tmp_path / "manifest.json").read_text())
+    change(record)
+    (tmp_path / "manifest.json").write_text(json.dumps(record))
+    with pytest.raises(SeipError, match=sentence):
+        list(load_frames(tmp_path))
+
+
+def test_a_run_is_not_written_into_the_folder_of_a_placement(tmp_path) -> None:
+    (tmp_path / "placement.json").write_text("{}")
+    with pytest.raises(SeipError, match="holds a placement"):
+        finish(steps(tmp_path, make_run()))
+    assert [path.name for path in tmp_path.iterdir()] == ["placement.json"]
+
+
+def test_a_manifest_of_another_version_has_its_sentence(tmp_path) -> None:
+    (tmp_path / "manifest.json").write_text(json.dumps({"schema": "seip-run/9", "key": "", "frames": []}))
+    with pytest.raises(SeipError, match="not of this version"):
+        load_manifest(tmp_path)
+
+
+def test_a_damaged_frame_has_its_sentence(tmp_path) -> None:
+    finish(steps(tmp_path, make_run()))
+    frame_path(tmp_path, 2).write_bytes(b"PK")
+    with pytest.raises(SeipError, match=r"000002\.npz"):
+        finish(steps(tmp_path, make_run()))

@@ -1,0 +1,562 @@
+"""Scans of traffic against worked examples, and against casting every ray at everything."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields, replace
+
+from headless.studies.benchmark.scans import SLACK, combined, differing, exact_hit, full_scan, grazes, passes_an_edge
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.rosette import Rosette
+from seip_addon.core.sensing.scans.beam_culling import BeamWindows
+from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame, Labels
+from seip_addon.core.sensing.scans.motion import rotations
+from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
+from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, frame_times, prepare
+from seip_addon.core.sensing.scans.static_scene import static_scene
+from seip_addon.core.sensing.traffic.trajectories import RoadUser
+from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
+from tests.builders.small_junction import box_triangles
+from tests.builders.traffic_by_hand import (
+    box_body,
+    ground,
+    make_model,
+    make_sensor,
+    make_static,
+    make_trajectories,
+    parked,
+)
+from tests.engines import ANY, each_engine, needs_any
+from tests.oracles.float64_rays import first_hits
+from tests.oracles.random_cases import cases
+from tests.oracles.visibility_search import behind_prisms
+
+pytestmark = needs_any
+
+EXACT = ScanSettings(noise=False, engine=ANY)
+NOISY = ScanSettings(seed=5, engine=ANY)
+ONE_RAY = {"elevations": np.zeros(1), "points_per_second": 10.0}
+
+
+def simulation(static, sensors, trajectories, scan_settings=EXACT, reflectivity=0.5) -> Simulation:
+    bodies = [box_body(user, reflectivity) for user in trajectories.users]
+    return finish(prepare(static, sensors, trajectories, bodies, scan_settings))
+
+
+def same(one: Frame, other: Frame) -> bool:
+    pairs = [(getattr(one, part.name), getattr(other, part.name)) for part in fields(Frame) if part.name != "labels"]
+    pairs += [(getattr(one.labels, part.name), getattr(other.labels, part.name)) for part in fields(Labels)]
+    return all(np.array_equal(a, b) and np.asarray(a).dtype == np.asarray(b).dtype for a, b in pairs)
+
+
+@each_engine
+def test_a_box_before_the_sensor_returns_what_the_formula_says(engine) -> None:
+    sensor = make_sensor((1.0, 0.0, 1.0), **ONE_RAY)
+    frame = simulation(
+        make_static(), [sensor], parked((12.0, 0.0, 0.0, 0.0, 0.0)), replace(EXACT, engine=engine)
+    ).frame(0, 0.0)
+    np.testing.assert_allclose(frame.points, [[10.0, 0.0, 1.0]], atol=1e-6)
+    assert frame.instance.tolist() == [0]
+    assert frame.sensor.tolist() == frame.delay.tolist() == [0]
+    assert frame.intensity[0] == pytest.approx(0.5 * math.exp(-0.01 * 9.0), rel=1e-5)
+    labels = frame.labels
+    assert (labels.user.tolist(), labels.category.tolist(), labels.points.tolist()) == ([0], ["car"], [[1]])
+    np.testing.assert_allclose(labels.centre, [[12.0, 0.0, 0.75]])
+    assert labels.size.tolist() == [[4.0, 2.0, 1.5]]
+    assert (labels.visibility.tolist(), labels.speed.tolist(), labels.inside.tolist()) == ([1.0], [3.0], [True])
+
+
+def test_a_sloping_face_returns_less_by_the_cosine() -> None:
+    sensor = make_sensor((0.0, 0.0, 0.75), **ONE_RAY)
+    frame = simulation(make_static(), [sensor], parked((10.0, 0.2, 0.0, math.radians(30.0), 0.0))).frame(0, 0.0)
+    distance = float(np.linalg.norm(frame.points[0] - sensor.xyz))
+    assert frame.intensity[0] == pytest.approx(0.5 * math.cos(math.radians(30)) * math.exp(-0.01 * distance), rel=1e-5)
+
+
+def test_what_is_out_of_range_stops_rays_without_a_return() -> None:
+    sensor = make_sensor((0.0, 0.0, 0.75), **ONE_RAY, min_range=9.0, max_range=20.0)
+    wall = box_triangles((15.0, -5.0, 0.0), (16.0, 5.0, 5.0))
+    near = simulation(make_static(wall), [sensor], parked((6.0, 0.0, 0.0, 0.0, 0.0))).frame(0, 0.0)
+    assert (len(near), near.labels.visibility.tolist()) == (0, [0.0])
+    clear = simulation(make_static(wall), [sensor], parked((12.0, 0.0, 0.0, 0.0, 0.0))).frame(0, 0.0)
+    assert clear.points[0, 0] == pytest.approx(10.0)
+    beyond = simulation(make_static(), [sensor], parked((30.0, 0.0, 0.0, 0.0, 0.0))).frame(0, 0.0)
+    assert len(beyond) == 0
+
+
+def test_visibility_is_the_share_of_rays_that_get_through() -> None:
+    """One level channel, a degree from ray to ray; a wall hides all to the left of straight ahead."""
+    sensor = make_sensor((0.0, 0.0, 1.0), elevations=np.zeros(1), points_per_second=3600.0)
+    cars = parked((22.0, 0.0, 0.0, 0.0, 0.0), (-22.0, 0.0, 0.0, math.pi, 0.0), (0.0, 50.0, 0.0, 0.0, 0.0))
+    wall = box_triangles((10.0, 0.05, 0.0), (10.5, 3.0, 4.0))
+    front = math.floor(math.degrees(math.atan2(1.0, 20.0)))
+    labels = simulation(make_static(wall), [sensor], cars).frame(0, 0.0).labels
+    assert labels.points[:, 0].tolist() == [front + 1, 2 * front + 1, labels.points[2, 0]]
+    np.testing.assert_allclose(labels.visibility[:2], [(front + 1) / (2 * front + 1), 1.0])
+    assert labels.yaw.tolist() == [0.0, -math.pi, 0.0]
+    assert labels.inside.tolist() == [True, True, False]
+
+
+def test_what_no_sensor_sees_is_labelled() -> None:
+    wall = box_triangles((5.0, -20.0, 0.0), (6.0, 20.0, 10.0))
+    frame = simulation(make_static(ground(), wall), [make_sensor()], parked((20.0, 0.0, 0.0, 0.0, 0.0))).frame(0, 0.0)
+    assert (frame.labels.visibility.tolist(), frame.labels.points.tolist()) == ([0.0], [[0]])
+    assert (frame.instance == STATIC_INSTANCE).all()
+
+
+def test_a_box_on_a_slope_has_its_middle_over_its_underside() -> None:
+    labels = simulation(make_static(), [make_sensor()], parked((10.0, 0.0, 1.0, math.pi / 2, 0.1))).frame(0, 0.0).labels
+    np.testing.assert_allclose(labels.centre, [[10.0, -0.75 * math.sin(0.1), 1.0 + 0.75 * math.cos(0.1)]])
+    np.testing.assert_allclose(
+        rotations(np.array([0.3]), np.array([0.2]))[0].T @ rotations(np.array([0.3]), np.array([0.2]))[0],
+        np.eye(3),
+        atol=1e-15,
+    )
+
+
+@st.composite
+def places(draw):
+    """Draw sensors, tilted ones too, and road users among walls, some so near that they are on all sides."""
+    random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    walls = []
+    for _ in range(draw(st.integers(0, 6))):
+        x, y, wide, deep, high = random.uniform((-40, -40, 0.5, 0.5, 1), (40, 40, 12, 12, 15))
+        walls.append(box_triangles((x, y, 0.0), (x + wide, y + deep, high)))
+    poses = random.uniform(
+        (-35, -35, -0.3, -math.pi, -0.15), (35, 35, 0.3, math.pi, 0.15), (draw(st.integers(0, 12)), 5)
+    )
+    sensors = []
+    for number in range(draw(st.integers(1, 2))):
+        tilt = random.uniform(-0.4, 0.4, 2) * draw(st.booleans())
+        turned = rotations(np.array([random.uniform(-3, 3)]), tilt[:1])[0]
+        roll = np.array(
+            [[1, 0, 0], [0, math.cos(tilt[1]), -math.sin(tilt[1])], [0, math.sin(tilt[1]), math.cos(tilt[1])]]
+        )
+        model = make_model(azimuth_offsets=random.uniform(-0.1, 0.1, 7), max_range=float(random.uniform(15, 90)))
+        xyz = random.uniform((-20, -20, 1.8), (20, 20, 8))
+        sensors.append(MountedSensor(f"S{number}", model, xyz, turned @ roll))
+    return make_static(ground(), *walls), sensors, parked(*poses)
+
+
+@each_engine
+@cases(25)
+@given(place=places())
+def test_merged_returns_are_those_of_a_full_scan(engine, place) -> None:
+    static, sensors, cars = place
+    made = simulation(static, sensors, cars, replace(EXACT, engine=engine))
+    bodies = [box_body(user) for user in cars.users]
+    snapshot = cars.at(1.0)
+    surface, owner = combined(static, bodies, snapshot, engine)
+    for scanner, scan in zip(made.scanners, made.scans(snapshot), strict=True):
+        full = full_scan(scanner, surface, owner, len(cars))
+        rays = differing(scan, full)
+        same_place = np.isfinite(full.distance)
+        same_place[rays] = False
+        np.testing.assert_allclose(scan.distance[same_place], full.distance[same_place], atol=SLACK, rtol=0)
+        np.testing.assert_allclose(scan.intensity[same_place], full.intensity[same_place], atol=1e-5)
+        for ray in rays:
+            assert grazes(scanner.sensor.xyz, scanner.directions[ray], surface.caster.triangles, scan.distance[ray])
+
+
+def test_an_edge_is_found_where_it_is() -> None:
+    box = box_triangles((9.0, -1.0, -1.0), (11.0, 1.0, 1.0))
+    ahead = np.array([1.0, 0.0, 0.0])
+    assert exact_hit(np.zeros(3), rotations(np.array([0.02]), np.array([0.01]))[0][:, 0], box) == pytest.approx(
+        9.0 / math.cos(0.02) / math.cos(0.01)
+    )
+    assert exact_hit(np.zeros(3), -ahead, box) == math.inf
+    beside = np.array([9.0, 1.0, 0.3]) / np.linalg.norm([9.0, 1.0, 0.3])
+    assert passes_an_edge(np.zeros(3), beside, box)
+    assert not passes_an_edge(
+        np.zeros(3), np.array([1.0, 0.0, 0.0]) @ rotations(np.array([0.02]), np.array([0.01]))[0].T, box
+    )
+
+
+PRISMS = Rosette((121.5, -77.7), (math.radians(18), math.radians(18)), 1.51)
+ROSETTE = {"points_per_second": 20e3, "rosette": PRISMS}
+
+
+@each_engine
+def test_a_rosette_goes_on_from_frame_to_frame(engine) -> None:
+    """All about is a box, so that each ray returns: along the prisms' directions at the time of the frame."""
+    walls = box_triangles((-20.0, -20.0, -20.0), (20.0, 20.0, 20.0))
+    sensor = make_sensor((1.0, 2.0, 3.0), yaw=0.7, **ROSETTE)
+    made = simulation(make_static(walls), [sensor], parked(), replace(EXACT, engine=engine))
+    frames = [made.frame(number, number / 10) for number in range(3)]
+    for number, frame in enumerate(frames):
+        rays = behind_prisms(replace(PRISMS, begin=number / 10), 20e3, 10.0) @ sensor.orientation.T
+        assert len(frame) == 2000
+        away = frame.points - sensor.xyz
+        np.testing.assert_allclose(away / np.linalg.norm(away, axis=1)[:, None], rays, atol=1e-6)
+        assert np.abs(frame.points).max(axis=1) == pytest.approx(20.0, abs=1e-4)
+    assert not same(frames[0], replace(frames[1], time=0.0))
+
+
+def test_frames_of_a_rosette_follow_from_their_time_and_the_seed_alone() -> None:
+    sensors = [make_sensor(**ROSETTE), make_sensor((5.0, 5.0, 6.0), yaw=-2.0)]
+    static, cars = make_static(ground()), parked((12.0, 2.0, 0.0, 0.3, 0.0))
+    made, other = (simulation(static, sensors, cars, NOISY) for _ in range(2))
+    forwards = [made.frame(number, number / 10) for number in range(4)]
+    backwards = [other.frame(number, number / 10) for number in (3, 1, 0, 2)]
+    for number, frame in zip((3, 1, 0, 2), backwards, strict=True):
+        assert same(frame, forwards[number])
+    snapshots = [cars.at(number / 10) for number in range(4)]
+    scans = [made.scans(snapshot) for snapshot in snapshots]
+    assert all(same(made.measure(n, snapshots[n], scans[n]), forwards[n]) for n in range(4))
+    alone = simulation(static, sensors[1:], cars, EXACT).frame(0, 0.0)  # the other sensor's cloud is as without it
+    both = simulation(static, sensors, cars, EXACT).frame(0, 0.0)
+    assert (both.points[both.sensor == 1] == alone.points).all()
+
+
+@each_engine
+@cases(10)
+@given(place=places(), time=st.floats(0, 9))
+def test_returns_of_rosettes_are_those_of_a_full_scan(engine, place, time) -> None:
+    static, sensors, cars = place
+    sensors = [replace(sensor, model=replace(sensor.model, **ROSETTE)) for sensor in sensors]
+    made = simulation(static, sensors, cars, replace(EXACT, engine=engine))
+    snapshot = cars.at(time)
+    surface, owner = combined(static, [box_body(user) for user in cars.users], snapshot, engine)
+    for scanner, scan in zip(made.scanners, made.scans(snapshot), strict=True):
+        full = full_scan(scanner, surface, owner, len(cars))
+        rays = differing(scan, full)
+        assert len(rays) < 20
+        for ray in rays:
+            assert grazes(scanner.sensor.xyz, scanner.directions[ray], surface.caster.triangles, scan.distance[ray])
+
+
+@cases(30)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_windows_hold_every_ray_through_a_hull(seed) -> None:
+    random = np.random.default_rng(seed)
+    view = random.choice([math.tau, random.uniform(0.05, math.tau), math.radians(359)])
+    model = make_model(azimuth_offsets=random.uniform(-0.3, 0.3, 7), field_of_view=view)
+    boxes = []
+    for _ in range(4):
+        size, middle = (
+            random.uniform(0.2, 8, 3),
+            random.uniform((-20, -20, -6), (20, 20, 6)) * random.choice([0.1, 1.0]),
+        )
+        boxes.append(
+            box_triangles(tuple(middle - size / 2), tuple(middle + size / 2))
+            @ rotations(np.array([random.uniform(-3, 3)]), np.zeros(1))[0]
+        )
+    hulls = np.stack([box.reshape(-1, 3) for box in boxes])
+    hull, ray = BeamWindows(model).rays_towards(hulls)
+    sensor = MountedSensor("S", model, np.zeros(3), np.eye(3))
+    directions = simulation(make_static(), [sensor], parked()).scanners[0].directions
+    for number, box in enumerate(boxes):
+        hit = np.isfinite(first_hits(np.zeros(3), directions, box))
+        own = ray[hull == number]
+        assert len(np.unique(own)) == len(own)
+        assert set(np.flatnonzero(hit)) <= set(own)
+
+
+def test_windows_are_narrow() -> None:
+    hull = box_triangles((20.0, -1.0, -1.0), (24.0, 1.0, 1.0)).reshape(1, -1, 3)
+    _, ray = BeamWindows(make_model()).rays_towards(hull)
+    assert 0 < len(ray) < 60  # 11 of 720 azimuths, 2 or 3 of 7 channels
+
+
+def test_a_seed_gives_the_same_frames_in_any_order() -> None:
+    static, cars = make_static(ground()), parked((10.0, 2.0, 0.0, 0.3, 0.0), (-8.0, 5.0, 0.0, 1.0, 0.0))
+    sensors = [make_sensor(), make_sensor((15.0, 15.0, 5.0), label="S2")]
+    forwards = simulation(static, sensors, cars, NOISY)
+    backwards = simulation(static, sensors, cars, NOISY)
+    frames = [forwards.frame(n, n / 10) for n in range(3)]
+    again = [backwards.frame(n, n / 10) for n in (2, 0, 1)]
+    assert all(same(one, other) for one, other in zip(frames, (again[1], again[2], again[0]), strict=True))
+    assert not np.array_equal(frames[0].points, frames[1].points)
+    other = simulation(static, sensors, cars, replace(NOISY, seed=6)).frame(0, 0.0)
+    assert not np.array_equal(frames[0].points, other.points)
+
+
+def test_noise_of_what_stands_still_does_not_depend_on_the_traffic() -> None:
+    static, sensor = make_static(ground()), make_sensor()
+    cars = make_trajectories([(0.0, 10.0, 0.0, 0.0, 0.0, 0.0), (1.0, 10.0, 0.0, 0.0, 0.0, 0.0)])
+    made = simulation(static, [sensor], cars, NOISY)
+    with_car, without = made.frame(4, 0.0), made.frame(4, 5.0)
+    points = {tuple(point) for point in without.points.tolist()}
+    still = [tuple(point) for point in with_car.points[with_car.instance == STATIC_INSTANCE].tolist()]
+    assert 0 < len(still) < len(points)
+    assert set(still) <= points
+
+
+def test_without_noise_foreground_is_what_traffic_returns() -> None:
+    cars = parked((10.0, 0.0, 0.0, 0.0, 0.0), (-7.0, 12.0, 0.0, 1.0, 0.0))
+    frame = simulation(make_static(ground()), [make_sensor(), make_sensor((8.0, 9.0, 5.0))], cars).frame(0, 0.0)
+    on_cars = frame.instance != STATIC_INSTANCE
+    assert on_cars.sum() > 50
+    assert not frame.foreground[~on_cars].any()
+    lowest = frame.points[on_cars & ~frame.foreground, 2]  # where a tyre stands, the road is no farther
+    assert len(lowest) < 0.05 * on_cars.sum()
+    assert (lowest < 0.2).all()
+
+
+def test_noise_hardly_makes_foreground_of_the_background() -> None:
+    sensor = make_sensor(range_noise_std=0.1, law=CarlaDropoff(general=0.1))
+    frame = simulation(make_static(ground()), [sensor], parked(), NOISY).frame(0, 0.0)
+    assert len(frame) > 1000
+    assert frame.foreground.mean() < 0.003  # Φ(−3) is 0.0013
+
+
+def test_before_the_sky_all_is_foreground() -> None:
+    sensor = make_sensor((0.0, 0.0, 1.0), **ONE_RAY)
+    stands = [(time, 10.0, 0.0, 0.0, 0.0, 0.0) for time in (0.0, 10.0)]
+    wall = make_trajectories(stands, users=[RoadUser("truck", "truck", 8.0, 40.0, 4.0)])
+    frame = simulation(make_static(ground()), [sensor], wall).frame(0, 0.0)
+    assert len(frame) > 0
+    assert frame.foreground.all()
+
+
+def share_in(points: np.ndarray, others: np.ndarray) -> float:
+    """Which share of points is, bit for bit, among others."""
+    known = {tuple(point) for point in others.tolist()}
+    return sum(tuple(point) in known for point in points.tolist()) / len(points)
+
+
+def test_runs_of_traffic_have_independent_noise() -> None:
+    static, sensor = make_static(ground()), make_sensor()
+    one, other = (
+        simulation(static, [sensor], parked((10.0, y, 0.0, 0.0, 0.0)), NOISY).frame(4, 0.0) for y in (0.0, 1e-3)
+    )
+    still, elsewhere = (frame.points[frame.instance == STATIC_INSTANCE] for frame in (one, other))
+    assert len(still) > 1000
+    assert share_in(still, elsewhere) < 0.01
+
+
+def test_the_name_of_a_run_changes_no_noise() -> None:
+    static, cars = make_static(ground()), parked((10.0, 0.0, 0.0, 0.0, 0.0))
+    renamed = replace(cars, source="elsewhere", users=tuple(replace(user, name="other") for user in cars.users))
+    one, other = (simulation(static, [make_sensor()], motion, NOISY).frame(4, 0.0) for motion in (cars, renamed))
+    assert same(one, other)
+
+
+def test_sensors_have_independent_noise() -> None:
+    """Two of one model at one place: every return of one is measured anew by the other."""
+    sensors = [make_sensor(), make_sensor(label="S2")]
+    frame = simulation(make_static(ground()), sensors, parked((10.0, 0.0, 0.0, 0.0, 0.0)), NOISY).frame(4, 0.0)
+    one, other = (frame.points[frame.sensor == number] for number in (0, 1))
+    assert len(one) > 1000
+    assert share_in(one, other) < 0.01
+
+
+def test_noise_is_that_of_the_model() -> None:
+    static, sensor = (
+        make_static(ground()),
+        make_sensor(range_noise_std=0.05, law=CarlaDropoff(general=0.5, zero_intensity=0.0)),
+    )
+    exact = simulation(static, [sensor], parked()).frame(0, 0.0)
+    noisy = simulation(static, [sensor], parked(), NOISY).frame(0, 0.0)
+    assert len(noisy) / len(exact) == pytest.approx(0.5, abs=0.03)
+    assert not exact.delay.any()
+    rise = (exact.points[:, 2] - 4.0) / np.linalg.norm(exact.points - sensor.xyz, axis=1)
+    assert noisy.points[:, 2].std() == pytest.approx(0.05 * math.sqrt((rise**2).mean()), rel=0.1)
+
+
+WAYS = {
+    "straight": [(0.0, -7.0, 6.0, 0.0, 0.0, 0.0), (1.0, 23.0, 6.0, 0.0, 0.0, 0.0)],
+    "a turn": [(0.0, 6.0, -6.0, 0.0, 0.0, 0.0), (0.05, 7.0, -5.0, 0.0, 0.9, 0.05), (0.3, 6.0, 6.0, 0.3, 2.4, -0.05)],
+    "round the sensor": [(0.0, 5.0, 0.0, 0.0, 1.6, 0.0), (0.1, -5.0, 0.5, 0.0, 4.6, 0.0)],
+}
+
+
+@each_engine
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("figures", [{}, {"clockwise": True}, {"field_of_view": math.radians(300)}])
+def test_with_a_rolling_shutter_each_ray_meets_what_is_there_at_its_own_time(engine, way, figures) -> None:
+    yaw = 2.6 if way == "round the sensor" and figures.keys() == {"field_of_view"} else 0.0  # begin where the car does
+    cars, sensor = make_trajectories(WAYS[way]), make_sensor(yaw=yaw, **figures)
+    made = simulation(make_static(), [sensor], cars, ScanSettings(noise=False, rolling_shutter=True, engine=engine))
+    (scan,) = made.scans(cars.at(0.0))
+    (scanner,) = made.scanners
+    body = box_body(cars.users[0]).triangles
+    expected = np.full(len(scan.distance), np.inf)
+    for step in range(0, 720, 3):
+        turn = (720 - step) % 720 if sensor.model.clockwise else step
+        then = cars.at(min(turn / 7200, WAYS[way][-1][0]))
+        turned = rotations(then.yaw, then.pitch)[0]
+        rays = np.arange(7) * 720 + step
+        expected[rays] = first_hits(sensor.xyz, scanner.directions[rays], then.position + body @ turned.T)
+    looked = np.flatnonzero(np.arange(len(expected)) % 720 % 3 == 0)
+    assert np.isfinite(expected[looked]).sum() > 10
+    different = np.isfinite(expected[looked]) != np.isfinite(scan.distance[looked])
+    assert different.sum() <= 1
+    both = looked[np.isfinite(expected[looked]) & np.isfinite(scan.distance[looked])]
+    np.testing.assert_allclose(scan.distance[both], expected[both], atol=1e-4)
+
+
+def test_with_a_rolling_shutter_each_ray_of_a_rosette_meets_what_is_there_at_its_own_time() -> None:
+    way = [(0.0, 12.0, -1.0, 0.0, 0.3, 0.0), (0.35, 12.0, 2.0, 0.0, 1.3, 0.0)]
+    cars, sensor = make_trajectories(way), make_sensor((0.0, 0.0, 1.0), **ROSETTE)
+    made = simulation(make_static(), [sensor], cars, replace(EXACT, rolling_shutter=True))
+    frame = made.frame(2, 0.2)
+    assert len(frame) > 50
+    rays = behind_prisms(replace(PRISMS, begin=0.2), 20e3, 10.0)
+    number = np.rint(frame.delay * 20e3).astype(int)
+    np.testing.assert_allclose(frame.delay, number / 20e3, atol=1e-9)
+    body = box_body(cars.users[0]).triangles
+    distance = np.array(
+        [
+            first_hits(sensor.xyz, rays[[ray]], then.position + body @ rotations(then.yaw, then.pitch)[0].T)[0]
+            for ray in range(2000)
+            for then in [cars.at(0.2 + ray / 20e3)]
+        ]
+    )
+    assert len(set(np.flatnonzero(np.isfinite(distance))) ^ set(number)) <= 2  # rays along an edge
+    met = np.isfinite(distance[number])
+    expected = sensor.xyz + distance[number[met], None] * rays[number[met]]
+    np.testing.assert_allclose(frame.points[met], expected, atol=1e-3)
+
+
+@pytest.mark.parametrize(("degrees", "steps"), [(360.0, [0, 4, 3, 2, 1]), (120.0, [4, 3, 2, 1, 0])])
+def test_a_clockwise_sensor_looks_the_other_way_round_at_the_same_directions(degrees, steps) -> None:
+    figures = {"elevations": np.zeros(1), "points_per_second": 50.0, "field_of_view": math.radians(degrees)}
+    sensors = [make_sensor(**figures), make_sensor(**figures, clockwise=True)]
+    one, other = simulation(make_static(), sensors, parked()).scanners
+    assert one.delay == pytest.approx(np.arange(5) / 50)
+    assert other.delay == pytest.approx(np.array(steps) / 50)
+    assert one.directions.tobytes() == other.directions.tobytes()
+
+
+def test_a_rolling_shutter_moves_a_face_by_speed_times_delay() -> None:
+    """A car of 30 m/s drives away along +y; a sensor that starts along +x meets its back a quarter turn later."""
+    car = make_trajectories([(0.0, 0.0, 20.0, 0.0, math.pi / 2, 0.0), (1.0, 0.0, 50.0, 0.0, math.pi / 2, 0.0)])
+    sensor = make_sensor((0.0, 0.0, 0.75), elevations=np.zeros(1), points_per_second=36000.0)
+    rolling = simulation(make_static(), [sensor], car, replace(EXACT, rolling_shutter=True)).frame(0, 0.0)
+    still = simulation(make_static(), [sensor], car).frame(0, 0.0)
+    assert not still.delay.any()
+    np.testing.assert_allclose(still.points[:, 1], 18.0, atol=1e-5)
+    np.testing.assert_allclose(rolling.points[:, 1], 18.0 + 30.0 * rolling.delay, atol=2e-5)
+    np.testing.assert_allclose(rolling.delay, 0.025, atol=0.001)
+    assert still.labels.centre[0, 1] == 20.0
+    assert rolling.labels.centre[0, 1] == pytest.approx(20.0 + 30.0 * rolling.delay.mean(), abs=1e-5)  # box and points
+
+
+def outside(frame, margin):
+    """Return which returns of the one road user lie outside its box by more than a margin."""
+    labels = frame.labels
+    turned = rotations(labels.yaw, labels.pitch)[0]
+    own = np.abs((frame.points[frame.instance == 0] - labels.centre[0]) @ turned)
+    return (own > labels.size[0] / 2 + margin).any(axis=1)
+
+
+@pytest.mark.parametrize("key", ["type1", "vlp32c"])
+def test_a_truck_at_14_metres_a_second_stays_in_its_box(key) -> None:
+    """At 5 Hz it drives 2.8 m in a revolution; of all that returns from it 99 % lie in its box, but for the noise."""
+    model = load_catalogue()[key]
+    truck = RoadUser("truck", "truck", 9.6, 2.55, 3.75)
+    way = [(0.0, -60.0, 12.0, 0.0, 0.0, 0.0), (10.0, 80.0, 12.0, 0.0, 0.0, 0.0)]
+    trajectories = make_trajectories(way, users=[truck])
+    made = simulation(
+        make_static(ground()), [MountedSensor("S1", model, np.array([0.0, 0.0, 5.4]), np.eye(3))], trajectories,
+        ScanSettings(rolling_shutter=True),
+    )  # fmt: skip
+    seen = [
+        outside(made.frame(number, time), 3 * model.range_noise_std) for number, time in enumerate(np.arange(1, 9, 0.7))
+    ]
+    assert sum(map(len, seen)) > 1000
+    assert np.concatenate(seen).mean() < 0.01
+
+
+def test_the_box_of_one_that_nobody_sees_is_that_of_mid_revolution() -> None:
+    way = [(0.0, 500.0, 0.0, 0.0, 0.0, 0.0), (1.0, 510.0, 0.0, 0.0, 0.4, 0.0)]
+    made = simulation(
+        make_static(ground()), [make_sensor()], make_trajectories(way), replace(EXACT, rolling_shutter=True)
+    )
+    frame = made.frame(0, 0.3)
+    assert not frame.labels.points.any()
+    halfway = make_trajectories(way).at(0.3 + 0.05)
+    np.testing.assert_allclose(frame.labels.centre[0, :2], halfway.position[0, :2], atol=1e-9)
+    np.testing.assert_allclose(frame.labels.yaw, halfway.yaw, atol=1e-9)
+
+
+def test_a_rolling_shutter_changes_nothing_where_nothing_moves() -> None:
+    static, cars = make_static(ground()), parked((10.0, 2.0, 0.0, 0.3, 0.0))
+    still = simulation(static, [make_sensor()], cars, NOISY).frame(0, 1.0)
+    rolling = simulation(static, [make_sensor()], cars, replace(NOISY, rolling_shutter=True)).frame(0, 1.0)
+    assert rolling.delay.any()
+    assert same(still, replace(rolling, delay=still.delay))
+
+
+def test_one_that_stood_and_drives_on_is_seen_where_it_is() -> None:
+    way = [(0.0, 10.0, 0.0, 0.0, 0.0, 0.0), (1.0, 10.0, 0.0, 0.0, 0.0, 0.0), (2.0, 20.0, 3.0, 0.0, 0.5, 0.0)]
+    cars = make_trajectories(way, [(0.5, -10.0, 0.0, 0.0, 0.0, 0.0), (5.0, -10.0, 0.0, 0.0, 0.0, 0.0)])
+    made = simulation(make_static(ground()), [make_sensor()], cars, NOISY)
+    for number, time in enumerate((0.0, 0.5, 1.0, 1.5, 2.0, 0.2)):
+        fresh = simulation(make_static(ground()), [make_sensor()], cars, NOISY)
+        assert same(made.frame(number, time), fresh.frame(number, time))
+
+
+def test_nobody_on_the_road_is_a_frame_with_empty_labels() -> None:
+    cars = make_trajectories([(0.0, 10.0, 0.0, 0.0, 0.0, 0.0), (1.0, 10.0, 0.0, 0.0, 0.0, 0.0)])
+    frame = simulation(make_static(ground()), [make_sensor()], cars).frame(0, 3.0)
+    labels = frame.labels
+    assert len(frame) > 0
+    assert len(labels) == 0
+    assert labels.centre.shape == labels.size.shape == (0, 3)
+    assert labels.points.shape == (0, 1)
+
+
+def test_a_sensor_that_sees_nothing_gives_an_empty_cloud_and_a_warning(tmp_path) -> None:
+    made = simulation(make_static(), [make_sensor()], parked((300.0, 0.0, 0.0, 0.0, 0.0)))
+    assert "S1 sees nothing" in made.warnings[0]
+    frame = made.frame(0, 0.0)
+    frame.save(tmp_path / "frame.npz")
+    assert len(Frame.load(tmp_path / "frame.npz")) == 0
+    assert not simulation(make_static(ground()), [make_sensor()], parked()).warnings
+
+
+def test_no_sensor_and_a_bad_seed_have_their_sentences() -> None:
+    with pytest.raises(SeipError, match="no sensor"):
+        simulation(make_static(), [], parked())
+    with pytest.raises(SeipError, match="seed"):
+        simulation(make_static(), [make_sensor()], parked(), ScanSettings(seed=-1, engine=ANY))
+    with pytest.raises(SeipError, match="'S1'"):
+        MountedSensor("S1", make_model(), np.zeros(3), np.diag([1.0, 1.0, -1.0]))
+
+
+def test_times_are_those_of_the_slowest_sensor() -> None:
+    cars = parked((0.0, 0.0, 0.0, 0.0, 0.0))
+    sensors = [make_sensor(), make_sensor(label="S2", rotation_rate=5.0)]
+    np.testing.assert_allclose(frame_times(cars, sensors), np.arange(51) / 5)
+    np.testing.assert_allclose(frame_times(cars, sensors[:1], start=2.3, duration=0.3), [2.3, 2.4, 2.5, 2.6])
+    np.testing.assert_allclose(frame_times(cars, sensors, start=9.0, rate=1.0), [9.0, 10.0])
+    with pytest.raises(SeipError, match="S2 turns 5 times"):
+        frame_times(cars, sensors, rate=10.0)
+    for wrong in ({"start": -1.0}, {"start": 11.0}, {"start": 5.0, "duration": 6.0}, {"duration": -1.0}):
+        with pytest.raises(SeipError, match="known from 0 s to 10 s"):
+            frame_times(cars, sensors, **wrong)
+
+
+def test_a_static_scene_does_not_depend_on_the_order_of_objects() -> None:
+    shiny = Mesh("a", box_triangles((0, 0, 0), (1, 1, 1)), np.full(12, 0.9))
+    plain = Mesh("b", box_triangles((3, 0, 0), (4, 1, 1)))
+    scenes = []
+    for occluders in ((shiny, plain), (plain, shiny)):
+        geometry = SceneGeometry("x", np.zeros(3), (Mesh("road", ground()),), (), occluders, make_static().region)
+        scenes.append(static_scene(geometry))
+    np.testing.assert_array_equal(scenes[0].triangles, scenes[1].triangles)
+    np.testing.assert_array_equal(scenes[0].reflectivity, scenes[1].reflectivity)
+    assert sorted(scenes[0].reflectivity.tolist()) == [0.3] * 14 + [0.9] * 12
+    assert (scenes[0].reflectivity == 0.9).sum() == 12
+    assert level_orientation(math.pi / 2) @ [1, 0, 0] == pytest.approx([0, 1, 0])
+
+
+def test_bodies_that_share_triangles_share_a_tree_and_keep_their_paint() -> None:
+    cars = parked((10.0, 0.0, 0.0, 0.0, 0.0), (-10.0, 0.0, 0.0, math.pi, 0.0))
+    body = box_body(RoadUser("x", "car", 4.0, 2.0, 1.5))
+    bright = replace(body, reflectivity=np.full(12, 1.0))
+    sensor = make_sensor((0.0, 0.0, 0.75), elevations=np.zeros(1), points_per_second=20.0)
+    frame = finish(prepare(make_static(), [sensor], cars, [body, bright], EXACT)).frame(0, 0.0)
+    assert frame.instance.tolist() == [0, 1]
+    assert frame.intensity[1] == pytest.approx(2 * frame.intensity[0])

@@ -1,0 +1,238 @@
+"""Floating car data and vehicle types, by hand."""
+
+import gzip
+import math
+import tracemalloc
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.sensing.traffic.floating_car_data import (
+    Extent,
+    listed,
+    read_floating_car_data,
+    read_trajectories,
+    unwrapped,
+)
+from seip_addon.core.sensing.traffic.sumo_files import read_net_offset
+from seip_addon.core.sensing.traffic.vehicle_types import BUILT_IN, CAR, VehicleType, read_vehicle_types
+from tests.builders.sumo_text import CONVERTED_CSV, FCD, NATIVE_CSV, NET, ROUTES
+
+
+def written(folder, name, text):
+    path = folder / name
+    path.write_bytes(gzip.compress(text.encode()) if name.endswith(".gz") else text.encode())
+    return path
+
+
+def read(path, **more):
+    return finish(read_floating_car_data(path, **more))
+
+
+def one(row, times=(0.0, 0.1)):
+    steps = "".join(f'<timestep time="{time}">{row}</timestep>' for time in times)
+    return f"<fcd-export>{steps}</fcd-export>"
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("f.xml", FCD),
+        ("f.fcd.xml.gz", FCD),
+        ("f", FCD),
+        ("f.csv", NATIVE_CSV),
+        ("f.csv.gz", NATIVE_CSV),
+        ("g.csv", CONVERTED_CSV),
+    ],
+)
+def test_every_form_says_the_same(tmp_path, name, text):
+    data = read(written(tmp_path, name, text), net_offset=np.array([10.0, 20.0]))
+    assert data.names == ("a", "w", "b")
+    assert data.types == ("long", "DEFAULT_PEDTYPE", "unheard")
+    assert data.person.tolist() == [False, True, False]
+    assert data.first.tolist() == [0, 2, 3, 5]
+    assert data.time.tolist() == [0.0, 0.2, 0.0, 0.2, 0.4]
+    np.testing.assert_array_equal(data.position[:, :2], [[100, 30], [102, 30], [10, 10], [0, 0], [0, 1]])
+    np.testing.assert_array_equal(data.position[:, 2], [1.5, 1.5, np.nan, 0, 0])
+    np.testing.assert_allclose(np.degrees(data.yaw), [0, 0, 90, -260, -280], atol=1e-12)
+    assert data.speed.tolist() == [10, 10, 1.3, 5, 5]
+
+
+def test_the_middle_is_half_a_length_behind_the_bumper(tmp_path):
+    data = read(written(tmp_path, "f.xml", FCD))
+    types = finish(read_vehicle_types([written(tmp_path, "r.xml", ROUTES)]))
+    got, warnings = read_trajectories(data, types, np.array([1.0, 2.0, 0.5]), "by hand")
+    bus, walker, unknown = got.users
+    assert (bus.category, bus.length, bus.width, bus.height) == ("bus", 10.0, 2.5, 3.0)
+    assert walker.category == "pedestrian"
+    assert (unknown.category, unknown.length) == ("car", 5.0)
+    np.testing.assert_allclose(got.position[0], [110 - 5 - 1, 50 - 2, 1.0])
+    np.testing.assert_allclose(got.position[2, :2], [19, 28])  # a walker's position is the middle
+    angle = math.radians(100.0)  # b: 350 degrees clockwise from north
+    np.testing.assert_allclose(got.position[3, :2], [10 - 2.5 * math.cos(angle) - 1, 20 - 2.5 * math.sin(angle) - 2])
+    (sentence,) = warnings
+    assert sentence.startswith("missing sizes: 1 of 3 road users is of no known vehicle type (b) and gets ")
+    assert "5 × 1.8 × 1.5 m" in sentence
+
+
+def test_paint_goes_by_the_name_alone(tmp_path):
+    data = read(written(tmp_path, "f.xml", FCD))
+    paints = [read_trajectories(data, BUILT_IN, np.zeros(3), source)[0].users[0].paint for source in ("x", "y")]
+    assert paints[0] == paints[1]
+    assert 0.1 <= paints[0] <= 0.8
+
+
+def test_types_fall_back_to_what_sumo_assumes(tmp_path):
+    types = finish(read_vehicle_types([written(tmp_path, "r.xml.gz", ROUTES)]))
+    assert types["default_truck"] == VehicleType("truck", 7.1, 2.4, 2.4)
+    assert types["van_by_shape"] == VehicleType("van", 6.0, 1.8, 1.5)
+    assert types["plain"] == CAR == types["DEFAULT_VEHTYPE"]
+    assert types["DEFAULT_BIKETYPE"].category == "bicycle"
+
+
+def test_only_the_window_is_kept(tmp_path):
+    path = written(tmp_path, "f.xml", FCD)
+    data = read(path, window=Extent(begin=0.1, bounds=(0.0, 0.0, 50.0, 50.0)))
+    assert data.names == ("b",)
+    assert data.elsewhere == 1  # a, at 112 m; the walker was there before
+    assert data.time.tolist() == [0.2, 0.4]
+
+
+def test_a_vehicle_and_a_person_may_share_an_id(tmp_path):
+    both = '<vehicle id="0" x="0" y="0" angle="0" lane="e_0"/><person id="0" x="1" y="1" angle="0" edge="e"/>'
+    data = read(written(tmp_path, "f.xml", one(both)))
+    assert data.names == ("0", "person 0")
+    assert data.person.tolist() == [False, True]
+
+
+def test_the_offset_of_a_network(tmp_path):
+    np.testing.assert_array_equal(read_net_offset(written(tmp_path, "n.net.xml", NET)), [270.79, -200.32])
+
+
+ROW = '<vehicle id="a" x="1" y="2" angle="0"/>'
+BOMB = '<!DOCTYPE f [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><fcd-export><timestep time="0"/>&b;</fcd-export>'
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "complaint"),
+    [
+        ("f.xml", one(ROW, (0.2, 0.1)), "times run backwards, 0.1 s comes after 0.2 s"),
+        ("f.csv", "timestep_time;vehicle_id\n3;\n1;\n", "times run backwards, 1 s comes after 3 s"),
+        ("f.xml", one(ROW, (0.2, 0.2)), "'a' is there twice at 0.2 s"),
+        ("f.xml", one(ROW.replace('x="1"', 'x="nan"')), "x='nan' of 'a' at 0 s is no number"),
+        ("f.xml", one(ROW.replace('angle="0"', "")), "angle='' of 'a' at 0 s is no number"),
+        ("f.xml", one(ROW, ("soon",)), "time='soon' of 'a time step' is no number"),
+        ("f.xml", "<routes/>", "no floating car data"),
+        ("f.xml", FCD[:-30], "unfinished XML"),
+        ("f.xml", "hello", "broken or unfinished XML"),
+        ("f.xml", BOMB, "declares a document type"),
+        ("f.csv", "a;b\n1;2\n", "no column timestep_time"),
+        ("f.csv", "", "no column timestep_time"),
+        ("f.csv", NATIVE_CSV[:-20], "line 6 has 6 cells under 10 columns"),
+        ("f.csv", NATIVE_CSV.replace("0.20;a", '0.20;"a'), "line 6 has 2 cells under 10 columns"),
+        ("f.csv", NATIVE_CSV.replace("0.20;a", "0.20;" + 50_000 * "a").replace("112.0", "x"), "aaa…' at 0.2 s is no"),
+        ("f.xml", one(ROW.replace('x="1"', f'x="{50_000 * "1"}x"')), "111…' of 'a' at 0 s is no number"),
+        ("f.xml", one(ROW.replace('x="1"', 'x="1e300"')), "x='1e300' of 'a' at 0 s is beyond 1e+08"),
+        ("f.xml", one(ROW, ("1e300",)), "time='1e300' of 'a time step' is beyond"),
+        ("f.xml", FCD.replace("UTF-8", "klingon"), "encoding that cannot be read"),
+        ("f.xml", FCD.replace("UTF-8", "utf-7"), "encoding that cannot be read"),
+    ],
+)
+def test_a_wrong_file_gets_one_sentence(tmp_path, name, text, complaint):
+    with pytest.raises(SeipError) as caught:
+        read(written(tmp_path, name, text))
+    assert complaint in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 300
+    assert name in str(caught.value)
+
+
+def test_blank_lines_of_a_table_say_nothing(tmp_path):
+    blank = read(written(tmp_path, "f.csv", NATIVE_CSV.replace("\n0.20", "\n\n0.20") + "\n\n"))
+    np.testing.assert_array_equal(blank.time, read(written(tmp_path, "g.csv", NATIVE_CSV)).time)
+
+
+def test_a_long_name_is_cut_in_sentences(tmp_path):
+    path = written(tmp_path, "r.xml", f'<routes><vType id="{50_000 * "t"}" length="0"/></routes>')
+    with pytest.raises(SeipError, match="is no size") as caught:
+        finish(read_vehicle_types([path]))
+    assert len(str(caught.value)) < 300
+    assert len(listed([50_000 * "a"])) < 100
+
+
+def test_damaged_or_missing_files_get_one_sentence(tmp_path):
+    whole = gzip.compress(FCD.encode())
+    (tmp_path / "f.xml.gz").write_bytes(whole[:-20])
+    with pytest.raises(SeipError, match="damaged gzip"):
+        read(tmp_path / "f.xml.gz")
+    with pytest.raises(SeipError, match="no such file"):
+        read(tmp_path / "none.xml")
+    with pytest.raises(SeipError, match="cannot read"):
+        read(tmp_path)
+    (tmp_path / "f.csv").write_bytes(b"timestep_time;vehicle_id\n\xff\xff;a\n")
+    with pytest.raises(SeipError, match="no csv table"):
+        read(tmp_path / "f.csv")
+
+
+@pytest.mark.parametrize("size", ["0", "-1", "long", "nan", "1e9"])
+def test_a_senseless_size_is_refused(tmp_path, size):
+    path = written(tmp_path, "r.xml", f'<routes><vType id="t" length="{size}"/></routes>')
+    with pytest.raises(SeipError, match="of vType 't' is no size"):
+        finish(read_vehicle_types([path]))
+
+
+@pytest.mark.parametrize("offset", [None, "nan,0", "5,nan", "here", "1e300,0"])
+def test_a_network_without_offset_is_refused(tmp_path, offset):
+    text = "<net/>" if offset is None else f'<net><location netOffset="{offset}"/></net>'
+    with pytest.raises(SeipError, match="netOffset"):
+        read_net_offset(written(tmp_path, "n.xml", text))
+
+
+def test_nobody_near_the_scene_is_refused(tmp_path):
+    data = read(written(tmp_path, "f.xml", FCD), window=Extent(bounds=(1e6, 1e6, 2e6, 2e6)))
+    with pytest.raises(SeipError, match=r"FCD of another map.* none of the 3 road users in f comes near"):
+        read_trajectories(data, BUILT_IN, np.zeros(3), "f")
+
+
+@pytest.mark.slow
+def test_what_lies_elsewhere_takes_no_memory(tmp_path):
+    """Four times as long a file takes hardly more memory: two road users' samples, where 200 would be kept.
+
+    Both files are longer than it takes the XML parser's own buffer to reach its full size.
+    """
+    row = "".join(f'<vehicle id="v{i}" x="{i}" y="0" angle="0" type="t" lane="e_0" speed="1"/>' for i in range(200))
+    path = tmp_path / "f.xml"
+    sizes, peaks = [], []
+    for steps in (200, 800):
+        with path.open("w") as file:
+            file.write("<fcd-export>")
+            file.writelines(f'<timestep time="{number}">{row}</timestep>' for number in range(steps))
+            file.write("</fcd-export>")
+        tracemalloc.start()
+        data = read(path, window=Extent(bounds=(-1, -1, 1.5, 1)))
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        sizes.append(path.stat().st_size)
+        assert data.names == ("v0", "v1")
+        assert data.elsewhere == 198
+    assert peaks[1] - peaks[0] < 0.05 * (sizes[1] - sizes[0])
+
+
+angles = st.lists(st.lists(st.floats(-20.0, 20.0), min_size=1, max_size=8), min_size=1, max_size=5)
+
+
+@given(angles)
+def test_unwrapping_adds_whole_turns_and_leaves_no_jump(users):
+    yaw = np.concatenate(users)
+    first = np.concatenate([[0], np.cumsum([len(user) for user in users])])
+    smooth = unwrapped(yaw, first)
+    turns = (smooth - yaw) / (2.0 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-9)
+    np.testing.assert_array_equal(smooth[first[:-1]], yaw[first[:-1]])
+    for begin, end in pairwise(first):
+        assert (np.abs(np.diff(smooth[begin:end])) <= np.pi + 1e-9).all()

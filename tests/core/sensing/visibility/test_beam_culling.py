@@ -1,0 +1,228 @@
+"""No ray that can return from near a target is culled, and few that cannot are kept."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.sensing.lidar.beams import beam_directions
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.visibility.beam_culling import (
+    Beams,
+    NearRays,
+    Patches,
+    disc_patches,
+    near_rays,
+    target_patches,
+)
+from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+
+
+def random_model(random: np.random.Generator, field_of_view: float = math.tau) -> LidarModel:
+    channels = int(random.integers(1, 12))
+    return LidarModel(
+        key="random",
+        name="Random",
+        manufacturer="Test",
+        source="Test",
+        elevations=random.uniform(-1.5, 1.5, channels),
+        min_range=0.0,
+        max_range=60.0,
+        points_per_second=10.0 * channels * int(random.integers(1, 150)),
+        rotation_rate=10.0,
+        price_range=(1.0, 2.0),
+        azimuth_offsets=random.uniform(-7, 7, channels),
+        field_of_view=field_of_view,
+    )
+
+
+def hits(origin: np.ndarray, directions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Where each ray meets each triangle, (rays, triangles, 3); NaN where it does not."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    normal = np.cross(b - a, c - a)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = ((a - origin) * normal).sum(axis=1) / (directions @ normal.T)
+        point = origin + along[..., None] * directions[:, None]
+        inside = along > 0
+        for one, other in ((a, b), (b, c), (c, a)):
+            inside &= (np.cross(other - one, point - one) * normal).sum(axis=2) >= 0
+    return np.where(inside[..., None], point, np.nan)
+
+
+def rays_by_target(near: NearRays, model: LidarModel, targets: int) -> np.ndarray:
+    marked = np.zeros((targets, model.channels, model.azimuth_count), dtype=bool)
+    for target, channel, first, width in zip(near.target, near.channel, near.first, near.width, strict=True):
+        assert model.all_round or 0 <= first < first + width <= model.azimuth_count
+        marked[target, channel, np.arange(first, first + width) % model.azimuth_count] = True
+    return marked.reshape(targets, -1)
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.05, 1.0, 4.0]))
+def test_every_ray_that_returns_from_near_a_target_is_kept(seed: int, delta: float) -> None:
+    random = np.random.default_rng(seed)
+    view = random.choice([math.tau, random.uniform(0.02, math.tau), math.radians(359)])
+    model, yaw = random_model(random, view), random.uniform(-7, 7)
+    origin = random.normal(0, 2, 3)
+    level = random.random() < 0.5  # road-like, or a soup
+    triangles = random.uniform(-20, 20, (40, 1, 3)) + random.normal(0, 4, (40, 3, 3)) * (1, 1, 0.05 if level else 1)
+    inside = random.dirichlet([1, 1, 1], 30)
+    targets = (triangles[random.integers(0, 40, 30)] * inside[:, :, None]).sum(axis=1)
+    targets += random.normal(0, 0.3 * delta, (30, 3))
+    targets[0] = origin + random.normal(0, 0.3 * delta, 3)  # δ about it may hold the sensor
+    surfaces = near_surfaces(triangles, targets, delta)
+    beams = Beams.of([model], yaw, VisibilitySettings(delta))
+    coarse = near_rays(beams, target_patches(origin, surfaces, all_of(surfaces)))
+    patches, planes = disc_patches(origin, surfaces, np.ones(30, dtype=bool))
+    fine = near_rays(beams, patches, planes)
+
+    points = hits(origin, beam_directions(model, yaw).reshape(-1, 3), triangles)
+    distance = np.linalg.norm(points[None] - targets[:, None, None], axis=3)
+    returns = (distance < delta).any(axis=2)
+    for near in (coarse, fine):
+        assert rays_by_target(near, model, 30)[returns].all()
+    within_range = np.linalg.norm(targets - origin, axis=1) < 60 - delta
+    likeliest = near_rays(beams, target_patches(origin, surfaces, all_of(surfaces))).likeliest(beams.sensor)
+    assert set(np.flatnonzero(returns.any(axis=1) & within_range)) <= set(likeliest.target.tolist())
+    assert len(np.unique(likeliest.target)) == len(likeliest.target)
+
+
+def all_of(surfaces):
+    return np.ones(len(surfaces.xyz), dtype=bool)
+
+
+def road(half: float) -> np.ndarray:
+    corners = np.array([[-half, -half, 0.0], [half, -half, 0], [half, half, 0], [-half, half, 0]])
+    return corners[[[0, 1, 2], [0, 2, 3]]]
+
+
+def test_hardly_a_ray_is_kept_that_passes_over_its_target() -> None:
+    random = np.random.default_rng(4)
+    targets = np.column_stack([random.uniform(-60, 60, (400, 2)), np.zeros(400)])
+    model = load_catalogue()["type3"]
+    origin = np.array([0.0, 0.0, 5.0])
+    surfaces = near_surfaces(road(80.0), targets, 1.0)
+    near = near_rays(
+        Beams.of([model], 0.3, VisibilitySettings()),
+        target_patches(origin, surfaces, all_of(surfaces)),
+    )
+    down = np.tan(model.elevations)[near.channel]
+    radius = -5.0 / down
+    ends = near.target[down < 0]
+    gap = np.abs(radius[down < 0] - np.hypot(*(targets[ends, :2] - origin[:2]).T))
+    assert (down < 0).all()
+    assert (gap < 1.03).all()
+
+
+@pytest.mark.slow
+def test_steep_surfaces_are_met_by_few_rays_more_than_needed() -> None:
+    """A wall beside the sensor's view: of all rays within its heights only those that end on its line are kept."""
+    wall = np.array([[[10.0, -9, -1], [10, 9, -1], [10, 9, 3]], [[10.0, -9, -1], [10, 9, 3], [10, -9, 3]]])
+    target = np.array([[10.0, 4.0, 0.0]])
+    model = replace(load_catalogue()["type3"], min_range=0.0)
+    origin = np.array([0.0, 0.0, 1.0])
+    surfaces = near_surfaces(wall, target, 1.0)
+    patches, planes = disc_patches(origin, surfaces, np.array([True]))
+    kept = rays_by_target(near_rays(Beams.of([model], 0.0, VisibilitySettings()), patches, planes), model, 1)[0]
+    points = hits(origin, beam_directions(model, 0.0).reshape(-1, 3), wall)
+    returns = (np.linalg.norm(points - target, axis=2) < 1.0).any(axis=1)
+    assert kept[returns].all()
+    assert kept.sum() < 1.6 * returns.sum()
+
+
+def test_targets_out_of_range_and_without_surface_need_no_ray() -> None:
+    model = replace(random_model(np.random.default_rng(0)), min_range=0.5)
+    patches = Patches(
+        *(np.array(values) for values in ([0, 1, 2], [0.0, 0, 0], [61.5, 0.1, 9], [0.3, 0.3, 0.3])),
+        *(np.array(values) for values in ([-0.1, -0.1, np.inf], [0.1, 0.1, -np.inf])),
+    )
+    assert len(near_rays(Beams.of([model], 0.0, VisibilitySettings()), patches)) == 0
+
+
+def test_least_range_is_measured_along_the_ray() -> None:
+    """Straight below a sensor a return is near in plan and as far off as the sensor is high."""
+    model = replace(random_model(np.random.default_rng(0)), elevations=np.full(1, -1.4), azimuth_offsets=np.zeros(1))
+    surfaces = near_surfaces(road(20.0), np.array([[0.5, 0.0, 0.0]]), 1.0)
+    patches = target_patches(np.array([0.0, 0.0, 6.0]), surfaces, all_of(surfaces))
+    for least, some in ((5.0, True), (7.0, False)):
+        beams = Beams.of([replace(model, min_range=least)], 0.0, VisibilitySettings())
+        assert (len(near_rays(beams, patches)) > 0) == some
+
+
+def test_the_sign_of_a_level_beam_does_not_matter() -> None:
+    wall = np.array([[[10.0, -9, -1], [10, 9, -1], [10, 9, 3]]])
+    surfaces = near_surfaces(wall, np.array([[10.0, 4.0, 0.5]]), 1.0)
+    patches, planes = disc_patches(np.array([0.0, 0.0, 0.5]), surfaces, np.array([True]))
+    model = replace(random_model(np.random.default_rng(0)), points_per_second=10.0 * 360)
+    one = {"azimuth_offsets": np.zeros(1)}
+    kept = [
+        near_rays(
+            Beams.of([replace(model, elevations=np.array([level]), **one)], 0.0, VisibilitySettings()), patches, planes
+        )
+        for level in (0.0, -0.0)
+    ]
+    assert kept[0].width.tolist() == kept[1].width.tolist() != []
+
+
+def test_a_sensor_as_far_above_a_face_as_returns_may_lie_off_it() -> None:
+    surfaces = near_surfaces(road(20.0), np.array([[0.2, 0.0, 0.0]]), 1.0)
+    patches, planes = disc_patches(np.array([0.0, 0.0, surfaces.tolerance]), surfaces, np.array([True]))
+    model = replace(random_model(np.random.default_rng(0)), elevations=np.full(1, -1.2), azimuth_offsets=np.zeros(1))
+    assert (near_rays(Beams.of([model], 0.0, VisibilitySettings()), patches, planes).width == model.azimuth_count).any()
+
+
+def test_the_likeliest_ray_ends_at_the_target_on_a_level_road() -> None:
+    model = LidarModel(
+        key="k",
+        name="N",
+        manufacturer="M",
+        source="S",
+        elevations=np.radians([-5.0, -20.0]),
+        min_range=0.0,
+        max_range=100.0,
+        points_per_second=7200.0,
+        rotation_rate=10.0,
+        price_range=(1.0, 2.0),
+    )
+    radius = 4 / math.tan(math.radians(20))
+    targets = np.array([[0.0, radius, 0.0], [30.0, 0.0, 0.0]])
+    beams = Beams.of([model], 0.0, VisibilitySettings())
+    surfaces = near_surfaces(road(50.0), targets, 1.0)
+    near = near_rays(beams, target_patches(np.array([0.0, 0, 4]), surfaces, all_of(surfaces))).likeliest(beams.sensor)
+    assert near.target.tolist() == [0]
+    assert (near.channel.tolist(), near.middle.tolist()) == ([1], [90])
+    assert near.miss.min() == pytest.approx(0, abs=0.1)
+
+
+def test_sensors_share_the_rays_of_equal_channels() -> None:
+    models = load_catalogue()
+    beams = Beams.of([models["type2"], models["type3"]], 0.2, VisibilitySettings())
+    equal = np.isin(models["type3"].elevations, models["type2"].elevations)
+    assert equal.any()
+    assert beams.rays == 7500 * (32 + 128 - equal.sum())
+    assert set(beams.first_ray[32:][equal]) <= set(beams.first_ray[:32])
+
+
+def test_sensors_share_rays_only_where_these_have_the_same_directions() -> None:
+    model = load_catalogue()["type1"]
+    half, third = (replace(model, field_of_view=math.tau / part) for part in (2, 3))
+    rays = model.channels * model.azimuth_count
+    for others, numbers in (([model], 1), ([half], 2), ([half, half], 2), ([half, third], 3)):
+        assert Beams.of([model, *others], 0.2, VisibilitySettings()).rays == numbers * rays
+
+
+@given(st.integers(1, 40), st.integers(-50, 50))
+def test_bundles_fall_into_single_rays(width: int, first: int) -> None:
+    left = NearRays(*(np.array([value]) for value in (0, 0, 0, first, width)), np.zeros(1))
+    steps = []
+    while len(left):
+        steps += left.middle.tolist()
+        left, part_of = left.beside_middle()
+        assert len(part_of) == len(left)
+    assert sorted(steps) == list(range(first, first + width))

@@ -1,0 +1,159 @@
+"""Both engines against plain float64 arithmetic."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.sensing.visibility.ray_casting import Engine, make_ray_caster
+from tests.engines import each_engine, needs_embree
+from tests.oracles.float64_rays import first_hits
+
+SQUARE = np.array([[[-1, -1, 5], [1, -1, 5], [1, 1, 5]], [[-1, -1, 5], [1, 1, 5], [-1, 1, 5]]], dtype=np.float64)
+UP = np.array([[0.0, 0.0, 1.0]])
+
+
+def unit(random: np.random.Generator, count: int) -> np.ndarray:
+    rays = random.normal(size=(count, 3))
+    return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+
+
+@each_engine
+def test_hit_miss_and_reach(engine: Engine) -> None:
+    caster = make_ray_caster(SQUARE, engine)
+    assert caster.name == engine
+    towards_corner = np.array([0.5, -0.25, 5.0]) / np.linalg.norm([0.5, -0.25, 5.0])
+    distance, triangle = caster.cast(np.zeros(3), np.stack([towards_corner, -UP[0]]), 100.0)
+    assert distance.tolist() == pytest.approx([np.linalg.norm([0.5, -0.25, 5.0]), np.inf], rel=1e-6)
+    assert triangle.tolist() == [0, -1]
+    distance, triangle = caster.cast(np.zeros(3), towards_corner[None], 5.0)
+    assert (distance[0], triangle[0]) == (np.inf, -1)
+
+
+@each_engine
+def test_both_sides_stop_a_ray(engine: Engine) -> None:
+    caster = make_ray_caster(SQUARE, engine)
+    assert caster.cast(np.array([0.1, 0.2, 9.0]), -UP, 100.0)[0][0] == pytest.approx(4)
+    assert caster.cast(np.array([0.1, 0.2, 0.0]), UP, 100.0)[0][0] == pytest.approx(5)
+
+
+@each_engine
+def test_triangles_without_area_stop_nothing(engine: Engine) -> None:
+    point = np.broadcast_to([0.1, 0.2, 1.0], (1, 3, 3))
+    line = np.array([[[-1.0, 0, 2], [1, 0, 2], [3, 0, 2]]])
+    caster = make_ray_caster(np.concatenate([point, line, SQUARE]), engine)
+    distance, triangle = caster.cast(np.array([0.1, 0.2, 0.0]), UP, 100.0)
+    assert distance[0] == pytest.approx(5)
+    assert triangle[0] == 3
+
+
+@each_engine
+def test_an_empty_scene_stops_nothing(engine: Engine) -> None:
+    distance, triangle = make_ray_caster(np.zeros((0, 3, 3)), engine).cast(np.zeros(3), UP, 100.0)
+    assert (distance[0], triangle[0]) == (np.inf, -1)
+
+
+@each_engine
+def test_no_rays_have_no_hits(engine: Engine) -> None:
+    distance, triangle = make_ray_caster(SQUARE, engine).cast(np.zeros(3), np.zeros((0, 3)), 100.0)
+    assert distance.shape == triangle.shape == (0,)
+
+
+@each_engine
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_coordinates_that_are_not_finite(engine: Engine, bad: float) -> None:
+    triangles = SQUARE.copy()
+    triangles[1, 2, 0] = bad
+    with pytest.raises(SeipError, match="not finite, the first is 1"):
+        make_ray_caster(triangles, engine)
+
+
+@each_engine
+def test_map_coordinates_lose_nothing(engine: Engine) -> None:
+    random = np.random.default_rng(3)
+    triangles = random.uniform(-40, 40, (300, 1, 3)) + random.normal(0, 3, (300, 3, 3))
+    rays = unit(random, 2000)
+    here, which = make_ray_caster(triangles, engine).cast(np.zeros(3), rays, 100.0)
+    far = np.array([5e6, -5e6, 100.0])
+    there, which_there = make_ray_caster(triangles + far, engine).cast(far, rays, 100.0)
+    assert (which == which_there).mean() > 0.999  # an edge may flip
+    same = (which == which_there) & (which >= 0)
+    np.testing.assert_allclose(here[same], there[same], atol=1e-4)
+
+
+@each_engine
+@given(seed=st.integers(0, 2**32 - 1))
+def test_hits_are_those_of_float64_arithmetic(engine: Engine, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    triangles = random.uniform(-20, 20, (60, 1, 3)) + random.normal(0, 4, (60, 3, 3))
+    rays = unit(random, 400)
+    expected = first_hits(np.zeros(3), rays, triangles)
+    distance, triangle = make_ray_caster(triangles, engine).cast(np.zeros(3), rays, 1000.0)
+    agree = np.isclose(distance, expected, rtol=0, atol=1e-3)
+    assert agree.sum() >= 398  # float32 may decide an edge the other way
+    assert ((triangle >= 0) == np.isfinite(distance)).all()
+
+
+@each_engine
+def test_a_rays_result_does_not_depend_on_its_company(engine: Engine) -> None:
+    random = np.random.default_rng(5)
+    triangles = random.uniform(-20, 20, (500, 1, 3)) + random.normal(0, 2, (500, 3, 3))
+    rays = unit(random, 1000)
+    caster = make_ray_caster(triangles, engine)
+    whole = caster.cast(np.zeros(3), rays, 100.0)
+    pick = random.permutation(1000)[:137]
+    part = caster.cast(np.zeros(3), rays[pick], 100.0)
+    assert (part[0] == whole[0][pick]).all()
+    assert (part[1] == whole[1][pick]).all()
+
+
+@each_engine
+def test_a_hit_is_the_same_whatever_else_is_kept_and_however_far_the_ray_goes(engine: Engine) -> None:
+    random = np.random.default_rng(6)
+    triangles = random.uniform(-20, 20, (500, 1, 3)) + random.normal(0, 2, (500, 3, 3))
+    rays = unit(random, 1000)
+    distance, triangle = make_ray_caster(triangles, engine).cast(np.zeros(3), rays, 100.0)
+    keep = random.random(500) < 0.5
+    fewer = make_ray_caster(triangles, engine, keep).cast(np.zeros(3), rays, 100.0)
+    same = (triangle >= 0) & keep[triangle]
+    assert (fewer[0][same] == distance[same]).all()
+    assert (fewer[1][same] == triangle[same]).all()
+    assert keep[fewer[1][fewer[1] >= 0]].all()
+    reach = float(np.median(distance[triangle >= 0]))
+    short = make_ray_caster(triangles, engine).cast(np.zeros(3), rays, reach)
+    assert (short[0] == np.where(distance <= reach, distance, np.inf)).all()
+
+
+@each_engine
+def test_threads_cast_alike(engine: Engine) -> None:
+    random = np.random.default_rng(7)
+    caster = make_ray_caster(random.uniform(-20, 20, (500, 1, 3)) + random.normal(0, 2, (500, 3, 3)), engine)
+    batches = [unit(random, 500) for _ in range(20)]
+    alone = [caster.cast(np.zeros(3), rays, 100.0) for rays in batches]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(lambda rays: caster.cast(np.zeros(3), rays, 100.0), batches))
+    for one, other in zip(alone, together, strict=True):
+        assert (one[0] == other[0]).all()
+        assert (one[1] == other[1]).all()
+
+
+def test_an_unknown_engine_names_the_known() -> None:
+    with pytest.raises(SeipError, match="auto, bvh or embree"):
+        make_ray_caster(SQUARE, "optix")  # type: ignore[arg-type]
+
+
+@needs_embree
+def test_auto_takes_embree_where_it_is() -> None:
+    assert make_ray_caster(SQUARE).name == "embree"
+
+
+@needs_embree
+def test_there_may_be_more_casters_than_embree_may_have_devices() -> None:
+    casters = [make_ray_caster(SQUARE, "embree") for _ in range(1100)]  # a device each ends the process at 1,024
+    above, down = SQUARE.mean(axis=(0, 1)) + np.array([0.0, 0.0, 1.0]), np.array([[0.0, 0.0, -1.0]])
+    assert all(caster.cast(above, down, 2.0)[1].item() >= 0 for caster in casters)

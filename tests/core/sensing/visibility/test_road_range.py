@@ -1,0 +1,72 @@
+"""Ranges on the road: the law on a level road, and the share of a region that lies beyond."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.range_equation import RangeEquation
+from seip_addon.core.sensing.visibility.road_range import range_warnings, road_range, road_reflectivity
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.scene_geometry import Mesh
+from seip_addon.core.site.weather import Weather
+from seip_addon.core.workflows.survey import SurveySettings, carla_warnings
+from tests.builders.synthetic_junction import junction_site
+
+CATALOGUE = load_catalogue()
+SIGHT = VisibilitySettings()
+
+
+def short_sighted(at_10):
+    law = RangeEquation.of_ranges(at_10, 2.5 * at_10)
+    return {"type1": replace(CATALOGUE["type1"], law=law)}
+
+
+def test_range_on_a_road_is_that_of_the_law_within_the_longest_range():
+    model = short_sighted(40.0)["type1"]
+    far = road_range(model, 0.17, 5.4, SIGHT)
+    hit, reflected = np.array([far]), np.array([0.17 * 5.4 / far])
+    assert model.law.chance(hit, reflected)[0] == pytest.approx(0.9, abs=1e-6)
+    assert road_range(replace(model, max_range=12.0), 0.17, 5.4, SIGHT) == 12.0
+    assert road_range(CATALOGUE["type1"], 0.17, 5.4, SIGHT) == CATALOGUE["type1"].max_range
+
+
+def test_the_reflectivity_of_a_road_is_that_of_most_of_its_area():
+    wide, narrow = np.array([[[0.0, 0, 0], [9, 0, 0], [0, 9, 0]]]), np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
+    meshes = [Mesh("asphalt", wide, np.array([0.17])), *(Mesh("paint", narrow, np.array([0.6])) for _ in range(9))]
+    assert road_reflectivity(meshes) == 0.17
+
+
+def test_warnings_say_which_share_lies_beyond_every_candidate():
+    site = junction_site(positions=1, sensors=["type1"], heights=[8.0])
+    (warning,) = range_warnings(site, short_sighted(30.0), 0.17, SIGHT)
+    reach = road_range(short_sighted(30.0)["type1"], 0.17, 8.0, SIGHT)
+    away = np.linalg.norm(site.targets.xyz[None] - site.candidates.xyz[:, None], axis=2).min(axis=0)
+    share = np.count_nonzero(away > reach) / len(away)
+    assert 0.1 < share < 1.0
+    assert f"up to {reach:.0f} m from 8 m height: {share:.0%} of the region lies beyond" in warning
+
+
+def test_sensors_that_see_through_any_weather_are_named():
+    alike = SurveySettings(CandidateSettings(sensors=("type1", "type2")))
+    models = {key: CATALOGUE[key] for key in ("type1", "type2", "os1_128")}
+    carla = {key: models[key] for key in ("type1", "type2")}
+    assert carla_warnings(carla, alike) == ()
+    assert carla_warnings({"os1_128": models["os1_128"]}, replace(alike, weather=Weather(rain=5.0))) == ()
+    (warning,) = carla_warnings(carla, replace(alike, weather=Weather(rain=5.0)))
+    assert warning.startswith("type1, type2: every return in range counts")
+    (warning,) = carla_warnings(carla, replace(alike, visibility=VisibilitySettings(detection=0.5)))
+    assert "the two do not compare" not in warning
+    (warning,) = carla_warnings(models, alike)
+    assert warning.endswith("os1_128 must detect it: the two do not compare")
+
+
+def test_there_is_no_warning_where_all_is_in_range_but_for_what_is_assumed():
+    site = junction_site(positions=8, sensors=["type1"], heights=[8.0])
+    seeing = short_sighted(900.0)
+    assert range_warnings(site, seeing, 0.17, SIGHT) == ()
+    assert range_warnings(site, CATALOGUE, 0.17, SIGHT) == ()
+    assumed = {"type1": replace(seeing["type1"], assumed_law="its range is a guess")}
+    assert range_warnings(site, assumed, 0.17, SIGHT)[0].endswith("; its range is a guess")

@@ -1,0 +1,556 @@
+"""The visibility grid against a full scan, against plain float64 arithmetic, and under moves of the scene."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from shapely import box
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.orientation import orientation
+from seip_addon.core.progress import Progress, finish
+from seip_addon.core.sensing.lidar.beams import BeamPattern
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.lidar.range_equation import RangeEquation
+from seip_addon.core.sensing.visibility.chunks import Rows
+from seip_addon.core.sensing.visibility.grid import (
+    VisibilityGrid,
+    VisibilitySettings,
+    compute_visibility,
+    full_scan_visibility,
+    visibility_key,
+)
+from seip_addon.core.sensing.visibility.ray_casting import Engine, make_ray_caster
+from seip_addon.core.sensing.visibility.ring_resolution import resolution_warnings, unresolved_from
+from seip_addon.core.sensing.visibility.store import CheckpointFolder, stored_visibility
+from seip_addon.core.site.site import Site, Targets
+from tests.builders.synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity
+from tests.engines import ANY, each_engine, needs_any, needs_bvh, needs_embree
+from tests.oracles.float64_rays import nearest_return
+from tests.oracles.random_cases import cases
+
+Float = NDArray[np.float64]
+
+
+def small_model(key: str, channels: int = 12, steps: int = 90, **changes: Any) -> LidarModel:
+    """A sensor small enough for brute force, with uneven elevations and azimuth offsets."""
+    place = np.linspace(0, 1, channels)
+    values = {"min_range": 0.5, "max_range": 40.0} | changes
+    return LidarModel(
+        key=key,
+        name=key,
+        manufacturer="test",
+        source="test",
+        elevations=np.radians(6 - 60 * place**1.3),
+        points_per_second=10.0 * channels * steps,
+        rotation_rate=10.0,
+        price_range=(1.0, 2.0),
+        azimuth_offsets=0.05 * np.sin(9 * place),
+        **values,
+    )
+
+
+MODELS = {"coarse": small_model("coarse", 6, 40), "fine": small_model("fine", 16, 120)}
+PHYSICAL = {
+    "coarse": replace(MODELS["coarse"], law=RangeEquation.of_ranges(8.0, 20.0)),
+    "fine": replace(MODELS["fine"], law=RangeEquation.of_ranges(15.0, 42.0)),
+}
+ONE_WAY = {
+    "coarse": replace(MODELS["coarse"], field_of_view=math.radians(100)),
+    "fine": replace(MODELS["fine"], field_of_view=math.radians(357)),
+}
+Strength = tuple[dict[str, LidarModel], tuple[float, ...]]
+STRENGTHS = st.sampled_from(
+    [
+        *((MODELS, (0.0,)), (MODELS, (0.2,)), (MODELS, (0.6,))),
+        *((PHYSICAL, ()), (PHYSICAL, (0.0, 0.5)), (ONE_WAY, (0.0,)), (ONE_WAY, (0.2,))),
+    ]
+)
+
+
+def random_site(seed: int, poses: int = 3) -> Site:
+    """A sloping patch of road with boxes on it, targets on the road, sensors above."""
+    random = np.random.default_rng(seed)
+    slope = random.normal(0, 0.03, 2)
+    road = rectangle((-15, -15), (15, 15), step=10.0)
+    road[:, :, 2] = road[:, :, :2] @ slope
+    boxes = [
+        prism(tuple(random.uniform(-12, 12, 2)), random.uniform(0.2, 3), random.uniform(1, 6), sides=4)
+        for _ in range(random.integers(0, 5))
+    ]
+    target = random.uniform(-14, 14, (60, 3))
+    target[:, 2] = target[:, :2] @ slope
+    xyz = random.uniform((-14, -14, 2.5), (14, 14, 8), (poses, 3))
+    triangles = np.concatenate([road, *boxes])
+    return Site(
+        name="random",
+        origin=np.zeros(3),
+        region=box(-15, -15, 15, 15),
+        targets=Targets(target, np.ones(60), np.zeros(60, dtype=bool), 1.0),
+        candidates=make_candidates(
+            xyz, random.choice(list(MODELS), poses), xyz[:, 2], random.uniform(-math.pi, math.pi, poses)
+        ),
+        triangles=triangles,
+        reflectivity=varied_reflectivity(triangles),
+    )
+
+
+def grid_of(site: Site, settings: VisibilitySettings, engine: Engine = ANY) -> VisibilityGrid:
+    return finish(compute_visibility(site, MODELS, settings, engine))
+
+
+def nearest_returns(site: Site) -> Float:
+    """Distance of each target's nearest return at each pose, (c, t)."""
+    poses = site.candidates
+    return np.array(
+        [
+            nearest_return(xyz, yaw, MODELS[key], site.triangles, site.targets.xyz)
+            for xyz, yaw, key in zip(poses.xyz, poses.yaw, poses.sensor.tolist(), strict=True)
+        ]
+    )
+
+
+@each_engine
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.3, 1.0, 3.0]), STRENGTHS)
+def test_same_as_the_full_scan_bit_for_bit(engine: Engine, seed: int, delta: float, strength: Strength) -> None:
+    site, (models, least) = random_site(seed), strength
+    settings = VisibilitySettings(delta, *least)
+    caster = make_ray_caster(site.triangles, engine)
+    lazy = finish(compute_visibility(site, models, settings, engine))
+    full = finish(full_scan_visibility(site, models, settings, caster))
+    assert (lazy.packed == full.packed).all()
+    assert lazy.key == full.key
+    assert lazy.parameters["rays_cast"] <= full.parameters["rays_cast"] == full.parameters["rays_of_full_scan"]
+
+
+def soup(seed: int) -> Site:
+    """Triangles of all slopes and sizes, slivers too, with targets about them and several sensors at each place."""
+    random = np.random.default_rng(seed)
+    size = 10 ** random.uniform(-2, 1, (60, 1, 1))
+    triangles = random.uniform((-15, -15, -2), (15, 15, 4), (60, 1, 3)) + size * random.normal(0, 1, (60, 3, 3))
+    target = triangles[random.integers(0, 60, 50)].mean(axis=1) + random.normal(0, 0.2, (50, 3))
+    xyz = np.repeat(random.uniform((-15, -15, 0), (15, 15, 6), (3, 3)), 2, axis=0)
+    yaw = np.repeat(random.uniform(-math.pi, math.pi, 3), 2)
+    return Site(
+        name="soup",
+        origin=np.zeros(3),
+        region=box(-15, -15, 15, 15),
+        targets=Targets(target, np.ones(50), np.zeros(50, dtype=bool), 1.0),
+        candidates=make_candidates(xyz, list(MODELS) * 3, xyz[:, 2], yaw),
+        triangles=triangles,
+        reflectivity=varied_reflectivity(triangles),
+    )
+
+
+@each_engine
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.1, 1.0, 5.0]), STRENGTHS)
+def test_same_as_the_full_scan_in_a_soup(engine: Engine, seed: int, delta: float, strength: Strength) -> None:
+    site, (models, least) = soup(seed), strength
+    settings = VisibilitySettings(delta, *least)
+    lazy = finish(compute_visibility(site, models, settings, engine))
+    full = finish(full_scan_visibility(site, models, settings, make_ray_caster(site.triangles, engine)))
+    assert (lazy.packed == full.packed).all()
+
+
+@each_engine
+@pytest.mark.parametrize("key", ["type1", pytest.param("type3", marks=pytest.mark.slow), "vls128"])
+def test_same_as_the_full_scan_on_a_junction(engine: Engine, key: str) -> None:
+    models = load_catalogue()
+    site = junction_site(positions=1, sensors=[key], heights=[5.4])
+    caster = make_ray_caster(site.triangles, engine)
+    lazy = finish(compute_visibility(site, models, VisibilitySettings(), engine))
+    full = finish(full_scan_visibility(site, models, VisibilitySettings(), caster))
+    assert (lazy.packed == full.packed).all()
+    assert 0.02 < lazy.visible.mean() < 0.98
+    assert lazy.parameters["rays_cast"] < 0.03 * full.parameters["rays_cast"]
+
+
+@pytest.mark.slow
+@needs_bvh
+@needs_embree
+def test_engines_differ_only_where_the_distance_is_delta_but_for_rounding() -> None:
+    settings = VisibilitySettings(0.6)
+    different = total = 0
+    for seed in range(40):
+        site = random_site(seed)
+        differs = grid_of(site, settings, "bvh").visible != grid_of(site, settings, "embree").visible
+        assert (np.abs(nearest_returns(site) - settings.delta)[differs] < 1e-3).all()
+        different += differs.sum()
+        total += differs.size
+    assert different <= 1e-3 * total
+
+
+@pytest.mark.slow
+@needs_bvh
+@needs_embree
+def test_engines_differ_in_few_targets_of_a_junction() -> None:
+    site, models = junction_site(positions=4), load_catalogue()
+    bvh, embree = (
+        finish(compute_visibility(site, models, VisibilitySettings(), engine)).visible for engine in ("bvh", "embree")
+    )
+    assert (bvh != embree).sum() <= 1e-4 * bvh.sum()
+
+
+@needs_any
+def test_an_interrupted_run_goes_on_from_its_finished_pieces(tmp_path: Path) -> None:
+    site, models, settings = (
+        junction_site(positions=24, heights=[5.0], spacing=4.0),
+        load_catalogue(),
+        VisibilitySettings(),
+    )
+    stored = lambda name: stored_visibility(tmp_path / name, site, models, settings, ANY)  # noqa: E731
+    whole = finish(stored("whole.npz"))
+    steps = stored("grid.npz")
+    while next(steps).done == 0:
+        pass
+    steps.close()
+    assert not (tmp_path / "grid.npz").exists()
+    assert list((tmp_path / "grid.pieces").iterdir())
+    resumed = stored("grid.npz")
+    assert next(resumed).done > 0
+    assert (finish(resumed).packed == whole.packed).all()
+    assert (tmp_path / "grid.npz").read_bytes() == (tmp_path / "whole.npz").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["grid.npz", "whole.npz"]
+
+
+@needs_any
+def test_pieces_that_a_process_left_when_it_was_killed_after_the_grid_go_with_the_next_run(tmp_path: Path) -> None:
+    site, models, settings = (
+        junction_site(positions=4, heights=[5.0], spacing=8.0),
+        load_catalogue(),
+        VisibilitySettings(),
+    )
+    grid = finish(stored_visibility(tmp_path / "grid.npz", site, models, settings, ANY))
+    CheckpointFolder(tmp_path / "grid.npz", grid.key).save(0, Rows(grid.packed, 7))
+    assert (tmp_path / "grid.pieces").is_dir()
+    finish(stored_visibility(tmp_path / "grid.npz", site, models, settings, ANY))
+    assert [path.name for path in tmp_path.iterdir()] == ["grid.npz"]
+
+
+@needs_any
+def test_pieces_of_another_grid_and_damaged_ones_are_not_used(tmp_path: Path) -> None:
+    rows = Rows(np.ones((2, 3), dtype=np.uint8), 7)
+    CheckpointFolder(tmp_path / "grid.npz", "a" * 64).save(0, rows)
+    same = CheckpointFolder(tmp_path / "grid.npz", "a" * 64)
+    found = same.load(0)
+    assert found is not None
+    assert (found.packed == rows.packed).all()
+    assert found.rays == 7
+    (path,) = (tmp_path / "grid.pieces").iterdir()
+    path.write_bytes(path.read_bytes()[:50])
+    assert same.load(0) is None
+    assert CheckpointFolder(tmp_path / "grid.npz", "b" * 64).load(0) is None
+    assert not path.exists()
+
+
+@pytest.mark.slow
+@each_engine
+def test_same_as_plain_arithmetic_but_for_borderline_targets(engine: Engine) -> None:
+    borderline = seen = total = 0
+    for seed in range(40):
+        site, settings = random_site(seed), VisibilitySettings(0.6)
+        distance = nearest_returns(site)
+        decided = np.abs(distance - settings.delta) >= 1e-3
+        visible = grid_of(site, settings, engine).visible
+        assert (visible == (distance < settings.delta))[decided].all()
+        borderline += (~decided).sum()
+        seen += visible.sum()
+        total += decided.size
+    assert borderline < 0.005 * total
+    assert 0.1 * total < seen < 0.9 * total
+
+
+def decided_site(seed: int, delta: float) -> Site:
+    """A random site without the targets that some pose's nearest return passes δ by a millimetre or less."""
+    site = random_site(seed)
+    decided = (np.abs(nearest_returns(site) - delta) >= 1e-3).all(axis=0)
+    xyz = site.targets.xyz[decided]
+    return replace(site, targets=Targets(xyz, np.ones(len(xyz)), np.zeros(len(xyz), dtype=bool), 1.0))
+
+
+def moved(site: Site, shift: Float, turn: float) -> Site:
+    """Turn scene, targets, poses and beams about the z axis, then shift them."""
+    rotation = np.array([[math.cos(turn), -math.sin(turn), 0], [math.sin(turn), math.cos(turn), 0], [0, 0, 1]])
+    poses = site.candidates
+    return replace(
+        site,
+        targets=replace(site.targets, xyz=site.targets.xyz @ rotation.T + shift),
+        candidates=make_candidates(poses.xyz @ rotation.T + shift, poses.sensor, poses.height, poses.yaw + turn),
+        triangles=site.triangles @ rotation.T + shift,
+    )
+
+
+@each_engine
+@cases(30)
+@given(seed=st.integers(0, 2**32 - 1), turn=st.floats(-7, 7))
+def test_moving_everything_changes_nothing(engine: Engine, seed: int, turn: float) -> None:
+    settings = VisibilitySettings(0.6)
+    site = decided_site(seed, settings.delta)
+    expected = grid_of(site, settings, engine).visible
+    far = moved(site, np.array([5e6, -3e6, 250.0]), 0.0)
+    assert (grid_of(far, settings, engine).visible == expected).all()
+    turned = moved(site, np.zeros(3), turn)
+    assert (grid_of(turned, settings, engine).visible == expected).all()
+
+
+@each_engine
+@given(seed=st.integers(0, 2**32 - 1))
+@cases(30)
+def test_the_order_of_things_does_not_matter(engine: Engine, seed: int) -> None:
+    settings = VisibilitySettings(0.6)
+    site = decided_site(seed, settings.delta)
+    expected = grid_of(site, settings, engine).visible
+    random = np.random.default_rng(seed)
+    order, pose_order = random.permutation(len(site.targets)), random.permutation(len(site.candidates))
+    triangle_order = random.permutation(len(site.triangles))
+    poses = site.candidates
+    shuffled = replace(
+        site,
+        targets=replace(site.targets, xyz=site.targets.xyz[order]),
+        candidates=make_candidates(
+            poses.xyz[pose_order], poses.sensor[pose_order], poses.height[pose_order], poses.yaw[pose_order]
+        ),
+        triangles=site.triangles[triangle_order],
+        reflectivity=site.reflectivity[triangle_order],
+    )
+    assert (grid_of(shuffled, settings, engine).visible == expected[np.ix_(pose_order, order)]).all()
+
+
+def one_sensor_site(*walls: Float) -> Site:
+    """A sensor 5 m above the middle of a level road, targets along the x axis."""
+    x = np.arange(-14.0, 15.0)
+    triangles = np.concatenate([rectangle((-15, -15), (15, 15)), *walls])
+    return Site(
+        name="one",
+        origin=np.zeros(3),
+        region=box(-15, -15, 15, 15),
+        targets=Targets(np.column_stack([x, 0 * x, 0 * x]), np.ones(29), np.zeros(29, dtype=bool), 1.0),
+        candidates=make_candidates(np.array([[0.0, 0.0, 5.0]]), ["fine"], np.array([5.0])),
+        triangles=triangles,
+        reflectivity=np.full(len(triangles), 0.3),
+    )
+
+
+@needs_any
+def test_a_wall_hides_what_lies_behind_it() -> None:
+    open_site = one_sensor_site()
+    x = open_site.targets.xyz[:, 0]
+    wall = np.array([[[4.0, -9, 0], [4, 9, 0], [4, 9, 9]], [[4.0, -9, 0], [4, 9, 9], [4, -9, 9]]])
+    free = grid_of(open_site, VisibilitySettings(0.9)).visible[0]
+    behind_wall = grid_of(one_sensor_site(wall), VisibilitySettings(0.9)).visible[0]
+    assert free[x > 5].any()
+    assert not behind_wall[x > 5].any()
+    assert (behind_wall == free)[x < 3].all()
+
+
+@needs_any
+def test_range_limits_returns() -> None:
+    site = one_sensor_site()
+    model = small_model("fine", 16, 120, min_range=7.0, max_range=10.0)
+    steps = compute_visibility(site, {"fine": model}, VisibilitySettings(0.9), ANY)
+    nearest = nearest_return(site.candidates.xyz[0], 0.0, model, site.triangles, site.targets.xyz)
+    assert (np.abs(nearest - 0.9) > 1e-3).all()
+    visible = finish(steps).visible[0]
+    assert (visible == (nearest < 0.9)).all()
+    slant = np.hypot(site.targets.xyz[:, 0], 5.0)
+    unlimited = nearest_return(site.candidates.xyz[0], 0.0, MODELS["fine"], site.triangles, site.targets.xyz) < 0.9
+    assert (unlimited & ~visible & (slant > 6.1) & (slant < 7)).any()  # reached, but by returns that are too near
+    assert (unlimited & ~visible & (slant > 10.9)).any()
+
+
+@needs_any
+def test_weak_returns_do_not_count() -> None:
+    site = one_sensor_site()
+    site = replace(site, reflectivity=np.ones(len(site.triangles)))
+    x = np.abs(site.targets.xyz[:, 0])
+    models = {"fine": small_model("fine", 64, 360)}
+    everything, strong = (
+        finish(compute_visibility(site, models, VisibilitySettings(0.6, least), ANY)).visible[0] for least in (0.0, 0.5)
+    )
+    # cos θ · exp(−a r) at the target: 0.5 is reached about 8.5 m from the foot
+    strength = 5 / np.hypot(x, 5) * np.exp(-0.004 * np.hypot(x, 5))
+    assert everything[x > 9].any()
+    assert not strong[strength < 0.46].any()
+    assert (strong == everything)[strength > 0.54].all()
+
+
+@needs_any
+def test_the_road_is_seen_as_far_as_its_returns_are_detected() -> None:
+    site = one_sensor_site()
+    law = RangeEquation.of_ranges(9.0, 25.0)
+    reach = law.reach_on_level(0.3, 0.9, 5.0)
+    away = np.hypot(np.abs(site.targets.xyz[:, 0]), 5.0)
+    models = {"fine": small_model("fine", 64, 360, law=law)}
+    seen = finish(compute_visibility(site, models, VisibilitySettings(0.6), ANY)).visible[0]
+    everything = finish(compute_visibility(site, {"fine": small_model("fine", 64, 360)}, VisibilitySettings(0.6), ANY))
+    assert 7.0 < reach < 11.0
+    assert not seen[away > reach + 0.6].any()
+    assert (seen == everything.visible[0])[away < reach - 0.6].all()
+    assert everything.visible[0][away > reach + 0.6].any()
+
+
+@needs_any
+def test_progress_counts_poses() -> None:
+    site = random_site(1)
+    seen: list[Progress] = []
+    steps = compute_visibility(site, MODELS, VisibilitySettings(), ANY)
+    finish(steps, seen.append)
+    assert [step.done for step in seen] == [0, 3]
+    assert {step.total for step in seen} == {3}
+
+
+@pytest.mark.parametrize(
+    "values",
+    [(0,), (-1,), (math.nan,), (math.inf,), (1, -0.1), (1, 1.1), (1, math.nan), (1, 0, 0), (1, 0, 1), (1, 0, math.nan)],
+)
+def test_settings_that_mean_nothing(values: tuple[float, ...]) -> None:
+    with pytest.raises(SeipError):
+        VisibilitySettings(*values)
+
+
+def test_a_probability_that_a_sensor_never_reaches_is_refused_by_its_name() -> None:
+    with pytest.raises(SeipError, match=r"coarse: a probability of detection must lie above 0 and below 0\.985"):
+        VisibilitySettings(detection=0.99).least_strength(PHYSICAL["coarse"])
+
+
+@needs_any
+def test_sites_that_mean_nothing() -> None:
+    site = random_site(1)
+
+    def compute(changed: Site) -> VisibilityGrid:
+        return finish(compute_visibility(changed, MODELS, VisibilitySettings(), ANY))
+
+    nowhere = make_candidates(np.zeros((0, 3)), [], np.zeros(0))
+    with pytest.raises(SeipError, match="no candidate"):
+        compute(replace(site, candidates=nowhere))
+    with pytest.raises(SeipError, match="no target"):
+        compute(replace(site, targets=Targets(np.zeros((0, 3)), np.zeros(0), np.zeros(0, dtype=bool), 1.0)))
+    with pytest.raises(SeipError, match="target are not finite"):
+        compute(replace(site, targets=replace(site.targets, xyz=site.targets.xyz * np.nan)))
+    with pytest.raises(SeipError, match="did you mean"):
+        compute(replace(site, candidates=make_candidates(np.zeros((1, 3)), ["finest"], np.zeros(1))))
+
+
+def test_a_grid_answers_for_chosen_poses() -> None:
+    visible = np.array([[1, 0, 1, 0, 0, 0, 0, 0, 1], [1, 1, 0, 0, 0, 0, 0, 0, 0]], dtype=bool)
+    grid = VisibilityGrid(np.packbits(visible, axis=1), (2, 9), "key", {})
+    assert (grid.visible == visible).all()
+    assert grid.times_seen(np.array([0, 1])).tolist() == [2, 1, 1, 0, 0, 0, 0, 0, 1]
+    assert grid.coverage(np.array([0])) == pytest.approx(3 / 9)
+    assert grid.coverage(np.array([0, 1])) == pytest.approx(4 / 9)
+    assert grid.coverage(np.array([], dtype=np.int64)) == 0
+    assert grid.coverage(np.array([1]), weight=np.array([3.0, 1, 1, 1, 1, 1, 1, 1, 1])) == pytest.approx(4 / 11)
+
+
+@needs_any
+def test_a_grid_comes_back_from_its_file_and_the_file_is_the_same_each_time(tmp_path: Path) -> None:
+    grid = grid_of(random_site(2), VisibilitySettings())
+    for name in ("a.npz", "b.npz"):
+        grid.save(tmp_path / name)
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+    back = VisibilityGrid.load(tmp_path / "a.npz")
+    assert (back.packed == grid.packed).all()
+    assert (back.shape, back.key, back.parameters) == (grid.shape, grid.key, grid.parameters)
+
+
+@needs_any
+def test_files_that_are_no_grid(tmp_path: Path) -> None:
+    grid_of(random_site(2), VisibilitySettings()).save(tmp_path / "good.npz")
+    whole = (tmp_path / "good.npz").read_bytes()
+    bad = tmp_path / "bad.npz"
+    with pytest.raises(SeipError, match="no visibility grid"):
+        VisibilityGrid.load(tmp_path / "absent.npz")
+    for content in (b"", b"hello", whole[: len(whole) // 2], whole[:200] + b"\0" * 40 + whole[240:]):
+        bad.write_bytes(content)
+        with pytest.raises(SeipError, match="delete it"):
+            VisibilityGrid.load(bad)
+    np.savez(bad, other=np.zeros(3))
+    with pytest.raises(SeipError, match="delete it"):
+        VisibilityGrid.load(bad)
+    header = '{"schema": "seip.visibility", "version": 99, "key": "", "shape": [1, 8], "parameters": {}}'
+    np.savez(bad, packed=np.zeros((1, 1), dtype=np.uint8), header=np.array(header))
+    with pytest.raises(SeipError, match="of this version"):
+        VisibilityGrid.load(bad)
+    np.save(tmp_path / "bad.npy", np.zeros(3))
+    with pytest.raises(SeipError, match="delete it"):
+        VisibilityGrid.load(tmp_path / "bad.npy")
+
+
+def test_the_key_follows_from_what_the_grid_follows_from() -> None:
+    site, settings = random_site(3), VisibilitySettings()
+    key = visibility_key(site, MODELS, settings, "bvh")
+    same = replace(site, name="other name", triangles=site.triangles.copy())
+    renamed = {name: replace(model, name="Other", price_range=(5.0, 6.0)) for name, model in MODELS.items()}
+    assert visibility_key(same, renamed, VisibilitySettings(1.0), "bvh") == key
+    poses = site.candidates
+    nudged = site.triangles + np.array([0, 0, 1e-9])
+    longer = {name: replace(model, max_range=41.0) for name, model in MODELS.items()}
+    others = [
+        visibility_key(replace(site, triangles=nudged), MODELS, settings, "bvh"),
+        visibility_key(
+            replace(site, targets=replace(site.targets, xyz=site.targets.xyz + 1e-9)), MODELS, settings, "bvh"
+        ),
+        visibility_key(replace(site, candidates=replace(poses, yaw=poses.yaw + 1e-9)), MODELS, settings, "bvh"),
+        visibility_key(site, longer, settings, "bvh"),
+        visibility_key(site, MODELS, VisibilitySettings(1.1), "bvh"),
+        visibility_key(site, MODELS, VisibilitySettings(1.0, 0.1), "bvh"),
+        visibility_key(site, MODELS, settings, "embree"),
+        visibility_key(site, PHYSICAL, settings, "bvh"),
+        visibility_key(site, PHYSICAL, VisibilitySettings(detection=0.8), "bvh"),
+        visibility_key(replace(site, reflectivity=site.reflectivity * 0.9), PHYSICAL, settings, "bvh"),
+    ]
+    darker = replace(site, reflectivity=site.reflectivity * 0.9)
+    assert visibility_key(darker, MODELS, VisibilitySettings(detection=0.8), "bvh") == key  # nothing of it matters
+    assert len({key, *others}) == 1 + len(others)
+
+
+def test_warnings_name_the_radius_from_which_rings_are_too_far_apart() -> None:
+    models = load_catalogue()
+    site = junction_site(positions=8, sensors=["type1"], heights=[8.0])
+    (warning,) = resolution_warnings(site, models, VisibilitySettings(1.0))
+    # rings of 8 m / tan 15°, tan 13°, …: 29.86, 34.65, 41.16 m; the first two are 4.8 m apart
+    assert "type1: beyond 30 m (at 8 m height)" in warning
+    assert resolution_warnings(site, models, VisibilitySettings(80.0)) == ()
+
+
+@pytest.mark.slow
+def test_warnings_name_the_radius_from_which_a_rosette_leaves_gaps() -> None:
+    models = load_catalogue()
+    site = junction_site(positions=8, sensors=["mid40"], heights=[8.0])
+    (warning,) = resolution_warnings(site, models, VisibilitySettings(1.0))
+    assert "mid40: from 24 m (at 8 m height) on a frame of 0.1 s leaves level road in view more than δ = 1 m" in warning
+    assert resolution_warnings(site, models, VisibilitySettings(80.0)) == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("height", "delta", "tilt"), [(5.4, 1.0, 0.0), (8.0, 2.0, 0.2)])
+def test_no_road_nearer_than_a_rosettes_gaps_is_missed(height: float, delta: float, tilt: float) -> None:
+    """Of random points on a level road in view, hardly any before the radius that is named is far from all rays."""
+    model = replace(load_catalogue()["mid70"], rotation_rate=2.0)
+    border = unresolved_from(model, height, delta, 90.0, tilt)
+    assert 20.0 < border < 80.0
+    turned = orientation(0.0, tilt)
+    ways = BeamPattern(model).directions(np.arange(model.channels)) @ turned.T
+    ends = ways[ways[:, 2] < 0]
+    ends = ends[:, :2] * (-height / ends[:, 2:])
+    road = np.random.default_rng(4).uniform((0, -60), (90, 60), (2000, 2))
+    road = road[model.faces(np.column_stack([road, np.full(len(road), -height)]) @ turned)]
+    gap = np.array([np.hypot(*(ends - point).T).min() for point in road])
+    radius = np.hypot(*road.T)
+    assert (gap[radius < border] < delta).mean() > 0.99  # gaps are looked for at points, not everywhere
+    assert (gap[radius > border] > delta).any()
+
+
+def test_warnings_say_when_targets_are_too_far_apart_for_delta() -> None:
+    site = junction_site(positions=8, sensors=["type3"], heights=[8.0], spacing=2.0)
+    warnings = resolution_warnings(site, load_catalogue(), VisibilitySettings(1.0))
+    assert any("targets are 2 m apart and δ is 1 m" in warning for warning in warnings)

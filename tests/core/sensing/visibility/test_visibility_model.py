@@ -1,0 +1,92 @@
+"""Sensors that hang and are turned anyhow see what a full scan from there sees."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.sensing.lidar.beams import beam_directions
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.scans.sensor import level_orientation
+from seip_addon.core.sensing.visibility.chunks import compute_rows
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.sensing.visibility.target_index import TargetIndex
+from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel
+from tests.builders.synthetic_junction import junction_site
+from tests.engines import ANY, each_engine
+from tests.oracles.random_cases import cases
+
+MODELS = load_catalogue()
+SITE = junction_site()
+SIGHT = VisibilitySettings(delta=1.0)
+MODEL = replace(MODELS["type1"], points_per_second=MODELS["type1"].points_per_second / 6)
+
+
+def turned(yaw, pitch, roll):
+    """The rotation about z, then the new y, then the new x."""
+    nod = np.array([[math.cos(pitch), 0, math.sin(pitch)], [0, 1, 0], [-math.sin(pitch), 0, math.cos(pitch)]])
+    lean = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
+    return level_orientation(yaw) @ nod @ lean
+
+
+def by_full_scan(caster, model, xyz, orientation, delta=SIGHT.delta):
+    directions = beam_directions(model).reshape(-1, 3) @ orientation.T
+    distance, triangle = caster.cast(xyz, directions, model.max_range)
+    hit = (triangle >= 0) & (distance >= model.min_range)
+    seen = np.zeros(len(SITE.targets), dtype=bool)
+    seen[TargetIndex(SITE.targets.xyz, delta).within_delta(xyz + directions[hit] * distance[hit, None])] = True
+    return seen
+
+
+@pytest.fixture(scope="module")
+def caster():
+    return make_ray_caster(SITE.triangles, ANY)
+
+
+@each_engine
+@pytest.mark.parametrize(
+    "angles", [(0.4, 0.0, 0.0), (1.0, 0.03, -0.02), (-2.0, 0.6, 0.0), (0.0, -0.4, 0.5), (3.0, 1.5, 3.0)]
+)
+def test_a_turned_sensor_sees_what_its_full_scan_sees(engine, angles):
+    tried = make_ray_caster(SITE.triangles, engine)
+    xyz, orientation = np.array([6.0, -7.0, 6.0]), turned(*angles)
+    seen = VisibilityModel(SITE, SIGHT, tried).see(MODEL, xyz, orientation)
+    assert (seen == by_full_scan(tried, MODEL, xyz, orientation)).all()
+    assert seen.any()
+
+
+@pytest.mark.slow
+@given(
+    angles=st.tuples(st.floats(-4, 4), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)),
+    place=st.tuples(st.floats(-12, 12), st.floats(-12, 12), st.floats(2, 9)),
+    delta=st.sampled_from([0.3, 1.0, 2.5]),
+)
+@cases(25)
+def test_wherever_it_hangs(angles, place, delta):
+    caster = make_ray_caster(SITE.triangles, ANY)
+    xyz, orientation = np.array(place), turned(*angles)
+    seen = VisibilityModel(SITE, replace(SIGHT, delta=delta), caster).see(MODEL, xyz, orientation)
+    assert (seen == by_full_scan(caster, MODEL, xyz, orientation, delta)).all()
+
+
+def test_a_level_sensor_sees_what_its_candidate_sees(caster):
+    poses = SITE.candidates
+    some = np.arange(0, len(poses), max(1, len(poses) // 6))
+    rows = compute_rows(VisibilityModel(SITE, SIGHT, caster), poses, MODELS, some)
+    grid = np.unpackbits(rows.packed, axis=1, count=len(SITE.targets)).astype(bool)
+    looks = VisibilityModel(SITE, SIGHT, caster)
+    for pose, row in zip(some, grid, strict=True):
+        model = MODELS[str(poses.sensor[pose])]
+        seen = looks.see(model, poses.xyz[pose], level_orientation(float(poses.yaw[pose])))
+        assert (seen == row).all()
+
+
+def test_a_sensor_that_looks_up_sees_no_road(caster):
+    upside = turned(0.0, 0.0, math.pi)
+    narrow = replace(MODEL, elevations=np.radians(np.linspace(-60, -30, 16)))
+    assert VisibilityModel(SITE, SIGHT, caster).see(narrow, np.array([0.0, 0.0, 6.0]), np.eye(3)).any()
+    assert not VisibilityModel(SITE, SIGHT, caster).see(narrow, np.array([0.0, 0.0, 6.0]), upside).any()

@@ -1,0 +1,278 @@
+"""Laser surveys: the ground, what stands on it, boxes that keep lines of sight, and what is refused."""
+
+import importlib
+import struct
+import sys
+import time
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.geo_reference import GeoReference, projection
+from seip_addon.core.geometry.height_raster import HeightRaster
+from seip_addon.core.progress import finish
+from seip_addon.core.site.scene_geometry import FROM_EXTRACT, FROM_SURVEY
+from seip_addon.core.world.citymodel.at_place import AskedBuildings, with_city_model
+from seip_addon.core.world.elevation import obstacles, point_cloud
+from seip_addon.core.world.elevation.at_place import AskedTerrain, MapSurroundings, with_terrain
+from seip_addon.core.world.elevation.obstacles import ObstacleRaster, blocked, merged, of_boxes, random_rays
+from seip_addon.core.world.streetscape.description import Building, SiteDescription
+from tests.builders.city_text import CityModel, origin_at
+from tests.builders.survey_files import BUILDING, UNCLASSIFIED, VEGETATION, block_points, ground_points, write_survey
+
+laspy = pytest.importorskip("laspy")
+pytest.importorskip("lazrs")
+
+X, Y, _ = origin_at(52.5, 13.4)
+MAP = GeoReference("+proj=utm +zone=33 +datum=WGS84 +units=m", (X, Y, 0.0, 0.0))
+AREA = shapely.Point(0, 0).buffer(60)
+ROAD = shapely.box(-80, -4, 80, 4)
+WKT = projection("EPSG:25833").wkt
+HOUSE, TREE, TRUCK, POST = (10, 10, 20, 12), (-25, 8, 8, 8), (-10, -2, 9, 3), (-20, -12, 0.3, 0.3)
+
+
+def slope(x, y):
+    return 40 + 0.02 * x + 0 * y
+
+
+def town(rng, surface=slope):
+    return np.concatenate([
+        ground_points(rng, surface, 90, without=[HOUSE]),
+        block_points(rng, *HOUSE, 52.0),
+        block_points(rng, *TREE, 50.0, VEGETATION, low=44.5),
+        block_points(rng, *TRUCK, 44.0, UNCLASSIFIED),
+        block_points(rng, *POST, 48.0, UNCLASSIFIED, density=400),
+        block_points(rng, 40, -30, 4, 2, 41.5, UNCLASSIFIED),  # a car
+    ])  # fmt: skip
+
+
+def around(lanes=None, area=AREA):
+    flat = np.zeros((9, 3))
+    return MapSurroundings(MAP, area, flat if lanes is None else lanes, ROAD)
+
+
+def surveyed(tmp_path, points, *, suffix=".laz", description=None, lanes=None, wkt=WKT, epsg=None):
+    path = write_survey(tmp_path / f"survey{suffix}", points, (X, Y), wkt)
+    site, notes, tried = finish(with_terrain(description or SiteDescription(), AskedTerrain(path, epsg), around(lanes)))
+    return site, notes, tried
+
+
+def bounds(site, name):
+    vertices = np.concatenate([one.solid.vertices for one in site.solids if one.name == name])
+    return vertices.min(axis=0), vertices.max(axis=0)
+
+
+@pytest.mark.parametrize("suffix", [".las", ".laz"])
+def test_ground_and_what_stands_on_it(suffix, tmp_path):
+    site, notes, tried = surveyed(tmp_path, town(np.random.default_rng(3)), suffix=suffix)
+    places = np.random.default_rng(4).uniform(-55, 55, (300, 2))
+    assert np.abs(site.relief.rise(places) - slope(*places.T)).max() < 0.06  # the most under the house
+    assert {one.name for one in site.solids} == {"Surveyed building", "Surveyed vegetation"}
+    assert {(one.source, one.on_ground) for one in site.solids} == {(FROM_SURVEY, False)}
+    low, high = bounds(site, "Surveyed building")
+    assert low[:2] == pytest.approx([10, 10], abs=1.0)
+    assert high == pytest.approx([30, 22, 52], abs=1.0)
+    assert high[2] == pytest.approx(52, abs=0.01)
+    assert low[2] < slope(10, 10)
+    low, high = bounds(site, "Surveyed vegetation")
+    tolerance = next(one.tolerance for one in tried if one.changed <= obstacles.MAX_CHANGED)
+    assert 44.5 <= low[2] <= 45.5 + tolerance  # a crown that light passes under
+    assert 49.5 - tolerance <= high[2] <= 50
+    assert any("of 4,000 random lines of sight" in note for note in notes)
+
+
+def test_a_map_with_heights_keeps_them_and_gets_what_stands_there(tmp_path):
+    lanes = np.column_stack([np.linspace(-50, 50, 60), np.zeros((60, 2))])
+    lanes[:, 2] = 7 + 0.02 * lanes[:, 0]
+    site, notes, _ = surveyed(tmp_path, town(np.random.default_rng(3)), lanes=lanes)
+    assert site.relief is None
+    assert bounds(site, "Surveyed building")[1][2] == pytest.approx(52 - 33, abs=0.05)
+    assert "the map keeps its own heights" in notes[0]
+
+
+def test_buildings_of_an_extract_and_of_a_city_model_are_not_there_twice(tmp_path):
+    own = Building(shapely.box(10, 10, 30, 22), 9.0, source=FROM_EXTRACT)
+    site, notes, _ = surveyed(tmp_path, town(np.random.default_rng(3)), description=SiteDescription(buildings=(own,)))
+    assert not site.buildings
+    assert notes[-1] == "1 building of the extract gave way to the survey's"
+    model = CityModel((X, Y, 0.0), 25833)
+    path = model.add("a", model.block(*HOUSE, 12)).write(tmp_path / "model.json")
+    described, _ = finish(with_city_model(SiteDescription(), AskedBuildings(path), MAP, AREA))
+    site, _, _ = surveyed(tmp_path, town(np.random.default_rng(3)), description=described)
+    assert {one.name for one in site.solids} == {"Building", "Surveyed vegetation"}
+
+
+def raster_of(kind, top, low=None):
+    ground = HeightRaster(np.zeros(2), 1.0, np.zeros(kind.shape))
+    return ObstacleRaster(ground, kind, np.full(kind.shape, -0.5) if low is None else low, top)
+
+
+@settings(max_examples=120, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), filled=st.floats(0.05, 0.95), tolerance=st.sampled_from([0.0, 0.3, 1.0, 4.0]))
+def test_boxes_cover_each_cell_once_and_no_other_within_the_tolerance(seed, filled, tolerance):
+    rng = np.random.default_rng(seed)
+    kind = np.where(rng.random((14, 17)) < filled, rng.integers(0, 3, (14, 17)), -1)
+    top = 2 + np.round(rng.random((14, 17)) * 5, 1)
+    raster = raster_of(kind, top, np.where((kind == 1) & (rng.random(kind.shape) < 0.5), top - 1, -0.5))
+    boxes = merged(raster, tolerance)
+    covered = np.zeros(kind.shape, int)
+    for box in boxes:
+        cells = slice(*box.rows), slice(*box.columns)
+        covered[cells] += 1
+        assert (kind[cells] == box.kind).all()
+        assert np.abs(top[cells] - box.top).max() <= tolerance + 1e-9
+        assert np.abs(raster.low[cells] - box.low).max() <= tolerance + 1e-9
+    assert (covered == (kind >= 0)).all()
+
+
+def test_equal_heights_are_one_box_and_change_no_ray():
+    kind = np.full((80, 90), -1)
+    kind[20:40, 30:70] = 2
+    raster = raster_of(kind, np.where(kind >= 0, 9.0, 0.0))
+    boxes = merged(raster, 0.0)
+    assert [(box.rows, box.columns, box.top) for box in boxes] == [((20, 40), (30, 70), 9.0)]
+    begin, end = random_rays(raster, np.random.default_rng(1))
+    assert (blocked(raster, begin, end) == blocked(of_boxes(raster, boxes), begin, end)).all()
+
+
+def test_a_ray_is_blocked_where_a_block_stands_in_it():
+    """Against the crossing of a segment and a box in closed form."""
+    kind = np.full((60, 60), -1)
+    kind[20:30, 25:45] = 0
+    raster = raster_of(kind, np.where(kind >= 0, 5.0, 0.0))
+    begin, end = random_rays(raster, np.random.default_rng(2))
+    low, high = np.array([24.5, 19.5, -0.5]), np.array([44.5, 29.5, 5.0])
+    with np.errstate(divide="ignore"):
+        enter, leave = (low - begin) / (end - begin), (high - begin) / (end - begin)
+    first = np.minimum(enter, leave).max(axis=1).clip(0)
+    last = np.maximum(enter, leave).min(axis=1).clip(None, 1)
+    length = np.linalg.norm(end - begin, axis=1)
+    found = blocked(raster, begin, end)
+    assert not found[first > last].any()
+    assert found[(last - first) * length > 2 * obstacles.RAY_STEP].all()
+
+
+def test_fewer_boxes_change_more_rays(tmp_path):
+    rng = np.random.default_rng(5)
+    kind = np.where(rng.random((120, 120)) < 0.3, 0, -1)
+    raster = raster_of(kind, 2 + 6 * rng.random(kind.shape))
+    boxes, tried = obstacles.chosen_boxes(raster, np.random.default_rng(6))
+    assert [one.boxes for one in tried] == sorted(one.boxes for one in tried)
+    chosen = next(one for one in tried if one.changed <= obstacles.MAX_CHANGED)
+    assert len(boxes) == chosen.boxes
+    assert (tried[-1].tolerance, tried[-1].changed) == (0.0, 0.0)
+
+
+def test_the_same_survey_makes_the_same_boxes(tmp_path):
+    first, second = (surveyed(tmp_path, town(np.random.default_rng(3)))[0] for _ in range(2))
+    for one, other in zip(first.solids, second.solids, strict=True):
+        assert one.solid.vertices.tobytes() == other.solid.vertices.tobytes()
+
+
+def test_a_survey_without_ground_is_refused(tmp_path):
+    points = town(np.random.default_rng(3))
+    with pytest.raises(SeipError, match=r"no points of class 2 \(ground\) at the place: classify it"):
+        surveyed(tmp_path, points[points[:, 3] == BUILDING])
+
+
+def test_a_survey_without_a_system_asks_for_it(tmp_path):
+    points = town(np.random.default_rng(3))
+    with pytest.raises(SeipError, match="--terrain-epsg CODE"):
+        surveyed(tmp_path, points, wkt=None)
+    assert surveyed(tmp_path, points, wkt=None, epsg=25833)[0].solids
+
+
+def test_the_system_in_plan_of_a_compound_one_counts(tmp_path):
+    heights = 'VERT_CS["DHHN2016",VERT_DATUM["x",2005,AUTHORITY["EPSG","1170"]],AUTHORITY["EPSG","7837"]]'
+    compound = f'COMPD_CS["both",{WKT},{heights},AUTHORITY["EPSG","9932"]]'
+    assert surveyed(tmp_path, town(np.random.default_rng(3)), wkt=compound)[0].solids
+
+
+def test_geokeys_of_older_files_name_the_system(tmp_path):
+    path = tmp_path / "survey.las"
+    header = laspy.LasHeader(version="1.2", point_format=1)
+    keys = np.array([1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 25833], dtype="<u2").tobytes()
+    header.vlrs.append(laspy.VLR("LASF_Projection", 34735, "", keys))
+    laspy.LasData(header).write(path)
+    assert point_cloud.survey_system(path)[0] == 25833
+
+
+def test_a_survey_of_another_place_is_refused_with_both(tmp_path):
+    points = town(np.random.default_rng(3))
+    points[:, 0] += 9000
+    with pytest.raises(SeipError, match=r"0% of the place: its middle is at latitude 52\.\d+, longitude 13\.53"):
+        surveyed(tmp_path, points)
+    points[:, 0] -= 9000 - 130
+    with pytest.raises(SeipError, match=r"has points on \d+% of the place"):
+        surveyed(tmp_path, points)
+
+
+def test_too_many_points_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(point_cloud, "MAX_POINTS", 1000)
+    with pytest.raises(SeipError, match="holds more than 1,000 points at the place: thin it"):
+        surveyed(tmp_path, town(np.random.default_rng(3)))
+
+
+@pytest.mark.parametrize("suffix", [".las", ".laz"])
+def test_a_damaged_survey_is_refused(suffix, tmp_path):
+    path = tmp_path / f"survey{suffix}"
+    asked = with_terrain(SiteDescription(), AskedTerrain(path), around())
+    with pytest.raises(SeipError, match="no such file"):
+        finish(asked)
+    for text in (b"", b"nothing", b"LASF" + bytes(400)):
+        path.write_bytes(text)
+        with pytest.raises(SeipError, match="no LAS or LAZ file that can be read"):
+            finish(with_terrain(SiteDescription(), AskedTerrain(path), around()))
+    whole = write_survey(path, town(np.random.default_rng(3)), (X, Y), WKT).read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(SeipError, match=r"survey\.la[sz]"):
+        finish(with_terrain(SiteDescription(), AskedTerrain(path), around()))
+
+
+HEADER = {
+    "variable-length records": (".las", 100, "<I", 2**32 - 1, "announces 4,294,967,295 variable-length records"),
+    "extended records": (".las", 243, "<I", 2**32 - 1, "announces 4,294,967,295 variable-length records"),
+    "points": (".las", 247, "<Q", 2**40, "announces 1,099,511,627,776 points"),
+    "packed points": (".laz", 247, "<Q", 2**40, "chunk table announces|packed bytes"),
+    "where points begin": (".las", 96, "<I", 2**31, "points begin at byte 2,147,483,648"),
+    "a scale": (".las", 131, "<d", float("nan"), "scale is nan"),
+    "an offset": (".las", 155, "<d", 1e300, r"offset is 1e\+300"),
+    "a bound": (".las", 179, "<d", float("inf"), "bound is inf"),
+}
+
+
+@pytest.mark.parametrize("name", HEADER)
+def test_a_header_that_the_file_does_not_bear_out_is_refused_at_once(name, tmp_path):
+    suffix, at, form, value, complaint = HEADER[name]
+    path = write_survey(tmp_path / f"survey{suffix}", ground_points(np.random.default_rng(3), slope, 5), (X, Y), WKT)
+    content = bytearray(path.read_bytes())
+    struct.pack_into(form, content, at, value)
+    path.write_bytes(content)
+    begin = time.process_time()
+    with pytest.raises(SeipError, match=complaint):
+        finish(with_terrain(SiteDescription(), AskedTerrain(path), around()))
+    assert time.process_time() - begin < 1.0
+
+
+def test_a_chunk_table_that_the_file_does_not_hold_is_refused(tmp_path):
+    path = write_survey(tmp_path / "survey.laz", ground_points(np.random.default_rng(3), slope, 5), (X, Y), WKT)
+    content = bytearray(path.read_bytes())
+    (data,) = struct.unpack_from("<I", content, 96)
+    (table,) = struct.unpack_from("<q", content, data)
+    struct.pack_into("<I", content, table + 4, 2**32 - 1)
+    path.write_bytes(content)
+    with pytest.raises(SeipError, match="chunk table announces 4,294,967,295 chunks"):
+        finish(with_terrain(SiteDescription(), AskedTerrain(path), around()))
+
+
+@pytest.mark.parametrize("missing", ["laspy", "lazrs"])
+def test_without_laspy_the_cure_is_named(missing, tmp_path, monkeypatch):
+    path = write_survey(tmp_path / "survey.laz", town(np.random.default_rng(3)), (X, Y), WKT)
+    monkeypatch.setitem(sys.modules, missing, None)
+    with pytest.raises(SeipError, match=f"needs {missing}, which is not here; pip install laspy lazrs"):
+        finish(with_terrain(SiteDescription(), AskedTerrain(path), around()))
+    importlib.invalidate_caches()

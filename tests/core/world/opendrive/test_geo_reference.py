@@ -1,0 +1,131 @@
+"""Latitude and longitude: the projection against what defines it, and what a user gets who types them."""
+
+import gzip
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.geo_reference import projection
+from seip_addon.core.progress import finish
+from seip_addon.core.world.opendrive.read import read_map
+from seip_addon.core.world.streetscape.description import SiteDescription
+from seip_addon.core.world.streetscape.model import site_model
+from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
+
+AXIS, ECCENTRICITY = 6_378_137.0, math.sqrt(0.00669437999014)
+BERLIN = "+proj=tmerc +lat_0=52.5 +lon_0=13.4 +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m"
+
+
+def radii(latitude):
+    """Return the radii of curvature of WGS 84 along the meridian and across it."""
+    root = 1 - (ECCENTRICITY * math.sin(latitude)) ** 2
+    return AXIS * (1 - ECCENTRICITY**2) / root**1.5, AXIS / root**0.5
+
+
+@given(st.floats(-80, 80))
+def test_on_its_meridian_the_projection_keeps_lengths(degrees):
+    to_metres = projection("+proj=utm +zone=32")
+    latitude = np.linspace(0.0, math.radians(degrees), 4001)
+    along = np.array([radii(each)[0] for each in latitude])
+    length = float(((along[1:] + along[:-1]) / 2 * np.diff(latitude)).sum())
+    easting, northing = to_metres(latitude[-1], math.radians(9.0))
+    assert easting == pytest.approx(500_000.0, abs=1e-6)
+    assert northing == pytest.approx(0.9996 * length, abs=0.2)
+
+
+@given(st.floats(-75, 75), st.floats(-6, 6))
+def test_the_projection_keeps_angles(degrees, east):
+    """With the lengths on its meridian this defines it."""
+    to_metres = projection("+proj=tmerc +lat_0=10 +lon_0=9 +k=0.9996")
+    latitude, longitude, step = math.radians(degrees), math.radians(9 + east), 1e-5
+    meridian, across = radii(latitude)
+    up, down = (np.array(to_metres(latitude + side * step, longitude)) for side in (1, -1))
+    right, left = (np.array(to_metres(latitude, longitude + side * step)) for side in (1, -1))
+    north = (up - down) / (2 * step * meridian)
+    easting = (right - left) / (2 * step * across * math.cos(latitude))
+    np.testing.assert_allclose(easting, [north[1], -north[0]], atol=1e-6)
+
+
+def test_a_known_place_is_where_it_is():
+    """The Eiffel tower in UTM zone 31."""
+    for text in ("+proj=utm +zone=31 +datum=WGS84", "EPSG:32631", "EPSG:25831"):
+        place = projection(text)(math.radians(48.85822), math.radians(2.2945))
+        np.testing.assert_allclose(place, [448_251, 5_411_943], atol=30)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(None, "", "+proj=merc", "+lat_0=49 +lon_0=8", "+proj=utm +zone=77", "+proj=tmerc +ellps=bessel +lon_0=9"),
+        *("+proj=tmerc +lon_0=9 +towgs84=598.1,73.7,418.2,0,0,0,0", "+proj=tmerc +lon_0=nine", "no projection"),
+        "+proj=utm +zone=32 +units=us-ft",
+    ],
+)
+def test_other_references_are_not_guessed_at(text):
+    assert projection(text) is None
+
+
+def street(tmp_path, reference, *, x=0.0, y=0.0, offset=""):
+    header = f"<header><geoReference>{reference}</geoReference>{offset}</header>"
+    street = road(geometry(length=400.0, x=x - 200, y=y), section(lane(1), lane(-1)))
+    return read_text(tmp_path, document(street, header=header))
+
+
+def built(road_map, near):
+    return finish(site_model(road_map, SiteDescription(near=near, radius=30.0)))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("offset", [(0.0, 0.0), (4000.0, -3000.0)])
+def test_latitude_and_longitude_are_converted_by_the_maps_projection(tmp_path, turned, offset):
+    """Also in the other order; the numbers would be a place of the map in metres too, 56 m off its street."""
+    header = f'<offset x="{offset[0]}" y="{offset[1]}" z="0" hdg="0"/>'
+    road_map = street(tmp_path, BERLIN, x=-offset[0], y=-offset[1], offset=header)
+    pair = (52.5, 13.402)
+    model = built(road_map, pair[::-1] if turned else pair)
+    east = math.radians(0.002) * radii(math.radians(52.5))[1] * math.cos(math.radians(52.5))
+    np.testing.assert_allclose(model.origin[:2], [east - offset[0], -offset[1]], atol=1.0)
+    assert "taken as latitude and longitude" in model.notes[0]
+
+
+@pytest.mark.parametrize("near", [(0.0, 0.0), (52.5, 0.0), (-60.0, 1.5), (120.25, 2.0)])
+def test_metres_stay_metres(tmp_path, near):
+    model = built(street(tmp_path, BERLIN), near)
+    np.testing.assert_array_equal(model.origin[:2], np.round(near))
+    assert not any("latitude" in note for note in model.notes)
+
+
+def test_without_a_projection_they_are_refused(tmp_path):
+    road_map = street(tmp_path, "+lat_0=49 +lon_0=8")
+    with pytest.raises(SeipError, match=r"look like latitude and longitude.*names no projection"):
+        built(road_map, (49.001, 8.002))
+    assert built(road_map, (49.0, 8.0)).origin[0] == 49  # whole metres are metres
+    with pytest.raises(SeipError, match=r"give metres of the map, not latitude and longitude"):
+        built(street(tmp_path, "", x=500_000.0, y=5_000_000.0), (52.51, 13.4))
+
+
+CITY = b'{"type": "CityJSON", "version": "1.1", "CityObjects": {}}'
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        (gzip.compress(b"<OpenDRIVE/>", mtime=0), "town.xodr is compressed with gzip; unpack it"),
+        (CITY, "town.xodr is CityJSON, a model of buildings, not OpenDRIVE"),
+        (b"\xef\xbb\xbf\n " + CITY, "is CityJSON"),
+        (b'{"type": "FeatureCollection"}', "town.xodr is JSON, not OpenDRIVE"),
+        (b"PK\x03\x04....", "is a zip archive"),
+        (b"BLENDER-v405", "is a .blend, no map"),
+        (b"<osm version='0.6'/>", "begins with <osm> as extracts of OpenStreetMap do"),
+        (b"<net version='1.9'/>", "begins with <net> as networks of SUMO do"),
+    ],
+)
+def test_a_file_of_another_format_is_named_as_such(tmp_path, content, complaint):
+    path = tmp_path / "town.xodr"
+    path.write_bytes(content)
+    with pytest.raises(SeipError, match=complaint):
+        read_map(path)

@@ -1,0 +1,428 @@
+"""Bridges and underpasses of extracts: their height, the grade of their ramps, and what has no room for them."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+import shapely
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.plan import surface_height
+from seip_addon.core.progress import finish
+from seip_addon.core.site.scene_geometry import OTHER_LEVELS
+from seip_addon.core.workflows.site_building import AskedSite, build_site
+from seip_addon.core.world.elevation.at_place import AskedTerrain
+from seip_addon.core.world.opendrive.lanes import lane_surfaces
+from seip_addon.core.world.opendrive.read import read_map
+from seip_addon.core.world.streetscape.terrain import MAX_ROADSIDE
+from tests.builders.city_text import origin_at
+from tests.builders.dem_files import sampled, write_dem
+from tests.builders.osm_text import Extract, corner_houses
+from tests.sumo_here import needs_sumo
+
+pytestmark = needs_sumo
+ROAD_CLEARANCE, RAIL_CLEARANCE, PATH_CLEARANCE = 5.5, 6.5, 3.5  # metres between the surfaces of both
+STEEPEST, GAP = 0.085, 0.02  # of ramps (8 %, and rounding), and metres between connected lanes
+MID = (52.5, 13.4)
+X, Y, _ = origin_at(*MID)
+
+
+def built(extract, tmp_path, **asked):
+    path = extract.write(tmp_path / "place.osm")
+    asked = {"near_latlon": (extract.latitude, extract.longitude), "radius": 90.0} | asked
+    site = finish(build_site(path, AskedSite(**asked)))
+    (tmp_path / "place.xodr").write_text(site.map_text, encoding="utf-8")
+    return site, read_map(tmp_path / "place.xodr")
+
+
+def lanes_of(road_map, name=None):
+    roads = [road for road in road_map.roads if name is None or road.name == name]
+    return [lane for road in roads for lane in lane_surfaces(road) if lane.lane_type == "driving"]
+
+
+def grades(lane):
+    """Return the steepest grade along the middle of a lane, over at least 2 m."""
+    middle = (lane.left + lane.right) / 2
+    away = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(middle[:, :2], axis=0).T))])
+    along = np.linspace(0.0, away[-1], int(away[-1] / 2.0) + 1)
+    return np.abs(np.diff(np.interp(along, away, middle[:, 2]))).max() / along[1] if away[-1] > 2.0 else 0.0
+
+
+def gaps(road_map):
+    """Return the differences in height between the ends of lanes that lead into each other, by plan alone."""
+    roads = {road.id: road for road in road_map.roads}
+    lanes = {number: lanes_of(road_map_of(road)) for number, road in roads.items()}
+    found = [0.0]
+    for road in roads.values():
+        for link, row in ((road.predecessor, 0), (road.successor, -1)):
+            if link is None or link.kind != "road":
+                continue
+            other_row = -1 if link.contact == "end" else 0
+            for lane in lanes[road.id]:
+                for other in lanes[link.id]:
+                    one, two = ((each.left[at] + each.right[at]) / 2 for each, at in ((lane, row), (other, other_row)))
+                    if np.hypot(*(one - two)[:2]) < 0.3:
+                        found.append(abs(one[2] - two[2]))
+    return found
+
+
+def road_map_of(road):
+    return type("OneRoad", (), {"roads": (road,)})()
+
+
+def clearances(road_map, upper, lower):
+    """Return the differences in height of two streets where they lie above each other."""
+    found = []
+    for one in lanes_of(road_map, upper):
+        for other in lanes_of(road_map, lower):
+            common = one.polygon.intersection(other.polygon)
+            if common.area > 0.5:
+                place = shapely.get_coordinates(common.centroid)[0]
+                found.append(height_at(one, place) - height_at(other, place))
+    return found
+
+
+def height_at(lane, place):
+    middle = (lane.left + lane.right) / 2
+    path = shapely.LineString(middle[:, :2])
+    away = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(middle[:, :2], axis=0).T))])
+    return float(np.interp(path.project(shapely.Point(place)), away, middle[:, 2]))
+
+
+def bridge(extract, half=15.0, reach=300.0, angle=0.0, **tags):
+    """Add High Road in three ways, the middle one on a bridge, at an angle from east (radians)."""
+    tags = {"highway": "primary", "name": "High Road", "lanes": 2} | tags
+
+    def at(away):
+        return round(away * math.cos(angle), 3), round(away * math.sin(angle), 3)
+
+    extract.way([at(-reach), at(-half)], **tags)
+    extract.way([at(-half), at(half)], bridge="yes", layer="1", **tags)
+    extract.way([at(half), at(reach)], **tags)
+
+
+def trunk(extract, **tags):
+    extract.way([(0, -300), (0, -200), (0, 200), (0, 300)], **({"highway": "trunk", "name": "Trunk Road"} | tags))
+
+
+def check(road_map, most=STEEPEST):
+    slopes = [road.elevation.slope(np.arange(0.0, road.length, 0.5)) for road in road_map.roads if not road.junction_id]
+    assert np.abs(np.concatenate(slopes)).max() < most
+    assert max(map(grades, lanes_of(road_map))) < 0.12  # inside a bend a lane is shorter than the road
+    assert max(gaps(road_map)) < GAP
+
+
+@pytest.mark.parametrize("half", [10.0, 20.0, 40.0])
+def test_a_short_bridge_is_as_high_as_it_needs_and_its_ramps_are_gentle(tmp_path, half):
+    extract = Extract()
+    bridge(extract, half)
+    trunk(extract)
+    site, road_map = built(extract, tmp_path, level=("Trunk Road",))
+    check(road_map, most=0.065)
+    assert clearances(road_map, "High Road", "Trunk Road")
+    assert min(clearances(road_map, "High Road", "Trunk Road")) > ROAD_CLEARANCE - 0.05
+    assert max(lane.left[:, 2].max() for lane in lanes_of(road_map)) < ROAD_CLEARANCE + 0.1
+    assert not any("steeper" in warning or "differ in height" in warning for warning in site.model.warnings)
+
+
+def test_slip_roads_of_an_exit_climb_to_the_bridge(tmp_path):
+    extract = Extract()
+    for x, ends in ((-8, (300, -300)), (8, (-300, 300))):
+        side = -1 if x < 0 else 1
+        extract.way(
+            [(x, ends[0]), (x, side * -180), (x, side * 180), (x, ends[1])], highway="motorway", name="A 1", lanes=2
+        )
+        extract.way([(x, side * -180), (3 * x, side * -90), (60 * side, 0)], highway="motorway_link")
+        extract.way([(60 * side, 0), (3 * x, side * 90), (x, side * 180)], highway="motorway_link")
+    tags = {"highway": "secondary", "name": "Cross Road", "lanes": 2}
+    extract.way([(-300, 0), (-60, 0), (-18, 0)], **tags)
+    extract.way([(-18, 0), (18, 0)], bridge="yes", layer="1", **tags)
+    extract.way([(18, 0), (60, 0), (300, 0)], **tags)
+    site, road_map = built(extract, tmp_path, level=("Cross Road",))
+    check(road_map)
+    assert min(clearances(road_map, "Cross Road", "A 1")) > ROAD_CLEARANCE - 0.05
+    assert max(abs(lane.left[:, 2]).max() for lane in lanes_of(road_map, "A 1")) < 0.5
+    assert not any("flat" in note for note in site.model.notes)
+
+
+def test_a_bridge_without_room_for_ramps_is_built_flat_and_named(tmp_path):
+    extract = Extract()
+    bridge(extract, 12.0)
+    trunk(extract)
+    extract.way([(30, 0), (20, 15), (0, 30)], highway="trunk_link")  # 6 m in 40 m
+    extract.lines = [line.replace('<nd ref="4"/><nd ref="6"/>', "") for line in extract.lines]
+    extract.way([(12, 0), (30, 0)], highway="primary", name="High Road", lanes=2)
+    extract.way([(0, 0.5), (0, 30)], highway="trunk", name="Trunk Road")
+    site, road_map = built(extract, tmp_path)
+    assert any(note.startswith("High Road over Trunk Road is built flat") for note in site.model.notes)
+    assert max(abs(lane.left[:, 2]).max() for lane in lanes_of(road_map)) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("below", "rise"),
+    [
+        ({"railway": "rail"}, RAIL_CLEARANCE),
+        ({"railway": "rail", "cutting": "yes"}, 0.0),
+        ({"highway": "footway"}, PATH_CLEARANCE),
+        ({"highway": "primary", "tunnel": "yes", "layer": "-1"}, 0.0),
+        ({"waterway": "river"}, 0.0),
+    ],
+)
+def test_the_height_is_that_of_what_is_crossed(tmp_path, below, rise):
+    extract = Extract()
+    bridge(extract, 20.0)
+    extract.way([(200, 0), (200, 100)], highway="residential", name="Side Street")
+    extract.way([(0, -100), (0, 100)], **below)
+    _, road_map = built(extract, tmp_path)
+    check(road_map)
+    assert max(lane.left[:, 2].max() for lane in lanes_of(road_map)) == pytest.approx(rise, abs=0.02)
+
+
+def test_an_underpass_is_lowered_under_a_street_that_stays(tmp_path):
+    extract = Extract()
+    extract.way([(-300, 0), (300, 0)], highway="primary", name="High Road", lanes=2)
+    usual = {"highway": "secondary", "name": "Low Road", "lanes": 2}
+    extract.way([(0, -300), (0, -30)], **usual)
+    extract.way([(0, -30), (0, 30)], layer="-1", **usual)
+    extract.way([(0, 30), (0, 300)], **usual)
+    _, road_map = built(extract, tmp_path, level=("High Road",))
+    check(road_map, most=0.065)
+    assert min(clearances(road_map, "High Road", "Low Road")) > ROAD_CLEARANCE - 0.05
+    assert max(abs(lane.left[:, 2]).max() for lane in lanes_of(road_map, "High Road")) < 0.01
+
+
+def test_a_footbridge_does_not_move_the_street_below(tmp_path):
+    extract = Extract()
+    for line, layer in (((-300, -30), {}), ((-30, 30), {"layer": "-1"}), ((30, 300), {})):
+        extract.way([(x, 0) for x in line], highway="primary", name="High Road", **layer)
+    extract.way([(0, -40), (0, 40)], highway="footway", bridge="yes", layer="1")
+    extract.way([(200, 0), (200, 100)], highway="residential", name="Side Street")
+    _, road_map = built(extract, tmp_path)
+    assert max(abs(lane.left[:, 2]).max() for lane in lanes_of(road_map)) < 0.01
+
+
+def test_three_levels_lie_above_each_other(tmp_path):
+    extract = Extract()
+    bridge(extract, 25.0)
+    trunk(extract)
+    usual = {"highway": "motorway", "name": "Top Road", "lanes": 2}
+    extract.way([(-280, -280), (-60, -60)], **usual)
+    extract.way([(-60, -60), (60, 60)], bridge="yes", layer="2", **usual)
+    extract.way([(60, 60), (280, 280)], **usual)
+    _, road_map = built(extract, tmp_path, level=("Trunk Road",))
+    check(road_map)
+    for upper, lower in (("High Road", "Trunk Road"), ("Top Road", "High Road")):
+        assert min(clearances(road_map, upper, lower)) > ROAD_CLEARANCE - 0.05
+
+
+def embankment(x, y):
+    """Return ground 6 m high but for a cutting 30 m wide in which Trunk Road lies."""
+    return 40.0 + np.where(np.abs(x - X) < 15.0, 0.0, 6.0) + 0.0 * y
+
+
+def test_on_terrain_a_bridge_leads_from_bank_to_bank(tmp_path):
+    extract = Extract()
+    bridge(extract, 15.0)
+    trunk(extract)
+    heights = sampled(embankment, X - 420, Y + 420, 840)
+    dem = write_dem(tmp_path / "dem.tif", heights, X - 420, Y + 420)
+    site, road_map = built(extract, tmp_path, level=("High Road",), terrain=AskedTerrain(dem))
+    deck = [lane for lane in lanes_of(road_map, "High Road") if abs(lane.left[:, 0].mean() - 300) < 20]
+    assert min(lane.left[:, 2].min() for lane in deck) > 45.0
+    assert max(lane.left[:, 2].max() for lane in lanes_of(road_map)) < 47.0
+    assert min(clearances(road_map, "High Road", "Trunk Road")) > ROAD_CLEARANCE - 0.05
+    check(road_map, most=0.11)
+    road = next(part for part in site.model.parts if part.name == "Driving lanes").solid.vertices[:, 2]
+    assert road.min() + site.model.origin[2] > 44.9
+
+
+def test_a_place_on_two_levels_is_asked_for_by_street(tmp_path):
+    extract = Extract()
+    bridge(extract)
+    trunk(extract)
+    with pytest.raises(
+        SeipError, match=r"High Road lies 5\.\d m above Trunk Road .*--level 'High Road' or --level 'Trunk"
+    ):
+        built(extract, tmp_path)
+    for name, z in (("high road", 5.5), ("Trunk Road", 0.0)):
+        site, _ = built(extract, tmp_path, level=(name,))
+        road = next(part for part in site.model.parts if part.name == "Driving lanes").solid.vertices[:, 2]
+        assert road.max() + site.model.origin[2] == pytest.approx(z, abs=0.05)
+    with pytest.raises(SeipError, match=r"no road 'Low Road' at this place: name a street .*: High Road, Trunk Road"):
+        built(extract, tmp_path, level=("Low Road",))
+
+
+def test_a_place_without_a_junction_on_its_level_is_titled_by_its_street(tmp_path):
+    """High Road has a junction 75 m from the middle, Trunk Road none."""
+    extract = Extract()
+    bridge(extract, 20.0, 75.0)
+    extract.way([(75, 0), (300, 0)], highway="primary", name="High Road", lanes=2)
+    trunk(extract)
+    extract.way([(75, 0), (75, 150)], highway="residential", name="Side Street")
+    for level, radius, name in (
+        ("trunk road", 60.0, "Trunk Road"),
+        ("trunk road", 90.0, "Trunk Road"),
+        ("High Road", 60.0, "High Road"),
+        ("High Road", 90.0, "High Road / Side Street"),
+    ):
+        site, _ = built(extract, tmp_path, level=(level,), radius=radius)
+        assert site.model.name == name
+
+
+def test_a_level_that_is_a_tunnel_is_named_in_a_note(tmp_path):
+    extract = corner_houses(Extract())
+    extract.way([(-200, 0), (40, 0), (200, 0)], highway="primary", name="Top Road")
+    extract.way([(40, 0), (40, 150)], highway="residential", name="Side Road")
+    dip = {"highway": "secondary", "name": "Dip Road", "lanes": 2}
+    extract.way([(0, -20), (0, 20)], tunnel="yes", layer="-1", **dip)
+    with pytest.raises(SeipError, match=r"Dip Road lies in a tunnel at this place, and scenes leave tunnels out"):
+        built(extract, tmp_path, level=("dip road",), radius=60.0)
+    extract.way([(0, -200), (0, -20)], **dip)
+    extract.way([(0, 20), (0, 200)], **dip)
+    site, _ = built(extract, tmp_path, level=("dip road",), radius=60.0)
+    assert site.model.name == "Top Road / Side Road"
+    assert any(note.startswith("Dip Road lies in a tunnel at this place") for note in site.model.notes)
+    site, _ = built(extract, tmp_path, radius=60.0)
+    assert not any("tunnel" in note for note in site.model.notes)
+
+
+def random_exit(seed):
+    """Return a random crossing of two roads on two levels, with a junction, side streets and slip roads."""
+    random = np.random.default_rng(seed)
+    extract, angle = Extract(), random.uniform(-0.7, 0.7)
+    along = np.array([math.cos(angle), math.sin(angle)])
+    half, west, east, junction = random.uniform([1, 120, 160, 100], [15, 350, 350, 220])
+    half += 14.0 / math.cos(angle)  # both carriageways of one cross both of the other on the bridge
+    dual, wide = random.random(2) < 0.5
+    tags = {
+        "highway": str(random.choice(["primary", "secondary", "residential"])),
+        "name": "High Road",
+        "lanes": int(random.integers(1, 5)),
+        **({"oneway": "yes"} if dual else {}),
+    }
+
+    def at(away, aside=0.0):
+        x, y = away * along + aside * np.array([-along[1], along[0]])
+        return round(float(x), 2), round(float(y), 2)
+
+    for aside, sign in ((-6.0, 1), (6.0, -1)) if dual else ((0.0, 1),):
+        for line, more in (
+            ((-west, -half), {}),
+            ((-half, half), {"bridge": "yes", "layer": "1"}),
+            ((half, 60, east), {}),
+        ):
+            extract.way([at(away, aside) for away in line[::sign]], **tags, **more)
+    near, far = at(60, -6.0 if dual else 0.0), at(60, 6.0)
+    if dual:
+        extract.way([far, near], highway="residential", name="Side Street")
+    extract.way([near, (near[0] + 5, near[1] - random.uniform(60, 150))], highway="residential", name="Side Street")
+    for x, sign in ((-8, -1), (8, 1)) if wide else ((0, 1),):
+        line = [(x, -300), (x, -round(junction, 1)), (x, round(junction, 1)), (x, 300)][::sign]
+        extract.way(line, highway="trunk", name="Trunk Road", lanes=2, **({"oneway": "yes"} if wide else {}))
+    x = 8 if wide else 0
+    if random.random() < 0.7:
+        extract.way([(x, -round(junction, 1)), (x + 12, 40 - junction), near], highway="trunk_link", oneway="yes")
+    return extract
+
+
+def check_exit(seed, tmp_path):
+    site, road_map = built(random_exit(seed), tmp_path, level=("Trunk Road",))
+    assert not any("flat" in note for note in site.model.notes)
+    check(road_map)
+    assert min(clearances(road_map, "High Road", "Trunk Road")) > ROAD_CLEARANCE - 0.05
+    assert not any("steeper" in warning or "differ in height" in warning for warning in site.model.warnings)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_exits_have_gentle_grades_and_no_steps(tmp_path, seed):
+    check_exit(seed, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(6, 66))
+def test_many_random_exits_have_gentle_grades_and_no_steps(tmp_path, seed):
+    check_exit(seed, tmp_path)
+
+
+def test_a_bridge_is_in_the_way_of_what_lies_below(tmp_path):
+    extract = Extract()
+    bridge(extract)
+    trunk(extract)
+    site, _ = built(extract, tmp_path, level=("Trunk Road",))
+    deck = next(part for part in site.model.parts if part.name == "Roads above")
+    assert deck.solid.vertices[:, 2].max() + site.model.origin[2] == pytest.approx(ROAD_CLEARANCE, abs=0.01)
+    assert not any("nothing in this scene can hide" in warning for warning in site.model.warnings)
+
+
+def surfaces(model, *names):
+    """Return the triangles (n, 3, 3), local axes, of the parts with names."""
+    corners = [
+        part.solid.vertices[list(face)] for part in model.parts if part.name in names for face in part.solid.faces
+    ]
+    return np.array(corners).reshape(-1, 3, 3)
+
+
+@pytest.mark.parametrize("level", ["High Road", "Trunk Road"])
+@pytest.mark.parametrize("half", [2.0, 15.0])
+def test_the_ground_lies_on_the_land_and_slopes_lead_up_to_ramps(tmp_path, level, half):
+    extract = corner_houses(Extract(), near=40.0)
+    bridge(extract, half=half)
+    trunk(extract)
+    site, _ = built(extract, tmp_path, level=(level,))
+    model, land = site.model, -site.model.origin[2]
+    verge = surfaces(model, "Verge").reshape(-1, 3)
+    roads = surfaces(model, "Driving lanes", "Pavements", "Pavements beyond", OTHER_LEVELS, "Roads above")
+    away = shapely.distance(shapely.multipolygons(shapely.polygons(roads[:, :, :2])), shapely.points(verge[:, :2]))
+    np.testing.assert_allclose(verge[away > MAX_ROADSIDE, 2], land, atol=0.05)
+    assert (away > MAX_ROADSIDE).sum() > 50
+    low, high = verge[:, 2].min(), verge[:, 2].max()
+    assert low > land - 0.2
+    assert high > land + ROAD_CLEARANCE - 1.5  # the ramps lie on embankments
+    houses = [
+        part.foot[2] + part.solid.vertices[:, 2].min()
+        for part in model.parts
+        if re.fullmatch(r"Building \d+", part.name)
+    ]
+    np.testing.assert_allclose(houses, land, atol=0.05)
+
+
+def test_the_ground_beside_and_below_a_bridge_is_closed(tmp_path):
+    """Under the deck there is ground or the lower road; beside it the surface has no holes and no cliffs."""
+    extract = Extract()
+    bridge(extract)
+    trunk(extract)
+    site, _ = built(extract, tmp_path, level=("High Road",))
+    model = site.model
+    lower = surfaces(model, "Verge", OTHER_LEVELS)
+    trunk_at = shapely.union_all([shapely.Polygon(face) for face in faces_in_plan(model, OTHER_LEVELS)]).centroid
+    x, y = np.meshgrid(np.arange(-14.0, 14.1, 0.7), np.arange(-12.0, 12.1, 0.7))
+    places = np.column_stack([x.ravel() + trunk_at.x, y.ravel() + trunk_at.y]) + 0.013
+    below = surface_height(places, lower)
+    assert np.isfinite(below).all()
+    rows = below.reshape(x.shape)
+    assert max(np.abs(np.diff(rows, axis=axis)).max() for axis in (0, 1)) < 1.6
+    deck = surface_height(places, surfaces(model, "Driving lanes"))
+    over = np.isfinite(deck) & (np.abs(places[:, 0] - trunk_at.x) < 3.0)
+    assert over.any()
+    assert (deck - below)[over].min() > ROAD_CLEARANCE - 0.1
+
+
+def test_a_street_in_an_underpass_lies_in_a_cutting(tmp_path):
+    extract = corner_houses(Extract(), near=40.0)
+    extract.way([(-300, 0), (0, 0), (300, 0)], highway="secondary", name="High Road", lanes=2)
+    low = {"highway": "primary", "name": "Low Road", "lanes": 2}
+    extract.way([(0, -300), (0, -30)], **low)
+    extract.way([(0, -30), (0, 30)], layer="-1", **low)
+    extract.way([(0, 30), (0, 300)], **low)
+    site, _ = built(extract, tmp_path, level=("Low Road",))
+    verge = surfaces(site.model, "Verge").reshape(-1, 3) + np.array([0, 0, site.model.origin[2]])
+    assert verge[:, 2].max() == pytest.approx(0.0, abs=0.13)  # up to the pavements
+    assert verge[:, 2].min() < -4.0
+    (deck,) = [part for part in site.model.parts if part.name == "Roads above"]
+    assert deck.solid.vertices[:, 2] + site.model.origin[2] == pytest.approx(0.0, abs=0.05)
+
+
+def faces_in_plan(model, name):
+    part = next(part for part in model.parts if part.name == name)
+    return [part.solid.vertices[list(face), :2] for face in part.solid.faces]

@@ -1,0 +1,185 @@
+"""Reading extracts, whole and broken."""
+
+import gzip
+
+import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.world.openstreetmap import extract as reading
+from seip_addon.core.world.openstreetmap.extract import Way, read_extract, rings, window
+from tests.builders.osm_text import Extract, crossing
+
+
+def read(path, within=None):
+    return finish(read_extract(path, within))
+
+
+def written(tmp_path, text, name="place.osm"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def osm(body):
+    return f'<?xml version="1.0" encoding="UTF-8"?><osm version="0.6">{body}</osm>'
+
+
+def test_an_extract_is_read_plain_and_packed(tmp_path):
+    plain = crossing().write(tmp_path / "place.osm")
+    packed = tmp_path / "place.osm.gz"
+    packed.write_bytes(gzip.compress(plain.read_bytes()))
+    one, other = read(plain), read(packed)
+    assert len(one.nodes) == len(other.nodes) > 20
+    assert one.ways.keys() == other.ways.keys()
+    assert any(way.tags.get("name") == "East Road" for way in one.ways.values())
+
+
+def test_a_packed_extract_is_known_by_its_content_not_its_name(tmp_path):
+    path = tmp_path / "place.osm"
+    path.write_bytes(gzip.compress(crossing().text().encode()))
+    assert read(path).ways
+
+
+def test_nodes_outside_a_window_are_passed_over(tmp_path):
+    path = crossing().write(tmp_path / "place.osm")
+    near = read(path, window(52.5, 13.4, 60.0))
+    assert 0 < len(near.nodes) < len(read(path).nodes)
+    assert len(near.ways) == len(read(path).ways)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("", "broken or unfinished XML"),
+        ("<osm><node id='1' lat='0' lon='0'>", "broken or unfinished XML"),
+        (osm("")[:-6] + "<node", "broken or unfinished XML"),
+        (osm(""), "has no node"),
+        ("<OpenDRIVE/>", "no extract of OpenStreetMap: its first element is <OpenDRIVE>"),
+        ('<!DOCTYPE osm [<!ENTITY a "aaaa">]><osm>&a;</osm>', "declares a document type or entities"),
+        (osm('<node id="x" lat="0" lon="0"/>'), "is no whole number"),
+        (osm('<node lat="0" lon="0"/>'), "is no whole number"),
+        (osm(f'<node id="{10**20}" lat="0" lon="0"/>'), "is no whole number below"),
+        ("<html/>", "first element is <html>; download the place"),
+        (osm('<node id="1" lat="0" lon="0"/><way id="2"><nd ref=""/></way>'), "is no whole number"),
+    ],
+)
+def test_a_broken_extract_is_refused_in_a_sentence(tmp_path, text, complaint):
+    with pytest.raises(SeipError, match=complaint):
+        read(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("content", "cure"),
+    [
+        (b"\x00\x00\x00\x0d\x0a\x09OSMHeader", "osmium cat"),
+        (b"PK\x03\x04rest", "unpack"),
+        (b"BZh91", "bunzip2"),
+        (b' {"a": 1}', "JSON"),
+    ],
+)
+def test_another_format_is_named_with_the_cure(tmp_path, content, cure):
+    path = tmp_path / "place.osm"
+    path.write_bytes(content)
+    with pytest.raises(SeipError, match=cure):
+        read(path)
+
+
+def test_a_missing_file_and_a_damaged_one_are_named(tmp_path):
+    with pytest.raises(SeipError, match="no such file"):
+        read(tmp_path / "nowhere.osm")
+    path = tmp_path / "place.osm.gz"
+    path.write_bytes(gzip.compress(crossing().text().encode())[:-30])
+    with pytest.raises(SeipError, match="damaged gzip"):
+        read(path)
+
+
+def test_places_that_are_none_and_repeats_are_counted(tmp_path):
+    nodes = ['<node id="1" lat="10" lon="10"/>', '<node id="1" lat="11" lon="10"/>']
+    nodes += ['<node id="2" lat="90" lon="0"/>', '<node id="3" lat="0" lon="181"/>', '<node id="4" lat="nan" lon="1"/>']
+    nodes += ['<node id="5" lat="0" lon="180"/>', '<node id="6" lat="0" lon="-180"/>', '<node id="7"/>']
+    found = read(written(tmp_path, osm("".join(nodes))))
+    assert sorted(found.nodes) == [1, 5, 6]
+    assert found.nodes[1].latitude == 11
+    assert "gives 1 element twice" in found.notes[0]
+    assert "gives 4 nodes no place on Earth" in found.notes[1]
+
+
+def test_an_extract_that_is_too_large_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(reading, "MAX_ELEMENTS", 10)
+    with pytest.raises(SeipError, match="more than 10 elements; cut the place out"):
+        read(crossing().write(tmp_path / "place.osm"))
+
+
+def test_deleted_elements_are_passed_over(tmp_path):
+    text = osm('<node id="1" lat="1" lon="1"/><node id="2" lat="1" lon="1" action="delete"/>')
+    assert list(read(written(tmp_path, text)).nodes) == [1]
+
+
+def test_ways_are_joined_to_rings_in_either_direction():
+    ways = [Way((1, 2, 3), {}), Way((5, 4, 3), {}), Way((5, 1), {}), Way((7, 8), {})]
+    found, left = rings(ways)
+    assert found == [[1, 2, 3, 4, 5]]
+    assert left == 1
+
+
+def test_ids_and_tags_survive_odd_characters(tmp_path):
+    extract = Extract()
+    extract.way([(0, 0), (10, 0)], highway="residential", name='"Quoted" & <angled> ä 南京')
+    found = read(extract.write(tmp_path / "place.osm"))
+    assert next(iter(found.ways.values())).tags["name"] == '"Quoted" & <angled> ä 南京'
+
+
+def test_the_next_node_of_a_street_that_leaves_the_window_is_kept(tmp_path):
+    extract = Extract()
+    extract.way([(-2500, 0), (0, 0), (2500, 0)], highway="unclassified")
+    extract.way([(0, 5), (2400, 5)], barrier="fence")
+    found = read(extract.write(tmp_path / "place.osm"), window(52.5, 13.4, 700.0))
+    assert len(found.nodes) == 4
+    assert sorted(len(found.line(way)) for way in found.ways.values()) == [1, 3]
+
+
+def test_places_on_both_sides_of_the_date_line_are_neighbours(tmp_path):
+    nodes = '<node id="1" lat="-16.8" lon="179.9999"/><node id="2" lat="-16.8" lon="-179.9998"/>'
+    path = written(tmp_path, osm(nodes))
+    for found in (read(path), read(path, window(-16.8, 179.9999, 500.0)), read(path, window(-16.8, -179.9999, 500.0))):
+        assert found.nodes[2].longitude - found.nodes[1].longitude == pytest.approx(0.0003)
+
+
+def test_many_ways_are_joined_at_once():
+    count = 50_000
+    ways = [Way((n, (n + 1) % count), {}) for n in range(count)]
+    found, left = rings([*ways[::2], *ways[1::2]])
+    assert (len(found), len(found[0]), left) == (1, count, 0)
+
+
+def test_tags_are_one_line_of_at_most_255_characters(tmp_path):
+    extract = Extract()
+    for name in ("Two&#10;Lines", "\u202eturned\u202c", "n" * 10**6, "\u06a9\u0648\u0686\u0647\u200c\u0627\u06cc"):
+        extract.way([(0, 0), (10, 0)], highway="residential", name=name)
+    path = written(tmp_path, extract.text().replace("&amp;#10;", "&#10;"))
+    names = [way.tags["name"] for way in read(path).ways.values()]
+    assert names == ["Two Lines", "turned", "n" * 255, "\u06a9\u0648\u0686\u0647\u200c\u0627\u06cc"]
+
+
+@pytest.mark.parametrize(
+    ("head", "credit"),
+    [
+        ("<osm>", "© OpenStreetMap contributors (ODbL)"),
+        ('<osm copyright="OpenStreetMap and contributors">', "© OpenStreetMap contributors (ODbL)"),
+        (
+            '<osm><meta osm_base="2024-03-22T14:09:45Z"/>',
+            "© OpenStreetMap contributors (ODbL), data of 2024-03-22",
+        ),
+        ('<osm timestamp="2023-01-02T03:04:05Z">', "© OpenStreetMap contributors (ODbL), data of 2023-01-02"),
+        (
+            '<osm><node id="7" lat="1" lon="1" timestamp="2013-08-03T15:55:30Z"/>',
+            "© OpenStreetMap contributors (ODbL), changes up to 2013-08-03",
+        ),
+        ('<osm timestamp="yesterday">', "© OpenStreetMap contributors (ODbL)"),
+        ('<osm copyright="A\n&lt;b&gt; town">', "© A <b> town"),
+    ],
+)
+def test_the_credit_of_an_extract_names_its_holder_and_its_date(tmp_path, head, credit):
+    path = written(tmp_path, f'{head}<node id="1" lat="1" lon="1"/></osm>')
+    assert read(path).attribution == credit

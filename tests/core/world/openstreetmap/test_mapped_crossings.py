@@ -1,0 +1,118 @@
+"""Crossings of the extract in the map of its streets, in place of those that netconvert guesses."""
+
+import numpy as np
+import pytest
+import shapely
+
+from seip_addon.core.progress import finish
+from seip_addon.core.workflows.site_building import AskedSite, build_site
+from seip_addon.core.world.opendrive.objects import placed_objects
+from seip_addon.core.world.opendrive.read import read_map
+from tests.builders.osm_text import Extract, corner_houses
+from tests.sumo_here import needs_sumo
+
+pytestmark = needs_sumo
+ORIGIN_ROUNDING = 0.8  # metres: local origins are whole metres of the map
+
+
+def streets(*, crossing=None, footway=False):
+    """Return a crossing of two streets, and a node or a footway across the eastern one."""
+    extract = Extract(52.5, 15.0)  # where the map's north is north
+    usual = {"lanes": 2, "maxspeed": "30"}
+    east = [(0, 0), (30, 0), (200, 0)]
+    if crossing is not None:
+        east[1] = extract.node(30, 0, **crossing)
+    extract.way([(-200, 0), *east], highway="secondary", name="East Road", **usual)
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="secondary", name="North Road", **usual)
+    if footway:
+        extract.way([(30, 12), (30, 0), (30, -12)], highway="footway", footway="crossing", width="3")
+    return corner_houses(extract)
+
+
+def built(extract, tmp_path):
+    path = extract.write(tmp_path / "place.osm")
+    return finish(build_site(path, AskedSite(near_latlon=(extract.latitude, extract.longitude))))
+
+
+def crossings(site):
+    return {place.name: place.polygon for place in site.model.places if place.name.startswith("Crossing")}
+
+
+@pytest.mark.parametrize(
+    ("how", "depth"),
+    [
+        ({"crossing": {"highway": "crossing"}}, 4.0),
+        ({"crossing": {"highway": "crossing", "width": "6"}}, 6.0),
+        ({"footway": True}, 3.0),
+    ],
+)
+def test_the_extract_s_crossings_replace_guessed_ones(tmp_path, how, depth):
+    site = built(streets(**how), tmp_path)
+    ((name, area),) = crossings(site).items()
+    assert name == "Crossing of East Road"
+    assert area.area == pytest.approx(6.4 * depth, rel=0.03)
+    assert area.centroid.distance(shapely.Point(30, 0)) < ORIGIN_ROUNDING
+    x, y = np.ptp(shapely.get_coordinates(area), axis=0)
+    assert (x, y) == pytest.approx((depth, 6.4), abs=0.2)
+    assert not any("crossings of pedestrians" in note for note in site.model.notes)
+
+
+@pytest.mark.parametrize("how", [{}, {"crossing": {"highway": "crossing", "crossing": "no"}}])
+def test_guessed_crossings_are_called_assumed(tmp_path, how):
+    site = built(streets(**how), tmp_path)
+    found = crossings(site)
+    assert sorted(found) == [
+        f"Crossing of {street} Road, {arm} arm (assumed)"
+        for street, arm in (("East", "east"), ("East", "west"), ("North", "north"), ("North", "south"))
+    ]
+    for name, area in found.items():
+        x, y = {"east": (1, 0), "west": (-1, 0), "north": (0, 1), "south": (0, -1)}[name.split()[-3]]
+        assert area.centroid.x * x + area.centroid.y * y > 5.0
+    assert "4 crossings of pedestrians at junctions are assumed: the extract maps none there" in site.model.notes
+
+
+def test_a_crossing_within_the_map_s_junction_lies_where_the_extract_has_it(tmp_path):
+    extract = Extract(52.5, 15.0)
+    node = extract.node(9, 0, highway="crossing")
+    extract.way([(-200, 0), (0, 0), node, (200, 0)], highway="secondary", name="East Road", lanes=2)
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="secondary", name="North Road", lanes=4)
+    ((_, area),) = crossings(built(corner_houses(extract), tmp_path)).items()
+    assert area.centroid.distance(shapely.Point(9, 0)) < ORIGIN_ROUNDING
+    assert area.area == pytest.approx(4 * 6.4, abs=1.0)
+
+
+def test_the_written_map_has_the_same_crossings(tmp_path):
+    site = built(streets(crossing={"highway": "crossing"}), tmp_path)
+    path = tmp_path / "again.xodr"
+    path.write_text(site.map_text, encoding="utf-8")
+    (crossing,) = [one for one in placed_objects(read_map(path)) if one.kind == "crosswalk"]
+    place = crossing.position[:2] - site.model.origin[:2]
+    assert place == pytest.approx(np.array([30.0, 0.0]), abs=ORIGIN_ROUNDING)
+    assert (crossing.length, crossing.width) == pytest.approx((4.0, 6.4), abs=0.1)
+
+
+def test_where_streets_meet_no_place_of_a_crossing_is_told(tmp_path):
+    extract = Extract(52.5, 15.0)
+    middle = extract.node(0, 0, highway="crossing")
+    extract.way([(-200, 0), middle, (200, 0)], highway="secondary", name="East Road", lanes=2)
+    extract.way([(0, -200), middle, (0, 200)], highway="secondary", name="North Road", lanes=2)
+    assert all(name.endswith("(assumed)") for name in crossings(built(corner_houses(extract), tmp_path)))
+
+
+def test_no_crossing_is_assumed_where_a_street_only_goes_on(tmp_path):
+    """Its number of lanes changes where a driveway joins it, which is not a street here."""
+    extract = Extract(52.5, 15.0)
+    usual = {"highway": "secondary", "maxspeed": "30", "sidewalk": "both"}
+    extract.way([(-200, 0), (0, 0), (70, 0)], name="East Road", lanes=2, **usual)
+    extract.way([(70, 0), (200, 0)], name="East Road", lanes=4, **usual)
+    extract.way([(0, -200), (0, 0), (0, 200)], name="North Road", lanes=2, **usual)
+    extract.way([(70, 0), (70, 40)], highway="service", service="driveway")
+    site = built(corner_houses(extract), tmp_path)
+    assert len(crossings(site)) == 4
+    path = tmp_path / "again.xodr"
+    path.write_text(site.map_text, encoding="utf-8")
+    places = [
+        one.position[:2] - site.model.origin[:2] for one in placed_objects(read_map(path)) if one.kind == "crosswalk"
+    ]
+    assert len(places) == 4
+    assert max(np.hypot(*place) for place in places) < 20.0

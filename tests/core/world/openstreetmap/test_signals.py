@@ -1,0 +1,98 @@
+"""Traffic signals that are mapped before the junction: they have posts at it, or a note."""
+
+import numpy as np
+import pytest
+
+from seip_addon.core.progress import finish
+from seip_addon.core.workflows.site_building import AskedSite, build_site
+from seip_addon.core.world.openstreetmap.extract import read_extract, window
+from seip_addon.core.world.openstreetmap.streets import write_streets
+from tests.builders.osm_text import Extract, corner_houses
+from tests.sumo_here import needs_sumo
+
+
+def approached(away=10.0, arms=("east", "west", "north", "south"), far=200.0, **tags):
+    """Return a crossing with signals some metres before it on its arms, and none at it."""
+    extract = Extract()
+    ends = {"east": (1, 0), "west": (-1, 0), "north": (0, 1), "south": (0, -1)}
+    for name, (x, y) in ends.items():
+        street = {"highway": "secondary", "lanes": 2, "name": "East Road" if y == 0 else "North Road"}
+        line = [(0, 0), (far * x, far * y)]
+        if name in arms:
+            line.insert(1, extract.node(away * x, away * y, highway="traffic_signals", **tags))
+        extract.way(line, **street)
+    return corner_houses(extract)
+
+
+def signal_poles(extract, tmp_path, **asked):
+    path = extract.write(tmp_path / "place.osm")
+    place = {"near_latlon": (extract.latitude, extract.longitude)} | asked
+    model = finish(build_site(path, AskedSite(**place))).model
+    return [part for part in model.parts if "ignal pole" in part.name], model
+
+
+@needs_sumo
+@pytest.mark.parametrize("away", [7.0, 13.0, 28.0])
+@pytest.mark.parametrize("arms", [("east", "west", "north", "south"), ("east", "south")])
+def test_signals_at_the_stop_lines_have_posts_at_the_junction(tmp_path, away, arms):
+    poles, model = signal_poles(approached(away, arms), tmp_path)
+    assert len(poles) >= 4
+    assert max(np.hypot(*part.foot[:2]) for part in poles) < 20.0
+    assert not any("belong to no junction" in note for note in model.notes)
+
+
+@needs_sumo
+def test_signals_between_junctions_have_no_post_and_a_note(tmp_path):
+    poles, model = signal_poles(approached(70.0, ("east", "west")), tmp_path)
+    assert not poles
+    (note,) = [note for note in model.notes if "belong to no junction" in note]
+    assert note.startswith("traffic signals that belong to no junction within 40 m have no post: 2, at 52.50000, 13.4")
+
+
+def written(extract, tmp_path):
+    """Return whether the node at the middle, and those before it, carry signals in what netconvert reads."""
+    read = finish(read_extract(extract.write(tmp_path / "place.osm")))
+    target = tmp_path / "streets.osm"
+    result = write_streets(read, target, window(extract.latitude, extract.longitude, 500.0))
+    lines = target.read_text(encoding="utf-8").split("<node ")
+    signals = [line.partition('"')[2].partition('"')[0] for line in lines if "traffic_signals" in line]
+    return [int(number) for number in signals], result
+
+
+@pytest.mark.parametrize(
+    ("direction", "arms", "at_junction"),
+    [("backward", ("east",), True), ("forward", ("east",), False), ("both", ("east",), True)],
+)
+def test_the_direction_of_signals_counts(tmp_path, direction, arms, at_junction):
+    """The way leads away from the junction: its traffic that comes to it goes backward."""
+    extract = approached(20.0, arms, traffic_signals__direction=direction)
+    numbers, result = written(extract, tmp_path)
+    middle = extract.node(0, 0)
+    assert (numbers == [middle]) is at_junction
+    assert bool(result.lone_signals) is not at_junction
+
+
+def test_signals_of_a_one_way_street_are_those_of_the_junction_ahead(tmp_path):
+    for oneway, ahead in (("yes", (60, 0)), ("-1", (0, 0))):
+        extract = Extract()
+        signal = extract.node(25, 0, highway="traffic_signals")
+        extract.way([(-100, 0), (0, 0), signal, (60, 0), (200, 0)], highway="secondary", oneway=oneway)
+        for x in (0, 60):
+            extract.way([(x, -100), (x, 0), (x, 100)], highway="residential")
+        numbers, _ = written(extract, tmp_path)
+        assert numbers == [extract.node(*ahead)]
+
+
+def test_signals_that_stand_behind_a_junction_are_its(tmp_path):
+    for away, number in ((10.0, 1), (30.0, 0)):
+        extract = approached(away, ("east",), traffic_signals__direction="forward")
+        numbers, _ = written(extract, tmp_path)
+        assert numbers.count(extract.node(0, 0)) == number
+
+
+def test_signals_of_a_pedestrian_crossing_away_from_a_junction_are_not_its(tmp_path):
+    for away, number in ((10.0, 1), (30.0, 0)):
+        extract = approached(away, ("east",), crossing="traffic_signals")
+        numbers, result = written(extract, tmp_path)
+        assert numbers.count(extract.node(0, 0)) == number
+        assert len(result.lone_signals) == 1 - number

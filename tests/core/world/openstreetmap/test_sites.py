@@ -1,0 +1,692 @@
+"""Sites of extracts, with SUMO: ten kinds of junctions, and where things stand in them."""
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+import shapely
+
+from seip_addon.core import sumo_programs
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.site.roles import Role
+from seip_addon.core.workflows.site_building import AskedSite, build_site
+from seip_addon.core.world.opendrive.read import read_map
+from tests.builders.osm_text import (
+    JUNCTIONS,
+    Extract,
+    corner_houses,
+    crossing,
+    dual_carriageway,
+    left_hand,
+    plaza,
+    roundabout,
+    slope,
+)
+from tests.sumo_here import needs_sumo
+
+pytestmark = needs_sumo
+CORNER_HOUSE = 24.0 * 24.0
+
+
+def built(extract, tmp_path, **asked):
+    path = extract.write(tmp_path / "place.osm")
+    asked = {"near_latlon": (extract.latitude, extract.longitude)} | asked
+    return finish(build_site(path, AskedSite(**asked)))
+
+
+def plan(model, name):
+    """Return the area in plan of the parts whose names begin so."""
+    parts = [part for part in model.parts if part.name.startswith(name)]
+    faces = [part.solid.vertices[list(face)][:, :2] for part in parts for face in part.solid.faces]
+    return shapely.union_all([shapely.Polygon(face).buffer(0) for face in faces if len(face) > 2], grid_size=1e-4)
+
+
+@pytest.mark.parametrize("name", JUNCTIONS)
+def test_a_kind_of_junction_becomes_a_sound_site(name, tmp_path):
+    site = built(JUNCTIONS[name](), tmp_path)
+    model = site.model
+    assert model.region.is_valid
+    assert model.region.geom_type == "Polygon"
+    assert 1000 < model.region.area < 8000
+    assert " / " in model.name
+    assert not model.warnings
+    assert site.map_text is not None
+    for part in model.parts:
+        assert np.isfinite(part.solid.vertices).all()
+        assert part.source or not {Role.ROADS, Role.GROUND, Role.OCCLUDERS, Role.POLES} & set(part.roles)
+    houses = {row.kind: row for row in model.sources()}["Building"]
+    assert (houses.source, houses.assumed) == ("extract", 0)
+    driving = plan(model, "Driving lanes")
+    holes = [ring for part in shapely.get_parts(driving) for ring in part.interiors]
+    assert sum(shapely.Polygon(hole).area for hole in holes if shapely.Polygon(hole).area < 30) < 1.0
+
+
+def test_the_map_and_the_model_of_an_extract_carry_its_credit(tmp_path):
+    site = built(crossing(), tmp_path)
+    assert site.model.attribution == ("© OpenStreetMap contributors (ODbL)",)
+    again = tmp_path / "again.xodr"
+    again.write_text(site.map_text, encoding="utf-8")
+    assert read_map(again).attribution == site.model.attribution
+
+
+def test_the_same_extract_makes_the_same_map(tmp_path):
+    assert built(crossing(), tmp_path).map_text == built(crossing(), tmp_path).map_text
+
+
+def test_what_stands_at_the_road_s_edge_in_the_extract_stands_there_in_the_scene(tmp_path):
+    extract = crossing()
+    edges = [(x, side * 3.2) for x in (-70, -45, 45, 70) for side in (-1, 1)]
+    for x, y in edges:
+        extract.node(x, y, natural="tree", height="9")
+    model = built(extract, tmp_path).model
+    road = plan(model, "Driving lanes")
+    trees = [part for part in model.parts if part.name.startswith("Tree")]
+    assert len(trees) == len(edges)
+    for tree in trees:
+        assert road.boundary.distance(shapely.Point(tree.foot[:2])) < 0.3
+
+
+def test_footprints_keep_their_area(tmp_path):
+    model = built(crossing(), tmp_path).model
+    houses = [part for part in model.parts if part.name.startswith("Building") and Role.OCCLUDERS in part.roles]
+    assert len(houses) == 4
+    for house in houses:
+        hull = shapely.MultiPoint(house.solid.vertices[:, :2]).convex_hull
+        assert hull.area == pytest.approx(CORNER_HOUSE, rel=0.01)
+
+
+def test_the_region_follows_the_approaches_and_holds_both_carriageways(tmp_path):
+    model = built(dual_carriageway(), tmp_path).model
+    low_x, low_y, high_x, high_y = model.region.bounds
+    assert (low_x, high_x) == (pytest.approx(-90, abs=8), pytest.approx(90, abs=8))
+    for y in (-8, 8):
+        for x in (-80, 80):
+            assert model.region.distance(shapely.Point(x, y)) < 4.0
+    assert low_y < -80 < 80 < high_y
+
+
+def test_a_radius_is_a_circle_without_streets_that_only_pass_by(tmp_path):
+    extract = crossing()
+    extract.way([(-200, 45), (-10, 55), (200, 70)], highway="motorway", name="Passing")
+    extract.way([(-60, -200), (-60, -70), (-40, -60), (200, -60)], highway="residential", name="Behind")
+    model = built(extract, tmp_path, radius=70.0).model
+    assert max(np.hypot(*np.array(model.region.exterior.coords).T)) < 71.5
+    assert not model.region.contains(shapely.Point(-50, 53))
+
+
+def test_the_island_of_a_roundabout_is_no_road(tmp_path):
+    model = built(roundabout(), tmp_path).model
+    middle = shapely.Point(0, 0).buffer(8)
+    assert not plan(model, "Driving lanes").intersects(middle)
+    weighted = next(part for part in model.parts if Role.WEIGHTED_REGIONS in part.roles)
+    assert shapely.MultiPoint(weighted.solid.vertices[:, :2]).convex_hull.area > 36**2
+
+
+def test_a_slope_is_that_of_the_nodes(tmp_path):
+    model = built(slope(), tmp_path).model
+    road = next(part for part in model.parts if part.name == "Driving lanes").solid.vertices
+    rise = np.polyfit(road[:, 0], road[:, 2], 1)[0]
+    assert rise == pytest.approx(0.06, abs=0.004)
+
+
+def test_traffic_on_the_left_is_in_the_map(tmp_path):
+    site = built(left_hand(), tmp_path)
+    assert site.map_text is not None
+    assert 'rule="LHT"' in site.map_text
+    pavement = plan(site.model, "Pavement")
+    assert pavement.intersects(shapely.box(-9, 40, -3, 60))  # north along North Road the left is the west
+    assert not pavement.intersects(shapely.box(3.6, 40, 9, 60))
+
+
+def test_a_place_can_be_named_by_its_streets(tmp_path):
+    site = built(crossing(), tmp_path, near_latlon=None, junction=("north road", "East Road"))
+    assert set(site.model.name.split(" / ")) == {"East Road", "North Road"}
+
+
+@pytest.mark.parametrize(
+    ("asked", "complaint"),
+    [
+        ({"near_latlon": None}, "needs a place"),
+        ({"near_latlon": (48.0, 2.0)}, "no node near the place"),
+        ({"near_latlon": (52.5, 13.4), "osm": "x"}, "is an extract"),
+        ({"near_latlon": None, "junction": ("East Road",)}, "has two streets"),
+        (
+            {"near_latlon": None, "junction": ("East Road", "Nowhere Lane")},
+            "no street called 'Nowhere Lane'; the closest",
+        ),
+        ({"near_latlon": None, "junction": ("East Road", "East Road Far")}, "no street called"),
+        ({"near_latlon": None, "junction": ("East Road", "east road")}, "two different streets"),
+        ({"near_latlon": None, "junction": ("East Road", "")}, "two different streets"),
+        ({"near_latlon": (91.0, 0.0)}, "--near-latlon 91 0 is no place with streets"),
+        ({"near_latlon": (0.0, 1e308)}, "is no place with streets"),
+        ({"near_latlon": (float("nan"), 0.0)}, "is no place with streets"),
+        ({"radius": -5.0}, "--radius -5 is no length"),
+        ({"radius": float("nan")}, "--radius nan is no length"),
+        ({"approaches": 0.0}, "--approaches 0 is no length"),
+    ],
+)
+def test_a_place_that_is_none_is_refused_in_a_sentence(asked, complaint, tmp_path):
+    with pytest.raises(SeipError, match=complaint):
+        built(crossing(), tmp_path, **asked)
+
+
+def test_streets_that_do_not_meet_are_named(tmp_path):
+    extract = crossing()
+    extract.way([(-100, 300), (100, 300)], highway="residential", name="Far Lane")
+    with pytest.raises(SeipError, match="'East Road' and 'Far Lane' do not meet"):
+        built(extract, tmp_path, near_latlon=None, junction=("East Road", "Far Lane"))
+
+
+def test_an_extract_without_streets_is_refused(tmp_path):
+    extract = Extract()
+    extract.house(0, 0, 10, 10)
+    with pytest.raises(SeipError, match=r"has no street within 590 m of 52\.50000, 13\.40000"):
+        built(extract, tmp_path)
+
+
+def test_a_place_between_junctions_needs_a_radius(tmp_path):
+    extract = Extract()
+    extract.way([(-400, 0), (400, 0)], highway="residential", name="Long Street")
+    extract.house(-20, 10, 20, 10)
+    with pytest.raises(SeipError, match="give --radius for a place between junctions"):
+        built(extract, tmp_path)
+    assert built(extract, tmp_path, radius=60.0).model.region.area == pytest.approx(120 * 6.4, rel=0.05)
+
+
+def test_a_square_and_a_canopy(tmp_path):
+    model = built(plaza(), tmp_path).model
+    names = {row.kind: row for row in model.sources()}
+    assert names["Shelter"].assumed == 1
+    assert names["Tree"].assumed == 0
+    assert names["Footways"].count == 1
+    canopy = [part for part in model.parts if part.name.startswith("Building") and part.solid.vertices[:, 2].min() > 4]
+    assert len(canopy) == 1
+
+
+def test_without_sumo_the_cure_is_named(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("SUMO_HOME", raising=False)
+    monkeypatch.setattr(sumo_programs.importlib.util, "find_spec", lambda _name: None)
+    with pytest.raises(SeipError, match="SUMO is not installed"):
+        built(crossing(), tmp_path)
+
+
+def test_a_site_description_adds_to_an_extract(tmp_path):
+    description = tmp_path / "more.toml"
+    description.write_text('name = "Here"\n[[wall]]\nline = [[150, 150], [160, 150]]\n', encoding="utf-8")
+    model = built(crossing(), tmp_path, site=description).model
+    assert model.name == "Here"
+    assert ("Wall", "site description") in {(row.kind, row.source) for row in model.sources()}
+
+
+def test_an_extract_adds_buildings_to_an_opendrive_map(tmp_path):
+    site = built(crossing(), tmp_path)
+    assert site.map_text is not None
+    map_path = tmp_path / "street.xodr"
+    map_path.write_text(site.map_text, encoding="utf-8")
+    middle = tuple((site.model.origin[:2] * 1.0).tolist())
+    asked = AskedSite(near=middle, radius=60.0, osm=tmp_path / "place.osm")
+    model = finish(build_site(map_path, asked)).model
+    rows = {row.kind: row for row in model.sources()}
+    assert (rows["Building"].count, rows["Building"].source) == (4, "extract")
+    assert rows["Driving lanes"].source == "map"
+    elsewhere = Extract(40.0, 5.0)
+    elsewhere.house(0, 0, 10, 10)
+    with pytest.raises(SeipError, match="nothing that stands at the place"):
+        finish(build_site(map_path, dataclasses.replace(asked, osm=elsewhere.write(tmp_path / "no.osm"))))
+
+
+def test_latitude_and_longitude_are_places_of_a_map_with_a_projection_and_of_no_other(tmp_path):
+    site = built(crossing(), tmp_path)
+    assert site.map_text is not None
+    map_path = tmp_path / "street.xodr"
+    map_path.write_text(site.map_text, encoding="utf-8")
+    asked = AskedSite(near_latlon=(52.5, 13.4), radius=50.0)
+    middle = finish(build_site(map_path, asked)).model
+    assert middle.region.centroid.distance(shapely.Point(0, 0)) < 2.0
+    map_path.write_text(
+        re.sub(r"<geoReference>.*?</geoReference>", "", site.map_text, flags=re.DOTALL), encoding="utf-8"
+    )
+    with pytest.raises(SeipError, match="names no projection that latitudes and longitudes"):
+        finish(build_site(map_path, asked))
+
+
+def test_what_stands_on_the_carriageway_is_moved_or_cut(tmp_path):
+    extract = crossing()
+    extract.house(30, -8, 16, 14)
+    for x, y in ((30, 1.5), (60, -2.5), (-30, 2)):
+        extract.node(x, y, natural="tree", height="9")
+    extract.way([(25, -9), (25, 9)], barrier="hedge")
+    model = built(extract, tmp_path).model
+    road = plan(model, "Driving lanes")
+    for name in ("Building", "Hedge"):
+        assert plan(model, name).intersection(road).area < 0.5
+    for tree in [part for part in model.parts if part.name.startswith("Tree")]:
+        assert road.distance(shapely.Point(tree.foot[:2])) == pytest.approx(0.2, abs=0.05)
+    assert [note for note in model.notes if note.endswith((": 1", ": 3")) and "carriageway" in note]
+
+
+def test_a_street_leads_through_a_building_and_the_building_above_it(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway="tertiary", name="Main Street")
+    extract.way([(0, 0), (0, 8)], highway="residential", name="Gate Lane")
+    extract.way([(0, 8), (0, 22)], highway="residential", name="Gate Lane", tunnel="building_passage", layer="-1")
+    extract.way([(0, 22), (0, 200)], highway="residential", name="Gate Lane")
+    extract.house(-30, 8, 60, 14)
+    model = built(extract, tmp_path).model
+    road = plan(model, "Driving lanes")
+    pieces = [part for part in model.parts if part.name.startswith("Building")]
+    assert sum(plan(model, part.name).area for part in pieces) == pytest.approx(60 * 14, rel=0.01)
+    for part in pieces:
+        lowest = part.solid.vertices[:, 2].min()
+        assert lowest > 4 or plan(model, part.name).intersection(road).area < 0.1
+    assert not any("carriageway" in note for note in model.notes)
+
+
+def test_pavements_lie_beside_the_lanes(tmp_path):
+    extract = Extract()
+    usual = {"highway": "residential", "oneway": "yes", "name": "Street"}
+    extract.way([(-200, -3), (0, -3), (200, -3)], lanes=3, sidewalk="both", **usual)
+    extract.way([(200, 3), (0, 3), (-200, 3)], lanes=3, sidewalk="both", **usual)
+    extract.way([(0, -200), (0, -3), (0, 3), (0, 200)], highway="residential", name="Side Street")
+    model = built(extract, tmp_path).model
+    assert plan(model, "Pavements").intersection(plan(model, "Driving lanes")).area < 1.0
+
+
+def test_slip_lanes_leave_islands_and_the_weighted_box_lies_along_the_roads(tmp_path):
+    extract = Extract()
+    middle = extract.node(0, 0, highway="traffic_signals")
+    usual = {"highway": "primary", "lanes": 6}
+    extract.way([(-200, 0), (-50, 0), middle, (50, 0), (200, 0)], name="East Road", **usual)
+    extract.way([(0, -200), (0, -50), middle, (0, 50), (0, 200)], name="North Road", **usual)
+    for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
+        ends = [(50 * x, 0), (26 * x, 12 * y), (12 * x, 26 * y), (0, 50 * y)]
+        extract.way(ends if x * y > 0 else ends[::-1], highway="primary_link", oneway="yes")
+    model = built(corner_houses(extract, near=34), tmp_path).model
+    holes = [shapely.Polygon(ring) for ring in model.region.interiors]
+    assert len(holes) == 4
+    assert all(100 < hole.area < 300 for hole in holes)
+    box = plan(model, "Junction")
+    low_x, low_y, high_x, high_y = box.bounds
+    assert box.area == pytest.approx((high_x - low_x) * (high_y - low_y), rel=0.1)
+
+
+def test_no_holes_are_left_where_the_number_of_lanes_changes(tmp_path):
+    extract = Extract()
+    usual = {"highway": "secondary", "name": "East Road"}
+    extract.way([(-200, 0), (-50, 0)], lanes=2, **usual)
+    extract.way([(-50, 0), (-40, 0)], lanes=3, **usual)
+    extract.way([(-40, 0), (0, 0), (200, 0)], lanes=2, **usual)
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="tertiary", name="North Road")
+    model = built(corner_houses(extract), tmp_path).model
+    road = plan(model, "Driving lanes")
+    assert sum(shapely.Polygon(ring).area for ring in road.interiors) < 1.0
+    assert not model.region.interiors
+
+
+@pytest.mark.parametrize("radius", [30, 60])
+def test_a_roundabout_is_one_place_with_all_its_approaches(radius, tmp_path):
+    extract = Extract()
+    ring = [extract.node(radius * np.cos(at), radius * np.sin(at)) for at in np.arange(24) * np.pi / 12]
+    extract.way([*ring[:13]], highway="primary", junction="roundabout", name="Circus", lanes=2)
+    extract.way([*ring[12:], ring[0]], highway="primary", junction="roundabout", name="Circus", lanes=3)
+    for name, index, end in (
+        ("East", 0, (300, 0)),
+        ("North", 6, (0, 300)),
+        ("West", 12, (-300, 0)),
+        ("South", 18, (0, -300)),
+    ):
+        extract.way([ring[index], end], highway="primary", name=f"{name} Street")
+    extract.house(-150, 40, 30, 30)
+    model = built(extract, tmp_path).model
+    assert model.region.geom_type == "Polygon"
+    for x, y in ((radius + 75, 0), (-radius - 75, 0), (0, radius + 75), (0, -radius - 75)):
+        assert model.region.distance(shapely.Point(x, y)) < 4.0
+    assert plan(model, "Junction").area > (2 * radius) ** 2
+    assert any(part.name.startswith("Building") for part in model.parts)
+
+
+def test_streets_that_part_at_an_acute_angle_are_a_junction(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (217, 38)], highway="secondary", name="Left Fork")
+    extract.way([(0, 0), (215, -46)], highway="secondary", name="Right Fork")
+    extract.house(-40, 12, 20, 20)
+    model = built(extract, tmp_path).model
+    assert model.name == "Left Fork / Right Fork"
+    assert model.region.geom_type == "Polygon"
+
+
+def test_the_other_carriageway_is_whole_beside_a_junction_that_does_not_reach_it(tmp_path):
+    extract = Extract()
+    usual = {"highway": "primary", "oneway": "yes", "name": "Avenue"}
+    extract.way([(250, 9), (60, 9)], lanes=2, **usual)
+    extract.way([(60, 9), (-250, 9)], lanes=3, **usual)
+    extract.way([(-250, -9), (0, -9), (250, -9)], lanes=2, **usual)
+    extract.way([(0, -200), (0, -9)], highway="residential", name="Side Street")
+    model = built(corner_houses(extract, near=24), tmp_path).model
+    assert len(shapely.get_parts(model.region)) == 2
+    for x in range(-80, 81, 5):
+        assert model.region.distance(shapely.Point(x, 18)) < 5.0  # the middle is that of the other carriageway
+
+
+def test_a_crossing_at_the_date_line_and_one_whose_next_nodes_are_far(tmp_path):
+    for latitude, longitude, length in ((-16.8, 179.999, 300), (38.5, -99.0, 2400)):
+        extract = Extract(latitude, longitude)
+        extract.way([(-length, 0), (0, 0), (length, 0)], highway="secondary", name="East Road")
+        extract.way([(0, -length), (0, 0), (0, length)], highway="secondary", name="North Road")
+        path = corner_houses(extract).write(tmp_path / "place.osm")
+        text = re.sub(r'"180\.\d+"', lambda found: f'"{float(found[0][1:-1]) - 360}"', path.read_text(encoding="utf-8"))
+        path.write_text(text, encoding="utf-8")
+        model = finish(build_site(path, AskedSite(near_latlon=(latitude, longitude)))).model
+        assert model.region.bounds == pytest.approx((-87, -87, 87, 87), abs=3)
+
+
+def test_of_several_places_where_streets_meet_one_counts_and_the_others_are_named(tmp_path):
+    extract = Extract()
+    extract.way([(-300, 0), (-150, 0), (150, 0), (300, 0)], highway="secondary", name="East Road")
+    extract.way([(-150, 0), (-150, 80), (150, 80), (150, 0)], highway="residential", name="Crescent")
+    site = built(extract, tmp_path, near_latlon=None, junction=("East Road", "Crescent"))
+    assert "Crescent" in site.model.name
+    assert any("meet in 2 places" in note and "--near-latlon" in note for note in site.model.notes)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "St John's Road",
+        'The "Strand" & <Mall>',
+        "\u0634\u0627\u0631\u0639 \u0627\u0644\u0645\u0644\u0643",
+        "\U0001f600 Street",
+    ],
+)
+def test_names_of_streets_are_as_in_the_extract(name, tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway="residential", name=name)
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="residential", name="Second")
+    model = built(extract, tmp_path, near_latlon=None, junction=(name, "Second")).model
+    assert set(model.name.split(" / ")) == {name, "Second"}
+    assert name in {place.name for place in model.places}
+
+
+@pytest.mark.parametrize(
+    ("asked", "name"),
+    [
+        ({}, "Avenue / Main Street"),
+        ({"near_latlon": None, "junction": ("Mill Lane", "Main Street")}, "Mill Lane / Main Street"),
+        ({"near_latlon": None, "junction": ("main street", "B 5")}, "Main Street / B 5"),
+        ({"near_latlon": None, "junction": ("Hauptweg", "Mill Lane")}, "Hauptweg / Mill Lane"),
+    ],
+)
+def test_the_title_is_what_was_asked_for_else_the_highest_classes(asked, name, tmp_path):
+    """A slip road and a lane come before the streets that they belong to, in the file and beside the middle."""
+    extract = Extract()
+    middle = extract.node(0, 0)
+    extract.way([(-45, 0), (-6, -22), (0, -45)], highway="primary_link", oneway="yes", name="Avenue Slip")
+    extract.way([middle, (140, 140)], highway="residential", name="Mill Lane")
+    extract.way([(-200, 0), (-45, 0), middle, (200, 0)], highway="tertiary", name="Main Street", alt_name="Hauptweg")
+    extract.way([(0, -200), (0, -45), middle, (0, 200)], highway="primary", name="Avenue", ref="B 5")
+    model = built(corner_houses(extract, near=60), tmp_path, **asked).model
+    assert model.name == name
+
+
+def test_a_place_between_junctions_is_titled_by_its_street(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (90, 0), (200, 0)], highway="primary", name="Long Road")
+    extract.way([(90, 0), (90, 150)], highway="residential", name="Side Street")
+    extract = corner_houses(extract)
+    assert built(extract, tmp_path, radius=60.0).model.name == "Long Road"
+    assert built(extract, tmp_path, radius=100.0).model.name == "Long Road / Side Street"
+
+
+@pytest.mark.parametrize(
+    ("tags", "said"),
+    [
+        (
+            {"lanes": "1000000000"},
+            "East Road lanes=1000000000, which is not a plausible number of lanes: 2 lanes in all",
+        ),
+        ({"lanes": "many"}, "East Road lanes=many, which"),
+        ({"lanes": "4", "lanes:forward": "99"}, "East Road lanes:forward=99, which"),
+    ],
+)
+def test_an_implausible_number_of_lanes_is_named_in_a_note(tags, said, tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway="secondary", name="East Road", **tags)
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="secondary", name="North Road", lanes=2)
+    notes = [note for note in built(corner_houses(extract), tmp_path).model.notes if "lanes" in note]
+    (note,) = notes
+    assert said in note
+
+
+def test_two_sections_of_one_street_are_not_the_title(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0)], highway="primary", name="Ring Road Section 1")
+    extract.way([(0, 0), (200, 0)], highway="primary", name="Ring Road Section 2")
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="tertiary", name="Side Street")
+    assert built(corner_houses(extract), tmp_path).model.name == "Ring Road Section 1 / Side Street"
+
+
+def test_no_id_of_netconvert_is_the_name_of_a_street(tmp_path):
+    """The number of lanes changes before the junction, and so makes a joint there."""
+    extract = Extract()
+    extract.way([(-200, 0), (-50, 0)], highway="primary", lanes=2, name="Main Street")
+    extract.way([(-50, 0), (0, 0)], highway="primary", lanes=4, name="Main Street")
+    extract.way([(0, 0), (200, 0)], highway="primary", lanes=2, name="Main Street")
+    extract.way([(0, -200), (0, 0), (0, 60)], highway="residential", name="Side Street")
+    extract.way([(0, 60), (0, 200)], highway="residential", name="Back Street")
+    extract.way([(0, 0), (100, 100)], highway="unclassified")
+    site = built(corner_houses(extract, near=20), tmp_path)
+    assert 'name=":' not in site.map_text
+    names = {place.name for place in site.model.places if not place.name.startswith("Crossing")}
+    assert names == {"Main Street", "Side Street", "Back Street", "Unnamed street"}
+
+
+def test_an_outline_that_is_drawn_twice_counts_once(tmp_path):
+    extract = crossing()
+    for _ in range(3):
+        extract.house(60, 60, 10, 10)
+    model = built(extract, tmp_path).model
+    assert {row.kind: row.count for row in model.sources()}["Building"] == 5
+    assert any(note.startswith("2 outlines that are drawn twice") for note in model.notes)
+
+
+def test_a_bridge_without_a_layer_lies_above(tmp_path):
+    extract = crossing()
+    extract.way([(-300, 60), (-60, 60)], highway="primary", name="High Road")
+    extract.way([(-60, 60), (60, 60)], highway="primary", name="High Road", bridge="yes")
+    extract.way([(60, 60), (300, 60)], highway="primary", name="High Road")
+    model = built(extract, tmp_path).model
+    above = [part for part in model.parts if part.name == "Roads above"]
+    assert above
+    assert above[0].solid.vertices[:, 2].max() > 5
+
+
+def test_a_site_without_street_names_is_named_by_road_number_or_position(tmp_path):
+    for ref, name in (({"ref": "B 1"}, "B 1"), ({}, "Junction at 52.50000, 13.40000")):
+        extract = Extract()
+        usual = {"highway": "primary", "oneway": "yes", "lanes": 2} | ref
+        extract.way([(-250, -8), (0, -8), (250, -8)], **usual)
+        extract.way([(250, 8), (0, 8), (-250, 8)], **usual)
+        extract.way([(0, -200), (0, -8), (0, 8), (0, 200)], highway="unclassified")
+        model = built(corner_houses(extract, near=24), tmp_path).model
+        assert model.name == name
+
+
+PARALLEL = {
+    "a street of the same name": ([(60, 0), (66, 14), (240, 14)], "Avenue"),
+    "a street that forks off": ([(60, 0), (85, 10), (110, 14), (240, 16)], "Little Row"),
+    "a street along a part of it": ([(50, 0), (54, 14), (74, 14), (78, 0)], "Little Row"),
+}
+
+
+@pytest.mark.parametrize(("points", "name"), PARALLEL.values(), ids=PARALLEL)
+def test_a_residential_street_along_an_approach_is_not_studied(tmp_path, points, name):
+    extract = Extract()
+    middle = extract.node(0, 0, highway="traffic_signals")
+    ends = [points[0]] + [points[-1]] * (points[-1][1] == 0)
+    extract.way([(-250, 0), middle, *ends, (250, 0)], highway="secondary", lanes=2, name="Avenue")
+    extract.way([(0, -200), middle, (0, 200)], highway="tertiary", name="Side Street")
+    extract.way(points, highway="residential", name=name)
+    region = built(corner_houses(extract, near=30.0), tmp_path).model.region
+    assert region.intersection(shapely.box(points[0][0] - 5, 8, 200, 30)).area < 5
+    assert region.bounds[2] > 75
+
+
+def test_tracks_of_light_rail_are_laid(tmp_path):
+    extract = crossing()
+    extract.way([(-60, -200), (-60, 200)], railway="light_rail")
+    extract.way([(60, -200), (60, 200)], railway="light_rail", tunnel="yes")
+    tracks = plan(built(extract, tmp_path).model, "Tracks")
+    assert tracks.intersection(shapely.box(-70, 20, -50, 100)).area > 100
+    assert tracks.intersection(shapely.box(50, 20, 70, 100)).area == 0
+
+
+@pytest.mark.parametrize("kind", ["trunk", "primary", "secondary"])
+def test_a_street_without_a_number_of_lanes_has_one_each_way(tmp_path, kind):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway=kind, name="East Road", sidewalk="no")
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="residential", name="North Road", lanes=2, sidewalk="no")
+    site = built(corner_houses(extract), tmp_path)
+    across = shapely.LineString([(50, -30), (50, 30)])
+    assert plan(site.model, "Driving lanes").intersection(across).length == pytest.approx(6.4, abs=0.1)
+    note = "one lane is assumed in each direction of streets without a number of lanes in the extract: East Road"
+    assert note in site.model.notes
+
+
+RINGS = {
+    "secondary": (
+        "-3.9,9.4 -7.9,6.3 -9.8,1.7 -9.8,-4.1 -7.2,-8 -2.7,-10.6 2.7,-10.6 6.4,-9.3 9,-5.4 9.7,0 9,5 6.4,7.6 1.9,8.9",
+        {
+            0: "-10.8,26.1 -30,55.6 -75,106",
+            3: "-17.1,-8.3 -24.9,-14.8 -79,-104",
+            6: "7.3,-40.5 9.2,-66.4 14,-101",
+            10: "70.3,16.4 98.3,25.2 221,57",
+        },
+        {"highway": "secondary"},
+    ),
+    "with cycle lanes": (
+        "12,-5 12,1 6,10 1,13 -3,12 -9,10 -12,5 -12,-1 -9,-6 -5,-10 0,-13 8,-10",
+        {6: "-72,32 -168,77", 3: "1,32 8,86 27,237", 0: "40,-23 98,-49 206,-100", 10: "-6,-28 -13,-76"},
+        {"highway": "primary", "cycleway": "track"},
+    ),
+    "with an acute entry": (
+        "-6,9 -10,5 -11,0 -10,-6 -6,-11 0,-13 7,-11 11,-5 12,0 10,5 7,9 0,10",
+        {9: "58,34 80,48 167,91", 4: "-54,-35 -120,-70", 11: "-10,19 -21,25 -31,29 -90,50"},
+        {"highway": "primary", "cycleway": "lane"},
+    ),
+}
+"""Small roundabouts: the nodes of the ring, the arms by the node where they meet it, and the tags of the arms."""
+
+
+def points(text):
+    return [tuple(map(float, pair.split(","))) for pair in text.split()]
+
+
+@pytest.mark.parametrize("name", RINGS)
+def test_the_island_and_the_pavements_of_a_small_roundabout_are_whole(tmp_path, name):
+    ring, arms, tags = points(RINGS[name][0]), *RINGS[name][1:]
+    extract = Extract()
+    extract.way([*ring, ring[0]], highway=tags["highway"], junction="roundabout", name="Circus")
+    for index, path in arms.items():
+        extract.way([ring[index], *points(path)], name=f"Arm {index}", **tags)
+    model = built(extract, tmp_path).model
+    road, pavement = plan(model, "Driving lanes"), plan(model, "Pavements")
+    paved = shapely.union_all([road, plan(model, "Cycle lanes")])
+    (island,) = [
+        shapely.Polygon(hole)
+        for part in shapely.get_parts(paved)
+        for hole in part.interiors
+        if shapely.Polygon(hole).contains(shapely.Point(0, 0))
+    ]
+    middle_line = shapely.Polygon(ring)
+    assert 0.85 < island.area / middle_line.buffer(-1.6).area < 1.25
+    assert island.convex_hull.area < 1.05 * island.area
+    assert pavement.intersection(island).area == pytest.approx(0.0, abs=1e-3)
+    assert plan(model, "Verge strip").intersection(island).area == pytest.approx(0.0, abs=1e-3)
+    walked = shapely.set_precision(pavement, 1e-3)
+    wide = walked.buffer(-0.29, join_style="mitre").buffer(0.35, join_style="mitre")
+    assert walked.difference(wide).area < 0.02
+    street = shapely.union_all([paved, walked]).buffer(0.06, join_style="mitre").buffer(-0.06, join_style="mitre")
+    around = shapely.Point(0, 0).buffer(28)
+    rounded = street.buffer(1.0, join_style="mitre").buffer(-1.0, join_style="mitre")
+    assert rounded.difference(street).intersection(around).difference(island).area < 0.5
+
+
+@pytest.mark.parametrize(("width", "assumed"), [({}, 1), ({"width": "8"}, 0)])
+def test_lanes_whose_width_the_extract_does_not_give_are_assumed(tmp_path, width, assumed):
+    model = built(crossing(**width), tmp_path).model
+    rows = {row.kind: row for row in model.sources()}
+    assert rows["Driving lanes"].assumed == assumed
+    assert rows["Pavements"].assumed == 1
+
+
+def test_arms_of_streets_without_a_name_are_told_apart(tmp_path):
+    extract = Extract(52.5, 15.0)
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway="secondary", lanes=2)
+    extract.way([(0, 0), (0, 200)], highway="residential", name="North Road", lanes=2)
+    model = built(corner_houses(extract), tmp_path).model
+    found = {place.name: place.polygon.centroid for place in model.places if "Crossing" not in place.name}
+    assert set(found) == {"Unnamed street, west arm", "Unnamed street, east arm", "North Road"}
+    assert found["Unnamed street, east arm"].x > 30 > -30 > found["Unnamed street, west arm"].x
+
+
+def test_streets_that_assumed_ramps_raise_are_named(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway="secondary", name="Low Road", lanes=2)
+    over = {"highway": "primary", "name": "High Road", "lanes": 2}
+    extract.way([(60, -200), (60, -30)], **over)
+    extract.way([(60, -30), (60, 30)], bridge="yes", layer="1", **over)
+    extract.way([(60, 30), (60, 200)], **over)
+    extract.way([(0, 0), (0, 45), (60, 60)], highway="residential", name="Side Road", lanes=2)
+    model = built(corner_houses(extract), tmp_path)
+    (note,) = [note for note in model.model.notes if "ramps are assumed" in note]
+    assert re.search(r"High Road by up to \d\.\d\d m upwards", note)
+    assert re.search(r"Side Road by up to \d\.\d\d m upwards", note)
+    assert "Low Road" not in note
+
+
+def test_bridges_that_begin_at_the_place_are_among_the_assumed_heights(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0)], highway="secondary", name="Low Road", lanes=2)
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="residential", name="Side Road", lanes=2)
+    extract.way([(0, 0), (120, 0)], highway="secondary", name="Viaduct", lanes=2, bridge="yes", layer="1")
+    extract.way([(120, 0), (300, 0)], highway="secondary", name="Far Road", lanes=2)
+    extract.way([(60, -200), (60, 200)], highway="primary", name="Under Road", lanes=2)
+    model = built(corner_houses(extract), tmp_path)
+    (note,) = [note for note in model.model.notes if "ramps are assumed" in note]
+    assert re.search(r"Viaduct by up to \d\.\d\d m upwards", note)
+
+
+def test_a_weighted_region_without_street_names_is_named_once(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway="secondary", lanes=2)
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="residential", lanes=2)
+    model = built(corner_houses(extract), tmp_path).model
+    (name,) = [part.name for part in model.parts if Role.WEIGHTED_REGIONS in part.roles]
+    assert name.startswith("Junction at ")
+
+
+@pytest.mark.parametrize("radius", [14, 24])
+def test_the_weighted_region_of_a_roundabout_has_all_of_its_ring(radius, tmp_path):
+    extract = Extract()
+    ring = [extract.node(radius * np.cos(at), radius * np.sin(at)) for at in np.arange(24) * np.pi / 12]
+    extract.way([*ring, ring[0]], highway="secondary", junction="roundabout", name="Circus")
+    for name, index, end in (("East", 0, (200, 0)), ("North", 5, (40, 200)), ("Slip", 3, (150, 150))):
+        extract.way([ring[index], end], highway="secondary", name=f"{name} Street", lanes=2)
+    model = built(corner_houses(extract), tmp_path).model
+    weighted = next(part for part in model.parts if Role.WEIGHTED_REGIONS in part.roles)
+    area = shapely.MultiPoint(weighted.solid.vertices[:, :2]).convex_hull.buffer(0.01)
+    (island,) = map(shapely.Polygon, model.region.interiors)
+    ring = plan(model, "Driving lanes").intersection(island.buffer(2.5))
+    assert ring.difference(area).area == pytest.approx(0.0, abs=0.1)
+
+
+def test_the_message_on_a_place_without_streets_does_not_tell_the_window_as_the_extent(tmp_path):
+    extract = Extract()
+    extract.way([(5000, 0), (5200, 0)], highway="residential", name="Far Street")
+    extract.node(0, 0)
+    with pytest.raises(SeipError, match="no street within 590 m") as raised:
+        built(extract, tmp_path)
+    assert "latitude and" not in str(raised.value)

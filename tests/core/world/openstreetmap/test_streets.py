@@ -1,0 +1,211 @@
+"""Which ways are streets, and what netconvert is told of them."""
+
+import pytest
+from defusedxml.ElementTree import fromstring
+
+from seip_addon.core.progress import finish
+from seip_addon.core.world.openstreetmap.extract import read_extract, window
+from seip_addon.core.world.openstreetmap.handedness import drives_on_the_left
+from seip_addon.core.world.openstreetmap.streets import has_lane_count, is_street, lane_counts, write_streets
+from tests.builders.osm_text import Extract, dual_carriageway, left_hand, roundabout
+
+
+def streets(extract, tmp_path, **options):
+    read = finish(read_extract(extract.write(tmp_path / "place.osm")))
+    reach = options.pop("reach", 500.0)
+    result = write_streets(
+        read, tmp_path / "streets.osm", window(extract.latitude, extract.longitude, reach), **options
+    )
+    root = fromstring((tmp_path / "streets.osm").read_text(encoding="utf-8"))
+    return result, [{tag.get("k"): tag.get("v") for tag in way.iter("tag")} for way in root.iter("way")], root
+
+
+@pytest.mark.parametrize(
+    ("tags", "street"),
+    [
+        ({"highway": "residential"}, True),
+        ({"highway": "primary_link"}, True),
+        ({"railway": "tram"}, True),
+        ({"railway": "light_rail"}, True),
+        ({"railway": "light_rail", "tunnel": "yes"}, False),
+        ({"railway": "rail"}, False),
+        ({"highway": "service"}, False),
+        ({"highway": "footway"}, False),
+        ({"highway": "cycleway"}, False),
+        ({"highway": "residential", "area": "yes"}, False),
+        ({"highway": "primary", "tunnel": "yes"}, False),
+        ({"highway": "primary", "tunnel": "building_passage"}, True),
+        ({"railway": "subway"}, False),
+        ({}, False),
+    ],
+)
+def test_what_a_street_is(tags, street):
+    assert is_street(tags) is street
+
+
+def test_driveways_are_streets_where_they_are_asked_for():
+    assert is_street({"highway": "service"}, service=True)
+
+
+@pytest.mark.parametrize(
+    ("tags", "lanes"),
+    [
+        ({"highway": "residential"}, {"forward": 1, "backward": 1}),
+        ({"highway": "primary", "lanes": "4"}, {"forward": 2, "backward": 2}),
+        ({"highway": "primary", "lanes": "3", "lanes:backward": "1"}, {"forward": 2, "backward": 1}),
+        ({"highway": "primary", "lanes": "3", "lanes:forward": "2"}, {"forward": 2, "backward": 1}),
+        ({"highway": "primary", "oneway": "yes", "lanes": "3"}, {"forward": 3}),
+        ({"highway": "motorway"}, {"forward": 2}),
+        ({"highway": "motorway_link"}, {"forward": 1}),
+        ({"highway": "trunk", "oneway": "yes"}, {"forward": 2}),
+        ({"highway": "trunk"}, {"forward": 1, "backward": 1}),
+        ({"highway": "primary"}, {"forward": 1, "backward": 1}),
+        ({"highway": "primary", "oneway": "yes"}, {"forward": 1}),
+        ({"highway": "primary", "junction": "roundabout"}, {"forward": 1}),
+        ({"highway": "primary", "oneway": "yes", "turn:lanes": "left|through|"}, {"forward": 3}),
+        ({"highway": "primary", "turn:lanes:backward": "left|through"}, {"forward": 1, "backward": 2}),
+        ({"highway": "primary", "lanes": "1"}, {"forward": 1, "backward": 1}),
+        ({"highway": "primary", "lanes": "many"}, {"forward": 1, "backward": 1}),
+        ({"highway": "road", "lanes": "2", "lanes:forward": "2", "lanes:backward": "1"}, {"forward": 2, "backward": 1}),
+    ],
+)
+def test_how_many_lanes_a_street_has(tags, lanes, tmp_path):
+    assert lane_counts(tags) == lanes
+    extract = Extract()
+    extract.way([(-100, 0), (100, 0)], **tags)
+    _, (written,), _ = streets(extract, tmp_path)
+    own = {f"lanes:{way}": str(number) for way, number in lanes.items()} if len(lanes) > 1 else {}
+    assert {key: value for key, value in written.items() if key.startswith("lanes")} == (
+        {"lanes": str(sum(lanes.values()))} | own
+    )
+
+
+@pytest.mark.parametrize(
+    ("tags", "known"),
+    [
+        ({"highway": "primary"}, False),
+        ({"highway": "primary", "lanes": "0"}, False),
+        ({"highway": "primary", "lanes": "2"}, True),
+        ({"highway": "primary", "lanes:forward": "1"}, False),
+        ({"highway": "primary", "lanes:forward": "1", "turn:lanes:backward": "left|right"}, True),
+        ({"highway": "primary", "oneway": "yes", "turn:lanes": "left|right"}, True),
+    ],
+)
+def test_whether_the_extract_gives_the_number_of_lanes(tags, known):
+    assert has_lane_count(tags) is known
+
+
+def test_widths_are_shared_out_over_lanes_beside_pavements_and_cycle_lanes(tmp_path):
+    extract = Extract()
+    extract.way([(-100, 0), (100, 0)], highway="residential", width="10", cycleway__both="lane", sidewalk="both")
+    _, (tags,), _ = streets(extract, tmp_path)
+    assert tags["width:lanes:forward"] == tags["width:lanes:backward"] == "3.50|1.50|2.50"
+    assert tags["cycleway:left"] == tags["cycleway:right"] == "lane"
+
+
+def test_an_absurd_width_is_kept_within_what_lanes_have(tmp_path):
+    extract = Extract()
+    extract.way([(-100, 0), (100, 0)], highway="residential", width="50", sidewalk="no")
+    extract.way([(-100, 50), (100, 50)], highway="residential", width="1e9", sidewalk="no")
+    _, (wide, absurd), _ = streets(extract, tmp_path)
+    assert wide["width:lanes:forward"] == "6.00"
+    assert not any(key.startswith("width") for key in absurd)
+
+
+@pytest.mark.parametrize(
+    ("tags", "side"),
+    [
+        ({}, "both"),
+        ({"sidewalk": "no"}, "none"),
+        ({"sidewalk": "left"}, "left"),
+        ({"sidewalk": "separate"}, "both"),
+        ({"sidewalk:both": "separate"}, "both"),
+        ({"sidewalk:left": "no"}, "right"),
+        ({"sidewalk:right": "separate", "sidewalk:left": "no"}, "right"),
+        ({"highway": "motorway", "oneway": "yes"}, "none"),
+        ({"highway": "secondary_link", "oneway": "yes"}, "right"),
+    ],
+)
+def test_pavements_are_those_of_the_tags_or_usual_for_the_street(tmp_path, tags, side):
+    extract = Extract()
+    extract.way([(-100, 0), (100, 0)], **({"highway": "residential"} | tags))
+    assert streets(extract, tmp_path)[1][0]["sidewalk"] == side
+
+
+def test_a_dual_carriageway_has_pavements_at_its_outer_sides(tmp_path):
+    _, ways, _ = streets(dual_carriageway(), tmp_path)
+    assert [way["sidewalk"] for way in ways] == ["right", "right", "both"]
+
+
+def test_traffic_on_the_left_changes_the_sides(tmp_path):
+    result, ways, _ = streets(left_hand(), tmp_path)
+    assert result.left_hand
+    assert [way["sidewalk"] for way in ways] == [
+        "both",
+        "right",
+    ]  # netconvert mixes them up there: the left is its right
+    assert streets(left_hand(), tmp_path, left_hand=False)[1][1]["sidewalk"] == "left"
+
+
+def test_a_roundabout_shows_the_side_and_stays_whole(tmp_path):
+    result, ways, _ = streets(roundabout(), tmp_path)
+    assert not result.left_hand
+    assert "roundabouts" in result.notes[0]
+    assert [len(nodes) for nodes in result.roundabouts] == [16]
+    assert ways[0]["sidewalk"] == "right"
+
+
+LEFT = [
+    *(
+        (51.5, -0.1),
+        (53.3, -6.3),
+        (35.7, 139.7),
+        (-33.9, 151.2),
+        (13.75, 100.5),
+        (28.6, 77.2),
+        (-1.3, 36.8),
+        (-16.8, -179.99),
+    ),
+    *((22.3, 114.2), (-36.8, 174.8), (18.0, -76.8), (6.5, -58.2), (-26.2, 28.0), (1.3, 103.8), (34.9, 33.6)),
+]
+RIGHT = [
+    *((52.5, 13.4), (40.7, -74.0), (48.86, 2.35), (25.05, 121.5), (39.9, 116.4), (37.57, 126.98), (22.54, 114.06)),
+    *((14.6, 121.0), (21.0, 105.8), (50.85, 4.35), (11.55, 104.9), (16.8, 96.2), (9.0, 38.7), (-23.5, -46.6)),
+    *((50.95, 1.86), (-8.8, 13.2), (-4.3, 15.3), (41.9, 12.5)),
+]
+
+
+@pytest.mark.parametrize(("place", "left"), [*((place, True) for place in LEFT), *((place, False) for place in RIGHT)])
+def test_where_nothing_shows_the_side_the_country_does(tmp_path, place, left):
+    extract = Extract(*place)
+    extract.way([(0, 0), (10, 0)], highway="residential")
+    assert drives_on_the_left(finish(read_extract(extract.write(tmp_path / "place.osm"))))[0] is left
+
+
+def test_a_street_that_leaves_the_window_comes_in_pieces(tmp_path):
+    extract = Extract()
+    extract.way([(-50, 0), (0, 0), (300, 0), (400, 50), (300, 100), (0, 100), (-50, 100)], highway="residential")
+    result, ways, root = streets(extract, tmp_path, reach=100.0)
+    assert result.streets == len(ways) == 2
+    ids = [way.get("id") for way in root.iter("way")]
+    assert len(set(ids)) == 2
+    nodes = {node.get("id") for node in root.iter("node")}
+    assert {ref.get("ref") for ref in root.iter("nd")} <= nodes
+
+
+def test_elevations_count_where_nearly_all_nodes_have_one(tmp_path):
+    extract = Extract()
+    extract.way([extract.node(0, 0, ele="50"), extract.node(100, 0, ele="56")], highway="residential")
+    assert streets(extract, tmp_path)[0].elevated
+    extract.way([(0, 50), (100, 50)], highway="residential")
+    assert not streets(extract, tmp_path)[0].elevated
+
+
+def test_a_name_without_letters_in_the_pictures_is_in_english(tmp_path):
+    extract = Extract()
+    extract.way([(-100, 0), (100, 0)], highway="residential", name="中山北路", name__en="Zhongshan North Road")
+    extract.way([(-100, 50), (100, 50)], highway="residential", name="Straße", name__en="Street")
+    extract.way([(-100, 90), (100, 90)], highway="residential", name="南京東路")
+    extract.way([(-100, 120), (100, 120)], highway="primary", ref="B 1")
+    names = [tags["name"] for tags in streets(extract, tmp_path)[1]]
+    assert names == ["Zhongshan North Road", "Straße", "南京東路", "B 1"]

@@ -1,0 +1,244 @@
+"""What stands beside the streets of an extract: footprints, heights, trees, posts and walls."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seip_addon.core.geometry.geo_reference import projection
+from seip_addon.core.progress import finish
+from seip_addon.core.world.openstreetmap.buildings import USUAL_HEIGHT
+from seip_addon.core.world.openstreetmap.extract import read_extract
+from seip_addon.core.world.openstreetmap.plan_shapes import MENDED, PlanShapes
+from seip_addon.core.world.openstreetmap.street_objects import surroundings
+from tests.builders.osm_text import Extract
+
+UTM = projection("+proj=utm +zone=33 +ellps=WGS84 +datum=WGS84 +units=m +no_defs")
+ORIGIN = np.array(UTM(math.radians(52.5), math.radians(13.4)))
+EVERYWHERE = shapely.Point(0, 0).buffer(500)
+ROAD = shapely.box(-200, -4, 200, 4)
+
+
+def found(extract, tmp_path, area=EVERYWHERE):
+    path = extract.write(tmp_path / "place.osm")
+    shapes = PlanShapes(finish(read_extract(path)), UTM, ORIGIN)
+    return surroundings(shapes, area, ROAD), shapes
+
+
+def test_a_footprint_is_that_of_the_extract(tmp_path):
+    extract = Extract()
+    extract.house(10, 20, 30, 12, height="14")
+    (building,), _ = [found(extract, tmp_path)[0].buildings, None]
+    true = [
+        ORIGIN * 0 + np.array(UTM(*map(math.radians, extract.place(x, y)))) - ORIGIN
+        for x, y in ((10, 20), (40, 20), (40, 32), (10, 32))
+    ]
+    exact = shapely.Polygon(true)
+    assert building.outline.symmetric_difference(exact).area < 0.01 * exact.area
+    assert building.outline.area == pytest.approx(360, rel=0.01)
+    assert (building.height, building.height_assumed, building.source) == (14, False, "extract")
+
+
+@pytest.mark.parametrize(
+    ("tags", "height", "base", "roof", "assumed"),
+    [
+        ({"height": "12 ft"}, 3.6576, 0, 0, False),
+        ({"building:levels": "4"}, 12, 0, 0, False),
+        ({"building:levels": "4", "roof:shape": "gabled", "roof:levels": "1"}, 15, 0, 3, False),
+        ({"building:levels": "3", "roof:shape": "hipped"}, 9 + 2.5, 0, 2.5, False),
+        ({"height": "10", "roof:shape": "gabled", "roof:height": "4"}, 10, 0, 4, False),
+        ({"height": "10", "min_height": "4"}, 6, 4, 0, False),
+        ({"building:levels": "5", "building:min_level": "1"}, 12, 3, 0, False),
+        ({"height": "-5"}, USUAL_HEIGHT, 0, 0, True),
+        ({"height": "1e9", "building:levels": "2"}, 6, 0, 0, False),
+        ({"height": "3;4"}, 4, 0, 0, False),
+        ({"building": "garage"}, 2.8, 0, 0, True),
+        ({"building": "roof", "height": "5"}, 0.4, 4.6, 0, False),
+        ({"height": "5", "roof:shape": "gabled", "roof:height": "50"}, 5, 0, 5, False),
+    ],
+)
+def test_heights_are_those_of_the_tags(tmp_path, tags, height, base, roof, assumed):
+    extract = Extract()
+    extract.house(10, 20, 30, 12, **({"height": ""} | tags))
+    (building,) = found(extract, tmp_path)[0].buildings
+    got = (building.height, building.base, building.roof.height, building.height_assumed)
+    assert got == (pytest.approx(height), pytest.approx(base), pytest.approx(roof), assumed)
+
+
+def test_an_unknown_height_is_the_median_of_those_known(tmp_path):
+    extract = Extract()
+    for i, height in enumerate((8, 10, 20, 21, 22)):
+        extract.house(40 * i, 20, 30, 12, height=str(height))
+    extract.house(0, 60, 30, 12, height="")
+    assert found(extract, tmp_path)[0].buildings[-1].height == 20
+
+
+def test_what_is_no_building_is_left_out(tmp_path):
+    extract = Extract()
+    for tags in (
+        {"building": "no"},
+        {"building": "yes", "location": "underground"},
+        {"building": "yes", "layer": "-1"},
+    ):
+        extract.house(10, 20, 30, 12, **tags)
+    assert not found(extract, tmp_path)[0].buildings
+
+
+def test_parts_stand_in_place_of_their_outline(tmp_path):
+    extract = Extract()
+    extract.house(0, 20, 30, 10, height="10")
+    extract.house(0, 20, 15, 10, building="no", building__part="yes", height="6")
+    extract.house(15, 20, 15, 10, building="no", building__part="yes", height="10", min_height="3")
+    solids = found(extract, tmp_path)[0].buildings
+    assert sorted((round(one.height), round(one.base)) for one in solids) == [(6, 0), (7, 3)]
+    assert sum(one.outline.area for one in solids) == pytest.approx(300, rel=0.01)
+
+
+def test_the_rest_of_an_outline_stands_where_parts_do_not_fill_it(tmp_path):
+    extract = Extract()
+    extract.house(0, 20, 30, 10, height="10")
+    extract.house(0, 20, 10, 10, building="no", building__part="yes", height="20")
+    solids = found(extract, tmp_path)[0].buildings
+    assert {one.height: one.outline.area for one in solids} == {
+        10: pytest.approx(200, rel=0.01),
+        20: pytest.approx(100, rel=0.01),
+    }
+
+
+def test_a_relation_has_courtyards_and_its_ways_count_once(tmp_path):
+    extract = Extract()
+    whole = extract.area([(0, 20), (40, 20), (40, 60), (0, 60)], building="yes")
+    inner = extract.area([(10, 30), (30, 30), (30, 50), (10, 50)])
+    extract.relation(
+        [("way", whole, "outer"), ("way", inner, "inner")], type="multipolygon", building="yes", height="9"
+    )
+    (building,) = found(extract, tmp_path)[0].buildings
+    assert building.outline.area == pytest.approx(1200, rel=0.01)
+    assert len(building.outline.interiors) == 1
+
+
+def test_a_relation_that_contains_itself_or_nothing_harms_nobody(tmp_path):
+    extract = Extract()
+    own = extract.house(10, 20, 30, 12) + 1
+    extract.relation([("relation", own, "outer")], type="multipolygon", building="yes")
+    extract.relation([("way", 999, "outer"), ("way", 998, "")], type="multipolygon", building="yes")
+    extract.relation([], type="multipolygon", building="yes")
+    assert len(found(extract, tmp_path)[0].buildings) == 1
+
+
+def test_a_cut_outline_is_closed_or_left_out_and_counted(tmp_path):
+    extract = Extract()
+    extract.way([(0, 20), (20, 20), (20, 30), 9999, (0, 30), (0, 20)], building="yes", height="9")
+    extract.way([(50, 20), 9998, 9997, 9996, (50, 30)], building="yes", height="9")
+    extract.way([(80, 20), (100, 20), (100, 30), (80, 30)], building="yes", height="9")
+    site, shapes = found(extract, tmp_path)
+    assert len(site.buildings) == 2
+    assert all(one.outline.area == pytest.approx(200, rel=0.01) for one in site.buildings)
+    assert sorted(shapes.dropped.values()) == [1, 1]
+
+
+def test_an_outline_that_crosses_itself_is_mended(tmp_path):
+    extract = Extract()
+    extract.area([(0, 20), (20, 40), (20, 20), (0, 40)], building="yes", height="9")
+    site, shapes = found(extract, tmp_path)
+    assert sum(one.outline.area for one in site.buildings) == pytest.approx(200, rel=0.01)
+    assert all(one.outline.is_valid for one in site.buildings)
+    assert shapes.dropped[MENDED] == 1
+
+
+def test_trees_lamps_posts_and_walls(tmp_path):
+    extract = Extract()
+    extract.node(10, 10, natural="tree", height="11", diameter_crown="5")
+    extract.node(20, 10, natural="tree")
+    extract.way([(0, 30), (80, 30)], natural="tree_row")
+    extract.node(30, 6, highway="street_lamp")
+    extract.node(31, 6, highway="street_lamp", support="wall")
+    extract.node(40, 6, highway="traffic_signals")
+    extract.node(40, 0, highway="traffic_signals")
+    extract.node(50, 6, power="pole", height="9.5")
+    extract.way([(0, 50), (30, 50), (30, 60)], barrier="wall", height="1.8")
+    extract.way([(0, 70), (30, 70)], barrier="hedge")
+    extract.way([(0, 80), (30, 80)], barrier="kerb")
+    extract.area([(60, 60), (70, 60), (70, 70), (60, 70)], barrier="hedge", area="yes")
+    site, _ = found(extract, tmp_path)
+    assert [(tree.height, tree.crown_diameter, tree.height_assumed) for tree in site.trees[:2]] == [
+        (11, 5, False),
+        (8, 4.8, True),
+    ]
+    assert len(site.trees[2].positions) == 11
+    assert site.trees[2].source == "assumed"
+    assert len(site.street_lights) == len(site.signal_poles) == len(site.posts) == 1
+    assert (site.posts[0].height, site.posts[0].height_assumed) == (9.5, False)
+    assert [(wall.name, wall.height, wall.material) for wall in site.walls] == [
+        ("Wall", 1.8, "wall"),
+        ("Hedge", 1.5, "leaves"),
+    ]
+    assert [(slab.name, slab.top) for slab in site.slabs] == [("Hedge", 1.5)]
+
+
+def test_a_shelter_has_its_back_to_the_road_s_other_side(tmp_path):
+    extract = Extract()
+    extract.node(0, 6, highway="bus_stop", shelter="yes")
+    roof, back = found(extract, tmp_path)[0].slabs
+    assert roof.top == 2.5
+    assert roof.outline.area == pytest.approx(6.0, rel=0.02)
+    assert roof.outline.distance(ROAD) > 0.9
+    assert back.outline.centroid.y > roof.outline.centroid.y
+
+
+def test_only_what_reaches_into_the_area_counts(tmp_path):
+    extract = Extract()
+    extract.house(10, 20, 30, 12)
+    extract.house(310, 20, 30, 12)
+    extract.node(300, 300, natural="tree")
+    site, _ = found(extract, tmp_path, shapely.Point(0, 0).buffer(100))
+    assert len(site.buildings) == 1
+    assert not site.trees
+
+
+VALUES = ["yes", "no", "nan", "gabled", "hipped", "part", "roof", "wall", "tree", "3;4", "-5", "1e9", "∞"]
+KEYS = [
+    "building",
+    "building:part",
+    "height",
+    "min_height",
+    "building:levels",
+    "roof:shape",
+    "roof:height",
+    "roof:direction",
+    "natural",
+    "barrier",
+    "area",
+    "width",
+    "layer",
+    "highway",
+    "amenity",
+    "diameter_crown",
+    "building:min_level",
+]
+tag_sets = st.dictionaries(st.sampled_from(KEYS), st.sampled_from([*VALUES, "12 ft", ""]), max_size=6)
+points = st.lists(st.tuples(st.integers(-60, 60), st.integers(-60, 60)), min_size=1, max_size=8)
+
+
+@settings(max_examples=100)
+@given(shapes=st.lists(st.tuples(points, tag_sets, st.booleans()), min_size=1, max_size=6))
+def test_no_tags_and_shapes_break_the_reader(tmp_path_factory, shapes):
+    extract = Extract()
+    extract.node(0, 0)
+    for corners, tags, closed in shapes:
+        if len(corners) == 1:
+            extract.node(*corners[0], **tags)
+        elif closed:
+            extract.area(corners, **tags)
+        else:
+            extract.way(corners, **tags)
+    site, _ = found(extract, tmp_path_factory.mktemp("osm"))
+    for building in site.buildings:
+        assert building.outline.is_valid
+        assert 0 < building.height < 1000
+        assert 0 <= building.roof.height <= building.height
+    for item in (*site.trees, *site.walls, *site.posts, *site.street_lights):
+        assert 0 < item.height <= 80

@@ -1,0 +1,230 @@
+"""Roads above roads: a scene has one level, told by how roads connect, or by the user."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.site.roles import Role
+from seip_addon.core.site.scene_geometry import OTHER_LEVELS
+from seip_addon.core.world.opendrive.read import read_map
+from seip_addon.core.world.streetscape.description import SiteDescription, read_site_description
+from seip_addon.core.world.streetscape.levels import Crossing
+from seip_addon.core.world.streetscape.model import site_model
+from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
+
+MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[5] / "shared" / "opendrive")
+DECK = 6.0
+LANES = section(lane(1), lane(-1))
+
+
+def level(z):
+    return f'<elevation s="0" a="{z}" b="0" c="0" d="0"/>'
+
+
+def street(number, x, y, length, hdg=0.0, *, z=0.0, objects="", signals=""):
+    plan = geometry(length=length, x=float(x), y=float(y), hdg=hdg)
+    return road(plan, LANES, number=number, elevation=level(z), objects=objects, signals=signals)
+
+
+LIGHT = '<object id="1" type="streetLamp" name="lamp" s="{s}" t="5" zOffset="0" height="8"/>'
+SIGNAL = '<signal id="1" s="{s}" t="-5" zOffset="0" orientation="+" dynamic="yes" type="1000001"/>'
+
+
+def underpass():
+    """A street of three pieces along x at height 0, and one along y 6 m above its middle piece."""
+    low = [street(str(n), x, 0, 60) for n, x in ((1, -90), (2, -30), (3, 30))]
+    furniture = {"objects": LIGHT.format(s=30), "signals": SIGNAL.format(s=35)}
+    high = [
+        street(str(n), 0, y, 60, np.pi / 2, z=DECK, **(furniture if n == 5 else {}))
+        for n, y in ((4, -90), (5, -30), (6, 30))
+    ]
+    return document(*low, *high)
+
+
+def built(tmp_path, near, roads=(), text=None, radius=50.0):
+    place = SiteDescription(near=near, radius=radius, level=tuple(roads))
+    return finish(site_model(read_text(tmp_path, text or underpass()), place))
+
+
+def corners(model, *roles):
+    """Return the corners (n, 3, 3), map coordinates, of faces in any of the roles; kerbs have none here."""
+    return model.origin + np.concatenate(
+        [
+            part.solid.vertices[np.array([face[:3] for face in part.solid.faces])] + part.foot
+            for part in model.parts
+            if set(part.roles) & set(roles)
+        ]
+    )
+
+
+def heights(model, *roles):
+    return corners(model, *roles)[:, :, 2]
+
+
+@pytest.mark.parametrize(("near", "roads", "z"), [((-40, 0), (), 0), ((0, 40), (), DECK), ((0, 0), ("2",), 0), ((0, 0), ("5",), DECK)])  # fmt: skip  # noqa: E501
+def test_road_ground_and_posts_are_all_on_one_level(tmp_path, near, roads, z):
+    model = built(tmp_path, near, roads)
+    assert model.origin[2] == z
+    np.testing.assert_allclose(heights(model, Role.ROADS, Role.CANDIDATE_AREAS, Role.REGION), z, atol=0.1)
+    lower = {OTHER_LEVELS, "Retaining walls"}
+    ground = [part for part in model.parts if Role.GROUND in part.roles and part.name not in lower]
+    assert np.abs(np.concatenate([part.solid.vertices[:, 2] for part in ground]) + model.origin[2] - z).max() < 0.5
+    across = 1 if z == 0 else 0
+    assert model.region.bounds[across] == pytest.approx(-3.5 - model.origin[across], abs=0.1)
+    assert any("is on another level" in note for note in model.notes)
+
+
+def test_the_road_above_is_in_the_way_and_the_one_below_is_ground(tmp_path):
+    below, above = built(tmp_path, (-40, 0)), built(tmp_path, (0, 40))
+    (deck,) = [part for part in below.parts if part.name == "Roads above"]
+    assert deck.roles == (Role.OCCLUDERS,)
+    np.testing.assert_allclose(deck.solid.vertices[:, 2], DECK, atol=1e-6)
+    (street,) = [part for part in above.parts if part.name == OTHER_LEVELS]
+    assert street.roles == (Role.GROUND,)
+    np.testing.assert_allclose(street.solid.vertices[:, 2], -DECK, atol=1e-6)
+
+
+def test_walls_that_rays_end_on_close_the_gap_beside_a_road_below(tmp_path):
+    model = built(tmp_path, (0, 40))
+    (walls,) = [part for part in model.parts if part.name == "Retaining walls"]
+    assert walls.roles == (Role.GROUND,)
+    assert walls.solid.vertices[:, 2].min() == pytest.approx(-DECK)
+    assert walls.solid.vertices[:, 2].max() == pytest.approx(0.0)
+    (street,) = [part for part in model.parts if part.name == OTHER_LEVELS]
+    faces = [street.solid.vertices[list(face), :2] for face in street.solid.faces]
+    edge = shapely.union_all([shapely.Polygon(face) for face in faces], grid_size=1e-3).boundary
+    feet = shapely.union_all(
+        [shapely.LineString(walls.solid.vertices[list(face), :2]) for face in walls.solid.faces], grid_size=1e-3
+    )
+    assert shapely.difference(edge, feet.buffer(0.01)).length < 0.1
+
+
+def test_poles_of_another_level_carry_nothing(tmp_path):
+    """The lamp and the signal stand on the bridge."""
+    assert not [part for part in built(tmp_path, (-40, 0)).parts if Role.POLES in part.roles]
+    poles = [part for part in built(tmp_path, (0, 40)).parts if Role.POLES in part.roles]
+    assert {part.name for part in poles} == {"lamp", "Assumed signal pole 1"}
+
+
+def test_no_post_stands_beside_the_bridge_over_the_street(tmp_path):
+    area = corners(built(tmp_path, (0, 0), ("5",)), Role.CANDIDATE_AREAS)
+    assert np.abs(area[:, :, 1]).min() > 3.5
+
+
+def test_a_crossing_in_the_middle_of_the_place_is_refused_by_name(tmp_path):
+    with pytest.raises(SeipError, match=r"road 5 lies 6\.0 m above road 2 at \(0, 0\).*--level 5 or --level 2"):
+        built(tmp_path, (0, 0))
+    with pytest.raises(SeipError, match="no road '9' at this place"):
+        built(tmp_path, (0, 0), ("9",))
+
+
+def test_a_ramp_belongs_to_the_level_that_it_leaves(tmp_path):
+    """It climbs from the end of road 1 beside the street to the bridge's road 4: most of it is nearer to road 1."""
+    ramp = road(
+        geometry(length=90.0, x=-30.0, y=-4.0, hdg=-np.pi / 2 + 0.3), LANES, number="8",
+        elevation=f'<elevation s="0" a="0" b="{DECK / 90}" c="0" d="0"/>',
+    )  # fmt: skip
+    text = underpass().replace("</OpenDRIVE>", f"{ramp}</OpenDRIVE>")
+    model = built(tmp_path, (-40, 0), text=text)
+    middles = corners(model, Role.ROADS).mean(axis=1)
+    assert middles[:, 2].min() == pytest.approx(0, abs=0.1)
+    assert middles[:, 2].max() > 3.0
+    on_bridge = (np.abs(middles[:, 0]) < 3.4) & (np.abs(middles[:, 1]) < 70) & (np.abs(middles[:, 1]) > 4)
+    assert not on_bridge.any()
+
+
+def test_roads_that_meet_in_height_are_one_level(tmp_path):
+    text = document(street("1", -60, 0, 120), street("2", 0, -60, 120, np.pi / 2, z=0.3))
+    model = built(tmp_path, (0, 0), text=text)
+    assert not any("level" in note for note in model.notes)
+
+
+def test_the_level_is_an_option_and_a_key(tmp_path):
+    path = tmp_path / "site.toml"
+    for written, roads in (('"5"', ("5",)), ('["5", "4"]', ("5", "4"))):
+        path.write_text(f'map = "map.xodr"\nnear = [0, 0]\nlevel = {written}\n', encoding="utf-8")
+        assert read_site_description(path).level == roads
+    path.write_text("level = 5", encoding="utf-8")
+    with pytest.raises(SeipError, match="level must be a text in quotes, or a list"):
+        read_site_description(path)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not MAPS.is_dir(), reason="the maps of other projects are not here; set SEIP_MAPS to their folder")
+@pytest.mark.parametrize(("near", "roads", "z"), [((-190, -1), (), 0), ((-236, 40), (), 10), ((-236, -1), ("3",), 0)])
+def test_the_bridge_of_a_real_town_makes_no_curtain(near, roads, z):
+    model = finish(site_model(read_map(MAPS / "Town05.xodr"), SiteDescription(near=near, radius=60.0, level=roads)))
+    surface = [part for part in model.parts if part.name in {"Driving lanes", "Shoulders", "Verge", "Verge strip"}]
+    for part in surface:
+        np.testing.assert_allclose(part.solid.vertices[:, 2] + model.origin[2], z, atol=0.3)
+
+
+@pytest.mark.parametrize(
+    ("streets", "called"),
+    [
+        (("High Road", "Low Road"), "High Road lies 6.0 m above Low Road"),
+        (("High Road", ""), "High Road lies 6.0 m above a street without a name"),
+        (("", "Low Road"), "a street without a name lies 6.0 m above Low Road"),
+        (("Ring", "ring"), "Ring (road 5) lies 6.0 m above ring (road 2)"),
+        (("", ""), "road 5 lies 6.0 m above road 2"),
+    ],
+)
+def test_messages_name_streets_as_far_as_they_have_names(streets, called):
+    crossing = Crossing("5", "2", 6.0, (0.2, -0.3), streets)
+    assert str(crossing) == f"{called} at (0, 0)"
+    own = {name for name in (*streets, "5", "2") if name}
+    assert set(crossing.levels) <= own
+    assert len({level.casefold() for level in crossing.levels}) == 2
+
+
+def test_the_carriageways_of_one_street_are_one_note(tmp_path):
+    low = [street(str(n), x, 0, 60) for n, x in ((1, -90), (2, -30), (3, 30))]
+    high = [street(number, x, -90, 180, np.pi / 2, z=DECK) for number, x in (("4", -8), ("5", 8))]
+    road_map = read_text(tmp_path, document(*low, *high))
+    names = {"4": "High Road", "5": "High Road", "2": ""}
+    roads = tuple(replace(one, name=names.get(one.id, "")) for one in road_map.roads)
+    model = finish(site_model(replace(road_map, roads=roads), SiteDescription(near=(-40, 0), radius=50.0)))
+    notes = [note for note in model.notes if "another level" in note]
+    (note,) = notes
+    assert note == (
+        "High Road lies 6.0 m above a street without a name at (-8, 0): the upper one is on another level, in the way "
+        "but not studied"
+    )
+
+
+def test_of_two_roads_as_many_joints_away_the_nearer_one_is_studied(tmp_path):
+    """Road 1 leads to the lower road over 30 m, road 7 to the bridge over 130 m."""
+    middle = street("0", -90, 0, 60)
+    low = [street("1", -30, 0, 30), street("2", 0, 0, 60)]
+    ramp = road(
+        geometry(length=130.0, x=-90.0, y=0.0, hdg=-np.pi / 2), LANES, number="7",
+        elevation=f'<elevation s="0" a="0" b="{DECK / 130}" c="0" d="0"/>',
+    )  # fmt: skip
+    deck = street("8", -90, -130, 240, np.arctan2(170, 120), z=DECK)
+    model = built(tmp_path, (-60, 0), text=document(middle, *low, ramp, deck), radius=80.0)
+    assert any("road 8 lies 6.0 m above road" in note and "the upper one" in note for note in model.notes)
+
+
+def test_where_a_street_to_the_other_level_branches_off_the_surface_is_studied(tmp_path):
+    """Road 2 climbs from road 1 to a bridge; road 4 turns off road 1 on to road 6, which leads beneath the bridge."""
+    climb = road(
+        geometry(length=90.0, x=-30.0, y=0.0), LANES, number="2",
+        elevation=f'<elevation s="0" a="0" b="{DECK / 90}" c="0" d="0"/>',
+    )  # fmt: skip
+    turn = street("4", -45, 0, 30, -0.35)
+    end = np.array([-45 + 30 * np.cos(0.35), -30 * np.sin(0.35)])
+    beneath = street("6", *end, 130, 0.0961)
+    text = document(street("1", -90, 0, 60), climb, street("3", 60, 0, 60, z=DECK), turn, beneath)
+    model = built(tmp_path, (-60, 0), text=text, radius=170.0)
+    assert any("road 6" in note and "the lower one is on another level" in note for note in model.notes)
+    where = {part.name: part.solid.vertices + model.origin for part in model.parts}
+    assert where[OTHER_LEVELS][:, 0].min() == pytest.approx(end[0], abs=2.0)
+    assert where["Driving lanes"][:, 1].min() < end[1]
+    above = where.get("Roads above", np.full((1, 3), DECK))
+    assert above[:, 2].min() > 5.0  # nothing hangs at knee height over the studied road

@@ -1,0 +1,95 @@
+"""Buildings as solids: closed, and of the volume that geometry says."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.world.streetscape.roofs import RIDGED, SLOPED, Roof, house
+
+BOX = shapely.box(3.0, 5.0, 15.0, 13.0)  # 12 m by 8 m
+
+
+def volume(solid):
+    """Return the volume within faces that are planar or nearly so, by the divergence theorem."""
+    total = 0.0
+    for face in solid.faces:
+        corners = solid.vertices[list(face)]
+        for i in range(1, len(corners) - 1):
+            total += np.dot(corners[0], np.cross(corners[i], corners[i + 1])) / 6
+    return total
+
+
+def is_closed(solid):
+    """Return whether each edge is used once in each direction."""
+    places = [tuple(np.round(vertex, 5)) for vertex in solid.vertices]
+    edges = Counter(
+        (places[a], places[b])
+        for face in solid.faces
+        for a, b in zip(face, (*face[1:], face[0]), strict=True)
+        if places[a] != places[b]
+    )
+    return all(number == edges[b, a] for (a, b), number in edges.items())
+
+
+@pytest.mark.parametrize(
+    ("shape", "above"),
+    [
+        ("flat", 0.0),
+        ("gabled", 96 * 3 / 2),
+        ("skillion", 96 * 3 / 2),
+        ("pyramidal", 96 * 3 / 3),
+        ("hipped", 3 * 8 * (3 * 12 - 8) / 6),  # a ridge of 4 m between two half pyramids
+    ],
+)
+def test_a_roof_adds_the_volume_of_its_shape(shape, above):
+    solid = house(BOX, 1.0, 7.0, side="wall", roof=Roof(shape, 3.0))
+    assert is_closed(solid)
+    assert volume(solid) == pytest.approx(96 * 6 + above, rel=0.004)
+    assert solid.vertices[:, 2].min() == 1.0
+    assert solid.vertices[:, 2].max() == pytest.approx(10.0 if shape != "flat" else 7.0, abs=0.02)
+
+
+def test_a_courtyard_stays_open():
+    outline = shapely.Polygon(BOX.exterior, [shapely.box(6, 7, 10, 11).exterior])
+    solid = house(outline, 0.0, 5.0, side="wall")
+    assert is_closed(solid)
+    assert volume(solid) == pytest.approx((96 - 16) * 5)
+
+
+def test_a_roof_falls_where_it_is_said_to():
+    east = house(BOX, 0.0, 4.0, side="wall", roof=Roof("skillion", 2.0, heading=0.0))
+    top = east.vertices[east.vertices[:, 2] > 3.0]
+    assert top[top[:, 0] > 14.9, 2] == pytest.approx(4.0)
+    assert top[top[:, 0] < 3.1, 2] == pytest.approx(6.0)
+
+
+def test_the_ridge_lies_along_the_longer_side_or_across_it():
+    along = house(BOX, 0.0, 4.0, side="wall", roof=Roof("gabled", 2.0)).vertices
+    across = house(BOX, 0.0, 4.0, side="wall", roof=Roof("gabled", 2.0, across=True)).vertices
+    assert along[along[:, 2] > 5.9, 1] == pytest.approx(9.0)
+    assert across[across[:, 2] > 5.9, 0] == pytest.approx(9.0)
+
+
+coordinates = st.tuples(st.floats(-40, 40), st.floats(-40, 40))
+
+
+@given(
+    points=st.lists(coordinates, min_size=3, max_size=9),
+    hole=st.booleans(),
+    shape=st.sampled_from(sorted(RIDGED | SLOPED | {"flat", "unheard of"})),
+    height=st.floats(0.0, 12.0),
+)
+def test_every_outline_makes_a_closed_solid(points, hole, shape, height):
+    outline = shapely.MultiPoint(points).convex_hull
+    if outline.geom_type != "Polygon" or outline.area < 1.0 or outline.buffer(-0.3).is_empty:
+        return
+    if hole and not outline.buffer(-2.0).is_empty:
+        outline = outline.difference(outline.buffer(-2.0))
+    solid = house(outline, 0.0, 5.0, side="wall", roof=Roof(shape, height))
+    assert is_closed(solid)
+    assert 5 * outline.area * 0.999 <= volume(solid) <= (5 + height) * outline.area * 1.001
+    assert len(solid.faces) == len(solid.materials)

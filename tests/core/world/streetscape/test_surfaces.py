@@ -1,0 +1,187 @@
+"""Each place of a modelled street has one surface: no pavement in a lane, no two faces in one place."""
+
+import dataclasses
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from seip_addon.core.progress import finish
+from seip_addon.core.site.roles import Role
+from seip_addon.core.workflows.site_building import AskedSite, build_site
+from seip_addon.core.world.opendrive.lanes import LaneSurface
+from seip_addon.core.world.opendrive.read import read_map
+from seip_addon.core.world.streetscape.description import SiteDescription
+from seip_addon.core.world.streetscape.footways import without_doubles
+from seip_addon.core.world.streetscape.model import site_model
+from seip_addon.core.world.streetscape.road_surface import markings, roadside, without_gaps, without_loose_ends
+from tests.builders.osm_text import JUNCTIONS, crossing
+from tests.builders.street_map import street_map
+from tests.oracles.face_areas import coincident_areas, plan, surfaces
+from tests.sumo_here import needs_sumo
+
+ROOT = Path(__file__).resolve().parents[4]
+SHARED = Path(os.environ.get("SEIP_MAPS", ROOT.parent / "shared" / "opendrive")).parent
+REAL = {
+    "osm/neukolln.osm": {"near_latlon": (52.47391, 13.44048)},
+    "osm/borough_sausage_links.osm": {"near_latlon": (51.50103, -0.09301)},
+    "osm/northgate_dual_carriageway.osm": {"near_latlon": (47.70856, -122.32636)},
+    "osm/taipei.osm": {"near_latlon": (25.05217, 121.52256)},
+    "osm/perth_stretched_lights.osm": {"near_latlon": (-31.97471, 115.89771)},
+    "opendrive/Town05.xodr": {"near": (-49.0, -1.0)},
+    "opendrive/Town01.xodr": {"anywhere": True},
+}
+MAX_OVERLAP = 0.2  # m² of pavement in lanes: rounding along hundreds of metres of edges
+MAX_HOLE = 4.0  # m²: smaller holes in the carriageway are no islands
+MAX_COINCIDENT = 0.5  # m² of faces in one place, of a site of some 10,000 m²
+
+
+def check(model):
+    """No pavement or place for posts lies in a lane, lanes leave no small holes, no two faces lie in one place."""
+    roads = plan([part for part in model.parts if Role.ROADS in part.roles])
+    walked = plan([part for part in model.parts if part.name.startswith("Pavements")])
+    posts = plan([part for part in model.parts if Role.CANDIDATE_AREAS in part.roles])
+    assert walked.intersection(roads).area < MAX_OVERLAP
+    assert posts.intersection(roads).area < MAX_OVERLAP
+    holes = [shapely.Polygon(ring).area for part in shapely.get_parts(roads) for ring in part.interiors]
+    assert sum(hole for hole in holes if hole < MAX_HOLE) < MAX_OVERLAP
+    found = coincident_areas(surfaces(model))
+    assert sum(found.values()) < MAX_COINCIDENT, found
+
+
+@needs_sumo
+@pytest.mark.parametrize("name", [*JUNCTIONS])
+def test_surfaces_of_an_extract_lie_beside_each_other(name, tmp_path):
+    extract = JUNCTIONS[name]()
+    source = extract.write(tmp_path / "place.osm")
+    place = AskedSite(near_latlon=(extract.latitude, extract.longitude))
+    check(finish(build_site(source, place)).model)
+
+
+@needs_sumo
+def test_surfaces_of_the_shipped_extract_lie_beside_each_other():
+    asked = AskedSite(junction=("Harbour Road", "Rope Lane"))
+    check(finish(build_site(ROOT / "scenes" / "harbour.osm", asked)).model)
+
+
+@pytest.mark.slow
+@needs_sumo
+@pytest.mark.parametrize("name", REAL)
+def test_surfaces_of_real_places_lie_beside_each_other(name):
+    source = SHARED / name
+    if not source.is_file():
+        pytest.skip(f"{source} is not beside the project")
+    check(finish(build_site(source, AskedSite(**REAL[name]))).model)
+
+
+def test_a_lane_that_overlaps_another_road_gives_way(tmp_path):
+    path = tmp_path / "street.xodr"
+    text = street_map(lane_types=("driving", "sidewalk"))
+    beside = street_map(y=6.0, lane_types=("driving",)).replace('id="1"', 'id="11"').replace('id="3"', 'id="13"')
+    roads = [part for part in beside.split("<road ")[1:] if part.startswith(('id="11"', 'id="13"'))]
+    path.write_text(
+        text.replace("<junction ", "".join(f"<road {road.split('<junction')[0]}" for road in roads) + "<junction "),
+        encoding="utf-8",
+    )
+    path.write_text(path.read_text().replace("</OpenDRIVE></OpenDRIVE>", "</OpenDRIVE>"), encoding="utf-8")
+    model = finish(site_model(read_map(path), SiteDescription(near=(0.0, 0.0), radius=60.0)))
+    check(model)
+    roads = plan([part for part in model.parts if Role.ROADS in part.roles])
+    assert shapely.contains_xy(roads, *(np.array([[-40.0, 5.0]]) - model.origin[:2]).T).all()
+
+
+PAVEMENT = shapely.box(-100, 0, 100, 2.5)
+
+
+def doubles(*points, width=2.0):
+    shapely.prepare(PAVEMENT)
+    return without_doubles(np.array(points, dtype=float), width, PAVEMENT)
+
+
+def test_a_footway_along_a_pavement_is_the_same_pavement():
+    area, length = doubles((-50, 6), (50, 6))
+    assert length == pytest.approx(100)
+    assert area.is_empty
+
+
+@pytest.mark.parametrize(
+    "line",
+    [[(-50, 12), (50, 12)], [(0, 3), (0, 40)], [(-20, 3), (30, 60)]],
+    ids=["far from it", "across", "aslant"],
+)
+def test_other_footways_stay(line):
+    area, length = doubles(*line)
+    assert length == 0
+    assert shapely.LineString(line).buffer(1.0).difference(area).area < 0.1
+
+
+def test_a_path_that_met_the_footway_is_led_on_to_the_pavement():
+    area, length = doubles((-50, 6), (0, 6), (0, 40))
+    assert length == pytest.approx(50, abs=2.5)
+    assert area.intersects(PAVEMENT)
+    assert area.bounds[0] > -4
+
+
+@needs_sumo
+def test_a_mapped_footway_beside_the_street_makes_no_second_pavement(tmp_path):
+    extract = crossing()
+    extract.way([(12, 11), (90, 11)], highway="footway", footway="sidewalk")
+    site = finish(build_site(extract.write(tmp_path / "place.osm"), AskedSite(near_latlon=(52.5, 13.4))))
+    assert not [part for part in site.model.parts if part.name == "Footways"]
+    assert any("footways beside a pavement" in note for note in site.model.notes)
+
+
+def strip(low_x, low_y, high_x, high_y, lane_type="driving", road="1"):
+    """Return a lane of a junction over a rectangle."""
+    xs = np.array([low_x, high_x], dtype=float)
+    left, right = (np.column_stack([xs, np.full(2, y), np.zeros(2)]) for y in (high_y, low_y))
+    return LaneSurface(road, "7", 0, -1, lane_type, False, xs - low_x, left, right)
+
+
+def around(size):
+    """Return lanes around a square gap."""
+    return (
+        strip(-10, size, 10, size + 4),
+        strip(-10, -4, 10, 0, road="2"),
+        strip(-10, 0, 0, size, road="3"),
+        strip(size, 0, 10, size, road="4"),
+    )
+
+
+@pytest.mark.parametrize(("size", "filled"), [(1.5, True), (3.0, False)])
+def test_a_small_gap_between_the_lanes_of_a_junction_is_no_island(size, filled):
+    lanes = around(size)
+    gap = shapely.box(0, 0, size, size)
+    assert without_gaps(roadside(lanes), lanes, fill=False).contains(gap.centroid) is filled
+    median = strip(0, 0, size, size, "median", "5")
+    assert not without_gaps(roadside(lanes), (*lanes, median), fill=False).contains(gap.centroid)
+
+
+def rectangle(road, low_x, low_y, high_x, high_y):
+    s = np.array([0.0, 1.0])
+    left, right = (np.array([(low_x, y, 0), (high_x, y, 0)], dtype=float) for y in (high_y, low_y))
+    return LaneSurface(
+        road_id=road, junction_id=None, section=0, lane_id=-1, lane_type="driving", keeps_left=False,
+        s=s, left=left, right=right,
+    )  # fmt: skip
+
+
+def test_small_pieces_of_roads_that_lead_nowhere_are_left_out():
+    extent = shapely.box(-50, -50, 50, 50)
+    region = shapely.box(-20, -3, 20, 3)
+    main, next_to_it = rectangle("1", -40, -3, 0, 3), rectangle("2", 0, -3, 60, 3)
+    sliver, street = rectangle("3", 45, 40, 90, 46), rectangle("4", -45, 30, 45, 36)
+    kept = without_loose_ends([main, next_to_it, sliver, street], region, extent)
+    assert [lane.road_id for lane in kept] == ["1", "2", "4"]
+
+
+def test_markings_end_where_the_road_ends():
+    lanes = [rectangle("1", -60, 0, 60, 3.5)]
+    lanes.append(dataclasses.replace(rectangle("1", -60, -3.5, 60, 0), lane_id=1))
+    extent = shapely.Point(0, 0).buffer(41.7)
+    painted = markings(lanes, extent)
+    corners = shapely.points(painted[:, :, :2].reshape(-1, 2))
+    assert shapely.distance(extent, corners).max() < 0.1
+    assert painted[:, :, 0].max() == pytest.approx(41.7, abs=0.2)

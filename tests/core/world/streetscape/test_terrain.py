@@ -1,0 +1,138 @@
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.geometry.plan import plane_height
+from seip_addon.core.world.streetscape.terrain import MAX_ROADSIDE, Embankments, Terrain, cut, triangulate
+from tests.oracles.random_cases import cases
+
+SQUARE = np.array([[[0, 0, 1], [4, 0, 1], [4, 4, 3]], [[0, 0, 1], [4, 4, 3], [0, 4, 3]]], dtype=float)
+"""The plane z = 1 + y / 2 over a square of side 4."""
+
+L_SHAPE = shapely.Polygon([(0, 0), (9, 0), (9, 3), (3, 3), (3, 9), (0, 9)])
+
+
+def plan_area(triangles):
+    edges = triangles[:, 1:, :2] - triangles[:, :1, :2]
+    return (edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]) / 2
+
+
+@given(st.floats(0, 4), st.floats(0, 4))
+def test_height_on_a_plane_is_the_planes(x, y):
+    assert Terrain(SQUARE).height(np.array([[x, y]]))[0] == pytest.approx(1 + y / 2)
+
+
+def test_height_beside_is_that_of_the_nearest_point():
+    np.testing.assert_allclose(Terrain(SQUARE).height(np.array([[2.0, 100.0], [2.0, -7.0], [9.0, 2.0]])), [3, 1, 2])
+
+
+def test_overlapping_triangles_count_equally():
+    lower = SQUARE - [0, 0, 0.4]
+    inside = np.array([[1.0, 2.0]])
+    assert Terrain(np.concatenate([SQUARE, lower])).height(inside)[0] == pytest.approx(1.8)
+
+
+def test_upright_triangles_are_no_ground():
+    upright = np.array([[[1, 1, 50], [2, 2, 50], [1.5, 1.5, 90]]], dtype=float)
+    assert Terrain(np.concatenate([SQUARE, upright])).height(np.array([[1.5, 1.5]]))[0] == pytest.approx(1.75)
+
+
+def test_triangles_fill_an_area_once_and_face_up():
+    holed = L_SHAPE.difference(shapely.box(1, 1, 2, 2))
+    area = plan_area(triangulate(holed))
+    assert (area > 0).all()
+    assert area.sum() == pytest.approx(holed.area)
+
+
+@given(st.floats(0.7, 20), st.floats(-50, 50), st.floats(-50, 50))
+@cases(25)
+def test_draping_keeps_the_area_wherever_the_grid_falls(spacing, x, y):
+    area = shapely.affinity.translate(L_SHAPE, x, y)
+    ground = SQUARE * [100, 100, 1] - [200, 200, 0]
+    triangles = Terrain(ground).drape(area, spacing=spacing, above=0.25)
+    assert plan_area(triangles).sum() == pytest.approx(area.area, abs=1e-3)
+    expected = 1 + (triangles[..., 1] + 200) / 200 + 0.25
+    np.testing.assert_allclose(triangles[..., 2], expected, atol=1e-9)
+
+
+def test_a_draped_area_has_no_cracks():
+    """Each inner edge belongs to exactly two triangles: what is left over is the outline."""
+    triangles = Terrain(SQUARE).drape(L_SHAPE, spacing=2.0)
+    corners = np.round(triangles, 9)
+    edges = {}
+    for a, b, c in corners:
+        for start, stop in ((a, b), (b, c), (c, a)):
+            key = (tuple(start), tuple(stop))
+            edges[key] = edges.get(key, 0) + 1
+    assert set(edges.values()) == {1}
+    open_edges = [(start, stop) for start, stop in edges if (stop, start) not in edges]
+    length = sum(np.hypot(stop[0] - start[0], stop[1] - start[1]) for start, stop in open_edges)
+    assert length == pytest.approx(L_SHAPE.length)
+
+
+@given(st.floats(-1, 5), st.floats(0.1, 3))
+@cases(25)
+def test_cutting_leaves_the_rest_on_its_plane(x, size):
+    hole = shapely.box(x, 1, x + size, 1 + size)
+    rest = cut(SQUARE, hole)
+    assert plan_area(rest).sum() == pytest.approx(16 - hole.intersection(shapely.box(0, 0, 4, 4)).area, abs=1e-4)
+    np.testing.assert_allclose(rest[..., 2], 1 + rest[..., 1] / 2, atol=1e-9)
+
+
+def test_cutting_everything_leaves_nothing():
+    assert cut(SQUARE, shapely.box(-1, -1, 5, 5)).shape == (0, 3, 3)
+    assert cut(np.empty((0, 3, 3)), shapely.box(0, 0, 1, 1)).shape == (0, 3, 3)
+
+
+def test_plane_height_extends_the_triangle():
+    assert plane_height(SQUARE[:1], np.array([[-3.0, 10.0]]))[0] == pytest.approx(6.0)
+
+
+def strip(x, width, z, length=60.0):
+    """Return a road along y at a height."""
+    low = np.array([[x, -length, z], [x + width, -length, z], [x + width, length, z], [x, length, z]], dtype=float)
+    return low[[[0, 1, 2], [0, 2, 3]]]
+
+
+def level_land(xy):
+    return np.zeros(len(xy))
+
+
+def test_an_embankment_leads_from_the_road_to_the_land():
+    ground = Embankments(strip(0, 8, 5.0), level_land)
+    along = np.column_stack([np.linspace(8.0, 30.0, 221), np.zeros(221)])
+    height = ground.height(along)
+    assert height[0] == pytest.approx(5.0, abs=1e-3)
+    assert (np.diff(height) <= 1e-9).all()
+    assert np.abs(np.diff(height)).max() < 0.1 * 1.2
+    np.testing.assert_array_equal(height[along[:, 0] > 8 + MAX_ROADSIDE], 0.0)
+
+
+def test_between_roads_at_different_heights_the_ground_has_no_step():
+    ground = Embankments(np.concatenate([strip(0, 8, 5.0), strip(12, 8, 0.0)]), level_land)
+    along = np.column_stack([np.linspace(8.0, 12.0, 401), np.zeros(401)])
+    height = ground.height(along)
+    assert height[[0, -1]] == pytest.approx([5.0, 0.0], abs=1e-3)
+    assert np.abs(np.diff(height)).max() < 0.07
+
+
+def test_a_road_below_the_land_lies_in_a_cutting():
+    ground = Embankments(strip(0, 8, -4.0), level_land)
+    assert ground.height(np.array([[8.0, 0.0], [10.0, 0.0], [30.0, 0.0]])) == pytest.approx([-4, -3.6, 0], abs=0.3)
+
+
+def test_steep_ground_has_a_finer_grid_without_cracks():
+    """Each edge of a triangle within the area belongs to two triangles, corners and heights alike."""
+    ground = Embankments(strip(0, 8, 5.0), level_land)
+    area = shapely.box(8, -36, 60, 36)
+    triangles = Terrain(strip(0, 8, 5.0), ground.height, ground.steep).drape(area, spacing=12.0)
+    assert plan_area(triangles).sum() == pytest.approx(area.area)
+    assert len(triangles) < 1000
+    edges = {}
+    for corners in np.round(triangles, 6):
+        for start, stop in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            edges[tuple(start), tuple(stop)] = edges.get((tuple(start), tuple(stop)), 0) + 1
+    open_edges = [(start, stop) for start, stop in edges if (stop, start) not in edges]
+    assert sum(np.hypot(*np.subtract(stop, start)[:2]) for start, stop in open_edges) == pytest.approx(area.length)
