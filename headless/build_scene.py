@@ -1,11 +1,11 @@
 """Build a Blender scene from an OpenDRIVE map or an extract of OpenStreetMap.
 
 blender -b --python-exit-code 1 -P headless/build_scene.py -- map.xodr --near -49 -1 --radius 80 -o site.blend
-python -m headless.build_scene place.osm --near-latlon 52.47391,13.44048 -o site.blend
-python -m headless.build_scene place.osm --junction "One Street" "Other Street" -o site.blend
-python -m headless.build_scene map.xodr --junction 53 --site site.toml -o site.blend
-python -m headless.build_scene site.toml -o site.blend
-python -m headless.build_scene place.osm --near-latlon 51.906 4.456 --buildings town.json --terrain dem.tif -o a.blend
+seip build-scene place.osm --near-latlon 52.47391,13.44048 -o site.blend
+seip build-scene place.osm --junction "One Street" "Other Street" -o site.blend
+seip build-scene map.xodr --junction 53 --site site.toml -o site.blend
+seip build-scene site.toml -o site.blend
+seip build-scene place.osm --near-latlon 51.906 4.456 --buildings town.json --terrain dem.tif -o a.blend
 """
 
 import argparse

@@ -1,6 +1,6 @@
 """Average precision of a trained detector with the sensors of a scene, on runs of traffic.
 
-python -m headless.detect out/placed.blend --traffic run-*.npz -o out/detection
+seip detect out/placed.blend --traffic run-*.npz -o out/detection
 blender -b --python-exit-code 1 out/placed.blend -P headless/detect.py -- --traffic run-*.npz -o out/detection
 
 Needs torch (make detection). The sensors are those of the scene, of any types and at any positions. The detector that

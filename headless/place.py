@@ -6,7 +6,7 @@ In Blender, on the scene that is open::
 
 or as plain Python on the bpy module::
 
-    python -m headless.place site.blend --sensor type1 --count 4 -o out/
+    seip place site.blend --sensor type1 --count 4 -o out/
 """
 
 import argparse

@@ -1,6 +1,6 @@
 """Write a report on a placement: one page of HTML and a PDF, for those who decide on it.
 
-python -m headless.report out/
+seip report out/
 blender -b --python-exit-code 1 -P headless/report.py -- out/
 """
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -45,6 +46,7 @@ def main(arguments: list[str]) -> str | None:
     if not stamp.is_file() or stamp.read_text() != wanted:
         install(environment)
         stamp.write_text(wanted)
+    write_command(environment)
     for group in arguments[1:]:
         install_group(environment, group)
     return None
@@ -54,8 +56,8 @@ def what_is_missing() -> str | None:
     """Return what this system lacks, with its cure, before anything is downloaded."""
     if sys.version_info[:2] not in SUPPORTED_PYTHONS:
         return (
-            f"this is Python {sys.version_info[0]}.{sys.version_info[1]}, but Blender's module exists for 3.11 and "
-            "3.13 alone; name one of these: make PYTHON=python3.13 ..."
+            f"this is Python {sys.version_info[0]}.{sys.version_info[1]}, but Blender's module exists for Python 3.11 and "
+            "3.13 only; use one of these: make PYTHON=python3.13 ..."
         )
     missing = missing_libraries()
     if importlib.util.find_spec("ensurepip") is None:
@@ -117,16 +119,25 @@ def fingerprint() -> str:
 
 
 def install(environment: Path) -> None:
-    """Make the environment anew and install the pinned packages, Blender's module (370 MB) among them."""
+    """Create the environment and install the pinned packages, Blender's module (370 MB) among them."""
     print(f"setting up {environment} (a few minutes the first time)", flush=True)  # noqa: T201  # a command's output
     if environment.exists():
         if not (environment / "pyvenv.cfg").is_file():
-            sys.exit(f"{environment} is there already and no virtual environment; name another: make VENV=.venv ...")
+            sys.exit(f"{environment} exists and is not a virtual environment; name another: make VENV=.venv ...")
         shutil.rmtree(environment)
     run(sys.executable, "-m", "venv", str(environment))
     for group in ("installer", "development"):
         install_group(environment, group)
     run(str(environment / "bin" / "python"), "-c", "import bpy")
+
+
+def write_command(environment: Path) -> None:
+    """Write the command ``seip`` of this checkout into the environment."""
+    python = environment.resolve() / "bin" / "python"
+    program = f"import sys; sys.path[0] = {str(ROOT)!r}; from headless.__main__ import main; main()"
+    command = python.with_name("seip")
+    command.write_text(f'#!/bin/sh\nexec {shlex.quote(str(python))} -c {shlex.quote(program)} "$@"\n', encoding="utf-8")
+    command.chmod(0o755)
 
 
 def install_group(environment: Path, group: str) -> None:
@@ -154,4 +165,4 @@ if __name__ == "__main__":
     try:
         sys.exit(main(sys.argv[1:]))
     except KeyboardInterrupt:
-        sys.exit("set-up stopped; the next run starts it anew")
+        sys.exit("set-up stopped; the next run starts again")

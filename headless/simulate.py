@@ -1,7 +1,7 @@
 """Simulate the scans that a scene's sensors make of its traffic, and write datasets.
 
 blender -b --python-exit-code 1 placed.blend -P headless/simulate.py -- --traffic run-1.npz -o out/run-1
-python -m headless.simulate placed.blend --traffic run-1.npz -o out/run-1
+seip simulate placed.blend --traffic run-1.npz -o out/run-1
 
 The merged cloud of a frame is the array ``points``; that of a sensor are those whose ``sensor`` is its number. A run
 that was stopped goes on where it was when it is started again.

@@ -63,6 +63,7 @@ def test_a_library_that_is_not_there_is_noticed(monkeypatch):
 def test_a_finished_environment_is_left_alone(monkeypatch, tmp_path):
     installed = []
     monkeypatch.setattr(set_up, "install", installed.append)
+    (tmp_path / "bin").mkdir()
     (tmp_path / "set-up").write_text("another Python's")
     assert set_up.main([str(tmp_path)]) is None
     assert set_up.main([str(tmp_path)]) is None
@@ -73,9 +74,20 @@ def test_a_finished_environment_is_left_alone(monkeypatch, tmp_path):
 def test_a_folder_that_is_no_environment_is_never_cleared(tmp_path):
     treasure = tmp_path / "treasure.txt"
     treasure.write_text("mine")
-    with pytest.raises(SystemExit, match="no virtual environment"):
+    with pytest.raises(SystemExit, match="not a virtual environment"):
         set_up.main([str(tmp_path)])
     assert treasure.read_text() == "mine"
+
+
+def test_the_environment_gets_the_command_seip(tmp_path):
+    """It works from any folder, also where the path of the environment has a space."""
+    python = tmp_path / "an environment" / "bin" / "python"
+    python.parent.mkdir(parents=True)
+    python.symlink_to(sys.executable)
+    set_up.write_command(tmp_path / "an environment")
+    command = [str(python.with_name("seip")), "--help"]
+    shown = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)  # noqa: S603
+    assert "build-scene" in shown.stdout
 
 
 def test_a_step_that_fails_ends_the_set_up():
