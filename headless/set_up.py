@@ -56,8 +56,8 @@ def what_is_missing() -> str | None:
     """Return what this system lacks, with its cure, before anything is downloaded."""
     if sys.version_info[:2] not in SUPPORTED_PYTHONS:
         return (
-            f"this is Python {sys.version_info[0]}.{sys.version_info[1]}, but Blender's module exists for Python 3.11 and "
-            "3.13 only; use one of these: make PYTHON=python3.13 ..."
+            f"this is Python {sys.version_info[0]}.{sys.version_info[1]}, but Blender's module exists "
+            "for Python 3.11 and 3.13 only; use one of these: make PYTHON=python3.13 ..."
         )
     missing = missing_libraries()
     if importlib.util.find_spec("ensurepip") is None:

@@ -132,7 +132,19 @@ def test_the_add_on_never_names_itself():
 
 def test_what_is_imported_is_pinned():
     """Torch may be imported by the detector alone, Dask and spopt where they are of use; SciPy is for oracles."""
-    ours = {"contourpy", "defusedxml", "embreex", "highspy", "matplotlib", "numpy", "PIL", "pulp", "shapely", "tqdm"}
+    ours = {
+        "contourpy",
+        "defusedxml",
+        "embreex",
+        "fpdf",
+        "highspy",
+        "matplotlib",
+        "numpy",
+        "PIL",
+        "pulp",
+        "shapely",
+        "tqdm",
+    }
     everywhere = ours | {"seip_addon", "headless"} | set(sys.stdlib_module_names) | BLENDERS_OWN
     by_file = {
         "executors.py": {"dask", "distributed"},

@@ -1,248 +1,177 @@
-"""A report as PDF, A4, set with matplotlib alone; lengths are points."""
+"""Report as PDF: A4, set by fpdf2. Lengths are points."""
 
 from __future__ import annotations
 
 import io
-import warnings
-from collections.abc import Iterator, Sequence
+import logging
 from datetime import datetime
-from functools import lru_cache
+from pathlib import Path
 
-import numpy as np
-from matplotlib.backends.backend_pdf import PdfPages
-from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties
-from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
-from matplotlib.textpath import text_to_path
+import matplotlib as mpl
+from fpdf import FPDF, FontFace
+from fpdf.enums import Align, TableBordersLayout, VAlign, XPos, YPos
 from PIL import Image
 
 from ..pictures.palette import INK, PAPER, SOFT_INK
-from ..pictures.plan_style import Style
 from .blocks import Block, Bullets, Code, Paragraph, Picture, Report, Section, Table
 
-WIDTH, HEIGHT = 595.0, 842.0
-LEFT, RIGHT, TOP, BOTTOM = 50.0, 50.0, 52.0, 56.0
-INNER = WIDTH - LEFT - RIGHT
+MARGIN, TOP, BOTTOM = 50.0, 52.0, 56.0
 BODY, SMALL, HEADING, TITLE = 9.5, 8.0, 13.0, 18.0
-LEADING = 1.4  # of the size of the type
+LEADING = 1.4  # height of a line, in sizes of the type
 GAP = 7.0  # between blocks
-COLUMN_GAP, ROW_GAP, LEAST_COLUMN = 9.0, 4.0, 26.0
-MOST_PICTURE = 400.0  # height of a picture
-UNBROKEN = 150.0  # height up to which a table stays on one page
-KEPT_TOGETHER = 90.0  # room that must be left below a heading
+MAX_PICTURE_HEIGHT = 400.0
+HEADING_ROOM = 90.0  # room required below the top of a heading, so that it does not end a page
 RULE, SHADE = "#c9d1d7", "#eef1f3"
-BULLET_INDENT = 12.0
-CODE_PADDING = 6.0
-TEXT: Style = {"family": "DejaVu Sans", "parse_math": False, "va": "baseline"}
-MONO = "DejaVu Sans Mono"
+BULLET_INDENT, CELL_PADDING = 12.0, 3.0
+CODE_PADDING = 6
+TEXT, MONO = "text", "mono"
+FONTS = {(TEXT, ""): "DejaVuSans", (TEXT, "B"): "DejaVuSans-Bold", (MONO, ""): "DejaVuSansMono"}
+"""Files of the type, which Matplotlib brings, by family and style."""
 
 
 def as_pdf(report: Report) -> bytes:
-    """Return the report as PDF; its date of creation is that of the placement, so that the same gives the same bytes.
+    """Return the report as a PDF file.
 
-    Characters that the type does not have are shown as boxes.
+    Its date is that of the placement, so that the same report gives the same bytes. Characters that the type lacks are
+    shown as boxes.
     """
-    content = io.BytesIO()
-    created = datetime.fromisoformat(report.created)
-    about = {"Title": report.title, "Creator": "SEIP for Blender", "CreationDate": created, "ModDate": created}
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        pages = _Typesetter().pages(report)
-        with PdfPages(content, metadata=about) as file:
-            for number, page in enumerate(pages, start=1):
-                _footer(page, report.title, f"{number} / {len(pages)}")
-                file.savefig(page)
-    return content.getvalue()
+    logging.getLogger("fpdf").setLevel(logging.ERROR)  # it warns of each character that the type lacks
+    pdf = _Document(report.title)
+    pdf.set_creation_date(datetime.fromisoformat(report.created))
+    pdf.add_page()
+    pdf.text_lines(report.title, TITLE, style="B")
+    pdf.ln(4.0)
+    pdf.text_lines(report.summary, HEADING - 1.0)
+    pdf.text_lines(f"Placement of {report.created}", SMALL, color=SOFT_INK)
+    for section in report.sections:
+        _add_section(pdf, section)
+    return bytes(pdf.output())
 
 
-class _Typesetter:
-    """Pages in the making: the last one, and how far down it is filled."""
+class _Document(FPDF):
+    """A4 pages with the title and the page number at the foot."""
 
-    def __init__(self) -> None:
-        self._pages: list[Figure] = []
-        self._y = 0.0  # of the next block's upper edge, from the foot of the page
-        self._turn()
+    def __init__(self, title: str) -> None:
+        super().__init__(unit="pt", format="A4")
+        self._footer_title = title
+        folder = Path(mpl.get_data_path()) / "fonts" / "ttf"
+        for (family, style), file in FONTS.items():
+            self.add_font(family, style, folder / f"{file}.ttf")
+        self.set_title(title)
+        self.set_creator("SEIP for Blender")
+        self.set_margins(MARGIN, TOP, MARGIN)
+        self.set_auto_page_break(auto=True, margin=BOTTOM)
+        self.c_margin = 0.0
 
-    def pages(self, report: Report) -> list[Figure]:
-        """Set a report, and return its pages."""
-        self._lines(report.title, TITLE, weight="bold")
-        self._y -= 4.0
-        self._lines(report.summary, HEADING - 1.0)
-        self._lines(f"Placement of {report.created}", SMALL, color=SOFT_INK)
-        for section in report.sections:
-            self._section(section)
-        return self._pages
+    def footer(self) -> None:
+        """Write the foot of a page; called by fpdf2."""
+        self.set_y(-BOTTOM + 14.0)
+        self.set_font(TEXT, "", SMALL)
+        self.set_text_color(SOFT_INK)
+        room = self.epw - 60.0
+        title = self._footer_title
+        while title and self.get_string_width(f"{title} …") > room:
+            title = title[:-1]
+        self.cell(room, SMALL, title if title == self._footer_title else f"{title} …")
+        self.cell(60.0, SMALL, f"{self.page_no()} / {{nb}}", align="R")
 
-    def _section(self, section: Section) -> None:
-        self._y -= 2 * GAP
-        self._need(KEPT_TOGETHER)
-        self._rule(self._y + GAP, RULE)
-        self._lines(section.title, HEADING, weight="bold")
-        for block in section.blocks:
-            self._y -= GAP
-            self._block(block)
-
-    def _block(self, block: Block) -> None:
-        if isinstance(block, Paragraph):
-            self._lines(block.text, BODY)
-        elif isinstance(block, Bullets):
-            for line in block.lines:
-                self._need(BODY * LEADING)
-                self._text(LEFT + 2.0, self._y - BODY, "•", BODY)
-                self._lines(line, BODY, indent=BULLET_INDENT)
-                self._y -= 1.5
-        elif isinstance(block, Code):
-            self._code(block.text)
-        elif isinstance(block, Picture):
-            self._picture(block)
-        else:
-            self._table(block)
-
-    def _lines(self, text: str, size: float, *, indent: float = 0.0, weight: str = "normal", color: str = INK) -> None:
-        for line in _wrapped(text, INNER - indent, size, weight):
-            self._need(size * LEADING)
-            self._text(LEFT + indent, self._y - size, line, size, weight=weight, color=color)
-            self._y -= size * LEADING
-
-    def _code(self, text: str) -> None:
-        lines = list(_wrapped(text, INNER - 2 * CODE_PADDING, SMALL, "normal", MONO))
-        high = len(lines) * SMALL * LEADING + 2 * CODE_PADDING
-        self._need(high)
-        box = Rectangle((LEFT / WIDTH, (self._y - high) / HEIGHT), INNER / WIDTH, high / HEIGHT, facecolor=SHADE)
-        self._page.add_artist(box)
-        for number, line in enumerate(lines):
-            low = self._y - CODE_PADDING - SMALL - number * SMALL * LEADING
-            self._text(LEFT + CODE_PADDING, low, line, SMALL, family=MONO)
-        self._y -= high
-
-    def _picture(self, picture: Picture) -> None:
-        pixels = np.asarray(Image.open(io.BytesIO(picture.png)).convert("RGB"))
-        wide = min(INNER, MOST_PICTURE * pixels.shape[1] / pixels.shape[0])
-        high = wide * pixels.shape[0] / pixels.shape[1]
-        self._need(high + 3 * SMALL * LEADING)
-        place = (LEFT / WIDTH, (self._y - high) / HEIGHT, wide / WIDTH, high / HEIGHT)
-        axes = self._page.add_axes(place)
-        axes.imshow(pixels, interpolation="none", aspect="auto")
-        axes.set(xticks=(), yticks=())
-        axes.spines[:].set(color=RULE, linewidth=0.6)
-        self._y -= high + 4.0
-        self._lines(picture.caption, SMALL, color=SOFT_INK)
-
-    def _table(self, table: Table) -> None:
-        widths = _column_widths(table)
-        head = [list(_wrapped(cell, width, SMALL, "bold")) for cell, width in zip(table.head, widths, strict=True)]
-        rows = [
-            [list(_wrapped(cell, width, SMALL, "normal")) for cell, width in zip(row, widths, strict=True)]
-            for row in table.rows
-        ]
-        high = _row_height(head) + sum(map(_row_height, rows))
-        self._need(high if high <= UNBROKEN else _row_height(head) + _row_height(rows[0]))
-        self._row(table, head, widths, weight="bold")
-        for row in rows:
-            if self._y - _row_height(row) < BOTTOM:
-                self._turn()
-                self._row(table, head, widths, weight="bold")
-            self._row(table, row, widths)
-
-    def _row(self, table: Table, cells: list[list[str]], widths: list[float], *, weight: str = "normal") -> None:
-        left = LEFT
-        for column, (lines, width) in enumerate(zip(cells, widths, strict=True)):
-            right = column in table.numbers
-            for number, line in enumerate(lines):
-                low = self._y - SMALL - number * SMALL * LEADING
-                x = left + width if right else left
-                self._text(x, low, line, SMALL, weight=weight, ha="right" if right else "left")
-            left += width + COLUMN_GAP
-        self._y -= _row_height(cells)
-        self._rule(self._y + ROW_GAP / 2, INK if weight == "bold" else RULE, left - COLUMN_GAP)
-
-    def _text(  # noqa: PLR0913  # where, what and how
-        self,
-        x: float,
-        y: float,
-        text: str,
-        size: float,
-        *,
-        weight: str = "normal",
-        color: str = INK,
-        ha: str = "left",
-        family: str = "DejaVu Sans",
+    def text_lines(
+        self, text: str, size: float, *, style: str = "", color: str = INK, indent: float = 0.0, family: str = TEXT
     ) -> None:
-        style = TEXT | {"family": family, "size": size, "weight": weight, "color": color, "ha": ha}
-        self._page.text(x / WIDTH, y / HEIGHT, text, **style)
+        """Write text in the width of the page, or from an indent on, and go to the next line."""
+        self.set_font(family, style, size)
+        self.set_text_color(color)
+        self.set_x(MARGIN + indent)
+        self.multi_cell(0, size * LEADING, text, align="L", new_x=XPos.LMARGIN, new_y=YPos.NEXT)
 
-    def _rule(self, y: float, color: str, right: float = WIDTH - RIGHT) -> None:
-        self._page.add_artist(
-            Line2D((LEFT / WIDTH, right / WIDTH), (y / HEIGHT, y / HEIGHT), color=color, linewidth=0.6)
+    def need(self, room: float) -> None:
+        """Start a new page if less room than given is left on this one."""
+        if self.will_page_break(room):
+            self.add_page()
+
+
+def _add_section(pdf: _Document, section: Section) -> None:
+    pdf.ln(2 * GAP)
+    pdf.need(HEADING_ROOM)
+    pdf.set_draw_color(RULE)
+    pdf.set_line_width(0.6)
+    if pdf.y > TOP:
+        pdf.line(MARGIN, pdf.y - GAP, pdf.w - MARGIN, pdf.y - GAP)
+    pdf.text_lines(section.title, HEADING, style="B")
+    for block in section.blocks:
+        pdf.ln(GAP)
+        _add_block(pdf, block)
+
+
+def _add_block(pdf: _Document, block: Block) -> None:
+    if isinstance(block, Paragraph):
+        pdf.text_lines(block.text, BODY)
+    elif isinstance(block, Bullets):
+        for line in block.lines:
+            pdf.need(BODY * LEADING)
+            pdf.set_font(TEXT, "", BODY)
+            pdf.set_text_color(INK)
+            pdf.set_x(MARGIN + 2.0)
+            pdf.cell(BULLET_INDENT, BODY * LEADING, "•")
+            pdf.text_lines(line, BODY, indent=BULLET_INDENT)
+    elif isinstance(block, Code):
+        pdf.set_font(MONO, "", SMALL)
+        pdf.set_text_color(INK)
+        pdf.set_fill_color(SHADE)
+        pdf.multi_cell(
+            0, SMALL * LEADING, block.text, fill=True, align="L", padding=CODE_PADDING, new_x="LMARGIN", new_y="NEXT"
         )
-
-    def _need(self, room: float) -> None:
-        """Turn the page where less room is left."""
-        if self._y - room < BOTTOM and self._y < HEIGHT - TOP:
-            self._turn()
-
-    def _turn(self) -> None:
-        self._page = Figure((WIDTH / 72, HEIGHT / 72), facecolor=PAPER)
-        self._pages.append(self._page)
-        self._y = HEIGHT - TOP
+        pdf.set_fill_color(PAPER)
+    elif isinstance(block, Picture):
+        _add_picture(pdf, block)
+    else:
+        _add_table(pdf, block)
 
 
-def _footer(page: Figure, title: str, number: str) -> None:
-    style = TEXT | {"size": SMALL, "color": SOFT_INK}
-    (short, *more) = list(_wrapped(title, INNER - 60.0, SMALL, "normal")) or [""]
-    page.text(LEFT / WIDTH, (BOTTOM - 22.0) / HEIGHT, f"{short} …" if more else short, ha="left", **style)
-    page.text((WIDTH - RIGHT) / WIDTH, (BOTTOM - 22.0) / HEIGHT, number, ha="right", **style)
+def _add_picture(pdf: _Document, picture: Picture) -> None:
+    image = Image.open(io.BytesIO(picture.png)).convert("RGB")
+    width = min(pdf.epw, MAX_PICTURE_HEIGHT * image.width / image.height)
+    height = width * image.height / image.width
+    pdf.need(height + 3 * SMALL * LEADING)
+    pdf.image(image, x=MARGIN, w=width, h=height)
+    pdf.set_draw_color(RULE)
+    pdf.rect(MARGIN, pdf.y - height, width, height)
+    pdf.ln(4.0)
+    pdf.text_lines(picture.caption, SMALL, color=SOFT_INK)
 
 
-def _row_height(cells: Sequence[Sequence[str]]) -> float:
-    return max(len(lines) for lines in cells) * SMALL * LEADING + ROW_GAP
+def _add_table(pdf: _Document, table: Table) -> None:
+    pdf.set_font(TEXT, "", SMALL)
+    pdf.set_text_color(INK)
+    pdf.set_draw_color(RULE)
+    widths = _column_widths(pdf, table)
+    with pdf.table(
+        rows=[table.head, *table.rows],
+        width=min(pdf.epw, sum(widths)),
+        align=Align.L,
+        col_widths=widths,
+        text_align=tuple(Align.R if column in table.numbers else Align.L for column in range(len(table.head))),
+        borders_layout=TableBordersLayout.HORIZONTAL_LINES,
+        headings_style=FontFace(emphasis="BOLD"),
+        line_height=SMALL * LEADING,
+        padding=(1.0, CELL_PADDING),
+        v_align=VAlign.T,
+    ):
+        pass
 
 
-def _column_widths(table: Table) -> list[float]:
-    """Return widths in which all columns fit on the page: the widest give way."""
-    columns = list(zip(table.head, *table.rows, strict=True))
-    weights = ["bold"] + ["normal"] * len(table.rows)
-    widths = [max(_width(cell, SMALL, w) for cell, w in zip(column, weights, strict=True)) for column in columns]
-    widths = [
-        max(width + 0.5, LEAST_COLUMN if any(column) else 0.0) for width, column in zip(widths, columns, strict=True)
-    ]
-    room = INNER - COLUMN_GAP * (len(widths) - 1)
-    while sum(widths) > room:
-        widest = max(range(len(widths)), key=widths.__getitem__)
-        others = sorted(widths)[-2] if len(widths) > 1 else 0.0
-        over = sum(widths) - room
-        step = widths[widest] - others
-        widths[widest] -= min(over, step) if step > 1.0 else min(over, 1.0)
+def _column_widths(pdf: FPDF, table: Table) -> list[float]:
+    """Return the width that the longest cell of each column needs; the widest are cut so that all fit on the page."""
+    widths = []
+    for column in zip(table.head, *table.rows, strict=True):
+        pdf.set_font(TEXT, "B", SMALL)
+        heading = pdf.get_string_width(column[0])
+        pdf.set_font(TEXT, "", SMALL)
+        longest = max([heading, *(pdf.get_string_width(cell) for cell in column[1:])])
+        widths.append(max(longest, SMALL) + 2 * CELL_PADDING + 1.0)
+    room = pdf.epw
+    for columns, width in zip(range(len(widths), 0, -1), sorted(widths), strict=True):
+        if width > room / columns:  # this column and all wider ones share the room that the narrower ones leave
+            return [min(own, room / columns) for own in widths]
+        room -= width
     return widths
-
-
-def _wrapped(text: str, room: float, size: float, weight: str, family: str = "DejaVu Sans") -> Iterator[str]:
-    """Yield the lines of a text, broken at blanks, and within words that are longer than a line."""
-    line = ""
-    for word in text.split():
-        rest = word
-        while True:
-            tried = f"{line} {rest}" if line else rest
-            if _width(tried, size, weight, family) <= room:
-                line = tried
-                break
-            if line:
-                yield line
-                line = ""
-                continue
-            fits = max(1, sum(_width(rest[:end], size, weight, family) <= room for end in range(1, len(rest))))
-            if len(rest) == 1:
-                line = rest
-                break
-            yield rest[:fits]
-            rest = rest[fits:]
-    if line:
-        yield line
-
-
-@lru_cache(maxsize=65536)
-def _width(text: str, size: float, weight: str, family: str = "DejaVu Sans") -> float:
-    properties = FontProperties(family=family, size=size, weight=weight)
-    width, _, _ = text_to_path.get_text_width_height_descent(text, properties, ismath=False)
-    return float(width)
