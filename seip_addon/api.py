@@ -37,7 +37,6 @@ from .core.choosing.placement.objective import Objective, Solution
 from .core.choosing.placement.scenarios import PoseErrors, Scenarios
 from .core.progress import finish
 from .core.sensing.scans.frame import Frame
-from .core.sensing.scans.sensor import MountedSensor
 from .core.sensing.scans.simulation import ScanSettings
 from .core.sensing.traffic.source import TrafficFiles
 from .core.sensing.traffic.source import load_traffic as _load_traffic
@@ -140,6 +139,5 @@ def scan(
     Frame
         Merged point cloud with the boxes of all road users.
     """
-    sensors = [MountedSensor(s.label, s.model, s.xyz, s.orientation) for s in solution.deployment.sensors]
-    run = make_run(geometry, sensors, traffic, RecordingSettings(settings or ScanSettings()), {})
+    run = make_run(geometry, solution.deployment.mounted, traffic, RecordingSettings(settings or ScanSettings()), {})
     return finish(simulation_of(run)).frame(*frame_number(run, time))

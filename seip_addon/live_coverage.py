@@ -12,7 +12,7 @@ import numpy as np
 
 from . import preferences
 from .core.arrays import Boolean, Integer
-from .core.choosing.placement.deployment import Deployment, Sensor
+from .core.choosing.placement.deployment import Deployment
 from .core.errors import SeipError
 from .core.sensing.scans.sensor import MountedSensor
 from .core.sensing.visibility.visibility_model import VisibilityModel
@@ -74,25 +74,21 @@ def _update(followed: FollowedSensors, scene: bpy.types.Scene) -> None:
     seen_by: Integer = np.sum([seen for _, seen in followed.sensors.values()], axis=0, dtype=np.int64)
     followed.coverage = float(np.count_nonzero(seen_by)) / len(seen_by)
     followed.moved = _moved(followed, sensors)
-    show_seen_by(scene, seen_by)
+    show_seen_by(scene, seen_by, moved=bool(followed.moved))
 
 
 def _moved(followed: FollowedSensors, sensors: dict[str, MountedSensor]) -> tuple[str, ...]:
     solution = followed.state.solution
     placed = {} if solution is None else {sensor.label: sensor for sensor in solution.deployment.sensors}
     return tuple(
-        label for label, sensor in sensors.items() if label not in placed or not _same(sensor, _mounted(placed[label]))
+        label for label, sensor in sensors.items() if label not in placed or not _same(sensor, placed[label].mounted)
     )
 
 
 def _as_placed(deployment: Deployment, visible: Boolean) -> dict[str, tuple[MountedSensor, Boolean]]:
     """Return what is known of sensors at candidate poses; the others are looked from anew."""
     there = [(sensor, sensor.pose) for sensor in deployment.sensors if sensor.pose is not None]
-    return {sensor.label: (_mounted(sensor), visible[pose]) for sensor, pose in there}
-
-
-def _mounted(sensor: Sensor) -> MountedSensor:
-    return MountedSensor(sensor.label, sensor.model, sensor.xyz, sensor.orientation)
+    return {sensor.label: (sensor.mounted, visible[pose]) for sensor, pose in there}
 
 
 def _same(one: MountedSensor, other: MountedSensor) -> bool:

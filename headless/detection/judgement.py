@@ -15,7 +15,7 @@ from .average_precision import Evaluation, balanced_score, evaluate
 from .breakdown import recall_by_category
 from .detector import Detector
 from .frame_results import FrameResult
-from .recordings import PlacedSensors, SampledRun, Simulator
+from .recordings import MountedSensors, SampledRun, Simulator
 from .rules import MAIN_RULE, precisions
 from .training import deterministic
 
@@ -58,7 +58,7 @@ class Judgement:
 
 
 def judge(
-    detector: Detector, simulator: Simulator, placed: PlacedSensors, runs: Sequence[SampledRun]
+    detector: Detector, simulator: Simulator, placed: MountedSensors, runs: Sequence[SampledRun]
 ) -> Generator[Progress, None, Judgement]:
     """Detect road users in every frame of runs of traffic, as some sensors scan them.
 

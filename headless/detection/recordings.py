@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import os
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,15 +57,18 @@ class SampledRun:
         return digest(self.trajectories.first, self.trajectories.time, self.trajectories.position)
 
 
-class PlacedSensors(ABC):
-    """Sensors where they hang, to make recordings with."""
+@dataclass(frozen=True, eq=False)
+class MountedSensors:
+    """Sensors where they are mounted, to make recordings with.
+
+    Parameters
+    ----------
+    sensors : tuple of MountedSensor
+        Of any types.
+    """
 
     name: str
-
-    @property
-    @abstractmethod
-    def sensors(self) -> tuple[MountedSensor, ...]:
-        """The sensors where they hang."""
+    sensors: tuple[MountedSensor, ...]
 
     @property
     def types(self) -> tuple[str, ...]:
@@ -75,26 +77,13 @@ class PlacedSensors(ABC):
 
     @property
     def key(self) -> str:
-        """Digest of where which sensors hang."""
+        """Digest of the sensors' types and poses."""
         return digest(*(part for one in self.sensors for part in (one.model.key, one.xyz, one.orientation)))
 
     @property
     def places(self) -> Float:
         """Positions of the sensors, (s, 3) in metres."""
         return np.array([sensor.xyz for sensor in self.sensors])
-
-
-@dataclass(frozen=True, eq=False)
-class MountedSensors(PlacedSensors):
-    """Sensors of any types, wherever they hang."""
-
-    name: str
-    mounted: tuple[MountedSensor, ...]
-
-    @property
-    def sensors(self) -> tuple[MountedSensor, ...]:
-        """The sensors where they hang."""
-        return self.mounted
 
 
 def sampled_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[SampledRun, ...]:
@@ -143,17 +132,17 @@ class Simulator:
         """Free the memory of what was cast."""
         self._simulation.cache_clear()
 
-    def record(self, configuration: PlacedSensors, run: SampledRun) -> Recording:
+    def record(self, configuration: MountedSensors, run: SampledRun) -> Recording:
         """Return the frames of a run, to be simulated when they are asked for."""
         frames = LazyFrames(len(run.times), lambda number: self.frame(configuration, run, number))
         name = f"{configuration.name} in {run.name}"
         return Recording(name, run.key, frames, configuration.types, self.site, configuration.key)
 
-    def frame(self, configuration: PlacedSensors, run: SampledRun, number: int) -> Frame:
+    def frame(self, configuration: MountedSensors, run: SampledRun, number: int) -> Frame:
         """Simulate a frame of a run."""
         return self._simulation(configuration, run).frame(number, float(run.times[number]))
 
-    def key(self, configuration: PlacedSensors, runs: Sequence[SampledRun]) -> str:
+    def key(self, configuration: MountedSensors, runs: Sequence[SampledRun]) -> str:
         """Return a digest of all that the frames of some runs follow from."""
         scans = (
             Run(
@@ -170,6 +159,6 @@ class Simulator:
         )
         return digest(*(scan.key for scan in scans))
 
-    def _prepared(self, configuration: PlacedSensors, run: SampledRun) -> Simulation:
+    def _prepared(self, configuration: MountedSensors, run: SampledRun) -> Simulation:
         bodies = [fitted_body(user) for user in run.trajectories.users]
         return finish(prepare(self.static, configuration.sensors, run.trajectories, bodies, self.settings))

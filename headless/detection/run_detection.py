@@ -11,7 +11,7 @@ from .detection_area import DetectionArea
 from .detector import Detector
 from .frame_results import FrameResult, frame_result
 from .inference import detect
-from .recordings import PlacedSensors, SampledRun, Simulator
+from .recordings import MountedSensors, SampledRun, Simulator
 from .settings import CLASS_CATEGORIES
 from .training import deterministic
 
@@ -20,7 +20,7 @@ AT_ONCE = (os.cpu_count() or 1) + 1  # works in threads on the CPU: one more tha
 
 def detect_in_runs(  # what measures where, what looks at it, and how
     simulator: Simulator,
-    placed: PlacedSensors,
+    placed: MountedSensors,
     runs: Sequence[SampledRun],
     detectors: Sequence[Detector],
     threads: int,

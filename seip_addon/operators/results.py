@@ -32,7 +32,7 @@ from ..scene.read import attribution_of
 from ..scene.render import render_elsewhere
 from ..scene.result_folder import result_files, write_tables
 from ..scene.sensors import labelled_sensors, read_sensors
-from ..scene.write import coverage_of, recolour, show_seen_by, take_over
+from ..scene.write import coverage_of, recolour, show_seen_by, shown_legend, take_over
 from ..sensor_edits import position_names, sensor_edits
 from ..session import SceneState, session
 from .base import LongWork, Outcome, attempt, started
@@ -372,6 +372,7 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
     finding = scene_survey.with_placement(scene)
     if coverage_of(scene) is not None:
         show_seen_by(scene, unpacked_counts(scene.seip.result.seen))  # it may show a comparison, or sensors on the move
+    legend = shown_legend(scene)
     tidy_pieces(scene)
     with result_files(folder) as part:
         save_blend(part["placed.blend"])
@@ -384,7 +385,7 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
         site, visible = survey.site, survey.grid.visible
         yield from write_tables(part, survey.geometry, site, solution, record, visible, survey.models)
         if render:
-            yield from render_elsewhere(part["view.png"], part["placed.blend"], name, site, solution.deployment)
+            yield from render_elsewhere(part["view.png"], part["placed.blend"], name, site, solution.deployment, legend)
     survey.grid.save(folder / "visibility.npz")
     return state
 

@@ -18,7 +18,7 @@ from ..core.sensing.visibility.sight_lines import pose_at, sight_lines
 from ..scene import contract
 from ..scene.blend_file import save_blend
 from ..scene.sensors import placed_sensors, pose_of
-from ..scene.write import colour_coverage, coverage_of
+from ..scene.write import colour_coverage, coverage_of, shown_legend
 from ..session import SceneState, session
 from ..viewport import coverage, overlays
 from ..viewport.sight_lines import NAME as SIGHT
@@ -45,6 +45,7 @@ class SEIP_OT_colour_coverage(bpy.types.Operator):
         name="Show",
         description="What the colours of the road mean",
         items=(
+            ("returns", "Returns", "Expected returns from a pedestrian there, where sensors were placed for returns"),
             ("seen", "Seen", "Whether some sensor sees the target"),
             ("times", "Sensors", "How many sensors see the target"),
             ("weights", "Weights", "How much the target counts"),
@@ -203,14 +204,14 @@ def _rendered_sheet(path: Path, scene: bpy.types.Scene) -> Generator[Progress, N
 
     from ..scene.render import render_elsewhere  # noqa: PLC0415  # as above
 
-    finding, name = scene_survey.with_placement(scene), scene.name
+    finding, name, legend = scene_survey.with_placement(scene), scene.name, shown_legend(scene)
     with TemporaryDirectory(prefix="seip-") as folder:
         blend, view = (Path(folder) / file for file in ("scene.blend", "view.png"))
         save_blend(blend)
         yield Progress(0, 0, "reading the scene")
         state = yield from finding
         survey, solution = state.placed()
-        yield from render_elsewhere(view, blend, name, survey.site, solution.deployment)
+        yield from render_elsewhere(view, blend, name, survey.site, solution.deployment, legend)
         with Image.open(view) as picture:
             _save_sheet(path, state, picture)
     return state

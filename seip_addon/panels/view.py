@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..core.output.pictures.coverage_colours import Aspect
 from ..operators.results import no_placement, not_evaluated
 from ..operators.view import (
     SEIP_OT_colour_coverage,
@@ -14,7 +15,7 @@ from ..operators.view import (
     SEIP_OT_toggle_legend,
     why_no_coverage,
 )
-from ..scene.write import ASPECT, coverage_of
+from ..scene.write import ASPECT, aspects_of, coverage_of
 from ..session import session
 from ..viewport import coverage, overlays
 from ..viewport.sight_lines import NAME as SIGHT
@@ -22,7 +23,7 @@ from .run_button import draw_run, is_running
 from .sidebar import Sidebar
 from .wrapped_text import draw_sentence
 
-ASPECTS = {"seen": "Seen", "times": "Sensors", "weights": "Weights"}
+ASPECTS: dict[Aspect, str] = {"returns": "Returns", "seen": "Seen", "times": "Sensors", "weights": "Weights"}
 """What the buttons of the colours say."""
 
 
@@ -52,7 +53,10 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
         head.operator(SEIP_OT_toggle_legend.bl_idname, text="", icon="INFO", depress=shown)
         obj = coverage_of(context.scene)
         row = column.row(align=True)
+        possible = ASPECTS if obj is None else aspects_of(obj)
         for aspect, words in ASPECTS.items():
+            if aspect not in possible:
+                continue
             now = obj is not None and obj.get(ASPECT) == aspect
             button = row.operator(SEIP_OT_colour_coverage.bl_idname, text=words, depress=now)
             button.aspect = aspect

@@ -22,6 +22,7 @@ from ..core.arrays import Boolean, Float
 from ..core.child_process import run_logged
 from ..core.choosing.placement.deployment import Deployment
 from ..core.errors import SeipError
+from ..core.output.pictures.coverage_colours import Legend
 from ..core.output.pictures.labelled_view import Sight, save_labelled_view
 from ..core.output.pictures.viewpoint import Viewpoint, frame
 from ..core.progress import Progress
@@ -29,6 +30,7 @@ from ..core.site.site import Site
 from . import contract
 from .daylight import add_daylight
 from .interrupts import held_interrupts
+from .write import shown_legend
 
 WIDTH, HEIGHT = 1440, 810  # pixels
 SAMPLES, DENOISED_SAMPLES = 12, 2  # without and with a denoiser, for as little noise or less
@@ -95,11 +97,11 @@ def save_rendered_view(
         raw = Path(folder) / "view.png"
         with _silence():
             hidden = take(shot, scene, raw)
-        save_labelled_view(path, raw, site, deployment, _sight(shot, hidden, site))
+        save_labelled_view(path, raw, site, deployment, shown_legend(scene), _sight(shot, hidden, site))
 
 
 def render_elsewhere(
-    path: Path, blend: Path, scene: str, site: Site, deployment: Deployment
+    path: Path, blend: Path, scene: str, site: Site, deployment: Deployment, legend: Legend | None
 ) -> Generator[Progress, None, None]:
     """Render a scene as `save_rendered_view` does, in a Blender of its own: the one that asks goes on answering.
 
@@ -113,6 +115,8 @@ def render_elsewhere(
         Its name.
     deployment : Deployment
         The sensors and what they see.
+    legend : Legend or None
+        What the colours on the road of the scene mean.
 
     Yields
     ------
@@ -136,7 +140,7 @@ def render_elsewhere(
         except OSError as error:
             last = log.read_text(errors="replace").strip().splitlines()[-1:]
             raise SeipError(f"the view could not be rendered ({' '.join(last)}): export without it") from error
-        save_labelled_view(path, raw, site, deployment, _sight(shot, hidden, site))
+        save_labelled_view(path, raw, site, deployment, legend, _sight(shot, hidden, site))
 
 
 def _command(job: Path) -> list[str]:

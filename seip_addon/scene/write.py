@@ -12,7 +12,7 @@ from ..core.arrays import Integer
 from ..core.choosing.placement.deployment import Deployment, Sensor
 from ..core.errors import SeipError
 from ..core.geometry.solids import Solid, join, prism, tube
-from ..core.output.pictures.coverage_colours import Aspect, Colouring, as_placed, colouring
+from ..core.output.pictures.coverage_colours import Aspect, Colouring, Legend, as_placed, colouring, of_placement
 from ..core.site.roles import AREA_OVERLAYS
 from ..core.site.site import Site, Targets
 from ..core.site.target_squares import target_squares
@@ -24,13 +24,11 @@ from .pieces import attach_piece, rename_whole
 MARK = "seip_result"
 """Custom property of every object made here, so that the next result replaces it and nothing else."""
 
-SEEN_BY, TARGET_WEIGHT, COLOUR = "seip_seen", "seip_weight", "seip_colour"
-"""Attributes of the coverage mesh, the first two of each target's square."""
+SEEN_BY, TARGET_WEIGHT, RETURNS, COLOUR = "seip_seen", "seip_weight", "seip_returns", "seip_colour"
+"""Attributes of the coverage mesh, all but the last of each target's square; returns only where they were maximised."""
 CLASS_WORDS, CLASS_COLOURS, SHARES, ASPECT = "seip_classes", "seip_class_colours", "seip_shares", "seip_aspect"
+TITLE = "seip_legend_title"
 """Custom properties of the coverage: what its colours mean; the aspect is empty where they are another's."""
-AS_PLACED: Aspect = "times"
-"""Aspect that a new placement is coloured by."""
-
 LIFT = max(height for height, _ in AREA_OVERLAYS.values()) + 0.02
 """Metres of the coverage above the road: over the veils of areas, under the top of a kerb, which cuts it off."""
 BODY_RADIUS, BODY_HEIGHT = 0.12, 0.22  # metres; somewhat larger than life
@@ -194,13 +192,21 @@ def recolour(scene: bpy.types.Scene, colours: Colouring) -> None:
     _paint(obj, colours)
 
 
-def show_seen_by(scene: bpy.types.Scene, seen_by: Integer) -> None:
-    """Show other counts than those of the placement, under the aspect that is shown.
+def aspects_of(obj: bpy.types.Object) -> tuple[Aspect, ...]:
+    """Return the aspects that a coverage mesh can show, first the one that a new placement is coloured by."""
+    others: tuple[Aspect, ...] = ("times", "seen", "weights")
+    return ("returns", *others) if RETURNS in obj.data.attributes else others
+
+
+def show_seen_by(scene: bpy.types.Scene, seen_by: Integer, *, moved: bool = False) -> None:
+    """Show how many sensors see each target, under the aspect that is shown.
 
     Parameters
     ----------
     seen_by : (t,) int64
         How many sensors see each target, in the order of those that the coverage was written for.
+    moved : bool
+        Whether sensors are not where they were placed: the returns of the placement are not theirs.
 
     Raises
     ------
@@ -208,7 +214,8 @@ def show_seen_by(scene: bpy.types.Scene, seen_by: Integer) -> None:
         There is no coverage, or it is of other targets.
     """
     obj = _shown_coverage(scene)
-    aspect = obj.get(ASPECT) or AS_PLACED  # nothing is compared any longer
+    aspect = obj.get(ASPECT) or aspects_of(obj)[0]  # nothing is compared any longer
+    aspect = "times" if moved and aspect == "returns" else aspect
     recolour(scene, as_placed(seen_by))
     obj.data.attributes[SEEN_BY].data.foreach_set("value", seen_by.astype(np.int32))
     colour_coverage(scene, aspect)
@@ -220,7 +227,7 @@ def colour_coverage(scene: bpy.types.Scene, aspect: Aspect) -> None:
     Raises
     ------
     SeipError
-        There is no coverage.
+        There is no coverage, or it has no returns to show.
     """
     obj = _shown_coverage(scene)
     attributes = obj.data.attributes
@@ -229,8 +236,21 @@ def colour_coverage(scene: bpy.types.Scene, aspect: Aspect) -> None:
     attributes[SEEN_BY].data.foreach_get("value", seen_by)
     if TARGET_WEIGHT in attributes:
         attributes[TARGET_WEIGHT].data.foreach_get("value", weight)
-    _paint(obj, colouring(aspect, seen_by.astype(np.int64), weight.astype(np.float64)))
+    returns = None
+    if RETURNS in attributes:
+        returns = np.empty(len(seen_by), dtype=np.float32)
+        attributes[RETURNS].data.foreach_get("value", returns)
+    _paint(obj, colouring(aspect, seen_by.astype(np.int64), weight.astype(np.float64), returns))
     obj[ASPECT] = aspect
+
+
+def shown_legend(scene: bpy.types.Scene) -> Legend | None:
+    """Return what the colours of a scene's coverage mean, None where there is none."""
+    obj = coverage_of(scene)
+    if obj is None or CLASS_WORDS not in obj:
+        return None
+    shares = np.array(obj[SHARES], dtype=np.float64)
+    return Legend(obj.get(TITLE, "Coverage"), tuple(obj[CLASS_WORDS]), tuple(obj[CLASS_COLOURS]), shares)
 
 
 def _shown_coverage(scene: bpy.types.Scene) -> bpy.types.Object:
@@ -256,15 +276,15 @@ def _paint(obj: bpy.types.Object, colours: Colouring) -> None:
     mesh.polygons.foreach_set("material_index", colours.of.astype(np.int32))
     mesh.update()
     obj[CLASS_WORDS], obj[CLASS_COLOURS] = list(colours.words), list(colours.colours)
-    obj[SHARES] = colours.shares.tolist()
+    obj[SHARES], obj[TITLE] = colours.shares.tolist(), colours.title
     obj[ASPECT] = ""
 
 
 def _write_coverage(collection: bpy.types.Collection, targets: Targets, deployment: Deployment) -> None:
-    obj = bpy.data.objects.new("Coverage", _coverage_mesh(targets, deployment.seen_by))
+    obj = bpy.data.objects.new("Coverage", _coverage_mesh(targets, deployment))
     obj[MARK] = True
-    _paint(obj, as_placed(deployment.seen_by))
-    obj[ASPECT] = AS_PLACED
+    _paint(obj, of_placement(deployment))
+    obj[ASPECT] = aspects_of(obj)[0]
     obj["seip_coverage"] = deployment.coverage
     obj["seip_seen_twice"] = deployment.seen_twice
     obj["seip_coverage_weighted"] = deployment.weighted
@@ -275,11 +295,14 @@ def _write_coverage(collection: bpy.types.Collection, targets: Targets, deployme
     collection.objects.link(obj)
 
 
-def _coverage_mesh(targets: Targets, seen_by: Integer) -> bpy.types.Mesh:
-    """Return one square per target, in their order, with how many sensors see it and how much it weighs."""
+def _coverage_mesh(targets: Targets, deployment: Deployment) -> bpy.types.Mesh:
+    """Return one square per target, in their order, with what is known of it."""
+    seen_by, returns = deployment.seen_by, deployment.pedestrian_returns
     mesh = bpy.data.meshes.new("Coverage")
     corners = target_squares(targets).reshape(-1, 3) + np.array((0.0, 0.0, LIFT))
     mesh.from_pydata(corners.tolist(), [], np.arange(4 * len(targets)).reshape(-1, 4).tolist())
     mesh.attributes.new(SEEN_BY, "INT", "FACE").data.foreach_set("value", seen_by.astype(np.int32))
     mesh.attributes.new(TARGET_WEIGHT, "FLOAT", "FACE").data.foreach_set("value", targets.weight.astype(np.float32))
+    if returns is not None:
+        mesh.attributes.new(RETURNS, "FLOAT", "FACE").data.foreach_set("value", returns.astype(np.float32))
     return mesh

@@ -4,7 +4,7 @@ import bpy
 
 from ..core.output.pictures.palette import rgb
 from ..overlay import Block, Entry, Overlay
-from ..scene.write import CLASS_COLOURS, CLASS_WORDS, SHARES, coverage_of
+from ..scene.write import coverage_of, shown_legend
 from . import overlays
 from .labels import labels_of_sensors
 
@@ -39,13 +39,13 @@ def show_colours(scene: bpy.types.Scene) -> None:
 
 
 def legend_of_coverage(scene: bpy.types.Scene) -> Block | None:
-    """Return what the colours of a scene's coverage mean, None where there is none."""
-    obj = coverage_of(scene)
-    if obj is None or CLASS_WORDS not in obj:
+    """Return the block of the legend for a scene's coverage, None where there is none."""
+    legend = shown_legend(scene)
+    if legend is None:
         return None
-    rows = zip(obj[CLASS_WORDS], obj[CLASS_COLOURS], obj[SHARES], strict=True)
+    rows = zip(legend.words, legend.colours, legend.shares, strict=True)
     entries = tuple(Entry(f"{words}  {share:.1%}", ((*rgb(colour), 1.0),)) for words, colour, share in rows)
-    return Block("Coverage", entries)
+    return Block(legend.title, entries)
 
 
 def shows_coverage(space: bpy.types.SpaceView3D) -> bool:

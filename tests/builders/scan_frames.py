@@ -7,9 +7,11 @@ import numpy as np
 
 from seip_addon.core.output.datasets.dataset_folder import write_dataset
 from seip_addon.core.output.datasets.formats import FORMATS
-from seip_addon.core.output.datasets.sample import SensorPose, TrafficRun
+from seip_addon.core.output.datasets.sample import TrafficRun
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame, Labels
+from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.traffic.trajectories import CATEGORIES
 
 ORIGIN = np.array([389_123.456, 5_712_345.678, 87.25])
@@ -36,9 +38,9 @@ def rotation(yaw, pitch=0.0, roll=0.0):
 def make_sensors(count=2, tilt=0.0):
     random = np.random.default_rng(count)
     return tuple(
-        SensorPose(
+        MountedSensor(
             label=f"S{number + 1}",
-            model="type2",
+            model=load_catalogue()["type2"],
             xyz=np.array([*random.uniform(-30, 30, 2), 6.0]),
             orientation=rotation(random.uniform(-np.pi, np.pi), *random.uniform(-tilt, tilt, 2)),
         )

@@ -99,6 +99,15 @@ def test_the_same_run_gives_the_same_bytes(folder, tmp_path, run):
 
 
 @pytest.mark.slow
+def test_eight_sensors_at_the_shipped_junction_are_proven_the_best(tmp_path):
+    """A change of the branch and bound that cuts less than this one does ends at the limit without a proof."""
+    options = ["--sensor", "type1", "--count", "8", "--effort", "120", "--no-render"]
+    place.main([str(SCENE), *options, "-o", str(tmp_path)])
+    objective = load_placement_record(tmp_path / "placement.json").objective
+    assert (objective.status, objective.gap) == ("optimal", 0.0)
+
+
+@pytest.mark.slow
 def test_a_tolerance_picks_the_spacings_and_the_record_says_why(tmp_path, run):
     record = run(tmp_path, "--count", "2", "--tolerance", "0.05")
     settings = record.settings

@@ -68,6 +68,27 @@ def test_failures_of_nominal_sensors_are_optimised_without_pose_errors(tmp_path,
         (["--pose-errors", "--traffic"], "leave out --pose-errors or --traffic"),
         (["--seen-by", "2", "--traffic"], "do not go with traffic"),
         (["--weights-from-traffic"], "--weights-from-traffic needs --traffic"),
+        (
+            ["--risk", "worst"],
+            "--risk has no effect on nominal poses and the empty road: add",
+        ),
+        (
+            ["--risk", "none"],
+            "--risk has no effect on nominal poses and the empty road: add",
+        ),
+        (
+            ["--scenarios", "5"],
+            "--scenarios has no effect on nominal poses and the empty road: add",
+        ),
+        (
+            ["--held-out", "5"],
+            "--held-out has no effect on nominal poses and the empty road: add",
+        ),
+        (["--seed", "1"], "--seed has no effect on nominal poses and the empty road: add"),
+        (["--failures", "mean", "--risk", "worst"], "--risk has no effect on nominal poses"),
+        (["--coverage", "0.5", "--failures", "worst"], "give one of these, or leave out --failures and --seen-by$"),
+        (["--coverage", "0.5", "--pose-errors"], r"give one of these, or only evaluate \(--risk none\)$"),
+        (["--criterion", "returns", "--seen-by", "2"], "choose the criterion road .* or leave out --failures and"),
     ],
 )
 def test_parts_of_an_objective_that_contradict_each_other_are_refused(tmp_path, run, options, sentence):

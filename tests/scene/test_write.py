@@ -1,4 +1,5 @@
 import hashlib
+from dataclasses import replace
 
 import bpy
 import matplotlib.pyplot as plt
@@ -7,13 +8,21 @@ import pytest
 
 from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.pictures.coverage_colours import Colouring, colouring
+from seip_addon.core.output.pictures.coverage_colours import Colouring, colouring, of_placement
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.scene import contract
 from seip_addon.scene.materials import linear
 from seip_addon.scene.render import save_rendered_view
 from seip_addon.scene.traffic import animate
-from seip_addon.scene.write import LIFT, clear_result, colour_coverage, recolour, write_result
+from seip_addon.scene.write import (
+    LIFT,
+    clear_result,
+    colour_coverage,
+    recolour,
+    show_seen_by,
+    shown_legend,
+    write_result,
+)
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import make_example
 
@@ -232,6 +241,39 @@ def test_coverage_is_recoloured_from_the_mesh_alone(example, scene, aspect):
     assert list(obj["seip_classes"]) == list(expected.words)
     assert np.allclose(obj["seip_shares"], expected.shares)
     assert obj["seip_aspect"] == aspect
+
+
+def test_a_placement_by_returns_is_shown_by_those_first(example, scene):
+    returns = np.linspace(0.0, 40.0, len(example.site.targets))
+    by_returns = replace(example.deployment, pedestrian_returns=returns)
+    write_result(scene, example.site, by_returns)
+    obj, shown = coverage(scene), of_placement(by_returns)
+    assert (obj["seip_aspect"], shown_legend(scene).title) == ("returns", "Returns from a pedestrian on the road")
+    assert np.allclose(colours_of(obj)[0], np.array([linear(colour) for colour in shown.colours])[shown.of])
+    show_seen_by(scene, example.deployment.seen_by)
+    assert obj["seip_aspect"] == "returns"
+    show_seen_by(scene, example.deployment.seen_by, moved=True)  # their returns are not known
+    assert obj["seip_aspect"] == "times"
+    colour_coverage(scene, "returns")
+    assert list(obj["seip_classes"]) == list(shown.words)
+    write_result(scene, example.site, example.deployment)
+    assert coverage(scene)["seip_aspect"] == "times"
+    with pytest.raises(SeipError, match="was not chosen for returns from road users"):
+        colour_coverage(scene, "returns")
+
+
+def test_the_rendered_view_explains_the_colours_that_are_shown(example, scene, tmp_path, monkeypatch):
+    legends = []
+    monkeypatch.setattr("seip_addon.scene.render.WIDTH", 64)
+    monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 36)
+    monkeypatch.setattr("seip_addon.scene.render.save_labelled_view", lambda *given: legends.append(given[-2]))
+    returns = np.full(len(example.site.targets), 7.0)
+    for deployment in (example.deployment, replace(example.deployment, pedestrian_returns=returns)):
+        write_result(scene, example.site, deployment)
+        save_rendered_view(tmp_path / "view.png", scene, example.site, deployment)
+        shown = of_placement(deployment)
+        assert (legends[-1].words, legends[-1].colours) == (shown.words, shown.colours)
+        assert legends[-1].shares == pytest.approx(shown.shares)
 
 
 def test_one_name_in_two_colours_is_two_materials(example, scene):

@@ -15,7 +15,7 @@ from headless.detection.breakdown import false_positives
 from headless.detection.detector import Detector
 from headless.detection.frame_results import FrameResult
 from headless.detection.frames import SampledRecording
-from headless.detection.recordings import PlacedSensors, SampledRun, Simulator, sampled_runs
+from headless.detection.recordings import MountedSensors, SampledRun, Simulator, sampled_runs
 from headless.detection.rules import MAIN_RULE, Precision, precisions
 from headless.detection.run_detection import AT_ONCE, detect_in_runs
 from headless.detection.settings import NetworkSettings, TrainingSettings
@@ -239,7 +239,7 @@ def simulate_training_set(
     """Simulate what the configurations measure, and keep what a network learns from it."""
     area = simulator.area(network.pillar)
 
-    def recordings(placed: PlacedSensors, runs: Sequence[SampledRun]) -> list[SampledRecording]:
+    def recordings(placed: MountedSensors, runs: Sequence[SampledRun]) -> list[SampledRecording]:
         return [SampledRecording(simulator.record(placed, run), area, network.most_points) for run in runs]
 
     training_set = TrainingSet(

@@ -12,7 +12,6 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.placement_record import PlacementRecord, load_placement_record
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
-from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.site.site import Site
 from seip_addon.core.workflows.moved_sensors import evaluate_moved_sensors
 from seip_addon.core.workflows.survey import Survey
@@ -61,10 +60,7 @@ def read_placements(
         keys = sorted({sensor.sensor for sensor in record.sensors})
         weather = survey.settings.weather
         known = find_models(load_catalogue(survey.settings.catalogue), keys)
-        mounted = [
-            MountedSensor(one.id, weather.through(known[one.sensor]), np.array(one.local_m), one.orientation)
-            for one in record.sensors
-        ]
+        mounted = [one.mounted(weather.through(known[one.sensor])) for one in record.sensors]
         places = {one.id: one.position for one in record.sensors}
         solution = yield from within(progress, evaluate_moved_sensors(survey, Objective(), mounted, places))
         gap = np.inf if record.objective.gap is None else record.objective.gap

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from headless.detection.recordings import PlacedSensors
+from headless.detection.recordings import MountedSensors
 from headless.studies.coverage.cells import Case
 
 from seip_addon.core.choosing.placement.deployment import Deployment
@@ -12,11 +12,13 @@ from seip_addon.core.sensing.scans.sensor import MountedSensor
 
 
 @dataclass(frozen=True, eq=False)
-class SensorConfiguration(PlacedSensors):
+class SensorConfiguration(MountedSensors):
     """Sensors of a placement, however it came about.
 
     Parameters
     ----------
+    sensors : tuple of MountedSensor
+        Those of the deployment.
     sensor : str
         What charts and tables group it under: the type, or the name of a placement that was read.
     count : int
@@ -29,7 +31,7 @@ class SensorConfiguration(PlacedSensors):
         Whether it was read from a folder; it is no number of sensors of a type then.
     """
 
-    name: str
+    sensors: tuple[MountedSensor, ...] = field(init=False)
     deployment: Deployment
     sensor: str
     count: int
@@ -37,16 +39,11 @@ class SensorConfiguration(PlacedSensors):
     gap: float
     read: bool = False
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sensors", self.deployment.mounted)
+
     @classmethod
     def of_case(cls, case: Case) -> SensorConfiguration:
         """Return a number of sensors of one type, placed where they cover most."""
         name = f"{case.count} × {case.sensor}"
         return cls(name, case.deployment, case.sensor, case.count, case.placement.status, case.placement.gap)
-
-    @property
-    def sensors(self) -> tuple[MountedSensor, ...]:
-        """The sensors where they hang."""
-        return tuple(
-            MountedSensor(sensor.label, sensor.model, sensor.xyz, sensor.orientation)
-            for sensor in self.deployment.sensors
-        )

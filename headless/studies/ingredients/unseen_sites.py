@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from headless.detection.average_precision import evaluate
 from headless.detection.detector import Detector
-from headless.detection.recordings import PlacedSensors, SampledRun, Simulator
+from headless.detection.recordings import MountedSensors, SampledRun, Simulator
 from headless.detection.rules import MAIN_RULE
 from headless.detection.run_detection import AT_ONCE, detect_in_runs
 from headless.detection.training import deterministic
@@ -29,10 +29,10 @@ class UnseenTest:
 
     name: str
     simulator: Simulator
-    scanned: tuple[tuple[SampledRun, PlacedSensors], ...]
+    scanned: tuple[tuple[SampledRun, MountedSensors], ...]
 
 
-def unseen_tests(site: LearntSite, best: PlacedSensors, seed: int, *, full: bool) -> tuple[UnseenTest, ...]:
+def unseen_tests(site: LearntSite, best: MountedSensors, seed: int, *, full: bool) -> tuple[UnseenTest, ...]:
     """Return the tests at a site: with one placement; in full also with random ones, and road users of other sizes."""
     runs = site.runs
     tests = [UnseenTest(f"{site.simulator.site}, {best.name}", site.simulator, tuple((run, best) for run in runs))]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from headless.detection.frames import Recording
-from headless.detection.recordings import PlacedSensors, SampledRun, Simulator
+from headless.detection.recordings import MountedSensors, SampledRun, Simulator
 
 import numpy as np
 
@@ -39,7 +39,7 @@ class LearntSite:
     runs: tuple[SampledRun, ...]
     simulator: Simulator
 
-    def random_placement(self, number: int, random: np.random.Generator) -> PlacedSensors:
+    def random_placement(self, number: int, random: np.random.Generator) -> MountedSensors:
         """Draw a placement; see `random_placements.random_placement`."""
         name = f"{self.name}, placement {number}"
         return random_placement(name, self.candidates, self.models, random)

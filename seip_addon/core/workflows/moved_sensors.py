@@ -97,7 +97,7 @@ def restored_by_hand(survey: Survey, record: PlacementRecord) -> Generator[Progr
     """Evaluate the sensors of a record again, on the survey that it was made on."""
     sensors = record.sensors
     models = find_models(load_catalogue(survey.settings.catalogue), sorted({one.sensor for one in sensors}))
-    mounted = [MountedSensor(one.id, models[one.sensor], np.array(one.local_m), one.orientation) for one in sensors]
+    mounted = [one.mounted(models[one.sensor]) for one in sensors]
     places = {one.id: one.position for one in sensors}
     return (yield from evaluate_moved_sensors(survey, record.asked.goal, mounted, places))
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..output.datasets.dataset_folder import write_dataset
 from ..output.datasets.formats import FORMATS
-from ..output.datasets.sample import SPLITS, SensorPose, TrafficRun
+from ..output.datasets.sample import SPLITS, TrafficRun
 from ..progress import Progress
 from ..sensing.scans.run_folder import Record, Run, load_frames, write_run
 from ..sensing.scans.sensor import MountedSensor
@@ -142,7 +142,7 @@ def _traffic_run(folder: Path, run: Run, settings: RecordingSettings) -> Traffic
         name=folder.resolve().name,
         split=settings.split,
         key=run.key,
-        sensors=tuple(SensorPose(s.label, s.model.name, s.xyz, s.orientation) for s in run.sensors),
+        sensors=tuple(run.sensors),
         origin=run.origin,
         geo_reference=run.geo_reference,
         record=run.record(),

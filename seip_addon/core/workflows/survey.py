@@ -13,7 +13,6 @@ import numpy as np
 from ..choosing.placement.deployment import deploy, pose_prices
 from ..choosing.placement.integer_program import check_solver
 from ..choosing.placement.objective import Solution, target_weights
-from ..choosing.placement.problem import Placement
 from ..choosing.placement.search_limits import DEFAULT_EFFORT, SolverLimits
 from ..errors import SeipError
 from ..output.results.headings import tilt_degrees
@@ -316,22 +315,10 @@ def restored_solution(survey: Survey, record: PlacementRecord) -> Solution:
     poses = range(len(site.candidates))
     if record.inputs.get("visibility") != grid.key or not all(sensor.pose in poses for sensor in record.sensors):
         raise SeipError("the placement was made for another state of the scene or its settings: place again")
-    objective, found = record.asked.goal, record.objective
-    chosen = np.array([sensor.pose for sensor in record.sensors], dtype=np.int64)
-    placement = Placement(
-        chosen=chosen,
-        objective=found.value,
-        bound=math.nan if found.bound is None else found.bound,
-        gap=math.inf if found.gap is None else found.gap,
-        status=found.status,
-        solver=found.solver,
-        seconds=record.times.durations_s.get("placement", 0.0),
-        covered=float(target_weights(site, objective)[grid.times_seen(chosen) > 0].sum()),
-        price=record.price_usd,
-        notes=record.notes,
-    )
+    objective, chosen = record.asked.goal, record.poses
+    covered = float(target_weights(site, objective)[grid.times_seen(chosen) > 0].sum())
     deployment = deploy(site, survey.models, grid.visible, chosen)
     known = replace(deployment, gain_band=record.coverage.gain_band, returns=record.returns)
     if record.returns is not None:
         known = replace(known, pedestrian_returns=stored_pedestrian_returns(survey, chosen))
-    return Solution(objective, placement, None, known)
+    return Solution(objective, record.placement(covered), None, known)

@@ -1,40 +1,65 @@
 """Constraints of a reduced placement problem, whatever its objective."""
 
+from __future__ import annotations
+
 import math
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
 from ...arrays import Boolean, Float, Integer
-from .problem import TIE_TOLERANCE
+from .problem import TIE_TOLERANCE, PlacementProblem
+
+MICROMETRE = 1e-6  # metres to which positions are rounded: posts may be too close by less than this
+
+Kind = TypeVar("Kind", bound="Constrained")
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Constrained:
     """A problem with c candidates and g mandatory groups, of which `Instance` and `ReturnsInstance` are kinds.
 
-    Attributes
+    Parameters
     ----------
     price : (c,) float64, dollars
     conflict : (c, c) bool
-        Pairs that exclude each other. The diagonal is false.
+        Pairs that exclude each other: same position, or too close. The diagonal is false.
     clique : (c,) int64
-        A partition of the candidates into sets of which one at most can be chosen.
+        A partition of the candidates into sets of which one at most can be chosen. Without a minimum distance these are
+        the positions.
     mandatory : (g, c) bool
+    original : (c,) int64
+        Index of each candidate in the problem.
     count : int
         Largest number of sensors.
     budget : float, dollars
         Largest total price; infinite where there is no budget.
     """
 
+    rows: ClassVar[tuple[str, ...]] = ("price", "clique", "original")
+    """Fields with one row for each candidate."""
+
     price: Float
     conflict: Boolean
     clique: Integer
     mandatory: Boolean
+    original: Integer
     count: int
     budget: float
 
     def __len__(self) -> int:
         """Return the number of candidates."""
         return len(self.price)
+
+    def of(self, keep: Integer) -> Self:
+        """Return the same instance with only the candidates ``keep``."""
+        return replace(
+            self,
+            **{name: getattr(self, name)[keep] for name in self.rows},
+            conflict=self.conflict[np.ix_(keep, keep)],
+            mandatory=self.mandatory[:, keep],
+        )
 
     def affordable(self, price: Float | float) -> Boolean | bool:
         """Return whether a total price is within the budget, except for rounding."""
@@ -48,3 +73,42 @@ class Constrained:
             and not self.conflict[np.ix_(chosen, chosen)].any()
             and self.mandatory[:, chosen].any(axis=1).all()
         )
+
+
+def constraints_of(problem: PlacementProblem, order: Integer) -> dict[str, Any]:
+    """Return the fields of `Constrained` for the candidates of a problem in an order, by name."""
+    conflict = conflicts(problem.positions[order], problem.xyz[order], problem.min_distance)
+    return {
+        "price": problem.prices[order],
+        "conflict": conflict,
+        "clique": cliques(conflict),
+        "mandatory": problem.mandatory_groups[:, order],
+        "original": order,
+        "count": problem.most_sensors,
+        "budget": math.inf if problem.budget is None else float(problem.budget),
+    }
+
+
+def conflicts(positions: Integer, xyz: Float, min_distance: float) -> Boolean:
+    """Return the pairs of candidates at one position, or closer in plan than the minimum distance, (c, c) bool."""
+    conflict: Boolean = positions[:, None] == positions[None, :]
+    if min_distance > 0:
+        for index, xy in enumerate(xyz[:, :2]):
+            conflict[index] |= np.hypot(*(xyz[:, :2] - xy).T) < min_distance - MICROMETRE
+    np.fill_diagonal(conflict, val=False)
+    return conflict
+
+
+def cliques(conflict: Boolean) -> Integer:
+    """Part the candidates into sets that all exclude each other, grown greedily in order, (c,) int64."""
+    clique = np.full(len(conflict), -1)
+    for first in range(len(conflict)):
+        if clique[first] < 0:
+            members = [first]
+            common = conflict[first] & (clique < 0)
+            while common.any():
+                members.append(int(np.argmax(common)))
+                common &= conflict[members[-1]]
+            clique[members] = first
+    numbered: Integer = np.unique(clique, return_inverse=True)[1]
+    return numbered

@@ -11,6 +11,7 @@ from ...arrays import Boolean, Float, Integer
 from ...geometry.orientation import describe_turn, orientation
 from ...limits import SHARE
 from ...sensing.lidar.model import LidarModel
+from ...sensing.scans.sensor import MountedSensor
 from ...site.site import Candidates, Site
 from .returns_summary import ReturnsSummary
 
@@ -79,6 +80,11 @@ class Sensor:
     def orientation(self) -> Float:
         """Rotation from the sensor's axes to the site's, (3, 3) float64."""
         return orientation(self.yaw, self.tilt, self.roll)
+
+    @property
+    def mounted(self) -> MountedSensor:
+        """The sensor as scans have it: what measures, without what it sees or costs."""
+        return MountedSensor(self.label, self.model, self.xyz, self.orientation)
 
     @property
     def turned(self) -> str:
@@ -176,6 +182,11 @@ class Deployment:
     gain_band: GainBand | None = None
     returns: ReturnsSummary | None = None
     pedestrian_returns: Float | None = None
+
+    @property
+    def mounted(self) -> tuple[MountedSensor, ...]:
+        """The sensors as scans have them."""
+        return tuple(sensor.mounted for sensor in self.sensors)
 
     @property
     def installed(self) -> bool:

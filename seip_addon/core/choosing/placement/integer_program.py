@@ -1,4 +1,4 @@
-"""The integer program in PuLP, and the solvers it can be given to by name."""
+"""Integer programs in PuLP, and the solvers that they can be given to by name."""
 
 import importlib.metadata
 import math
@@ -21,6 +21,7 @@ from pulp.apis.coin_api import pulp_cbc_path
 from ...arrays import Boolean, Float, Integer
 from ...errors import SeipError
 from ...progress import Progress, in_thread
+from .constraints import Constrained
 from .problem import TIE_TOLERANCE
 from .reduced_problem import Instance
 from .search_limits import OPERATIONS_PER_UNIT, Clock
@@ -60,28 +61,122 @@ class Outcome:
     nodes: int = 0
 
 
-class CoverProgram:
-    """The integer program of an instance, to which requirements are added stage by stage.
+class PlacementProgram:
+    """An integer program that chooses candidates, whatever its objective; requirements are added stage by stage.
 
-    ``x`` are binary, the covered share ``y`` and the doubly covered share ``z`` of each target are continuous: at an
-    optimum they are integral by themselves. ``z`` is right wherever the covered weight is required to be the largest
-    possible.
+    Parameters
+    ----------
+    rules : Constrained
+        The constraints; ``x`` are binary, one for each candidate.
+    entries : int
+        Entries of the objective's matrix other than zero, which the work of a solver grows with.
+    """
+
+    def __init__(self, rules: Constrained, entries: int) -> None:
+        self._rules, self._entries = rules, entries
+        self.model = pulp.LpProblem("placement", pulp.LpMaximize)
+        self.x = [self.model.add_variable(f"x{i}", cat=pulp.LpBinary) for i in range(len(rules))]
+        self._checks: list[Callable[[Integer], bool]] = [rules.feasible]
+        self.model.setObjective(self.number)
+        if rules.count < len(rules):
+            self.model += self.number <= rules.count
+        if math.isfinite(rules.budget):
+            self.model += self.price <= rules.budget * self.price_scale * (1 + TIE_TOLERANCE)
+        for group in rules.mandatory:
+            self.model += self.number_among(np.flatnonzero(group)) >= 1
+        for clique in cover_by_cliques(rules.conflict):
+            self.model += self.number_among(clique) <= 1
+
+    @property
+    def number(self) -> Expression:
+        """The number of sensors."""
+        return _linear(self.x, np.ones(len(self.x)))
+
+    @property
+    def price(self) -> Expression:
+        """The total price, scaled as `price_scale` says."""
+        return _linear(self.x, self._rules.price * self.price_scale)
+
+    @property
+    def price_scale(self) -> float:
+        """Factor that brings the dearest sensor to 10,000, away from the solvers' absolute tolerances."""
+        dearest = float(self._rules.price.max(initial=0.0))
+        return 1e4 / dearest if dearest > 0 else 1.0
+
+    def number_among(self, candidates: Integer, factors: Float | None = None) -> Expression:
+        """Return the (weighted) number of sensors among some candidates."""
+        return _linear([self.x[i] for i in candidates], np.ones(len(candidates)) if factors is None else factors)
+
+    def require(self, constraint: Expression, check: Callable[[Integer], bool] | None = None) -> None:
+        """Add a constraint for this and all later solves, and what it means in exact arithmetic."""
+        self.model += constraint
+        if check is not None:
+            self._checks.append(check)
+
+    def require_price(self, price: float) -> None:
+        """Require a total price of at most ``price``, but for `TIE_TOLERANCE`."""
+        limit = price * (1 + TIE_TOLERANCE)
+        prices = self._rules.price
+        self.require(self.price <= limit * self.price_scale, lambda c: math.fsum(prices[c]) <= limit)
+
+    def maximise(
+        self, objective: Expression, solver: str, clock: Clock, share: float = 1.0
+    ) -> Generator[Progress, None, Outcome]:
+        """Solve for the largest objective within a share of what is left of the limits.
+
+        The solver works in a thread of its own; when the generator is closed it is told to stop.
+        """
+        if clock.left <= 0:
+            return Outcome(None, math.inf, finished=False)
+        self.model.setObjective(objective)
+        ends = clock.elapsed + share * clock.left
+        size = self._entries + len(self.x)
+        for _ in range(MAX_REJECTED):
+            left = max(ends - clock.elapsed, MIN_SECONDS)
+            seconds = max(clock.seconds_left, MIN_SECONDS) if clock.counts_work else left
+            nodes = math.ceil(left * OPERATIONS_PER_UNIT / (size * OPERATIONS_PER_ENTRY)) if clock.counts_work else None
+            outcome = yield from in_thread(
+                lambda stop, limits=(seconds, nodes): self._solve(solver, limits, stop),  # type: ignore[misc]
+                f"solving an integer program of {len(self.x)} candidates",
+            )
+            branching = outcome.nodes * size * OPERATIONS_PER_ENTRY
+            clock.spend(CALL_OPERATIONS + _root_operations(self._entries) + branching)
+            chosen = outcome.chosen
+            if chosen is None or all(check(chosen) for check in self._checks):
+                return outcome
+            self.exclude(chosen)  # solvers have tolerances of their own: forbid exactly what fails in exact arithmetic
+        return replace(outcome, chosen=None, finished=False)
+
+    def exclude(self, chosen: Integer) -> None:
+        """Forbid a choice, and no other one."""
+        others = np.setdiff1d(np.arange(len(self.x)), chosen)
+        self.model += self.number_among(chosen) - self.number_among(others) <= len(chosen) - 1
+
+    def _solve(self, solver: str, limits: tuple[float, int | None], stop: threading.Event) -> Outcome:
+        with _engine(solver, limits, stop) as engine:
+            try:
+                self.model.solve(engine)
+            except (pulp.PulpSolverError, OSError) as error:
+                raise SeipError(
+                    f"the solver {solver} stopped with an error ({error}); choose another solver"
+                ) from error
+        status = self.model.sol_status
+        solved = status in (pulp.LpSolutionOptimal, pulp.LpSolutionIntegerFeasible)
+        chosen = np.flatnonzero([round(x.value() or 0.0) for x in self.x]) if solved else None
+        finished = status in (pulp.LpSolutionOptimal, pulp.LpSolutionInfeasible)
+        return Outcome(chosen, _bound(self.model, solver), finished, _nodes(self.model, solver))
+
+
+class CoverProgram(PlacementProgram):
+    """The integer program of maximal covering; see `PlacementProblem` for the formulation.
+
+    The covered share ``y`` and the doubly covered share ``z`` of each target are continuous: at an optimum they are
+    integral by themselves. ``z`` is right wherever the covered weight is required to be the largest possible.
     """
 
     def __init__(self, instance: Instance) -> None:
+        super().__init__(instance, np.count_nonzero(instance.visible))
         self.instance = instance
-        self.model = pulp.LpProblem("placement", pulp.LpMaximize)
-        self.x = [self.model.add_variable(f"x{i}", cat=pulp.LpBinary) for i in range(len(instance))]
-        self._checks: list[Callable[[Integer], bool]] = [instance.feasible]
-        self.model.setObjective(self.number)
-        if instance.count < len(instance):
-            self.model += self.number <= instance.count
-        if math.isfinite(instance.budget):
-            self.model += self.price <= instance.budget * self.price_scale * (1 + TIE_TOLERANCE)
-        for group in instance.mandatory:
-            self.model += self.number_among(np.flatnonzero(group)) >= 1
-        for clique in cover_by_cliques(instance.conflict):
-            self.model += self.number_among(clique) <= 1
 
     @cached_property
     def covered(self) -> Expression:
@@ -103,32 +198,6 @@ class CoverProgram:
         """Factor that brings the total weight to `TOTAL_WEIGHT`."""
         return TOTAL_WEIGHT / self.instance.total if self.instance.total > 0 else 1.0
 
-    @property
-    def number(self) -> Expression:
-        """The number of sensors."""
-        return _linear(self.x, np.ones(len(self.x)))
-
-    @property
-    def price(self) -> Expression:
-        """The total price, scaled as `price_scale` says."""
-        return _linear(self.x, self.instance.price * self.price_scale)
-
-    @property
-    def price_scale(self) -> float:
-        """Factor that brings the dearest sensor to 10,000, away from the solvers' absolute tolerances."""
-        dearest = float(self.instance.price.max(initial=0.0))
-        return 1e4 / dearest if dearest > 0 else 1.0
-
-    def number_among(self, candidates: Integer, factors: Float | None = None) -> Expression:
-        """Return the (weighted) number of sensors among some candidates."""
-        return _linear([self.x[i] for i in candidates], np.ones(len(candidates)) if factors is None else factors)
-
-    def require(self, constraint: Expression, check: Callable[[Integer], bool] | None = None) -> None:
-        """Add a constraint for this and all later solves, and what it means in exact arithmetic."""
-        self.model += constraint
-        if check is not None:
-            self._checks.append(check)
-
     def require_coverage(self, goal: float) -> None:
         """Require a covered weight, but for the instance's slack."""
         instance = self.instance
@@ -144,42 +213,6 @@ class CoverProgram:
         instance = self.instance
         self.require(self._at_least(self.doubly_covered, goal), lambda c: instance.doubly(c) >= goal - instance.slack)
 
-    def require_price(self, price: float) -> None:
-        """Require a total price of at most ``price``, but for `TIE_TOLERANCE`."""
-        limit = price * (1 + TIE_TOLERANCE)
-        prices = self.instance.price
-        self.require(self.price <= limit * self.price_scale, lambda c: math.fsum(prices[c]) <= limit)
-
-    def maximise(
-        self, objective: Expression, solver: str, clock: Clock, share: float = 1.0
-    ) -> Generator[Progress, None, Outcome]:
-        """Solve for the largest objective within a share of what is left of the limits.
-
-        The solver works in a thread of its own; when the generator is closed it is told to stop.
-        """
-        if clock.left <= 0:
-            return Outcome(None, math.inf, finished=False)
-        self.model.setObjective(objective)
-        ends = clock.elapsed + share * clock.left
-        size = np.count_nonzero(self.instance.visible) + len(self.x)
-        for _ in range(MAX_REJECTED):
-            left = max(ends - clock.elapsed, MIN_SECONDS)
-            seconds = max(clock.seconds_left, MIN_SECONDS) if clock.counts_work else left
-            nodes = math.ceil(left * OPERATIONS_PER_UNIT / (size * OPERATIONS_PER_ENTRY)) if clock.counts_work else None
-            outcome = yield from in_thread(
-                lambda stop, limits=(seconds, nodes): self._solve(solver, limits, stop),  # type: ignore[misc]
-                f"solving an integer program of {len(self.x)} candidates",
-            )
-            branching = outcome.nodes * size * OPERATIONS_PER_ENTRY
-            clock.spend(CALL_OPERATIONS + root_operations(self.instance) + branching)
-            chosen = outcome.chosen
-            if chosen is None or all(check(chosen) for check in self._checks):
-                return outcome
-            # solvers have tolerances of their own: forbid exactly what fails in exact arithmetic
-            others = np.setdiff1d(np.arange(len(self.x)), chosen)
-            self.model += self.number_among(chosen) - self.number_among(others) <= len(chosen) - 1
-        return replace(outcome, chosen=None, finished=False)
-
     def maximise_coverage(self, solver: str, clock: Clock, share: float = 1.0) -> Generator[Progress, None, Outcome]:
         """Solve for the largest covered weight within the limits; the outcome's bound is not scaled."""
         outcome = yield from self.maximise(self.covered, solver, clock, share)
@@ -189,20 +222,6 @@ class CoverProgram:
         """Return the requirement of a weight, lowered by what a solver may miss it by."""
         margin = max(self.instance.step / 2, TOLERANCE * self.instance.total)
         return covered >= (goal - margin) * self.weight_scale
-
-    def _solve(self, solver: str, limits: tuple[float, int | None], stop: threading.Event) -> Outcome:
-        with _engine(solver, limits, stop) as engine:
-            try:
-                self.model.solve(engine)
-            except (pulp.PulpSolverError, OSError) as error:
-                raise SeipError(
-                    f"the solver {solver} stopped with an error ({error}); choose another solver"
-                ) from error
-        status = self.model.sol_status
-        solved = status in (pulp.LpSolutionOptimal, pulp.LpSolutionIntegerFeasible)
-        chosen = np.flatnonzero([round(x.value() or 0.0) for x in self.x]) if solved else None
-        finished = status in (pulp.LpSolutionOptimal, pulp.LpSolutionInfeasible)
-        return Outcome(chosen, _bound(self.model, solver), finished, _nodes(self.model, solver))
 
     @cached_property
     def _y(self) -> list[Any]:
@@ -218,17 +237,26 @@ def root_operations(instance: Instance) -> float:
 
     The benchmark measures it against the entries of V (`seip study benchmark`, under “Growth”).
     """
-    return ROOT_OPERATIONS * float(np.count_nonzero(instance.visible)) ** 2
+    return _root_operations(np.count_nonzero(instance.visible))
+
+
+def _root_operations(entries: int) -> float:
+    return ROOT_OPERATIONS * float(entries) ** 2
 
 
 def is_affordable(instance: Instance, clock: Clock, share: float = 1.0) -> bool:
-    """Return whether an instance's program fits into memory, and its first relaxation into what is left of limits.
+    """Return whether an instance's program fits into memory, and its first relaxation into what is left of limits."""
+    return fits(np.count_nonzero(instance.visible), clock, share)
+
+
+def fits(entries: int, clock: Clock, share: float = 1.0) -> bool:
+    """Return whether a program fits into memory, and its first relaxation into what is left of limits.
 
     A solver cannot be stopped by counted work within a relaxation, and PuLP takes long to build a large program.
     """
-    if clock.left <= 0 or np.count_nonzero(instance.visible) > MAX_ENTRIES:
+    if clock.left <= 0 or entries > MAX_ENTRIES:
         return False
-    return root_operations(instance) <= share * clock.left * OPERATIONS_PER_UNIT
+    return _root_operations(entries) <= share * clock.left * OPERATIONS_PER_UNIT
 
 
 def reaching(instance: Instance, goal: float) -> CoverProgram:

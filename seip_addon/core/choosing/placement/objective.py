@@ -134,32 +134,55 @@ class Objective:
 
     def _check_scenarios(self) -> None:
         kind, measure = self.scenarios.kind, self.measure
-        looks = self.failures != "none" or self.seen_by > 1
-        if looks and (self.risk == "none" or kind == "traffic"):
+        if self._multi_cover and (self.risk == "none" or kind == "traffic"):
             other = "the risk none" if self.risk == "none" else "traffic"
             raise SeipError(f"sensor failures and several sensors per target do not go with {other}: leave one out")
+        if kind == "nominal":
+            self._require_no_settings_of_scenarios()
         if self.criterion == "height" and (kind != "traffic" or measure is None):
             raise SeipError("the criterion height is of traffic: add --traffic, or choose another criterion")
         if measure is None:
             return
+        # With failures the risk none is refused: only evaluating is no cure there.
+        instead = "leave out --failures and --seen-by" if self._multi_cover else "only evaluate (--risk none)"
         if self.cheapest:
             raise SeipError(
                 "optimising over scenarios or for failures needs a number of sensors or a budget, not a coverage to "
-                "reach: give one of these, or only evaluate (--risk none)"
+                f"reach: give one of these, or {instead}"
             )
         if self.criterion == "returns":
             raise SeipError(
                 "returns from road users are optimised for nominal poses and the empty road: choose the criterion road "
-                "for scenarios or failures, or only evaluate (--risk none)"
+                f"for scenarios or failures, or {instead}"
             )
         if self.count is not None:
             measure.require_sensors(self.count)
 
+    def _require_no_settings_of_scenarios(self) -> None:
+        """Raise SeipError where the only scenario is the nominal one, and a setting of several would be ignored."""
+        scenarios = self.scenarios
+        given = {
+            "--risk": self.risk != "auto",
+            "--scenarios": scenarios.count is not None,
+            "--held-out": scenarios.held_out is not None,
+            "--seed": scenarios.seed != 0,
+        }
+        idle = next((option for option, there in given.items() if there), None)
+        if idle is not None:
+            raise SeipError(
+                f"{idle} has no effect on nominal poses and the empty road: add --pose-errors or --traffic, or leave "
+                f"out {idle}"
+            )
+
+    @property
+    def _multi_cover(self) -> bool:
+        """Whether it matters how many sensors see a target."""
+        return self.failures != "none" or self.seen_by > 1
+
     @property
     def measure(self) -> Risk | None:
         """Risk measure that is maximised over the scenarios; None for nominal poses on the empty road."""
-        looks = self.failures != "none" or self.seen_by > 1
-        if self.risk == "none" or (self.scenarios.kind == "nominal" and not looks):
+        if self.risk == "none" or (self.scenarios.kind == "nominal" and not self._multi_cover):
             return None
         usual = "worst-quarter" if self.scenarios.kind == "pose-errors" else "mean"
         return Risk(TAILS[usual if self.risk == "auto" else self.risk], self.seen_by, self.failures)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Boolean, Float, Integer
 from ...errors import SeipError
-from .constraints import Constrained
+from .constraints import Constrained, constraints_of
 from .multi_cover import COVERAGE, MultiCover
 from .problem import TIE_TOLERANCE, PlacementProblem, canonical_order
 
@@ -23,7 +23,6 @@ MAX_EXACT_SINGLE = 2**24  # sums of whole numbers up to here are exact in single
 INCOMMENSURABLE_TOTAL = 2**50
 """Total of weights that have no common unit: sums stay exact in double precision, rounding below `TIE_TOLERANCE`."""
 
-MICROMETRE = 1e-6  # metres to which positions are rounded: posts may be too close by less than this
 WHOLE_SLACK = 0.25  # whole weights differ by one or not at all
 BOUND_ROUNDING = 1e-11  # share of all weight by which rounding may move a sum in double precision, with room to spare
 MAX_BINARY_PARTS = 1024  # binary fractions up to this are taken as the unit of weights: halves, quarters, ...
@@ -33,9 +32,11 @@ DENOMINATORS = range(1, 13)  # a common unit of all weights is sought among thes
 Numbers = NDArray[np.floating[Any]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Instance(Constrained):
     """A reduced maximal covering instance: c candidates in canonical order, t merged targets, g mandatory groups.
+
+    Beside the parameters of `Constrained` it has these.
 
     Parameters
     ----------
@@ -50,35 +51,17 @@ class Instance(Constrained):
         less than one unit); without one, this is `TIE_TOLERANCE` of the weight that the candidates together see.
     margin : float
         Rounding error that the bound of a relaxation may have.
-    price : (c,) float64
-    conflict : (c, c) bool
-        Pairs that exclude each other: same position, or too close. The diagonal is false.
-    clique : (c,) int64
-        A partition of the candidates into sets of which one at most can be
-        chosen. Without a minimum distance these are the positions.
-    mandatory : (g, c) bool
-    original : (c,) int64
-        Index of each candidate in the problem.
-    count : int
-        At most this many sensors.
-    budget : float
-        At most this total price; infinite where there is no budget.
     cover : MultiCover
         What a unit of weight is worth by how many sensors see it.
     """
+
+    rows = (*Constrained.rows, "visible")
 
     visible: Boolean
     weight: Float
     step: float
     slack: float
     margin: float
-    price: Float
-    conflict: Boolean
-    clique: Integer
-    mandatory: Boolean
-    original: Integer
-    count: int
-    budget: float
     cover: MultiCover = COVERAGE
 
     @cached_property
@@ -152,18 +135,6 @@ class Instance(Constrained):
         visible, weight = merge_targets(self.visible[keep], self.weight)
         return replace(self.of(keep), visible=visible, weight=weight)
 
-    def of(self, keep: Integer) -> Instance:
-        """Return the same instance with only the candidates ``keep``, and all targets."""
-        return replace(
-            self,
-            visible=self.visible[keep],
-            price=self.price[keep],
-            conflict=self.conflict[np.ix_(keep, keep)],
-            clique=self.clique[keep],
-            mandatory=self.mandatory[:, keep],
-            original=self.original[keep],
-        )
-
 
 def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
     """Reduce a problem, and return it with the factor that scaled its weights.
@@ -185,20 +156,13 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
     visible, weight = merge_targets(problem.visible[order][:, seen], np.rint(problem.weights[seen] / unit))
     total = float(weight.sum())
     slack = min(TIE_TOLERANCE * total, WHOLE_SLACK) if whole else TIE_TOLERANCE * total
-    conflict = conflicts(problem.positions[order], problem.xyz[order], problem.min_distance)
     instance = Instance(
         visible=visible,
         weight=weight,
         step=1.0 if whole else slack / 2,
         slack=slack,
         margin=BOUND_ROUNDING * total,
-        price=problem.prices[order],
-        conflict=conflict,
-        clique=cliques(conflict),
-        mandatory=problem.mandatory_groups[:, order],
-        original=order,
-        count=problem.most_sensors,
-        budget=math.inf if problem.budget is None else float(problem.budget),
+        **constraints_of(problem, order),
     )
     return instance.part(np.flatnonzero(~_superfluous(instance, problem.positions[order]))), 1 / unit
 
@@ -250,31 +214,6 @@ def merge_targets(visible: Boolean, weight: Float) -> tuple[Boolean, Float]:
     _, first, group = np.unique(keys, return_index=True, return_inverse=True)
     merged: Boolean = np.take(visible, first, axis=1)  # indexed, it would hold the rows of targets together in memory
     return merged, np.bincount(group, weight).astype(np.float64)
-
-
-def conflicts(positions: Integer, xyz: Float, min_distance: float) -> Boolean:
-    """Return the pairs of candidates at one position, or closer in plan than the minimum distance, (c, c) bool."""
-    conflict: Boolean = positions[:, None] == positions[None, :]
-    if min_distance > 0:
-        for index, xy in enumerate(xyz[:, :2]):
-            conflict[index] |= np.hypot(*(xyz[:, :2] - xy).T) < min_distance - MICROMETRE
-    np.fill_diagonal(conflict, val=False)
-    return conflict
-
-
-def cliques(conflict: Boolean) -> Integer:
-    """Part the candidates into sets that all exclude each other, grown greedily in order, (c,) int64."""
-    clique = np.full(len(conflict), -1)
-    for first in range(len(conflict)):
-        if clique[first] < 0:
-            members = [first]
-            common = conflict[first] & (clique < 0)
-            while common.any():
-                members.append(int(np.argmax(common)))
-                common &= conflict[members[-1]]
-            clique[members] = first
-    numbered: Integer = np.unique(clique, return_inverse=True)[1]
-    return numbered
 
 
 def _superfluous(instance: Instance, positions: Integer) -> Boolean:

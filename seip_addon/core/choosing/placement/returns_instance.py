@@ -12,25 +12,25 @@ less than the one before.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Boolean, Float, Integer
 from ...errors import SeipError
-from .constraints import Constrained
+from .constraints import Constrained, constraints_of
 from .problem import TIE_TOLERANCE, PlacementProblem, canonical_order
-from .reduced_problem import cliques, conflicts
 
 _ROWS_AT_ONCE = 32
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ReturnsInstance(Constrained):
     """A placement problem by expected returns: c candidates in canonical order, m road users, g mandatory groups.
+
+    Beside the parameters of `Constrained` it has these.
 
     Parameters
     ----------
@@ -38,29 +38,12 @@ class ReturnsInstance(Constrained):
         R.
     weight : (m,) float64
         w; they add up to 1.
-    price : (c,) float64
-    conflict : (c, c) bool
-        Pairs that exclude each other. The diagonal is false.
-    clique : (c,) int64
-        A partition of the candidates into sets of which one at most can be chosen.
-    mandatory : (g, c) bool
-    original : (c,) int64
-        Index of each candidate in the problem.
-    count : int
-        Largest number of sensors.
-    budget : float
-        Largest total price; infinite where there is no budget.
     """
+
+    rows = (*Constrained.rows, "returns")
 
     returns: NDArray[np.float32]
     weight: Float
-    price: Float
-    conflict: Boolean
-    clique: Integer
-    mandatory: Boolean
-    original: Integer
-    count: int
-    budget: float
 
     @property
     def margin(self) -> float:
@@ -85,18 +68,6 @@ class ReturnsInstance(Constrained):
             rows = self.returns[among[part]] * scale
             gained[part] = np.log1p(rows, out=rows) @ self.weight
         return gained
-
-    def of(self, keep: Integer) -> ReturnsInstance:
-        """Return the same instance with only the candidates ``keep``."""
-        return replace(
-            self,
-            returns=self.returns[keep],
-            price=self.price[keep],
-            conflict=self.conflict[np.ix_(keep, keep)],
-            clique=self.clique[keep],
-            mandatory=self.mandatory[:, keep],
-            original=self.original[keep],
-        )
 
 
 def row_blocks(rows: int) -> Iterator[slice]:
@@ -131,17 +102,10 @@ def make_returns_instance(problem: PlacementProblem, returns: NDArray[np.float32
             "no candidate has returns from any road user; try other heights or sensor types, or clear what stands in "
             "the way"
         )
-    conflict = conflicts(problem.positions[order], problem.xyz[order], problem.min_distance)
     instance = ReturnsInstance(
         returns=np.ascontiguousarray(returns[np.ix_(order, met)], dtype=np.float32),
         weight=problem.weights[met] / problem.weights.sum(),
-        price=problem.prices[order],
-        conflict=conflict,
-        clique=cliques(conflict),
-        mandatory=problem.mandatory_groups[:, order],
-        original=order,
-        count=problem.most_sensors,
-        budget=math.inf if problem.budget is None else float(problem.budget),
+        **constraints_of(problem, order),
     )
     return instance.of(np.flatnonzero(~_dominated(instance, problem.positions[order])))
 

@@ -31,7 +31,7 @@ from ...sensing.visibility.near_surfaces import NearSurfaces, near_surfaces, rot
 from ...sensing.visibility.ray_casting import engine_name, make_ray_caster
 from ...sensing.visibility.scanning import Caster, ScanPosition
 from ...sensing.visibility.surroundings import Surroundings
-from ...sensing.visibility.target_index import TargetIndex
+from ...sensing.visibility.target_index import TargetIndex, is_within
 from ...sensing.visibility.visibility_model import in_sensor_axes
 from ...site.scene_geometry import DEFAULT_REFLECTIVITY
 from .scenario_visibility import ScenarioVisibility, each_in_threads
@@ -287,5 +287,5 @@ class _HeightVisibility:
         ahead = (towards * static.directions(ray)).sum(axis=1)
         along = np.clip(ahead, static.model.min_range, end)
         squared = (towards**2).sum(axis=1) - 2 * along * ahead + along**2
-        passes: Boolean = (squared < static.place.settings.delta**2) & (end >= static.model.min_range)
+        passes: Boolean = is_within(squared, static.place.settings.delta) & (end >= static.model.min_range)
         return passes

@@ -10,10 +10,11 @@ from typing import Any
 from ...errors import SeipError
 from ...progress import Progress
 from ...sensing.scans.frame import Frame
+from ...sensing.scans.sensor import MountedSensor
 from ...storage.files import digest, save_json, whole_file
 from ..results.placement_record import versions
 from .format_interface import Format
-from .sample import OUTCOMES, SPLITS, Sample, SensorPose, TrafficRun, make_sample, require_file_name
+from .sample import OUTCOMES, SPLITS, Sample, TrafficRun, make_sample, require_file_name
 
 SCHEMA = "seip-dataset/1"
 MANIFEST = "manifest.json"
@@ -157,7 +158,9 @@ def _entry_of(manifest: Record, run: TrafficRun, kind: Format, folder: Path) -> 
 
 def _new_entry(run: TrafficRun, kind: Format) -> Record:
     sensors = [_sensor_record(sensor, run) for sensor in run.sensors]
-    parts = [part for sensor in run.sensors for part in (sensor.label, sensor.model, sensor.xyz, sensor.orientation)]
+    parts = [
+        part for sensor in run.sensors for part in (sensor.label, sensor.model.name, sensor.xyz, sensor.orientation)
+    ]
     place = [repr(run.geo_reference)] if run.geo_reference.projection else []
     return {
         "name": run.name,
@@ -177,10 +180,10 @@ def _new_entry(run: TrafficRun, kind: Format) -> Record:
     }
 
 
-def _sensor_record(sensor: SensorPose, run: TrafficRun) -> Record:
+def _sensor_record(sensor: MountedSensor, run: TrafficRun) -> Record:
     return {
         "label": sensor.label,
-        "model": sensor.model,
+        "model": sensor.model.name,
         "local_m": sensor.xyz.tolist(),
         "map_m": (sensor.xyz + run.origin).tolist(),
         "orientation": sensor.orientation.tolist(),

@@ -13,6 +13,7 @@ from ...arrays import Boolean, Float
 from ...errors import SeipError
 from ...geometry.geo_reference import GeoReference
 from ...sensing.scans.frame import Frame, Labels
+from ...sensing.scans.sensor import MountedSensor
 
 SPLITS = ("train", "val", "test")
 
@@ -27,31 +28,6 @@ _FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,99}")
 
 
 @dataclass(frozen=True, eq=False)
-class SensorPose:
-    """A sensor of a dataset: type and pose.
-
-    Parameters
-    ----------
-    label : str
-        Its name; folders are called by it.
-    model : str
-        Its type's name in the catalogue.
-    xyz : (3,) float64, metres
-        Optical centre, local site axes.
-    orientation : (3, 3) float64
-        Rotation from the sensor's axes (x forward, y left, z up) to the site's.
-    """
-
-    label: str
-    model: str
-    xyz: Float
-    orientation: Float
-
-    def __post_init__(self) -> None:
-        require_file_name(self.label, "the sensor", "rename its empty")
-
-
-@dataclass(frozen=True, eq=False)
 class TrafficRun:
     """One simulation of traffic, whole in one split: frames of a run resemble each other too much to be torn apart.
 
@@ -63,7 +39,7 @@ class TrafficRun:
         One of `SPLITS`.
     key : str
         Digest of all that the frames follow from: runs of one key are the same frames.
-    sensors : tuple of SensorPose
+    sensors : tuple of MountedSensor
         In the order of the frames' sensor numbers.
     origin : (3,) float64, metres
         Map coordinates of the local origin: map = local + origin.
@@ -76,7 +52,7 @@ class TrafficRun:
     name: str
     split: str
     key: str
-    sensors: tuple[SensorPose, ...]
+    sensors: tuple[MountedSensor, ...]
     origin: Float
     geo_reference: GeoReference = field(default_factory=GeoReference)
     record: Mapping[str, Any] = field(default_factory=dict)
@@ -87,6 +63,8 @@ class TrafficRun:
             raise SeipError(f"there is no split '{self.split}'; choose one of {', '.join(SPLITS)}")
         if not self.sensors:
             raise SeipError(f"the run '{self.name}' has no sensors; place some and simulate it again")
+        for sensor in self.sensors:
+            require_file_name(sensor.label, "the sensor", "rename its empty")
         labels = Counter(sensor.label.lower() for sensor in self.sensors)
         twice = next((label for label, count in labels.items() if count > 1), None)
         if twice is not None:

@@ -8,16 +8,18 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Rectangle
+from matplotlib.text import Text
 
 from ...arrays import Boolean, Float
 from ...choosing.placement.deployment import Deployment
 from ...site.site import Site
+from .coverage_colours import Legend
 from .drawing import draw_attribution, draw_sensors, draw_title, percent, save_png
-from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
+from .palette import INK, PAPER, SOFT_INK
 
 DPI = 160
 HEAD, FOOT, MARGIN = 0.86, 0.42, 0.2  # inches
-LEGEND_STEP = 2.35  # inches
+LEGEND_GAP = 0.22  # inches
 BACKGROUND_COLOUR = "#e9edf0"
 
 
@@ -39,7 +41,12 @@ class Sight:
 
 
 def save_labelled_view(
-    path: str | os.PathLike[str], picture: str | os.PathLike[str], site: Site, deployment: Deployment, sight: Sight
+    path: str | os.PathLike[str],
+    picture: str | os.PathLike[str],
+    site: Site,
+    deployment: Deployment,
+    legend: Legend | None,
+    sight: Sight,
 ) -> None:
     """Write title, labels and legend on a picture of the scene, as PNG.
 
@@ -47,6 +54,8 @@ def save_labelled_view(
     ----------
     picture : path-like
         The rendered PNG, transparent where there is nothing.
+    legend : Legend or None
+        What the colours on the road mean; None where the road has none.
     """
     pixels = imread(str(picture))
     height, width = pixels.shape[0] / DPI, pixels.shape[1] / DPI
@@ -62,23 +71,28 @@ def save_labelled_view(
     draw_sensors(view, deployment, sight.sensors * size, sight.targets * size, zorder=2, hidden=sight.hidden)
     draw_attribution(view, site.attribution)
     draw_title(figure, site, deployment, MARGIN)
-    _draw_legend(figure, deployment, any_hidden=bool(sight.hidden.any()))
+    if sight.hidden.any():
+        paper = {"boxstyle": "square,pad=0.25", "facecolor": PAPER, "alpha": 0.85, "edgecolor": "none"}
+        note = "outlined sensors stand behind something"
+        view.text(MARGIN, 0.08, note, va="bottom", size=8, color=SOFT_INK, bbox=paper, zorder=3)
+    if legend is not None:
+        _draw_legend(figure, legend)
     save_png(path, figure)
 
 
-def _draw_legend(figure: Figure, deployment: Deployment, *, any_hidden: bool) -> None:
-    """Write at the foot of the picture what the colours on the road and the marks mean."""
+def _draw_legend(figure: Figure, legend: Legend) -> None:
+    """Write at the foot of the picture what the colours on the road mean."""
     width, page = figure.get_size_inches()
     foot = figure.add_axes((0.0, 0.0, 1.0, FOOT / page))
     foot.set(xlim=(0.0, width), ylim=(0.0, FOOT))
     foot.axis("off")
-    for place, times in enumerate(reversed(range(SEEN_TWICE + 1))):
-        x = MARGIN + place * LEGEND_STEP
-        share = np.count_nonzero(np.minimum(deployment.seen_by, SEEN_TWICE) == times) / len(deployment.seen_by)
-        foot.add_patch(Rectangle((x, FOOT / 2 - 0.07), 0.2, 0.14, facecolor=SEEN_COLOURS[times]))
-        foot.text(x + 0.3, FOOT / 2, f"{SEEN_WORDS[times]}  {percent(share)}", va="center", size=9, color=INK)
-    if any_hidden:
-        x = width - MARGIN
-        foot.text(
-            x, FOOT / 2, "outlined sensors stand behind something", ha="right", va="center", size=8, color=SOFT_INK
-        )
+    x = _end(foot.text(MARGIN, FOOT / 2, legend.title, va="center", size=9, color=INK, weight="bold"))
+    for words, colour, share in reversed(list(zip(legend.words, legend.colours, legend.shares, strict=True))):
+        foot.add_patch(Rectangle((x + LEGEND_GAP, FOOT / 2 - 0.07), 0.2, 0.14, facecolor=colour))
+        label = f"{words}  {percent(share)}"
+        x = _end(foot.text(x + LEGEND_GAP + 0.3, FOOT / 2, label, va="center", size=9, color=INK))
+
+
+def _end(text: Text) -> float:
+    """Return where a text ends, inches from the left of the picture."""
+    return float(text.get_window_extent().x1) / DPI

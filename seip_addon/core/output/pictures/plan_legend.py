@@ -101,8 +101,7 @@ class PlanLegend:
 
     def _targets(self, site: Site, deployment: Deployment) -> None:
         shown = of_placement(deployment)
-        title = "Road" if deployment.pedestrian_returns is None else "Returns from a pedestrian on the road"
-        self._heading(title, len(shown.words) * LINE_HEIGHT + FOOTNOTE_HEIGHT)
+        self._heading(shown.title, len(shown.words) * LINE_HEIGHT + FOOTNOTE_HEIGHT)
         for words, colour, share in reversed(list(zip(shown.words, shown.colours, shown.shares, strict=True))):
             self._swatch(facecolor=colour)
             self._text(LEGEND_WIDTH, percent(share), ha="right", weight="bold")

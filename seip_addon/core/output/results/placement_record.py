@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from ... import limits
-from ...arrays import Float
+from ...arrays import Float, Integer
 from ...choosing.placement.deployment import GainBand, Sensor, TypeBand, price_text
 from ...choosing.placement.objective import Objective, Solution
 from ...choosing.placement.problem import Placement
@@ -25,6 +25,8 @@ from ...choosing.placement.returns_summary import ReturnsSummary, share_reached
 from ...errors import SeipError
 from ...geometry.geo_reference import GeoReference
 from ...geometry.orientation import orientation
+from ...sensing.lidar.model import LidarModel
+from ...sensing.scans.sensor import MountedSensor
 from ...site.site import Site
 from ...site.sources import SourceCount
 from ...storage.files import save_json
@@ -166,6 +168,10 @@ class RecordedSensor:
         yaw, tilt, roll = map(math.radians, (self.yaw_deg, self.tilt_deg, self.roll_deg or 0.0))
         return orientation(yaw, tilt, roll)
 
+    def mounted(self, model: LidarModel) -> MountedSensor:
+        """Return the sensor as scans have it, with the LiDAR model of its type."""
+        return MountedSensor(self.id, model, np.array(self.local_m), self.orientation)
+
 
 @dataclass(frozen=True)
 class RecordedCoverage:
@@ -282,6 +288,33 @@ class PlacementRecord:
     def asked(self) -> Asked:
         """What was asked for."""
         return from_json(Asked, self.settings, "settings")
+
+    @property
+    def poses(self) -> Integer:
+        """Rows of the visibility grid of the sensors at candidate poses, (k,) int64."""
+        return np.array([sensor.pose for sensor in self.sensors if sensor.pose is not None], dtype=np.int64)
+
+    def placement(self, covered: float) -> Placement:
+        """Return the placement that `placement_record` wrote down.
+
+        Parameters
+        ----------
+        covered : float
+            Weight of the targets that some sensor sees, which records hold as a share only.
+        """
+        found = self.objective
+        return Placement(
+            chosen=self.poses,
+            objective=found.value,
+            bound=math.nan if found.bound is None else found.bound,
+            gap=math.inf if found.gap is None else found.gap,
+            status=found.status,
+            solver=found.solver,
+            seconds=self.times.durations_s.get("placement", 0.0),
+            covered=covered,
+            price=self.price_usd,
+            notes=self.notes,
+        )
 
     @property
     def installed(self) -> bool:

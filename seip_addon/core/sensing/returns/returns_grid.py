@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Generator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Generator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from ... import limits
 from ...arrays import Integer
 from ...errors import SeipError
-from ...progress import REPORT_INTERVAL, Progress
+from ...progress import Progress
 from ...site.site import Site
 from ...storage.array_file import ArrayFile, ArrayRule, ContentError
 from ...storage.files import digest
 from ...storage.source_digest import source_digest
 from ..lidar.catalogue import find_models
 from ..lidar.model import LidarModel
+from ..visibility.chunks import collect
 from ..visibility.ray_casting import Engine, engine_name, make_ray_caster
 from .expected_returns import expected_returns
 from .road_users import RoadUsers
@@ -129,7 +130,8 @@ def compute_returns(
             origin, orientation = candidates.xyz[pose], candidates.orientation(int(pose))
             returns[pose] = expected_returns(caster, origin, orientation, model, users)[0]
 
-    yield from _in_threads(compute, chunks, min(caster.threads, threads or caster.threads))
+    with ThreadPoolExecutor(min(caster.threads, threads or caster.threads)) as pool:
+        yield from collect(chunks, lambda poses: pool.submit(compute, poses), {}, "returns from road users")
     return ReturnsGrid(returns, returns_key(site, users, used, name))
 
 
@@ -161,23 +163,3 @@ def stored_returns(
     grid = yield from compute_returns(site, users, models, engine, threads)
     grid.save(path)
     return grid
-
-
-def _in_threads(
-    compute: Callable[[Integer], None], chunks: list[Integer], threads: int
-) -> Generator[Progress, None, None]:
-    """Compute chunks of poses in threads; leaving the generator cancels those not begun."""
-    total, done = sum(map(len, chunks)), 0
-    yield Progress(done, total, "returns from road users")
-    pool = ThreadPoolExecutor(threads)
-    try:
-        sizes: dict[Future[None], int] = {pool.submit(compute, chunk): len(chunk) for chunk in chunks}
-        pending = set(sizes)
-        while pending:
-            finished, pending = wait(pending, REPORT_INTERVAL, FIRST_COMPLETED)
-            for future in finished:
-                future.result()
-                done += sizes[future]
-            yield Progress(done, total, "returns from road users")
-    finally:
-        pool.shutdown(cancel_futures=True)

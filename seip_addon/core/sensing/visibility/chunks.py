@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from ...site.candidates import Candidates
 from ...site.site import Site
 from ..lidar.model import LidarModel
 from .visibility_model import VisibilityModel
+
+Result = TypeVar("Result")
 
 _POSITIONS_IN_A_CHUNK = 16  # a second's work or less
 
@@ -118,22 +120,48 @@ def compute_chunks(
     """
     loaded = {number: checkpoint.load(number) for number in range(len(chunks))} if checkpoint else {}
     rows = {number: found for number, found in loaded.items() if found and len(found.packed) == len(chunks[number])}
+    keep = checkpoint.save if checkpoint else None
+    yield from collect(chunks, submit, rows, "visibility", keep)
+    return [rows[number] for number in range(len(chunks))]
+
+
+def collect(
+    chunks: Sequence[Integer],
+    submit: Callable[[Integer], Future[Result]],
+    results: dict[int, Result],
+    what: str,
+    keep: Callable[[int, Result], None] | None = None,
+) -> Generator[Progress, None, None]:
+    """Compute the chunks without a result, and add theirs; closing the generator cancels what has not begun.
+
+    Parameters
+    ----------
+    chunks : sequence of (k,) int64
+        Candidate poses.
+    submit : callable
+        Starts the work on one chunk.
+    results : dict of int to result
+        By the number of the chunk; those of this call are added.
+    what : str
+        What progress is called.
+    keep : callable, optional
+        Called with each number and result as soon as it is there.
+    """
     total = sum(map(len, chunks))
-    done = sum(len(chunks[number]) for number in rows)
-    yield Progress(done, total, "visibility")
-    numbers = {submit(chunk): number for number, chunk in enumerate(chunks) if number not in rows}
+    done = sum(len(chunks[number]) for number in results)
+    yield Progress(done, total, what)
+    numbers = {submit(chunk): number for number, chunk in enumerate(chunks) if number not in results}
     pending = set(numbers)
     try:
         while pending:
             finished, pending = wait(pending, REPORT_INTERVAL, FIRST_COMPLETED)  # so that the caller can cancel soon
             for future in finished:
                 number = numbers[future]
-                rows[number] = future.result()
-                if checkpoint:
-                    checkpoint.save(number, rows[number])
+                results[number] = future.result()
+                if keep:
+                    keep(number, results[number])
                 done += len(chunks[number])
-            yield Progress(done, total, "visibility")
+            yield Progress(done, total, what)
     finally:
         for future in pending:
             future.cancel()
-    return [rows[number] for number in range(len(chunks))]

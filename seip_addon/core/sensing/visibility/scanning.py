@@ -31,7 +31,7 @@ from .near_surfaces import NearSurfaces
 from .occlusion import stopped_by
 from .ray_culling import rays_near
 from .settings import VisibilitySettings
-from .target_index import TargetIndex
+from .target_index import TargetIndex, is_within, squared_length
 
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
 
@@ -257,7 +257,7 @@ class _Returns:
         """
         row = self._rows(bundles.channel, bundles.middle % self._beams.steps[bundles.channel])
         gap = self._point[row] - self._surfaces.xyz[bundles.target]
-        sees = gap[:, 0] ** 2 + gap[:, 1] ** 2 + gap[:, 2] ** 2 < self._position.settings.delta**2
+        sees = is_within(squared_length(gap), self._position.settings.delta)
         triangle = self._triangle[row]
         near = np.flatnonzero(sees)
         for number, model in enumerate(self._position.models):

@@ -6,9 +6,21 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...arrays import Float, Integer
+from ...arrays import Boolean, Float, Integer
 
 _MAX_CELLS_PER_SIDE = 2000
+
+
+def squared_length(gap: Float) -> Float:
+    """Squared lengths of vectors, (n,) from (n, 3); sums are of the same order everywhere, to the last digit."""
+    squared: Float = gap[:, 0] ** 2 + gap[:, 1] ** 2 + gap[:, 2] ** 2
+    return squared
+
+
+def is_within(squared_distance: Float, delta: float) -> Boolean:
+    """Return whether returns at squared distances from targets see them: they are nearer than δ, not just as near."""
+    near: Boolean = squared_distance < delta**2
+    return near
 
 
 class TargetIndex:
@@ -85,8 +97,7 @@ class TargetIndex:
             point = np.repeat(some, count)
             slot = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
             gap = points[point] - self._xyz[slot]
-            squared = gap[:, 0] ** 2 + gap[:, 1] ** 2 + gap[:, 2] ** 2
-            near = squared < self._delta**2
+            near = is_within(squared_length(gap), self._delta)
             yield which[point[near]], slot[near]
 
     def _cells(self, points: Float) -> tuple[Float, Float]:

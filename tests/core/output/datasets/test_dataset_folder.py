@@ -202,7 +202,7 @@ def test_names_that_cannot_be_files_are_refused(name, tmp_path):
     with pytest.raises(SeipError, match="cannot give its name to a file"):
         make_run(name)
     with pytest.raises(SeipError, match="cannot give its name to a file"):
-        replace(make_sensors()[0], label=name)
+        make_run(sensors=(replace(make_sensors()[0], label=name),))
     refused("cannot give its name to a file", "kitti", [(name, make_frame())], make_run(), tmp_path)
 
 
