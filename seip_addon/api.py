@@ -85,7 +85,7 @@ def compute_visibility(layout: Layout, threads: int | None = None) -> Survey:
     Parameters
     ----------
     threads : int, optional
-        Threads at most; as many as pay if not given.
+        Maximum number of threads; by default the number that saves time.
 
     Returns
     -------

@@ -67,7 +67,7 @@ class Background(Generic[Result]):
         try:
             with closing(steps):
                 result = finish(steps, report)
-        except BaseException as error:  # noqa: BLE001  # raised again where the result is asked for
+        except BaseException as error:  # noqa: BLE001  # raised again when the result is read
             self._end.set_exception(error)
         else:
             self._end.set_result(result)

@@ -1,7 +1,7 @@
 """Live coverage: computed again whenever a sensor is moved.
 
 A handler notes that something moved; a timer, a moment later, casts the rays of
-those sensors alone and colours the road anew. Neither is there while this is off.
+only those sensors and colours the road again. Nothing runs while this is off.
 """
 
 import time
@@ -48,7 +48,7 @@ def stop() -> None:
 
 
 def update() -> None:
-    """Cast the rays of the sensors that moved, and colour the road anew."""
+    """Cast the rays of the sensors that moved and colour the road again."""
     if session.following is None:
         return
     began = time.perf_counter()
@@ -86,7 +86,7 @@ def _moved(followed: FollowedSensors, sensors: dict[str, MountedSensor]) -> tupl
 
 
 def _as_placed(deployment: Deployment, visible: Boolean) -> dict[str, tuple[MountedSensor, Boolean]]:
-    """Return what is known of sensors at candidate poses; the others are looked from anew."""
+    """Return the visibility of sensors at candidate poses; that of the others is computed again."""
     there = [(sensor, sensor.pose) for sensor in deployment.sensors if sensor.pose is not None]
     return {sensor.label: (sensor.mounted, visible[pose]) for sensor, pose in there}
 

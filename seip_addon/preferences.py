@@ -93,7 +93,7 @@ def detecting_python() -> DetectingPython | None:
 
 
 def cores() -> int | None:
-    """Return how many threads may compute visibility at once, or None where nobody has said."""
+    """Return the number of threads for visibility, or None if it is not set."""
     preferences = own()
     return None if preferences is None else preferences.cores
 

@@ -34,7 +34,7 @@ def is_newer(scene: bpy.types.Scene) -> bool:
 
 
 def obstacle(scene: bpy.types.Scene) -> str:
-    """Return why nothing can be computed for a scene, in a sentence for panels and buttons alike; empty if it can."""
+    """Return the reason why nothing can be computed for a scene, as a sentence for panels and buttons, or ""."""
     if is_linked(scene):
         return LINKED
     if is_newer(scene):

@@ -10,7 +10,7 @@ from .session import session
 
 
 def refresh() -> None:
-    """Read the catalogues anew, and list what is new in all scenes; where a file is at fault the shipped types stay."""
+    """Read the catalogues again and list new types in all scenes; if a file is invalid the shipped types stay."""
     session.sensor_types.clear()
     session.catalogue_error = ""
     try:

@@ -35,14 +35,14 @@ from .scene.changes import Watch
 
 @dataclass(frozen=True)
 class Resources:
-    """What the preferences give to work, which must not ask Blender itself once it is in a thread.
+    """Values of the preferences for work in a thread, which must not read them from Blender.
 
     Parameters
     ----------
     cache : Path
         Folder in which visibility is kept.
     cores : int or None
-        Threads that may compute it, or None where nobody has said.
+        Number of threads, or None if it is not set.
     """
 
     cache: Path
@@ -68,7 +68,7 @@ class Resources:
 
 @dataclass(frozen=True)
 class SceneState:
-    """What is known of a scene: its layout or survey, its placement, and what they were made from.
+    """State of a scene: its layout or survey, its placement, and their inputs.
 
     Parameters
     ----------
@@ -79,11 +79,11 @@ class SceneState:
     watch : Watch
         Whether the scene has changed since.
     resources : Resources
-        As the preferences were when this was asked for last.
+        Values of the preferences at the last request.
     catalogues : tuple
         The user's catalogue files and when each was last written.
     estimate : Estimate or None
-        Of what the visibility grid will take.
+        Time and memory that the visibility grid will take.
     solution : Solution or None
         The one that the scene's result tells of.
     record : str
@@ -120,7 +120,7 @@ class SceneState:
 
 @dataclass(frozen=True)
 class CheckedScene:
-    """What a check of a site was made on.
+    """Inputs of a check of a site.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class FollowedSensors:
     scene : int
         The scene's session number.
     visibility : VisibilityModel
-        Of its site.
+        Visibility of the site.
     sensors : dict of str to (MountedSensor, (t,) bool)
         Where each was when it was looked from last, and what it saw.
     coverage : float
@@ -241,7 +241,7 @@ class Session:
     Parameters
     ----------
     states, checks, traffic, scans : dict
-        Of each scene.
+        State, checks, traffic and scans of each scene.
     overlays : dict of int to dict of str to Overlay
         What is drawn in the views of each scene, by name.
     sensor_types : dict of str to LidarModel

@@ -43,7 +43,7 @@ def sensors_key(scene: bpy.types.Scene) -> str:
 
 
 class SEIP_OT_detect(LongWork[str], bpy.types.Operator):
-    """Scan runs of traffic with the sensors as they hang, and see which road users a trained detector finds; it runs in a Python with PyTorch of its own"""  # noqa: E501  # a tooltip is one line
+    """Scan runs of traffic with the sensors of the scene and detect road users; runs in a separate Python with PyTorch"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.detect"
     bl_label = "Detect"

@@ -287,7 +287,7 @@ class SEIP_OT_evaluate_sensors(ForPlacement, LongWork[SceneState], bpy.types.Ope
     bl_label = "Evaluate Moved Sensors"
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Read where the sensors hang."""
+        """Read the poses of the sensors."""
         mounted = read_sensors(scene, preferences.catalogue(), hidden=True)
         return _evaluated(
             scene_survey.with_grid_of_placement(scene),
@@ -297,13 +297,13 @@ class SEIP_OT_evaluate_sensors(ForPlacement, LongWork[SceneState], bpy.types.Ope
         )
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
-        """Make them the placement, where they hang."""
+        """Make the sensors at their present poses the placement."""
         survey, solution = result.placed()
         live_coverage.stop()
         take_over(scene, survey.site, solution.deployment, labelled_sensors(scene, hidden=True))
         provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
         keep_result(scene, result, record_of(survey, solution, provenance))
-        self.report({"INFO"}, f"coverage {solution.deployment.coverage:.2%} where the sensors hang")
+        self.report({"INFO"}, f"coverage {solution.deployment.coverage:.2%} at the sensors' present poses")
 
 
 def _evaluated(

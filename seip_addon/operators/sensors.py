@@ -17,7 +17,7 @@ from .base import Outcome, attempt
 
 
 class SEIP_OT_list_sensor_types(bpy.types.Operator):
-    """Read the catalogues anew, and list what is new"""
+    """Read the catalogues again and list new types"""
 
     bl_idname = "seip.list_sensor_types"
     bl_label = "Read Catalogues"

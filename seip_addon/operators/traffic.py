@@ -37,7 +37,7 @@ INSTANTS = 60
 
 NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
 NO_LOADED = "There is no loaded traffic: load a traffic file first."
-NOT_AT_CANDIDATES = "Sensors hang where hands have put them: a placement in traffic is tried at candidate poses alone."
+NOT_AT_CANDIDATES = "Sensors were moved by hand: a placement in traffic is evaluated at candidate poses only."
 NO_TRAFFIC = "There is nothing to scan: name a traffic file, or animate objects in SEIP Traffic."
 NO_SENSORS = "There is no sensor to scan with: place sensors first."
 

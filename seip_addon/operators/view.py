@@ -104,7 +104,7 @@ class SEIP_OT_toggle_legend(bpy.types.Operator):
 
 
 _items: list[tuple[str, str, str]] = []
-"""Blender keeps no strings of a list that is made anew: they must live on here."""
+"""Blender does not keep the strings of a dynamic list: they must stay alive here."""
 
 
 def _sensors(_operator: object, context: bpy.types.Context | None) -> list[tuple[str, str, str]]:
@@ -136,7 +136,7 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneState], bpy.types.Ope
         key = str(obj.get(contract.SENSOR))
         pose = pose_at(survey.site.candidates, key, *pose_of(obj))
         if pose is None:
-            raise SeipError(f"{self.sensor} hangs at no candidate pose: put it back, or place again")
+            raise SeipError(f"{self.sensor} is not at a candidate pose: move it back, or place again")
         settings = survey.settings
         row = survey.grid.sees(pose)
         sight = sight_lines(survey.site, pose, survey.models[key], row, settings.visibility.delta, settings.engine)
@@ -173,7 +173,7 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operato
         return super().poll(context) and _can(cls, not_evaluated(context.scene))
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Find the placement again, and render it where that is asked for."""
+        """Restore the placement and render it if requested."""
         self._path = _free(_named(scene.seip.view.picture))
         self._is_view = scene.seip.view.picture_of == "VIEW"
         return scene_survey.with_placement(scene) if self._is_view else started(_rendered_sheet(self._path, scene))
@@ -234,7 +234,7 @@ def _save_sheet(path: Path, state: SceneState, view: Any) -> None:  # noqa: ANN4
 
 
 def _viewports() -> list[bpy.types.Area]:
-    """Return the 3D viewports that are open: one may have been closed since a picture was asked for."""
+    """Return the open 3D viewports: one may have been closed since the picture was requested."""
     areas = (area for window in bpy.context.window_manager.windows for area in window.screen.areas)
     return [area for area in areas if area.type == "VIEW_3D"]
 

@@ -35,7 +35,7 @@ CHANGED = "The sensors have changed since: detect again."
 
 
 class SEIP_PT_detection(Sidebar, bpy.types.Panel):
-    """Average precision of the sensors as they hang."""
+    """Panel: average precision with the sensors of the scene."""
 
     bl_idname = "SEIP_PT_detection"
     bl_label = "Detection"
@@ -62,7 +62,7 @@ class SEIP_PT_detection(Sidebar, bpy.types.Panel):
 
 
 def _draw_found(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
-    """Draw the figures, for as long as they are of the sensors as they hang, and where the files are."""
+    """Draw the figures while they belong to the present sensors, and the folder of the files."""
     detection, box = scene.seip.detection, layout.box()
     try:
         found = parsed_detection(detection.record)

@@ -1,4 +1,4 @@
-"""Where people look for the add-on: File ▸ Import, files dropped into a view, and menus, which the search goes by."""
+"""Entry points outside the sidebar: File ▸ Import, files dropped into a view, and menus, which the search uses."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class SEIP_FH_openstreetmap(_Dropped, bpy.types.FileHandler):
 
 
 class SEIP_MT_main(bpy.types.Menu):
-    """What the sidebar's buttons do, by name."""
+    """Menu with the operators of the sidebar, by name."""
 
     bl_idname = "SEIP_MT_main"
     bl_label = "SEIP"

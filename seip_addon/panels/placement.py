@@ -40,7 +40,7 @@ class SEIP_UL_rules(RowList, bpy.types.UIList):
 
 
 class SEIP_PT_placement(Sidebar, bpy.types.Panel):
-    """Which sensors where."""
+    """Panel: choice of the sensors."""
 
     bl_idname = "SEIP_PT_placement"
     bl_label = "Placement"

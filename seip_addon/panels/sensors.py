@@ -47,7 +47,7 @@ def _in_short(model: LidarModel) -> str:
 
 
 class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
-    """Which types of sensor to choose from."""
+    """Panel: sensor types to choose from."""
 
     bl_idname = "SEIP_PT_sensors"
     bl_label = "Sensors"
@@ -96,7 +96,7 @@ def _looks_one_way(key: str) -> bool:
 
 
 class SEIP_PT_sensor_details(Sidebar, bpy.types.Panel):
-    """What is known of the active type."""
+    """Panel: properties of the active sensor type."""
 
     bl_idname = "SEIP_PT_sensor_details"
     bl_parent_id = "SEIP_PT_sensors"

@@ -83,7 +83,7 @@ def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
 
 
 class SEIP_PT_site_roles(Sidebar, bpy.types.Panel):
-    """What objects mean."""
+    """Panel: roles of objects."""
 
     bl_idname = "SEIP_PT_site_roles"
     bl_parent_id = "SEIP_PT_site"

@@ -28,7 +28,7 @@ ASPECTS: dict[Aspect, str] = {"returns": "Returns", "seen": "Seen", "times": "Se
 
 
 class SEIP_PT_view(Sidebar, bpy.types.Panel):
-    """Seeing it."""
+    """Panel: what the viewport shows."""
 
     bl_idname = "SEIP_PT_view"
     bl_label = "View"

@@ -14,7 +14,7 @@ from .wrapped_text import draw_sentence
 
 
 class SEIP_PT_visibility(Sidebar, bpy.types.Panel):
-    """Who sees what."""
+    """Panel: visibility grid."""
 
     bl_idname = "SEIP_PT_visibility"
     bl_label = "Visibility"

@@ -17,7 +17,7 @@ NARROWEST = 12
 
 
 def draw_sentence(layout: bpy.types.UILayout, text: str, *, icon: str = "NONE", alert: bool = False) -> None:
-    """Draw a sentence on as many lines as the sidebar's width asks for."""
+    """Draw a sentence, wrapped to the width of the sidebar."""
     context = bpy.context
     width = context.region.width / context.preferences.system.ui_scale if context.region is not None else 250.0
     room = width - MARGIN - (BESIDE_ICON if icon != "NONE" else 0.0)

@@ -7,7 +7,7 @@ from bpy.props import StringProperty
 
 
 class SEIP_PG_detection(bpy.types.PropertyGroup):
-    """What road users are detected with, and the last figures."""
+    """Settings of detection, and the latest figures."""
 
     runs: StringProperty(
         name="Runs",

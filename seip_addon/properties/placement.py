@@ -1,4 +1,4 @@
-"""Properties of the placement: what is asked of it."""
+"""Properties of the placement: its objective."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class SEIP_PG_position_rule(bpy.types.PropertyGroup):
 
 
 class SEIP_PG_goal(bpy.types.PropertyGroup):
-    """What is asked of a placement."""
+    """Objective of a placement."""
 
     limit: EnumProperty(
         name="Goal",

@@ -46,7 +46,7 @@ ROLE_ITEMS = tuple((role.name, role.value.capitalize(), f"{roles.WORDS[role].cap
 
 
 class SEIP_PG_site(bpy.types.PropertyGroup):
-    """Where the site comes from, and what the check found in it."""
+    """Sources of the site, and the findings of the check."""
 
     source: StringProperty(
         name="Map",
@@ -117,7 +117,7 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
         return (bool(self.junction) or self.is_extract()) and self.region_shape == "APPROACHES"
 
     def asked(self) -> AskedSite:
-        """Return what is asked for, as the core takes it.
+        """Return the request as the core takes it.
 
         Raises
         ------

@@ -131,7 +131,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         return Weather(as_typed(self.rain), as_typed(self.visibility) if self.fog else math.inf, self.wet_road)
 
     def settings(self) -> SurveySettings:
-        """Return what is asked, as the core takes it.
+        """Return the settings as the core takes them.
 
         Raises
         ------

@@ -19,7 +19,7 @@ def _follow(_own: object, _context: bpy.types.Context) -> None:
 
 
 class SEIP_PG_traffic(bpy.types.PropertyGroup):
-    """Where the traffic comes from, and how it is scanned."""
+    """Source of the traffic, and settings of its scans."""
 
     file: StringProperty(
         name="Traffic",
@@ -103,7 +103,7 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
         return TrafficFiles(absolute(self.file), routes, absolute(self.net) if self.net else None)
 
     def recording(self) -> RecordingSettings:
-        """Return what is asked of scans, as the core takes it."""
+        """Return the settings of scans as the core takes them."""
         return RecordingSettings(
             scan=ScanSettings(self.seed, self.noise, self.rolling_shutter, self.id_data.seip.survey.engine),
             start=None if self.whole else as_typed(self.start),

@@ -1,6 +1,6 @@
 """Detection of changes to a scene since it was read.
 
-Blender reports what it evaluates anew: objects that move or change their shape.
+Blender reports what it evaluates again: objects that move or change their shape.
 What it does not report, such as objects that come and go, is in a digest of
 places and properties that takes no look at any vertex.
 """
@@ -65,7 +65,7 @@ def watch(scene: bpy.types.Scene) -> Watch:
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Note what Blender evaluated anew; a handler of ``depsgraph_update_post``."""
+    """Note what Blender evaluated again; a handler of ``depsgraph_update_post``."""
     concerned = [one for one in _watches if one.scene == scene.session_uid and not one.changed]
     if not concerned:
         return

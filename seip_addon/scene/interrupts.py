@@ -13,7 +13,7 @@ def held_interrupts() -> Iterator[None]:
     """Hold Ctrl-C back until the block ends, and raise it then.
 
     Rendering and saving call back into Python and swallow an interrupt that is
-    raised there: the run would go on as if nobody had asked it to stop. Where
+    raised there: the run would continue. Where
     Blender itself has taken the signal, its handler stays: Python knows no way
     to put it back.
     """

@@ -39,7 +39,7 @@ _SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 
 @dataclass(frozen=True)
 class SceneReading:
-    """What was read from a scene, and what a user should know of it.
+    """Content of a scene, with notes for the user.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class Shown:
     triangles : (n, 3, 3) float64, metres, or None
         In site axes; None where there are no faces, or faulty ones.
     reflectivity : (n,) float64 or None
-        Of the triangles.
+        Reflectivity of each triangle.
     source : bpy.types.Object
         What the user put into the scene: the object or what instances it.
     fault : str

@@ -45,7 +45,7 @@ UNSEEN_TYPES = {"LIGHT", "CAMERA", "SPEAKER", "LIGHT_PROBE"}
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """What it takes to take the picture, but for the scene.
+    """Settings of a picture, without the scene.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def render_elsewhere(
     Yields
     ------
     Progress
-        Of samples; the other Blender is ended when this is closed.
+        Samples rendered; closing the generator ends the other Blender.
 
     Raises
     ------
@@ -152,9 +152,9 @@ def _command(job: Path) -> list[str]:
     return [sys.executable, script, "--", str(job)]
 
 
-def _samples(said: str) -> Progress:
-    told = SAMPLE.findall(said)
-    return Progress(int(told[-1]) if told else 0, sample_count(), "rendering")
+def _samples(line: str) -> Progress:
+    counts = SAMPLE.findall(line)
+    return Progress(int(counts[-1]) if counts else 0, sample_count(), "rendering")
 
 
 def take(shot: Shot, scene: bpy.types.Scene, raw: Path) -> Boolean:

@@ -15,14 +15,14 @@ import bpy
 
 def main(job: Path) -> None:
     """Render what a job asks for, and write beside the picture which sensors are hidden."""
-    asked = json.loads(job.read_text())
+    request = json.loads(job.read_text())
     package = Path(__file__).resolve().parents[1]
-    sys.path[:] = [str(package.parent), *asked["path"]]
+    sys.path[:] = [str(package.parent), *request["path"]]
     render = import_module(f"{package.name}.scene.render")  # no extension is installed here
 
-    bpy.ops.wm.open_mainfile(filepath=asked["blend"], load_ui=False, use_scripts=False)
-    raw = Path(asked["raw"])
-    hidden = render.take(render.Shot.from_json(asked["shot"]), bpy.data.scenes[asked["scene"]], raw)
+    bpy.ops.wm.open_mainfile(filepath=request["blend"], load_ui=False, use_scripts=False)
+    raw = Path(request["raw"])
+    hidden = render.take(render.Shot.from_json(request["shot"]), bpy.data.scenes[request["scene"]], raw)
     raw.with_suffix(".json").write_text(json.dumps(hidden.tolist()))
 
 

@@ -23,12 +23,12 @@ def read_sensors(
 
     An empty's x axis points along azimuth zero and its z axis along the sensor's
     axis; its scale means nothing. Hidden empties do not count unless they are
-    asked for. One without a label of its own gets the first that is free.
+    requested. A sensor without a label gets the first free one.
 
     Parameters
     ----------
     catalogue : mapping of str to LidarModel
-        Of which the empties' ``seip_sensor`` are keys.
+        Sensor types by the keys in the empties' ``seip_sensor``.
     hidden : bool
         Whether hidden empties count.
 
@@ -112,7 +112,7 @@ def pose_of(obj: bpy.types.Object) -> tuple[Float, Float]:
     matrix = np.array(obj.matrix_world, dtype=np.float64)
     length = np.linalg.norm(matrix[:3, :3], axis=0)
     if not (np.isfinite(matrix).all() and (length > 0).all()):
-        raise SeipError(f"empty {obj.name!r} has no place, or a scale of zero: set its transform anew")
+        raise SeipError(f"empty {obj.name!r} has an invalid transform or zero scale: reset it")
     return matrix[:3, 3], _orthonormal(matrix[:3, :3] / length)
 
 

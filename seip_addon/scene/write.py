@@ -61,7 +61,7 @@ def write_result(scene: bpy.types.Scene, site: Site, deployment: Deployment) -> 
 def take_over(
     scene: bpy.types.Scene, site: Site, deployment: Deployment, empties: Mapping[str, bpy.types.Object]
 ) -> None:
-    """Make sensors that hang where a hand has put them the scene's result: no object of theirs is moved or removed.
+    """Make sensors that were moved by hand the scene's result; their objects are neither moved nor removed.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def _name(sensor: Sensor) -> str:
 
 
 def _describe(empty: bpy.types.Object, sensor: Sensor) -> None:
-    """Say in an empty's properties which sensor it is, where it hangs and what it sees."""
+    """Write the sensor, its position and its coverage to the properties of an empty."""
     properties = {
         MARK: True,
         contract.LABEL: sensor.label,

@@ -26,7 +26,7 @@ LIFT = 0.05  # metres of the rings above the road
 
 @dataclass(frozen=True, eq=False)
 class Preview:
-    """Whose beams are shown.
+    """Sensor whose beams are shown.
 
     Parameters
     ----------

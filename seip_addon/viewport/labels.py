@@ -33,7 +33,7 @@ def draw_labels(labels: list[Label], to_view: Matrix, size: tuple[int, int], sca
         From the scene's axes to the view's: -1 to 1 after division.
     size : (width, height) pixels
     scale : float
-        Of the interface.
+        Scale of the interface.
     """
     blf.size(FONT, TEXT_SIZE * scale)
     shown, boxes = [], []

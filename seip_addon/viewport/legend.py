@@ -25,7 +25,7 @@ def draw_legend(blocks: Sequence[Block], region: bpy.types.Region, area: bpy.typ
     region : bpy.types.Region
         The viewport's window.
     scale : float
-        Of the interface.
+        Scale of the interface.
     """
     overlaps = bpy.context.preferences.system.use_region_overlap
     beside = next((other.width for other in area.regions if other.type == "UI" and overlaps and other.width > 1), 0)

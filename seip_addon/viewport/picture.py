@@ -1,4 +1,4 @@
-"""What a viewport shows, as an array of pixels: the scene, what is drawn over it, and the legend."""
+"""Picture of a viewport as an array of pixels: the scene, overlays and the legend."""
 
 import bpy
 import gpu

@@ -173,7 +173,7 @@ def test_tilted_sensors_are_where_the_placement_put_them_until_a_hand_turns_them
     live_coverage.update()
     assert session.following.moved == ("S1",)
     assert session.following.coverage != coverage
-    with pytest.raises(RuntimeError, match="S1 hangs at no candidate pose"):
+    with pytest.raises(RuntimeError, match="S1 is not at a candidate pose"):
         bpy.ops.seip.show_sight_lines(sensor="S1")
 
 

@@ -82,7 +82,7 @@ def test_a_sensor_that_was_moved_has_no_sight_lines(placed):
     obj = next(obj for obj in bpy.data.collections["SEIP Sensors"].objects if obj.get("seip_label") == "S1")
     obj.location.x += 0.5
     bpy.context.view_layer.update()
-    with pytest.raises(RuntimeError, match="S1 hangs at no candidate pose"):
+    with pytest.raises(RuntimeError, match="S1 is not at a candidate pose"):
         bpy.ops.seip.show_sight_lines(sensor="S1")
 
 
