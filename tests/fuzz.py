@@ -560,7 +560,7 @@ def _read_detector(path: Path, _: bytes) -> None:
 
 
 def _records(folder: Path) -> list[bytes]:
-    from core.output.report.report_folder import make_folder  # noqa: PLC0415
+    from tests.builders.report_folder import make_folder  # noqa: PLC0415
 
     make_folder(folder / "sample")
     return [(folder / "sample" / "placement.json").read_bytes()]
@@ -598,7 +598,7 @@ def _read_record(path: Path, _: bytes) -> None:
 
 
 def _site_files(folder: Path) -> list[bytes]:
-    from core.output.report.report_folder import make_folder  # noqa: PLC0415
+    from tests.builders.report_folder import make_folder  # noqa: PLC0415
 
     make_folder(folder / "sample")
     return [(folder / "sample" / "site.npz").read_bytes()]

@@ -1,1 +1,1 @@
-"""What the program writes: records, tables, pictures, reports and datasets."""
+"""Output of the program: records, tables, pictures, reports and datasets."""

@@ -215,7 +215,7 @@ def _count(entry: Record, sample: Sample) -> None:
 
 
 def _written(folder: Path, kind: Format, sample: Sample) -> Record:
-    """Write a sample's files, but for those that are there, and return what the manifest says of it."""
+    """Write the missing files of a sample and return its entry in the manifest."""
     files = {}
     for path, content in kind.sample_files(sample).items():
         target = folder / path

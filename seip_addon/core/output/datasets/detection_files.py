@@ -19,7 +19,7 @@ def kitti_results(boxes: Float, categories: Sequence[str], score: Float) -> str:
     boxes : (k, 7) float64
         x, y, z of the middle, length, width, height (metres), yaw (radians), local site axes.
     categories : sequence of str
-        Of each.
+        Category of each box.
     score : (k,) float64, 0 to 1
     """
     numbers, alpha = camera_boxes(boxes[:, :3], boxes[:, 3:6], boxes[:, 6])

@@ -32,7 +32,7 @@ def sample_files(sample: Sample) -> dict[str, Callable[[], bytes]]:
     return {f"{sample.run.split}/{sample.run.name}/{sample.frame_id}.laz": lambda: _laz(sample)}
 
 
-def notes(run: TrafficRun) -> tuple[str, ...]:  # noqa: ARG001  # every run is alike
+def notes(run: TrafficRun) -> tuple[str, ...]:  # noqa: ARG001  # the same for every run
     """Note nothing, but see that LAZ can be written here."""
     _laspy()
     return ()

@@ -34,7 +34,7 @@ class TrafficRun:
     Parameters
     ----------
     name : str
-        Of the run, unique in a dataset; folders are called by it.
+        Name of the run, unique in a dataset; also the name of its folders.
     split : str
         One of `SPLITS`.
     key : str
@@ -78,15 +78,15 @@ class Sample:
     Parameters
     ----------
     number : int
-        Of the frame in the whole dataset, from 0.
+        Number of the frame in the whole dataset, from 0.
     frame_id : str
-        Of the frame in its run.
+        Identifier of the frame in its run.
     frame : Frame
         With all its labels.
     fates : tuple of str
-        What becomes of each of them, one of `OUTCOMES`.
+        Outcome for each of them, one of `OUTCOMES`.
     classes : tuple of str
-        Of each box, in the words of the format.
+        Class of each box, as the format names it.
     """
 
     number: int

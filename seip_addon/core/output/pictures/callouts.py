@@ -28,7 +28,7 @@ def place_callouts(anchors: Float, sizes: Float, bounds: Bounds, clearance: floa
     sizes : (k, 2) float64
         Widths and heights of the labels.
     bounds : (left, bottom, right, top)
-        Of the picture, in the unit of the anchors.
+        Bounds of the picture, in the unit of the anchors.
     clearance : float
         To keep between a label and everything else.
     subject : (m, 2) float64

@@ -19,7 +19,7 @@ Aspect = Literal["returns", "seen", "times", "weights"]
 
 @dataclass(frozen=True, eq=False)
 class Legend:
-    """What the colours of targets mean.
+    """Legend of the colours of targets.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Colouring:
     Parameters
     ----------
     words : tuple of str
-        Of each class, as a legend says them.
+        Name of each class in a legend.
     colours : tuple of str
         Web colour of each class.
     of : (t,) int64
@@ -124,7 +124,7 @@ def colouring(aspect: Aspect, seen_by: Integer, weight: Float, returns: Numbers 
 
 
 def _by_weight(weight: Float) -> Colouring:
-    """Give each weight a class, or where there are many, neighbouring ones one class: as many of them in each."""
+    """Group the weights into classes: one for each weight, or groups of neighbouring weights of equal size."""
     levels, of = np.unique(weight.round(6), return_inverse=True)
     groups = np.array_split(np.arange(len(levels)), min(len(levels), len(WEIGHT_COLOURS)))
     group_of = np.repeat(np.arange(len(groups)), [len(group) for group in groups])

@@ -82,11 +82,11 @@ def draw_sensors(
     points : (k, 2) float64
         Where each sensor is, in data coordinates.
     road : (t, 2) float64
-        Where each target is; labels keep off them where they can.
+        Position of each target; labels avoid them where possible.
     zorder : float
-        Of the marks; labels and their lines lie below.
+        Drawing order of the marks; labels and their lines are drawn below.
     hidden : (k,) bool, optional
-        Sensors behind something, which are marked by an outline alone.
+        Hidden sensors, which are marked by an outline only.
     """
     if 0 < len(points) <= MAX_LABELLED:
         words = [f"{s.label}  {s.model.key} · {s.height:.3g} m{s.turned}" for s in deployment.sensors]

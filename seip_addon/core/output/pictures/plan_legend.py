@@ -33,13 +33,13 @@ LETTERS_PER_LINE = 62  # of small text that fit into a line
 
 
 class PlanLegend:
-    """The legend, written from top to bottom in as many columns as it needs; lengths in inches.
+    """Legend of a plan, written from top to bottom in columns; lengths in inches.
 
     Parameters
     ----------
     axes : Axes
     height : float, inches
-        Of the axes.
+        Height of the axes.
     """
 
     def __init__(self, axes: Axes, height: float) -> None:

@@ -106,9 +106,9 @@ def _map_size(region: BaseGeometry) -> tuple[float, float]:
 
 
 def _window(region: BaseGeometry, map_width: float, map_height: float) -> Window:
-    """Return the part of the plane to show: the region with some room, on a map of so many inches.
+    """Return the part of the plane to show: the region with a margin, on a map of given size in inches.
 
-    There is more room where scale or north arrow would hide some of the region.
+    The margin is larger where the scale or the north arrow would hide part of the region.
     """
     x, y, width, height = _bounds(region)
     shape = map_height / map_width
@@ -220,7 +220,7 @@ def _draw_candidates(plan: Axes, geometry: SceneGeometry, site: Site) -> None:
 
 
 def _draw_headings(plan: Axes, deployment: Deployment, inch: float) -> None:
-    """Draw an arrow from each sensor that does not look all round alike, and a wedge of a limited field of view."""
+    """Draw an arrow for each sensor with a preferred direction, and a wedge for a limited field of view."""
     for sensor in deployment.sensors:
         x, y, _ = sensor.xyz.tolist()
         if not sensor.model.all_round:
@@ -234,7 +234,7 @@ def _draw_headings(plan: Axes, deployment: Deployment, inch: float) -> None:
 
 
 def draw_scale(plan: Axes, inch: float) -> None:
-    """Draw a bar of a round length, at most two inches of so many metres."""
+    """Draw a scale bar of a round length, at most two inches long; ``inch`` is an inch of the plan in metres."""
     length = _scale_length(inch)
     left, bottom = plan.get_xlim()[0] + 0.25 * inch, plan.get_ylim()[0] + 0.25 * inch
     _draw_paper(plan, *_scale_paper(plan.get_xlim()[0], plan.get_ylim()[0], inch))
@@ -246,7 +246,7 @@ def draw_scale(plan: Axes, inch: float) -> None:
 
 
 def _scale_length(inch: float) -> float:
-    """Return the largest round length, in metres, of at most two inches of so many metres."""
+    """Return the largest round length, metres, of at most two inches of the plan."""
     decade = 10.0 ** math.floor(math.log10(2 * inch))
     return max(step * decade for step in (1, 2, 5) if step * decade <= 2 * inch)
 

@@ -74,7 +74,7 @@ def draw_scan(frame: Frame, region: BaseGeometry, sensors: Sequence[MountedSenso
 
 
 def _draw_points(axes: Axes, points: NDArray[np.float32], colour: Float) -> None:
-    """Paint points as pixels, the highest last: as many as there are, a picture is small and quick."""
+    """Paint points as pixels, the highest last: one picture is smaller and faster than a mark for each point."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     shape = (round(PIXELS * (top - bottom) / (right - left)), PIXELS)
     column = np.floor((points[:, 0] - left) / (right - left) * shape[1]).astype(np.int64)

@@ -1,4 +1,4 @@
-"""What a report is made of: sections of paragraphs, lists, tables and pictures, before anything says how they look."""
+"""Content of a report without its format: sections of paragraphs, lists, tables and pictures."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ class Bullets:
 
 @dataclass(frozen=True)
 class Code:
-    """A command to be typed."""
+    """Command line."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table; columns that are named in ``numbers`` hold numbers, and stand to the right.
+    """Table; the columns in ``numbers`` hold numbers and are aligned to the right.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class Report:
     Parameters
     ----------
     created : str
-        When the placement was made (ISO 8601); no report says when it was written.
+        Time of the placement (ISO 8601); the time of the report is not recorded.
     """
 
     title: str

@@ -1,4 +1,4 @@
-"""What a report stands on: the files of a folder that a placement was written to."""
+"""Input of a report: the files of a result folder."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Evidence:
 
     @property
     def seen(self) -> Boolean:
-        """Which targets some sensor sees, (t,) bool."""
+        """Mask of the targets that some sensor sees, (t,) bool."""
         return self.seen_by > 0
 
     @property
@@ -62,7 +62,7 @@ class Evidence:
 
     @property
     def geo_reference(self) -> GeoReference:
-        """Where on the Earth the map is."""
+        """Georeference of the map."""
         known = self.record.site.geo_reference
         if known is None:
             return GeoReference()

@@ -1,4 +1,4 @@
-"""What a placement loses when a sensor fails, and what fewer or more sensors would see."""
+"""Coverage after the failure of a sensor, and with fewer or more sensors."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class Failures:
 
     @property
     def worst(self) -> float:
-        """What is left after the worst failure."""
+        """Coverage after the worst failure."""
         return min(self.left)
 
     @property
     def mean(self) -> float:
-        """What is left on average, each sensor failing as often."""
+        """Mean coverage over the failures of each sensor."""
         return sum(self.left) / len(self.left)
 
 

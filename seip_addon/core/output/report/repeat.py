@@ -68,10 +68,10 @@ def _of_survey(settings: Mapping[str, Any]) -> Iterator[str]:
         if settings.get(name):
             yield from (f"--{name}", *map(str, settings[name]))
     weather = settings.get("weather", {})
-    said = [f"{name}={weather[name]:.12g}" for name in ("rain", "visibility") if weather.get(name)]
-    said += ["wet"] if weather.get("wet_road") else []
-    if said:
-        yield from ("--weather", *said)
+    words = [f"{name}={weather[name]:.12g}" for name in ("rain", "visibility") if weather.get(name)]
+    words += ["wet"] if weather.get("wet_road") else []
+    if words:
+        yield from ("--weather", *words)
     cost = settings.get("installed_cost")
     if cost:
         shipped = cost == asdict(load_installed_cost())

@@ -48,16 +48,16 @@ def make_report(evidence: Evidence, points: Sequence[FrontPoint]) -> Report:
     """
     record = evidence.record
     sections = (
-        Section("The question", tuple(_question(evidence))),
-        Section("The site", tuple(_site(evidence))),
-        Section("The sensors", tuple(_sensors(evidence))),
-        Section("What they see", tuple(_coverage(evidence))),
+        Section("Objective", tuple(_question(evidence))),
+        Section("Site", tuple(_site(evidence))),
+        Section("Sensors", tuple(_sensors(evidence))),
+        Section("Coverage", tuple(_coverage(evidence))),
         Section("Blind spots", tuple(_blind_spots(evidence))),
-        Section("How good this answer is", tuple(_certificate(evidence, points))),
-        Section("What can go wrong", tuple(_losses(evidence))),
+        Section("Optimality", tuple(_certificate(evidence, points))),
+        Section("Failures and errors", tuple(_losses(evidence))),
         Section("Fewer or more sensors", tuple(_front(evidence, points))),
-        Section("What to know before trusting the figures", tuple(_warnings(evidence))),
-        Section("How it was made", tuple(_making(evidence))),
+        Section("Warnings and limits", tuple(_warnings(evidence))),
+        Section("Reproduction", tuple(_making(evidence))),
     )
     coverage = record.coverage
     central = "" if coverage.central is None else f", {percent(coverage.central)} of its weighted part"
@@ -72,7 +72,7 @@ def make_report(evidence: Evidence, points: Sequence[FrontPoint]) -> Report:
 
 
 def certificate_sentence(evidence: Evidence) -> str:
-    """Return how good the placement provably is, against every other choice among the same positions."""
+    """Return the sentence on the proven optimality gap among the same positions."""
     record = evidence.record
     found, places = record.objective, record.counts.positions
     if found.status == MOVED:
@@ -83,7 +83,7 @@ def certificate_sentence(evidence: Evidence) -> str:
     if found.bound is None:
         return f"Another {choice} may be better; how much better is not known."
     better = _cheaper(found) if found.cheapest else _more_coverage(evidence)
-    proven = "this is proven" if found.status == "optimal" else "this much is proven, and no more was found out"
+    proven = "this is proven" if found.status == "optimal" else "this bound is proven"
     return f"No other {choice} {better}: {proven}."
 
 
@@ -95,7 +95,7 @@ def _limits(goal: Objective, joint: str) -> str:
 
 def _cheaper(found: RecordedObjective) -> str:
     if found.status == "optimal" or found.bound is None:
-        return "reaches the coverage that was asked for at a lower price"
+        return "reaches the required coverage at a lower price"
     return f"is more than {_dollars(max(0.0, found.value - found.bound))} cheaper"
 
 
@@ -116,21 +116,20 @@ def _question(evidence: Evidence) -> Iterator[Block]:
     types = ", ".join(record.asked.candidates.sensors)
     if goal.coverage is not None:
         yield Paragraph(
-            f"Which sensors see {percent(goal.coverage)} of the road at the least price{with_limits}, and where do "
-            "they hang?"
+            f"Find the cheapest sensors and positions that see {percent(goal.coverage)} of the road{with_limits}."
         )
     else:
-        what = "see as much as possible of the road" if record.returns is None else "have most returns from road users"
-        yield Paragraph(f"Where must sensors hang to {what}{with_limits}?")
+        what = "see most of the road" if record.returns is None else "receive most returns from road users"
+        yield Paragraph(f"Find the positions of sensors that {what}{with_limits}.")
     rules = [
         f"Sensor types to choose from: {types}.",
         (
-            f"Places to choose from: {counts.positions:,}, of which {counts.positions_on_poles:,} are on existing "
+            f"Positions to choose from: {counts.positions:,}, of which {counts.positions_on_poles:,} are on existing "
             f"poles; with all heights, types and directions {counts.poses:,} candidates."
         ),
     ]
     if goal.weighted:
-        rules.append("The road in weighted regions counts for more than the rest.")
+        rules.append("The road in weighted regions has a higher weight.")
     if goal.min_distance > 0:
         rules.append(f"Sensors are at least {goal.min_distance:g} m apart.")
     rules += [_sentence(note) for note in record.notes if note.startswith(CHOSEN_FOR)]
@@ -147,7 +146,7 @@ def _site(evidence: Evidence) -> Iterator[Block]:
     )
     if record.site.sources:
         heading, *rows = source_table(record.site.sources)
-        yield Paragraph("Where the objects of the scene come from, and for how many place or height is assumed:")
+        yield Paragraph("Sources of the objects in the scene, with the number whose position or height is assumed:")
         yield Table(heading, tuple(rows), frozenset({2, 3, 4}))
     if record.site.attribution:
         yield Paragraph(f"Data: {'; '.join(record.site.attribution)}.")
@@ -160,7 +159,7 @@ def _site(evidence: Evidence) -> Iterator[Block]:
             "longitudes are on WGS 84."
         )
     if "view.png" in evidence.pictures:
-        yield Picture(evidence.pictures["view.png"], "The site with the sensors and what they see.")
+        yield Picture(evidence.pictures["view.png"], "The site with the sensors and their coverage.")
 
 
 def _origin(evidence: Evidence) -> str:
@@ -180,7 +179,7 @@ def _projection(evidence: Evidence) -> str:
 def _sensors(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
     price = "Installed price, $" if record.installed else "Price, $"
-    head = ("", "Type", "Place", "Height, m", "Tilt, °", "Direction, °", price)
+    head = ("", "Type", "Position", "Height, m", "Tilt, °", "Direction, °", price)
     rows = [
         (
             sensor.id,
@@ -197,20 +196,20 @@ def _sensors(evidence: Evidence) -> Iterator[Block]:
     ]
     yield Table(head, tuple(rows), frozenset({3, 4, 5, 6}))
     yield Paragraph(
-        f"Together {record.price_text}. Height is that of the optical centre above the ground; tilt is how "
-        "far the sensor's front looks down, direction where it points, counter-clockwise from the map's x axis."
+        f"Together {record.price_text}. Height is that of the optical centre above the ground; tilt is "
+        "the downward angle of the sensor's front, direction its heading, counter-clockwise from the map's x axis."
     )
     if record.installed:
         total = sum(sensor.installation_usd or 0.0 for sensor in record.sensors)
         yield Paragraph(
-            f"Prices are of installed sensors: {_dollars(total)} of them is for posts, mounting, power and backhaul, "
-            "by the table of installed costs under “How it was made”."
+            f"Prices include installation: {_dollars(total)} for posts, mounting, power and backhaul, "
+            "from the table of installed costs under “Reproduction”."
         )
     else:
-        yield Paragraph("Prices are of the sensors alone: posts, mounting, power and backhaul are not counted.")
+        yield Paragraph("Prices are for sensors only, without posts, mounting, power and backhaul.")
     types = {sensor.sensor_name: sensor.evidence for sensor in record.sensors if sensor.evidence}
     if types:
-        yield Paragraph("What the detection of each type rests on:")
+        yield Paragraph("Evidence for the detection range of each type:")
         yield Bullets(tuple(f"{name}: {rests_on}." for name, rests_on in types.items()))
     yield _coordinates(evidence)
     if not evidence.geo_reference.obstacle:
@@ -258,7 +257,7 @@ def _coverage(evidence: Evidence) -> Iterator[Block]:
         lines.append(f"{percent(coverage.central)} of the weighted regions is seen.")
     yield Bullets(tuple(lines))
     if "plan.png" in evidence.pictures:
-        yield Picture(evidence.pictures["plan.png"], "Coverage map: what is seen, what is not, and where sensors hang.")
+        yield Picture(evidence.pictures["plan.png"], "Coverage map with the sensor positions.")
     yield Table(
         ("", "Sees of the road", "Sees alone"),
         tuple((one.id, percent(one.coverage_alone), percent(one.coverage_marginal)) for one in record.sensors),
@@ -324,10 +323,10 @@ def _certificate(evidence: Evidence, points: Sequence[FrontPoint]) -> Iterator[B
     if record.greedy is not None:
         lost = record.greedy.gap_to_placement
         notes.append(
-            "Choosing one sensor after the other, each the best at the time, gives "
+            "A greedy choice of one sensor after the other gives "
             f"{f'{lost:.2%}' if lost > 0 else 'no'} {'less' if record.returns is None else 'fewer returns'}."
         )
-    notes.append("“Proven” is said of the model: of this scene, these sensors and this rule of what counts as seen.")
+    notes.append("“Proven” refers to the model: this scene, these sensor models and this definition of seen.")
     yield Bullets(tuple(notes))
 
 
@@ -357,8 +356,8 @@ def _losses(evidence: Evidence) -> Iterator[Block]:
     if failed is not None:
         worst = record.sensors[failed.left.index(failed.worst)].id
         yield Paragraph(
-            f"When one sensor fails, {percent(failed.mean)} of the road is still seen on average, and "
-            f"{percent(failed.worst)} in the worst case, the failure of {worst}. This is counted square by square."
+            f"After the failure of one sensor, {percent(failed.mean)} of the road is still seen on average, and "
+            f"{percent(failed.worst)} in the worst case, the failure of {worst}."
         )
         yield Table(
             ("Failed", "Still seen", "Lost"),
@@ -373,7 +372,7 @@ def _losses(evidence: Evidence) -> Iterator[Block]:
     if not errors and not scenarios.errs:
         errors = ["The loss from errors of the sensors' poses was not evaluated (option --pose-errors)."]
     if scenarios.kind != "traffic":
-        errors.append("The road is empty: what vehicles hide was not evaluated (option --traffic).")
+        errors.append("The road is empty: occlusion by vehicles was not evaluated (option --traffic).")
     if errors:
         yield Bullets(tuple(errors))
     for name in (*POSE_ERROR_PICTURES, *TRAFFIC_PICTURES):
@@ -386,26 +385,26 @@ def _front(evidence: Evidence, points: Sequence[FrontPoint]) -> Iterator[Block]:
         why = (
             "the folder does not hold the visibility grid of this placement"
             if evidence.grid is None
-            else "it was not asked for"
+            else "it was not requested"
         )
-        yield Paragraph(f"Other numbers of sensors were not looked at: {why}.")
+        yield Paragraph(f"Other numbers of sensors were not evaluated: {why}.")
         return
     record = evidence.record
-    weighted = " Coverage counts the road by its weights here." if np.ptp(evidence.site.problem.weights) > 0 else ""
+    weighted = " Coverage is weighted here." if np.ptp(evidence.site.problem.weights) > 0 else ""
     budget = record.asked.goal.budget
     limit = "" if budget is None else f" The budget of {_dollars(budget)} does not limit the choices of this table."
     yield Paragraph(
-        f"For each number of sensors, the choice that covers most under the same rules, whatever its "
-        f"price.{limit}{weighted} The last column states what is proven of the coverage of all other choices of at "
+        f"For each number of sensors, the placement with most coverage under the same rules, regardless of "
+        f"price.{limit}{weighted} The last column gives the proven bound on the coverage of all other placements of at "
         "most that number. Searches for other numbers start from this placement and are limited."
     )
     goal = purpose(record.notes)
     if goal:
-        yield Paragraph(f"This placement was chosen{goal}, and not to cover most: the table does not rank it.")
+        yield Paragraph(f"This placement was chosen{goal}, not for coverage: the table does not rank it.")
     price = "Installed price, $" if record.installed else "Price, $"
     yield Picture(
         front_chart(points, (record.price_usd, _weighted_share(evidence)), installed=record.installed),
-        "Coverage against price by number of sensors; a line above a point reaches to what could not be ruled out.",
+        "Coverage against price by number of sensors; a line above a point extends to its proven bound.",
     )
     rows = tuple(
         (
@@ -424,8 +423,8 @@ def _warnings(evidence: Evidence) -> Iterator[Block]:
     chosen = (sensor.sensor for sensor in record.sensors)
     warnings = relevant_warnings(record.warnings, record.asked.candidates.sensors, chosen)
     standing = (
-        "A square counts as seen when a return of the sensor's scan lies near its middle. The scene is a model: what "
-        "is not in it hides nothing. Check positions on site for ownership, foundations, power and lines."
+        "A square is seen if a return of the sensor's scan lies near its centre. The scene is a model: objects that it "
+        "lacks do not occlude. Check positions on site for ownership, foundations, power and lines."
     )
     yield Bullets((*(_sentence(warning) for warning in warnings), standing))
 
@@ -434,10 +433,10 @@ def _making(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
     command = repeating_command(record)
     if command:
-        yield Paragraph("In the folder of the result this repeats it, and writes to another folder:")
+        yield Paragraph("This command, run in the result folder, repeats the placement in another folder:")
         yield Code(command)
     else:
-        yield Paragraph("No single command makes this placement again; its settings are below.")
+        yield Paragraph("No single command repeats this placement; its settings are below.")
     versions = ", ".join(f"{name} {version}" for name, version in record.versions.items())
     yield Paragraph(f"Made {record.times.created} with {versions}; solver {record.objective.solver}.")
     settings = ((name, json.dumps(value, ensure_ascii=False)) for name, value in record.settings.items())

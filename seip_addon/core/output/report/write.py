@@ -17,7 +17,7 @@ from .pdf import as_pdf
 from .sections import make_report
 
 EFFORT = 5.0
-"""Counted work (about as many seconds of one core) for each other number of sensors."""
+"""Counted work for each other number of sensors; a unit is about a second of one core."""
 
 
 def write_report(folder: Path, effort: float = EFFORT) -> Generator[Progress, None, tuple[Path, ...]]:

@@ -53,7 +53,7 @@ def save_candidate_table(
 
 
 def _place(sensor: Sensor, site: Site, source: str) -> tuple[object, ...]:
-    """Return the columns of where a sensor hangs, how it is turned and what it costs."""
+    """Return the columns of a sensor's position, orientation and price."""
     return (
         sensor.position_name,
         int(sensor.on_pole),

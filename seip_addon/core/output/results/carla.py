@@ -93,7 +93,7 @@ def _attributes(sensor: Sensor) -> dict[str, str]:
 
 
 def _rows(model: LidarModel) -> int:
-    """Return the channels of CARLA's raster: for a rosette as many as make its steps equal both ways."""
+    """Return the channels of CARLA's raster; for a rosette the number that makes its steps equal in both directions."""
     return model.channels if model.rosette is None else max(2, math.isqrt(model.channels))
 
 
@@ -114,7 +114,7 @@ def _of_rosette(model: LidarModel) -> str:
     across = math.degrees(model.field_of_view)
     return (
         f"draws a rosette of {across:.3g} degrees that does not repeat, where CARLA repeats an even raster of "
-        f"{_rows(model)} rows over the square about it, with as many points"
+        f"{_rows(model)} rows over the enclosing square, with the same number of points"
     )
 
 

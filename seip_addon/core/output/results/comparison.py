@@ -18,7 +18,7 @@ COMPARED_WORDS = ("seen in neither", "seen in both", "gained", "lost")
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What changes from one placement to another.
+    """Difference between two placements.
 
     Parameters
     ----------

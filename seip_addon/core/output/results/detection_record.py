@@ -39,7 +39,7 @@ class RecordedPrecision:
 
 @dataclass(frozen=True)
 class DetectionRecord:
-    """What is shown of a ``detection.json``: average precision by the names of rules, and warnings."""
+    """Part of a ``detection.json`` that is shown: average precision by rule, and warnings."""
 
     average_precision: Mapping[str, RecordedPrecision]
     warnings: tuple[str, ...]

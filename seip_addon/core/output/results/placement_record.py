@@ -61,7 +61,7 @@ class Provenance:
         With its time zone.
     durations : mapping of str to float, seconds
     versions : mapping of str to str
-        Of the program and what it stands on; see `versions`.
+        Versions of the program and its libraries; see `versions`.
     """
 
     created: datetime
@@ -88,7 +88,7 @@ def relevant_warnings(warnings: Iterable[str], considered: Iterable[str], chosen
 
 @dataclass(frozen=True)
 class RecordedGeoReference:
-    """What the scene's map says of where on the Earth it is: see `GeoReference`."""
+    """Georeference of the scene's map; see `GeoReference`."""
 
     projection: str
     header_offset_m: MapPoint
@@ -127,7 +127,7 @@ class RecordedSensor:
     sensor : str
         Its type's key in the catalogue.
     roll_deg : float, optional
-        Of a sensor that a hand has put elsewhere, and of no other.
+        Roll, only of a sensor that was moved by hand.
     latitude_deg, longitude_deg, altitude_m : float, optional
         On WGS 84, and the height above the map's zero; None where the map's projection is not known.
     easting_m, northing_m : float, optional
@@ -189,7 +189,7 @@ class RecordedCoverage:
 
 @dataclass(frozen=True)
 class RecordedObjective:
-    """What was optimised, in covered weight or dollars, and what is proven of it; None where nothing bounds it."""
+    """Objective value, in covered weight or dollars, with its bound; None without a bound."""
 
     kind: Literal["vanilla", "weighted"]
     sought: Literal["most coverage", "most returns", "least price"]
@@ -245,7 +245,7 @@ class RecordedCandidates:
 
 @dataclass(frozen=True)
 class Asked:
-    """The settings of a record that are read again: what was asked for, and of which sensor types."""
+    """Settings of a record that are read again: objective and sensor types."""
 
     goal: Objective
     candidates: RecordedCandidates
@@ -253,7 +253,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class PlacementRecord:
-    """What ``placement.json`` holds but for its schema, key by key: see docs/formats.md.
+    """Content of ``placement.json`` without its schema, key by key; see docs/formats.md.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ class PlacementRecord:
         In the order of their labels.
     price_usd : float, dollars
     settings : mapping
-        All that could have been set, by name; `asked` is the part that this program reads again.
+        All settings by name; `asked` is the part that this program reads again.
     inputs : mapping of str to str
         Digests of what went in.
     returns : ReturnsSummary, optional
@@ -286,7 +286,7 @@ class PlacementRecord:
 
     @cached_property
     def asked(self) -> Asked:
-        """What was asked for."""
+        """Objective and sensor types."""
         return from_json(Asked, self.settings, "settings")
 
     @property
@@ -407,7 +407,7 @@ def parsed_record(text: str) -> PlacementRecord:
 
 
 def comparable(record: PlacementRecord) -> dict[str, Any]:
-    """Return what `PlacementRecord.as_json` does, but for what differs from one machine and run to the next.
+    """Return `PlacementRecord.as_json` without the parts that differ between machines and runs.
 
     That are times and versions.
     """
@@ -527,7 +527,7 @@ def _rounded_returns(returns: ReturnsSummary) -> ReturnsSummary:
 def _greedy(greedy: Placement, placement: Placement, *, of_returns: bool) -> RecordedGreedy:
     return RecordedGreedy(
         value=_significant(greedy.objective),
-        # The better of the two bounds: once the optimum is proven, it no longer hangs on a platform's rounding.
+        # The better of the two bounds: once the optimum is proven, it no longer depends on a platform's rounding.
         bound=_found(min(greedy.bound, placement.bound)),
         gap_to_placement=_share(1.0 - share_reached(greedy.objective, placement.objective, of_returns=of_returns)),
         poses=tuple(int(pose) for pose in greedy.chosen),

@@ -65,9 +65,9 @@ class SiteFile:
     Parameters
     ----------
     key : str
-        Of the visibility grid that this belongs to.
+        Key of the visibility grid that this belongs to.
     seen : (k, t) bool
-        What each sensor sees, in the order of the record.
+        Targets that each sensor sees, in the order of the record.
     problem : PlacementProblem
         Without its visibility; see `with_visibility`.
     """
@@ -96,9 +96,9 @@ def save_site_file(
     Parameters
     ----------
     key : str
-        Of the visibility grid.
+        Key of the visibility grid.
     problem : PlacementProblem
-        That the objective of the solution makes of the site.
+        Placement problem of the solution's objective.
     """
     targets = site.targets
     areas = [(WEIGHTED, area) for area in geometry.weighted_regions] + [(PLACE, area) for area in geometry.places]

@@ -7,7 +7,6 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from report_folder import NAME, make_folder
 
 from seip_addon.core.choosing.placement.cheapest import SAME_PRICE, cheapest_for_coverage
 from seip_addon.core.choosing.placement.objective import MOVED, Objective
@@ -25,6 +24,7 @@ from seip_addon.core.output.report.write import write_report
 from seip_addon.core.output.results.placement_record import RecordedGreedy
 from seip_addon.core.output.results.report_files import REPORT_FILES
 from seip_addon.core.progress import finish
+from tests.builders.report_folder import NAME, make_folder
 
 EFFORT = 0.2
 GOAL = 0.6  # coverage that takes several sensors
@@ -121,7 +121,7 @@ def test_places_and_blind_spots_are_named(page):
     assert "of road is not seen" in page.text
     assert "High Street, 48 m east of the centre of central box" in page.text
     assert "counted from the centre of the weighted region “central box”; north is the direction of" in page.text
-    assert "middle" not in page.text.split("Blind spots")[1].split("How good")[0]
+    assert "middle" not in page.text.split("Blind spots")[1].split("Optimality")[0]
     assert not re.search("Road (north|east|south|west) of", page.text)
 
 
@@ -151,12 +151,12 @@ def test_figures_agree_with_the_grid(folder):
         (
             Objective(count=3),
             {"status": "feasible", "objective": 500.0, "bound": 509.4, "gap": 0.0188},
-            r"covers more than 1\.4 percentage points more of the road: this much is proven",
+            r"covers more than 1\.4 percentage points more of the road: this bound is proven",
         ),
         (
             Objective(coverage=0.5),
             {"objective": 30_000.0, "bound": 24_000.0, "gap": 0.2, "status": "feasible"},
-            r"is more than \$6,000 cheaper: this much is proven",
+            r"is more than \$6,000 cheaper: this bound is proven",
         ),
         (
             Objective(count=5, budget=60_000.0),
@@ -171,7 +171,7 @@ def test_figures_agree_with_the_grid(folder):
             {},
             r"No other choice for at most \$60,000 among the 32 positions, under the same rules, covers more",
         ),
-        (Objective(coverage=0.5), {}, r"reaches the coverage that was asked for at a lower price: this is proven\."),
+        (Objective(coverage=0.5), {}, r"reaches the required coverage at a lower price: this is proven\."),
         (Objective(count=3), {"status": "feasible", "bound": np.inf, "gap": np.inf}, "how much better is not known"),
         (Objective(count=3), {"status": MOVED, "bound": np.nan, "gap": np.inf}, "nothing is proven of it"),
         (
@@ -226,14 +226,14 @@ def front_of(folder, **changes):
 def test_the_table_of_numbers_says_where_the_placement_was_chosen_for_something_else(tmp_path, notes):
     evidence, points = front_of(tmp_path, notes=notes)
     report = as_html(make_report(evidence, list(points.values())))
-    told = "This placement was chosen for returns from road users, and not to cover most: the table does not rank it."
+    told = "This placement was chosen for returns from road users, not for coverage: the table does not rank it."
     assert (told in report) == bool(notes)
 
 
 def test_the_question_names_a_budget_as_a_price(tmp_path):
     make_folder(tmp_path, goal=Objective(budget=60_000.0))
     text = as_html(make_report(load_evidence(tmp_path), ()))
-    assert "Where must sensors hang to see as much as possible of the road, for at most $60,000?" in text
+    assert "Find the positions of sensors that see most of the road, for at most $60,000." in text
 
 
 def test_the_area_of_the_squares_is_not_said_to_be_that_of_the_region(folder):
@@ -303,7 +303,7 @@ def test_the_cheapest_placement_has_one_bound_on_its_coverage(tmp_path):
     for fewer in range(1, count):  # what costs less does not reach the coverage
         assert points[fewer].coverage + points[fewer].missed <= GOAL + 1e-9
     text = as_html(make_report(evidence, tuple(points.values())))
-    assert "reaches the coverage that was asked for at a lower price: this is proven." in text
+    assert "reaches the required coverage at a lower price: this is proven." in text
     assert f"No other choice of {count} sensors, at the same price, covers more: this is proven." in text
     assert "equally cheap" not in text
 
