@@ -363,7 +363,7 @@ def test_without_its_grid_a_folder_has_no_front_and_the_report_says_why(tmp_path
 
 def test_a_front_can_be_left_out(folder):
     assert finish(front(load_evidence(folder), 0.0)) == ()
-    assert any("was not asked for" in one.text for one in blocks(folder, Paragraph))
+    assert any("was not requested" in one.text for one in blocks(folder, Paragraph))
 
 
 def test_all_rows_are_as_long_as_their_heads(folder):
