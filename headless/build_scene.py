@@ -112,7 +112,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "source",
         type=Path,
-        help="the map (.xodr), an extract (.osm, .osm.gz), or a site description (.toml) that names a map",
+        help="map (.xodr), extract (.osm, .osm.gz) or site description (.toml) with the name of a map",
     )
     place = parser.add_mutually_exclusive_group()
     place.add_argument(
@@ -120,21 +120,21 @@ def _parser() -> argparse.ArgumentParser:
         type=float,
         nargs=2,
         metavar=("X", "Y"),
-        help="middle of the place, map coordinates in metres (or latitude and longitude)",
+        help="centre of the site in map coordinates, metres (or latitude and longitude)",
     )
     place.add_argument(
         "--near-latlon",
         type=float,
         nargs=2,
         metavar=("LAT", "LON"),
-        help="middle of the place, degrees: the junction nearest to it is studied",
+        help="latitude and longitude in degrees; the nearest junction is studied",
     )
     place.add_argument(
         "--junction",
         nargs="+",
         default=[],
         metavar="NAME",
-        help="id or name of the junction in the middle of the place, or the names of two streets that meet there",
+        help="id or name of the junction, or the names of two streets that meet there",
     )
     size = parser.add_mutually_exclusive_group()
     size.add_argument("--radius", type=float, help="radius of the region of interest in metres (80 with --near)")
@@ -142,41 +142,41 @@ def _parser() -> argparse.ArgumentParser:
         "--approaches",
         type=float,
         metavar="M",
-        help="how far the region follows the approaches of the junction in metres (80 with --junction)",
+        help="length of the approaches in the region of interest, metres (80 with --junction)",
     )
     parser.add_argument(
         "--level",
         nargs="+",
         default=[],
         metavar="STREET",
-        help="name of a street on the level to study, or id of a road, where roads cross above",
+        help="street or road id on the level to study, where roads cross on several levels",
     )
-    parser.add_argument("--site", type=Path, metavar="TOML", help="site description: what the map does not have")
+    parser.add_argument("--site", type=Path, metavar="TOML", help="site description with objects that the map lacks")
     parser.add_argument(
-        "--osm", type=Path, metavar="EXTRACT", help="OpenStreetMap extract: adds buildings, trees and posts to a map"
+        "--osm", type=Path, metavar="EXTRACT", help="OpenStreetMap extract with buildings, trees and posts for a map"
     )
     parser.add_argument(
-        "--buildings", type=Path, metavar="CITYJSON", help="city model (CityJSON 1.1, 2.0) whose buildings are added"
+        "--buildings", type=Path, metavar="CITYJSON", help="city model (CityJSON 1.1, 2.0) with buildings"
     )
     placed = parser.add_mutually_exclusive_group()
     placed.add_argument(
-        "--buildings-epsg", type=int, metavar="CODE", help="reference system of the city model, where it names none"
+        "--buildings-epsg", type=int, metavar="CODE", help="coordinate system of the city model, if it names none"
     )
     placed.add_argument(
         "--buildings-origin",
         type=float,
         nargs=3,
         metavar=("X", "Y", "Z"),
-        help="map coordinates of the city model's zero in metres, where it has no reference system",
+        help="map coordinates of the city model's origin, metres, if it has no coordinate system",
     )
     parser.add_argument(
         "--terrain",
         type=Path,
         metavar="FILE",
-        help="ground that a flat map is laid on: GeoTIFF, or a survey (LAS, LAZ), of which what stands there is added",
+        help="ground for a flat map: GeoTIFF, or a survey (LAS, LAZ), whose objects are added too",
     )
     parser.add_argument(
-        "--terrain-epsg", type=int, metavar="CODE", help="reference system of a survey, where it names none"
+        "--terrain-epsg", type=int, metavar="CODE", help="coordinate system of a survey, if it names none"
     )
     parser.add_argument(
         "--mesh",
@@ -184,7 +184,7 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="FILE",
-        help="mesh that hides what is behind it (glTF, OBJ, PLY, STL, USD); may be given several times",
+        help="mesh that occludes (glTF, OBJ, PLY, STL, USD); may be given several times",
     )
     parser.add_argument(
         "--mesh-origin",
@@ -193,18 +193,20 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="NUMBER",
-        help="where the zero of a mesh stands: LAT LON or map X Y, and the heading of its x in degrees from east",
+        help="position of a mesh's origin, LAT LON or map X Y, and heading of its x axis in degrees from east",
     )
     parser.add_argument(
         "--mesh-up",
         choices=UP_AXES,
-        help="axis of OBJ, PLY and STL that points up (default: y of OBJ, z of the others)",
+        help="vertical axis of OBJ, PLY and STL files (default: y for OBJ, z for the others)",
     )
     parser.add_argument(
-        "--service-roads", action="store_true", help="of an extract: driveways, aisles and alleys are streets too"
+        "--service-roads", action="store_true", help="treat driveways, aisles and alleys of an extract as streets"
     )
     parser.add_argument(
-        "--traffic-keeps", choices=("left", "right"), help="of an extract: by default as it shows, or as in its country"
+        "--traffic-keeps",
+        choices=("left", "right"),
+        help="side of traffic in an extract (default: from the extract, or from its country)",
     )
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="BLEND", help="the .blend to write")
     return parser

@@ -117,7 +117,7 @@ def coarsest_settings(
     for name in (*objective.forbidden, *objective.mandatory):
         if name not in poles:
             raise SeipError(
-                f"{name!r} is no pole: a tolerance lays posts on the pavement anew, under other names; "
+                f"{name!r} is not a pole: with a tolerance, posts on the pavement are renamed; "
                 "draw a forbidden or mandatory area instead, or give --grid and --spacing"
             )
     evaluator = Evaluator(geometry, settings, objective)

@@ -150,19 +150,19 @@ def _save(folder: Path, judgement: Judgement, simulator: Simulator, sensors: lis
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("detect", "Compute the average precision of a detector with the sensors of a scene.")
     parser.add_argument("scene", nargs="?", type=Path, help="the .blend with its sensors; in Blender the open scene")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the figures")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the results")
     parser.add_argument("--traffic", nargs="+", type=Path, required=True, metavar="NPZ", help="runs to detect in")
     parser.add_argument(
         "--detector",
         type=Path,
         default=SHIPPED_DETECTOR,
         metavar="PT",
-        help="another than the shipped one, of `seip train` or `seip study site-training`",
+        help="detector of `seip train` or `seip study site-training` (default: the shipped one)",
     )
     parser.add_argument(
-        "--every", type=real_number(TIME_STEP), default=2.5, metavar="S", help="time from frame to frame"
+        "--every", type=real_number(TIME_STEP), default=2.5, metavar="S", help="interval between frames"
     )
-    parser.add_argument("--device", default="cpu", help="of torch: cpu or cuda")
+    parser.add_argument("--device", default="cpu", help="torch device: cpu or cuda")
     add_settings(parser, SurveySettings, "catalogue")
     how = parser.add_argument_group("measurement")
     add_settings(how, ScanSettings, "seed")

@@ -45,7 +45,7 @@ def main() -> None:
 def wheels(wanted: list[str], python: str, platforms: list[str], *, pure: bool = False) -> dict[str, str]:
     """Return the digests of the wheels that pip takes for a Python and platform, by their names.
 
-    Of ``pure`` ones, without compiled code, there may be none.
+    There may be no ``pure`` wheels, those without compiled code.
     """
     fitting = [
         f"{pin.name}{pin.specifier}"

@@ -178,7 +178,7 @@ def add_rolling_shutter(group: argparse._ActionsContainer) -> None:
         "--rolling-shutter",
         action=argparse.BooleanOptionalAction,
         default=True,
-        help="traffic moves while a sensor turns, and boxes are where their points are from (on)",
+        help="rolling shutter: traffic moves during a revolution, and boxes are at the time of their points (on)",
     )
 
 
@@ -204,7 +204,7 @@ def add_objective(parser: argparse.ArgumentParser) -> None:
     """Add the parts of an objective to a command: criterion, constraints, scenarios and risk measure."""
     objective = parser.add_argument_group("objective")
     add_settings(objective, Objective, "count", "budget", "coverage", "criterion", "shares", "seen_by", "failures")
-    objective.add_argument("--weighted", action="store_true", help="count targets by the weights of their regions")
+    objective.add_argument("--weighted", action="store_true", help="weight targets by their regions")
     add_settings(objective, Objective, "central_weight", "min_distance", "forbidden", "mandatory")
     scenarios = parser.add_argument_group("scenarios")
     scenarios.add_argument(

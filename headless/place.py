@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
         "--tolerance",
         type=real_number(SHARE),
         metavar="SHARE",
-        help="pick the coarsest --grid and --spacing whose placement covers as much but for this share",
+        help="choose the coarsest --grid and --spacing whose placement loses at most this share of coverage",
     )
     parser.add_argument("--no-render", action="store_true", help="leave out the rendered view")
     return parser

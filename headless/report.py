@@ -30,13 +30,13 @@ def main(argv: list[str]) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("report", "Write a report on a placement into its folder, as HTML and PDF.")
-    parser.add_argument("folder", type=Path, help="the folder that `seip place` has written")
+    parser.add_argument("folder", type=Path, help="result folder of `seip place`")
     parser.add_argument(
         "--effort",
         type=real_number(limits.EFFORT),
         default=EFFORT,
         metavar="UNITS",
-        help="counted work, a unit about a second of a core, for each other number of sensors; 0 leaves them out",
+        help="counted work for each other number of sensors, in units of about one core-second; 0: none",
     )
     return parser
 

@@ -59,7 +59,7 @@ _MADE: list[Path] = []  # folders that this process has made for results
 
 
 def in_blender() -> bool:
-    """Return whether this runs inside Blender rather than with the bpy package, not Python with the bpy module."""
+    """Return whether the code runs inside Blender, not in Python with the bpy package."""
     return not bpy.app.module
 
 
@@ -178,7 +178,7 @@ def finish_with_bar(steps: Generator[Progress, None, Result]) -> Result:
 def progress_bar() -> Iterator[Callable[[Progress], None]]:
     """Yield a callable for `finish` that shows work done and time left on standard error.
 
-    A terminal sees one bar, which stays on its line and begins anew where the work does (a smaller count, another
+    A terminal sees one bar, which stays on its line and restarts where the work does (a smaller count, another
     total); work of unknown length shows what it does and for how long. A log gets a line every ten seconds at most,
     or as often as ``SEIP_SECONDS_BETWEEN_LINES`` in the environment says.
     """

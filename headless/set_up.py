@@ -4,7 +4,7 @@
     python3 -m headless.set_up .venv traffic  # and a group of packages more
 
 It does nothing when the environment is there and the pins in ``pyproject.toml`` have not changed. pip takes no package
-whose digest is not in ``wheels.lock``, but for `UNLOCKED`. It runs under any Python 3, so that one of the wrong version
+whose digest is not in ``wheels.lock``, except `UNLOCKED`. It runs under any Python 3, so that one of the wrong version
 gets a sentence and no traceback.
 """
 

@@ -113,19 +113,23 @@ def _parser() -> argparse.ArgumentParser:
     parser = new_parser("simulate", "Simulate what the sensors of a scene measure of its traffic.")
     parser.add_argument("scene", nargs="?", type=Path, help="the .blend with its sensors; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the run")
-    parser.add_argument("--traffic", type=Path, metavar="NPZ", help="trajectories (those animated in the scene)")
+    parser.add_argument(
+        "--traffic", type=Path, metavar="NPZ", help="trajectories (default: animated objects of the scene)"
+    )
     add_settings(parser, SurveySettings, "catalogue")
     when = parser.add_argument_group("frames")
     add_settings(when, RecordingSettings, "start", "duration", "rate")
     how = parser.add_argument_group("measurement")
     add_settings(how, ScanSettings, "seed", "rolling_shutter")
-    how.add_argument("--no-noise", action="store_true", help="exact ranges, and no return is lost")
+    how.add_argument("--no-noise", action="store_true", help="exact ranges without lost returns")
     survey.add_optics(how)
     add_settings(how, ScanSettings, "engine")
     export = parser.add_argument_group("datasets")
-    export.add_argument("--format", nargs="+", choices=tuple(FORMATS), default=[], help="also write the run in these")
+    export.add_argument(
+        "--format", nargs="+", choices=tuple(FORMATS), default=[], help="also write the run in these formats"
+    )
     add_settings(export, RecordingSettings, "dataset")
-    export.add_argument("--split", choices=SPLITS, default=SPLITS[0], help="of the dataset that the run belongs to")
+    export.add_argument("--split", choices=SPLITS, default=SPLITS[0], help="split of the dataset for the run")
     return parser
 
 

@@ -82,7 +82,7 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
         const=DEFAULTS,
         type=Path,
         metavar="TOML",
-        help="prices with posts, power and backhaul, by the shipped table or yours",
+        help="include posts, power and backhaul in prices, from the shipped table or your own",
     )
     metres = parser.add_argument_group("grid and candidates, in metres")
     add_settings(metres, SurveySettings, "grid_spacing")
@@ -96,7 +96,7 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
     work.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="Dask scheduler whose workers cast: tcp://host:8786, tls://host:8786",
+        help="Dask scheduler for ray casting: tcp://host:8786 or tls://host:8786",
     )
     add_settings(work, SurveySettings, "solver")
     add_settings(work, SurveySettings, "effort", "time_limit")
@@ -108,10 +108,14 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
 def add_optics(group: argparse._ActionsContainer) -> None:
     """Add options of what surfaces reflect and of the weather."""
     group.add_argument(
-        "--reflectivity", nargs="+", default=[], metavar="M=SHARE", help="of materials M, 0 to 1 (the scene's own)"
+        "--reflectivity",
+        nargs="+",
+        default=[],
+        metavar="M=SHARE",
+        help="reflectivity of materials M, 0 to 1 (default: from the scene)",
     )
     group.add_argument(
-        "--weather", nargs="+", default=[], metavar="WHAT", help="to look through: rain=MM/H, visibility=M in fog, wet"
+        "--weather", nargs="+", default=[], metavar="WHAT", help="weather: rain=MM/H, visibility=M in fog, wet"
     )
 
 
@@ -131,7 +135,7 @@ def survey(
     Parameters
     ----------
     options : Namespace
-        Of a parser with `add_options`.
+        Options of a parser with `add_options`.
     check : callable
         Called before any ray is cast: refuses what cannot be had on the layout.
     refine : callable, optional

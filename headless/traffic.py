@@ -93,34 +93,43 @@ def _parser() -> argparse.ArgumentParser:
     parser = new_parser("traffic", "Put traffic on the road of a scene.")
     parser.add_argument("scene", nargs="?", type=Path, help="the .blend; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="NPZ", help="file for the trajectories")
-    parser.add_argument("--animate", type=Path, metavar="BLEND", help="the scene with this traffic, to press play in")
-    source = parser.add_mutually_exclusive_group(required=True)
-    source.add_argument(
-        "--fcd", type=Path, metavar="FILE", help="SUMO's floating car data: .xml or .csv, or packed .gz"
+    parser.add_argument(
+        "--animate", type=Path, metavar="BLEND", help="write the scene with this traffic as animated objects"
     )
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("--fcd", type=Path, metavar="FILE", help="SUMO's floating car data: .xml or .csv, also as .gz")
     source.add_argument(
-        "--simulate", type=Path, metavar="XODR", help="the scene's map, for SUMO to simulate traffic on"
+        "--simulate", type=Path, metavar="XODR", help="map of the scene, on which SUMO simulates traffic"
     )
     reading = parser.add_argument_group("with --fcd")
     reading.add_argument(
         "--routes", nargs="+", type=Path, default=[], metavar="XML", help="files with the vehicle types"
     )
-    reading.add_argument("--net", type=Path, metavar="XML", help="the .net.xml, which knows the offset from the map")
-    reading.add_argument("--begin", type=float, default=-math.inf, metavar="S", help="leave out what was before")
-    reading.add_argument("--end", type=float, default=math.inf, metavar="S", help="leave out what comes after")
+    reading.add_argument("--net", type=Path, metavar="XML", help=".net.xml with the offset from the map")
+    reading.add_argument(
+        "--begin", type=float, default=-math.inf, metavar="S", help="time at which the trajectories begin"
+    )
+    reading.add_argument("--end", type=float, default=math.inf, metavar="S", help="time at which the trajectories end")
     demand, signals = Demand(), SignalPlan()
     making = parser.add_argument_group("with --simulate")
     making.add_argument("--flow", type=float, default=demand.flow, metavar="N", help="vehicles per hour and arm")
     making.add_argument(
-        "--turns", type=float, nargs=3, default=demand.turns, metavar=("LEFT", "STRAIGHT", "RIGHT"), help="their shares"
+        "--turns",
+        type=float,
+        nargs=3,
+        default=demand.turns,
+        metavar=("LEFT", "STRAIGHT", "RIGHT"),
+        help="shares of turns",
     )
     making.add_argument(
         "--pedestrians", type=float, default=demand.pedestrians, metavar="N", help="persons per hour and arm"
     )
-    making.add_argument("--green", type=int, default=signals.green, metavar="S", help="of each phase of the signals")
-    making.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random")
-    making.add_argument("--duration", type=float, default=120.0, metavar="S", help="of the trajectories")
-    making.add_argument("--warm-up", type=float, default=120.0, metavar="S", help="of the simulation before that")
+    making.add_argument("--green", type=int, default=signals.green, metavar="S", help="green time of each signal phase")
+    making.add_argument("--seed", type=int, default=0, metavar="N", help="random seed")
+    making.add_argument("--duration", type=float, default=120.0, metavar="S", help="duration of the trajectories")
+    making.add_argument(
+        "--warm-up", type=float, default=120.0, metavar="S", help="duration of the simulation before the trajectories"
+    )
     return parser
 
 

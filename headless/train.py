@@ -120,14 +120,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("scene", nargs="?", type=Path, help="the site's .blend; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the detector")
     runs = parser.add_argument_group("folders of scans, by runs of traffic")
-    runs.add_argument("--train", nargs="+", type=Path, required=True, metavar="RUN", help="to learn from")
-    runs.add_argument("--validation", nargs="+", type=Path, required=True, metavar="RUN", help="to see when to stop")
-    runs.add_argument("--test", nargs="+", type=Path, default=[], metavar="RUN", help="to evaluate on")
+    runs.add_argument("--train", nargs="+", type=Path, required=True, metavar="RUN", help="runs for training")
+    runs.add_argument("--validation", nargs="+", type=Path, required=True, metavar="RUN", help="runs for validation")
+    runs.add_argument("--test", nargs="+", type=Path, default=[], metavar="RUN", help="runs for evaluation")
     net = parser.add_argument_group("network")
     add_settings(net, NetworkSettings, "head", "pillar", "most_points", "width", "blocks")
     work = parser.add_argument_group("training")
     add_settings(work, TrainingSettings, "steps", "batch", "seed")
-    work.add_argument("--device", default="cpu", help="of torch: cpu, cuda")
+    work.add_argument("--device", default="cpu", help="torch device: cpu or cuda")
     add_settings(work, TrainingSettings, "threads")
     return parser
 
