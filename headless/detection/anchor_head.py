@@ -26,7 +26,7 @@ MAX_BOXES = 500  # boxes of a cloud before suppression, the best first
 
 @dataclass(frozen=True)
 class AnchorSize:
-    """A box that stands in every cell, at 0 and at 90 degrees.
+    """Anchor box, placed in every cell at 0 and at 90 degrees.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class AnchorHead(nn.Module):
     Parameters
     ----------
     channels : int
-        Of the feature map.
+        Channels of the feature map.
     """
 
     def __init__(self, channels: int) -> None:
@@ -136,17 +136,17 @@ def assignment(wanted: TrainingTargets, grid: PillarGrid) -> Tensor:
     shape = overlap.shape[1:]
     if len(overlap) == 0:
         return torch.full(shape, BACKGROUND, device=device)
-    learnt = torch.nonzero(wanted.learnt)[:, 0]
+    learnable = torch.nonzero(wanted.learnable)[:, 0]
     unclear = (overlap >= negative).any(dim=0)
     assigned = torch.where(unclear, IGNORED, BACKGROUND)
-    if len(learnt) == 0:
+    if len(learnable) == 0:
         return assigned
-    most, owner = overlap[learnt].max(dim=0)
-    assigned = torch.where(most >= positive, learnt[owner], assigned)
-    peak, place = overlap[learnt].flatten(1).max(dim=1)
+    most, owner = overlap[learnable].max(dim=0)
+    assigned = torch.where(most >= positive, learnable[owner], assigned)
+    peak, place = overlap[learnable].flatten(1).max(dim=1)
     flat = assigned.flatten()
     # Where one anchor is the best of two road users the later keeps it, on every machine.
-    for box, index, value in zip(learnt.tolist(), place.tolist(), peak.tolist(), strict=True):
+    for box, index, value in zip(learnable.tolist(), place.tolist(), peak.tolist(), strict=True):
         if value > 0:
             flat[index] = box
     return flat.view(shape)

@@ -57,7 +57,7 @@ class CountedTruth:
     Parameters
     ----------
     score : (t,) float64
-        Of the detection that found it, `MISSED_SCORE` where none did.
+        Score of the matched detection, `MISSED_SCORE` without one.
     frame : (t,) int64
     category, points, visibility, distance
         As in `GroundTruth`.
@@ -106,7 +106,7 @@ class Evaluation:
 
     @property
     def average_precision(self) -> float:
-        """The area under the curve of the best precision at each recall or beyond; NaN where nothing had to be found.
+        """Area under the curve of the best precision at each recall or higher; NaN without counted road users.
 
         All-point interpolation of PASCAL VOC 2010, on all detections of all frames in one order. Equal scores make one
         point of the curve: no threshold can tell them apart.
@@ -144,8 +144,8 @@ def precision_recall(evaluation: Evaluation) -> PrecisionRecall:
 def average_precision_interval(evaluation: Evaluation) -> Interval | None:
     """Return the 95 % interval of the average precision over other traffic like this, or None on too few runs.
 
-    Runs alone are independent: what is seen now is seen again ten seconds later, and frames or stretches of a run drawn
-    one by one would feign certainty. See `share_interval`. It says nothing about another training.
+    Only runs are independent: frames of a run resemble each other, and resampling them gives intervals that are too
+    narrow. See `share_interval`. The interval does not cover the variation between trainings.
     """
     left_out = average_precisions_without_each_run(evaluation)
     if left_out is None:
@@ -178,7 +178,7 @@ def average_precisions_of_runs(evaluation: Evaluation, times: Float | Integer) -
 
 
 def too_few_runs(count: int) -> str:
-    """Return a sentence on why so many test runs give no interval, and how many would; empty where they are enough."""
+    """Return a sentence that states how many test runs an interval needs, or "" if there are enough."""
     if count >= MIN_TEST_RUNS:
         return ""
     return (
@@ -190,7 +190,7 @@ def too_few_runs(count: int) -> str:
 def balanced_score(evaluation: Evaluation) -> float:
     """Return the score with the highest F1, the harmonic mean of precision and recall; 0 without detections.
 
-    Choose it on validation frames and keep it, where false positives are compared at a fixed score.
+    Choose it on validation frames when false positives are compared at a fixed score.
     """
     curve = precision_recall(evaluation)
     if not curve.recall.any():
@@ -201,14 +201,14 @@ def balanced_score(evaluation: Evaluation) -> float:
 
 
 def part(evaluation: Evaluation, detections: Boolean, wanted: Boolean) -> Evaluation:
-    """Return the evaluation of some detections and some road users alone.
+    """Return the evaluation restricted to some detections and some road users.
 
     Parameters
     ----------
     detections : (d,) bool
-        Of the evaluated detections. Who found whom stays as it was.
+        Mask of the evaluated detections; their matches do not change.
     wanted : (t,) bool
-        Of the road users that count.
+        Mask of the counted road users.
     """
     return replace(
         evaluation, detections=_rows(evaluation.detections, detections), wanted=_rows(evaluation.wanted, wanted)

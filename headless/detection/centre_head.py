@@ -29,7 +29,11 @@ from .settings import CLASSES
 OFFSET, SIZE, AXIS, HEADING, OVERLAP = slice(0, 3), slice(3, 6), slice(6, 8), slice(8, 10), 10
 BOX_CHANNELS = 11
 
-TYPICAL_SIZE = (4.5, 1.8, 1.6)  # length, width and height in metres; sizes are learnt as logarithms of ratios to these
+TYPICAL_SIZE = (
+    4.5,
+    1.8,
+    1.6,
+)  # length, width and height in metres; sizes are predicted as log ratios to these
 HEAT_STD = 0.18  # standard deviation of heat along and across a box, as a share of its length and width
 MIN_HEAT = 0.2  # least heat of a cell that learns the box
 INITIAL_HEAT = 0.01  # predicted heat of every cell before training
@@ -63,7 +67,7 @@ class CentreHead(nn.Module):
         """Return the parts of the loss; see `heads.DetectionHead`."""
         maps = [_target_maps(wanted, grid, output.device) for wanted in targets]
         heat, owner = (torch.stack(part) for part in zip(*maps, strict=True))
-        ignored = torch.stack([heat_of(wanted.boxes[~wanted.learnt], grid, output.device)[0] for wanted in targets])
+        ignored = torch.stack([heat_of(wanted.boxes[~wanted.learnable], grid, output.device)[0] for wanted in targets])
         counted = (ignored < MIN_HEAT) & inner_cells(grid, OUTPUT_STRIDE, margin, output.device)
         heat_loss = heat_map_loss(output[:, : len(CLASSES)], heat, counted[:, None])
 
@@ -133,15 +137,15 @@ def reference_points(grid: PillarGrid, row: Tensor, column: Tensor) -> Tensor:
 
 def _target_maps(wanted: TrainingTargets, grid: PillarGrid, device: torch.device) -> tuple[Tensor, Tensor]:
     """Return the target heat (classes, rows, columns) and the index of the box that each cell learns, -1 for none."""
-    learnt = torch.nonzero(wanted.learnt)[:, 0]
-    category = wanted.category[learnt]
+    learnable = torch.nonzero(wanted.learnable)[:, 0]
+    category = wanted.category[learnable]
     heat = torch.stack(
-        [heat_of(wanted.boxes[learnt[category == number]], grid, device)[0] for number in range(len(CLASSES))]
+        [heat_of(wanted.boxes[learnable[category == number]], grid, device)[0] for number in range(len(CLASSES))]
     )
-    most, owner = heat_of(wanted.boxes[learnt], grid, device)
-    if len(learnt) == 0:
+    most, owner = heat_of(wanted.boxes[learnable], grid, device)
+    if len(learnable) == 0:
         return heat, torch.full_like(owner, -1)
-    return heat, torch.where(most >= MIN_HEAT, learnt[owner], -1)
+    return heat, torch.where(most >= MIN_HEAT, learnable[owner], -1)
 
 
 def heat_of(boxes: Tensor, grid: PillarGrid, device: torch.device) -> tuple[Tensor, Tensor]:

@@ -1,8 +1,8 @@
-"""Where a detector looks at a site: foreground returns over pillars, with heights above the road.
+"""Area of a site in which a detector works: foreground returns over pillars, with heights above the road.
 
-Two things that a site knows are taken out of every cloud before a network sees it, so that what is learnt at one site
-holds at another: its background, since a roadside sensor does not move (`Frame.foreground`), and the heights of its
-road, from which those of points and boxes are measured.
+Two properties of the site are removed from every cloud, so that a detector trained at one site works at others: the
+background, which is known because a roadside sensor does not move (`Frame.foreground`), and the height of the road,
+from which heights of points and boxes are measured.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class DetectionArea:
     road : HeightRaster
         Heights of the highest carriageway, and of what would continue it elsewhere.
     site : str
-        The scene's name; empty where it is not known.
+        Name of the scene, or "".
     """
 
     grid: PillarGrid
@@ -67,7 +67,7 @@ class DetectionArea:
 
 
 def area_of(geometry: SceneGeometry, pillar: float) -> DetectionArea:
-    """Return where a detector with pillars of a width in metres looks at a scene: over its region of interest.
+    """Return the detection area of a scene, its region of interest, for pillars of a given width in metres.
 
     Raises
     ------

@@ -44,14 +44,14 @@ class TrainingRecord:
     Parameters
     ----------
     sensors : tuple of str
-        Catalogue keys of the types whose clouds it has seen, in alphabetical order; none where it is not known.
+        Catalogue keys of the sensor types in its training, in alphabetical order; empty if unknown.
     """
 
     sensors: tuple[str, ...] = ()
     sites: tuple[str, ...] = ()
 
     def with_that_of(self, other: TrainingRecord) -> TrainingRecord:
-        """Return both together, for a detector that goes on from where another has ended."""
+        """Return the union of both records, for a detector whose training continues from another detector."""
         return TrainingRecord(*(tuple(sorted({*getattr(self, f.name), *getattr(other, f.name)})) for f in fields(self)))
 
 
@@ -61,9 +61,9 @@ class Detector(nn.Module):
     Parameters
     ----------
     seed : int
-        Of the weights it begins with.
+        Seed of the initial weights.
     training_record : TrainingRecord
-        What it has learnt from, or is to learn from.
+        Sensor types and sites of its training.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class Detector(nn.Module):
 
     @property
     def key(self) -> str:
-        """Digest of its weights and its settings."""
+        """Digest of weights and settings."""
         weights = [part for name, value in self.state_dict().items() for part in (name, value.cpu().numpy())]
         return digest(repr(self.settings), *weights)
 
@@ -119,7 +119,7 @@ class Detector(nn.Module):
         save_state(path, {**self.description(), "weights": weights})
 
     def description(self) -> dict[str, Any]:
-        """Return settings and what it has learnt from as plain values."""
+        """Return the settings and the training record as plain values."""
         return {
             "settings": _plain(asdict(self.settings)),
             "experience": _plain(asdict(self.training_record)),
@@ -146,7 +146,7 @@ class Detector(nn.Module):
 
 
 def keeping_at_most(detector: Detector, points: int) -> Detector:
-    """Return the detector with pillars that keep so many points at most, whatever it has learnt with."""
+    """Return the detector with another limit on the points in a pillar."""
     settings = replace(detector.settings, most_points=points)
     other = Detector(settings, training_record=detector.training_record)
     other.load_state_dict(detector.state_dict())
@@ -223,7 +223,7 @@ def fault_of(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 class _ContentError(SeipError):
-    """What is wrong with the content of a file, as a part of a sentence."""
+    """Fault in the content of a file, as a part of a sentence."""
 
 
 _READ_ERRORS = (*READ_ERRORS, AssertionError, ImportError, pickle.UnpicklingError, struct.error)
@@ -245,7 +245,7 @@ def _check_archive(content: bytes) -> None:
 def _training_record(known: Mapping[str, Any]) -> TrainingRecord:
     listed = all(isinstance(values, list | tuple) for values in known.values())
     if not listed or not all(isinstance(name, str) for values in known.values() for name in values):
-        raise _ContentError("what it has learnt from has no names")
+        raise _ContentError("its training record has no names")
     return TrainingRecord(**{name: tuple(values) for name, values in known.items()})
 
 

@@ -48,13 +48,13 @@ class GroundTruth:
     points : (g,) int64
         Returns from it, of all sensors.
     visibility : (g,) float64, 0 to 1
-        Of the rays that would meet it with nothing else there, the share that does.
+        Share of the rays on it that are not occluded.
     inside : (g,) bool
         Whether its middle is in the region of interest.
     distance : (g,) float64, metres
         From its middle to the nearest sensor.
     parked : (g,) bool
-        Whether it stands in all of its run; false where that is not known.
+        Whether it does not move during its run; false if unknown.
     """
 
     boxes: Float
@@ -79,7 +79,7 @@ class EvaluatedBoxes:
         As in `GroundTruth`.
     score : (k,) float64
     category : (k,) str
-        What it was taken for; a class of several categories goes by its first.
+        Detected category; a class of several categories is named by its first.
     points : (k,) int64
         Returns in the box.
     density : (k,) float64, per square metre
@@ -102,7 +102,7 @@ class EvaluatedBoxes:
 
 @dataclass(frozen=True, eq=False)
 class FrameResult:
-    """One frame: what was there and what was detected.
+    """Ground truth and detections of one frame.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def frame_result(  # noqa: PLR0913  # a frame, what was made of it, and what err
     run: str,
     parked: Boolean | None = None,
 ) -> FrameResult:
-    """Set detections beside the road users of a frame.
+    """Combine detections and road users of a frame.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def frame_result(  # noqa: PLR0913  # a frame, what was made of it, and what err
     region : shapely geometry, metres
     sensors : (s, 3) float64, metres
     parked : (u,) bool, optional
-        Which of the trajectories' road users stand in all of the run.
+        Mask of the trajectories' road users that do not move during the run.
     """
     labels, boxes = frame.labels, detections.boxes
     first = np.array([members[0] for members in classes], dtype=np.str_)

@@ -33,13 +33,13 @@ class Recording:
     traffic : str
         Identifier of the run of traffic: the source of its trajectories, with its seed.
     frames : sequence of Frame
-        In memory, or read when they are asked for.
+        Frames in memory, or read on access.
     sensors : tuple of str
         Catalogue keys of the sensors' types, where they are known.
     site : str
         The scene's name, where it is known.
     placement : str
-        Identifier of where the sensors hang, where a name does not tell.
+        Identifier of the sensors' poses.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Recording:
 
 
 def recording_of(folder: Path, site: str = "") -> Recording:
-    """Return what a folder of scans of a site holds; its frames are read when they are asked for.
+    """Return the recording in a folder of scans; frames are read on access.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def recording_of(folder: Path, site: str = "") -> Recording:
 
 
 class LazyFrames(Sequence[Frame]):
-    """Frames that are read, or simulated, each time that they are asked for.
+    """Frames that are read or simulated on each access.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class TrainingSample:
     category : (k,) int64
         Index into `settings.CLASSES`.
     returns : (k,) int64
-        From each, of all sensors.
+        Returns from each road user, of all sensors.
     """
 
     points: NDArray[np.float32]
@@ -114,7 +114,7 @@ class TrainingSample:
 
 
 def sample_of(frame: Frame, area: DetectionArea, most_points: int) -> TrainingSample:
-    """Return what a detector, whose pillars keep ``most_points``, can learn from a frame of a site."""
+    """Return the training sample of a frame, for pillars that keep ``most_points``."""
     labels = frame.labels
     cloud = area.cloud(frame)
     points = cloud[fill_pillars(cloud, area.grid, most_points).chosen]
@@ -129,14 +129,14 @@ def sample_of(frame: Frame, area: DetectionArea, most_points: int) -> TrainingSa
 
 
 class SampledRecording:
-    """A recording's samples, each made when it is first asked for and kept: some hundred kilobytes.
+    """Samples of a recording, each made on first access and kept; a sample takes some hundred kilobytes.
 
     Parameters
     ----------
     area : DetectionArea
-        Of the recording's site.
+        Detection area of the recording's site.
     most_points : int
-        That a pillar keeps.
+        Largest number of points that a pillar keeps.
     """
 
     def __init__(self, recording: Recording, area: DetectionArea, most_points: int) -> None:
@@ -158,7 +158,7 @@ def drawn(recordings: Sequence[SampledRecording], random: np.random.Generator) -
 
 
 def spread(recordings: Sequence[SampledRecording], most: int) -> list[tuple[DetectionArea, TrainingSample]]:
-    """Return so many samples at most with their areas, of all recordings in turn and from all over each."""
+    """Return at most n samples with their areas, spread evenly over all recordings."""
     each = max(1, most // len(recordings))
     chosen = []
     for recording in recordings[:most]:
@@ -170,7 +170,7 @@ def spread(recordings: Sequence[SampledRecording], most: int) -> list[tuple[Dete
 
 
 def training_record_of(recordings: Sequence[Recording]) -> TrainingRecord:
-    """Return of which sensor types and sites recordings are."""
+    """Return the sensor types and sites of recordings."""
     return TrainingRecord(
         sensors=tuple(sorted({sensor for recording in recordings for sensor in recording.sensors})),
         sites=tuple(sorted({recording.site for recording in recordings} - {""})),

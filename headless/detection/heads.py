@@ -18,13 +18,13 @@ class TrainingTargets:
     boxes : (k, 7) float32 Tensor
         As in `frame_results.Detections`.
     category : (k,) int64 Tensor
-    learnt : (k,) bool Tensor
+    learnable : (k,) bool Tensor
         Whether it has enough points to learn from; cells and anchors near the others are left out of the loss.
     """
 
     boxes: Tensor
     category: Tensor
-    learnt: Tensor
+    learnable: Tensor
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +44,12 @@ class BoxProposals:
 
 
 class DetectionHead(Protocol):
-    """Interface of detection heads, beside that of a module."""
+    """Interface of detection heads, in addition to that of a torch module."""
 
     def loss(
         self, output: Tensor, targets: list[TrainingTargets], grid: PillarGrid, margin: float
     ) -> dict[str, Tensor]:
-        """Return the parts of the loss, weighted, whose sum is learnt from.
+        """Return the weighted terms of the loss; training minimises their sum.
 
         Parameters
         ----------
@@ -58,7 +58,7 @@ class DetectionHead(Protocol):
         targets : list of b TrainingTargets
             In the coordinates of the grid.
         margin : float, metres
-            A border in which nothing is learnt: it shows parts of what stands beyond.
+            Width of a border that the loss ignores: it shows only parts of objects beyond it.
         """
 
     def candidates(self, output: Tensor, grid: PillarGrid, least_score: float) -> list[BoxProposals]:

@@ -28,14 +28,14 @@ def detect(detector: Detector, area: DetectionArea, frame: Frame, *, least_score
     Parameters
     ----------
     area : DetectionArea
-        Of the frame's site; what lies outside is left out.
+        Detection area of the site; returns outside are ignored.
     least_score : float
-        What scores less is not returned.
+        Lowest score of a returned detection.
 
     Raises
     ------
     SeipError
-        The detector has learnt with pillars of another size.
+        The detector was trained with pillars of another size.
     """
     found = detect_on_level(detector, area.grid, area.cloud(frame), least_score=least_score)
     return Detections(area.raised(found.boxes), found.score, found.category)
@@ -59,7 +59,7 @@ def detect_on_level(
     """
     if grid.pillar != detector.settings.pillar:
         raise SeipError(
-            f"a detector that has learnt with pillars of {detector.settings.pillar:g} m sees nothing in those of "
+            f"a detector trained with pillars of {detector.settings.pillar:g} m does not work with pillars of "
             f"{grid.pillar:g} m: lay the grid with its own"
         )
     detector.eval()

@@ -1,4 +1,4 @@
-"""What a trained detector finds with the sensors of any placement, on runs of traffic."""
+"""Detections of a trained detector with the sensors of a placement, on runs of traffic."""
 
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,16 +22,16 @@ from .training import deterministic
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """The frames of some runs with what a detector finds in them.
+    """Frames of some runs with the detections of a detector.
 
     Parameters
     ----------
     frames : tuple of FrameResult
-        Of all runs, one after the other.
+        Results of all runs, one after the other.
     fullest : int
         The frame with the most road users in the region.
     scan : Frame
-        Of that instant.
+        Scan of the fullest frame.
     score : float
         The best balance of precision and recall on these frames.
     """
@@ -60,7 +60,7 @@ class Judgement:
 def judge(
     detector: Detector, simulator: Simulator, placed: MountedSensors, runs: Sequence[SampledRun]
 ) -> Generator[Progress, None, Judgement]:
-    """Detect road users in every frame of runs of traffic, as some sensors scan them.
+    """Detect road users in every frame of runs of traffic, scanned by given sensors.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def judge(
 
 
 def figures(judgement: Judgement) -> Mapping[str, Any]:
-    """Return what a record holds of a judgement."""
+    """Return the figures for the record."""
     return {
         name: {
             "average_precision": value,

@@ -6,8 +6,8 @@ threshold. One that finds none of these, but overlaps a road user that does not 
 region, is not evaluated. All others are false.
 
 This is the rule of PASCAL VOC (Everingham et al. 2010) and COCO (Lin et al. 2014); the two differ where road users
-overlap each other alone. Road users count that are of the categories asked for, have their middle in the region and
-return enough points. All others neither count nor punish, as the neighbouring classes of KITTI (Geiger et al. 2012).
+overlap each other. Road users count if they are of the requested categories, have their centre in the region and
+return enough points. Detections of others are ignored, as those of neighbouring classes in KITTI (Geiger et al. 2012).
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ NO_MATCH = -1  # index that stands for no match, of a detection and of a road us
 
 @dataclass(frozen=True)
 class Rule:
-    """Which road users count, and when a detection matches one.
+    """Rule of matching: the counted road users, and the overlap of a match.
 
     Parameters
     ----------
@@ -37,11 +37,11 @@ class Rule:
     in_space : bool
         Whether boxes have to agree in height as well; in plan otherwise.
     categories : tuple of str
-        Of the road users that count and of the detections that are evaluated.
+        Categories of the counted road users and of the evaluated detections.
     fewest_points : int
-        Returns from a road user below which it does not count; 0 counts those that no sensor sees as well.
+        Least number of returns from a counted road user; 0 also counts those without returns.
     parked : bool or None
-        Whether those that stand in all of their run count alone, or those that do not; None counts both.
+        True counts only parked road users, False only moving ones, None both.
     """
 
     iou: float = 0.7
@@ -64,7 +64,7 @@ class Match:
     found : (k,) int64
         The road user that each detection found, `NO_MATCH` where it found none that counts.
     evaluated : (k,) bool
-        Whether it is a hit or false; the rest neither helps nor harms.
+        Whether the detection is a hit or a false positive; the others are ignored.
     """
 
     counted: Boolean
@@ -104,7 +104,7 @@ def match(frame: FrameResult, rule: Rule) -> Match:
 
 
 def must_be_found(frame: FrameResult, rule: Rule) -> Boolean:
-    """Return which road users count, (g,) bool."""
+    """Return the mask of counted road users, (g,) bool."""
     truth = frame.truth
     counts: Boolean = np.isin(truth.category, rule.categories) & truth.inside & (truth.points >= rule.fewest_points)
     if rule.parked is None:
@@ -113,7 +113,7 @@ def must_be_found(frame: FrameResult, rule: Rule) -> Boolean:
 
 
 def of_its_kind(frame: FrameResult, rule: Rule) -> Boolean:
-    """Return which detections are of the categories asked for, (k,) bool."""
+    """Return the mask of detections of the requested categories, (k,) bool."""
     return np.isin(frame.detected.category, rule.categories)
 
 

@@ -67,7 +67,7 @@ class PillarGrid:
         return (self.west + self.east) / 2, (self.south + self.north) / 2
 
     def window(self, x: float, y: float, pillars: int) -> PillarGrid:
-        """Return a square grid of so many pillars along a side about a point, which may reach beyond this grid."""
+        """Return a square grid of ``side`` pillars centred at a point, which may extend beyond this grid."""
         half = pillars * self.pillar / 2
         return replace(self, west=x - half, south=y - half, columns=pillars, rows=pillars)
 
@@ -177,9 +177,9 @@ class Filling:
     empty : float, 0 to 1
         Share of the grid's pillars without a point.
     over_full : float, 0 to 1
-        Of those with points, the share that has more than are kept.
+        Share of the pillars with points that have more points than are kept.
     left_out : float, 0 to 1
-        Of the points in the grid, the share that is not kept for that.
+        Share of the points in the grid that are dropped for this reason.
     """
 
     empty: float
@@ -188,7 +188,7 @@ class Filling:
 
 
 def filling(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Filling:
-    """Return how full the pillars of a cloud (n, 3 or more columns) are, where each keeps so many points."""
+    """Return the occupancy of the pillars of a cloud (n, 3 or more columns) for a limit of points in each."""
     _, pillar = _choose(points, grid, len(points) + 1)
     counts = np.unique(pillar, return_counts=True)[1]
     if not len(counts):

@@ -48,7 +48,7 @@ class SampledRun:
 
     @functools.cached_property
     def parked(self) -> Boolean:
-        """Whether each of the road users stands in all of the run, (u,) bool."""
+        """Mask of the road users that do not move during the run, (u,) bool."""
         return parked_users(self.trajectories)
 
     @property
@@ -109,7 +109,7 @@ class Simulator:
     """A scene in which runs of traffic are recorded.
 
     What stands still is cast against once for a configuration and a run, and
-    kept until some others were asked for: ask for the frames of one after the
+    cached for a few frames: request the frames of one after the
     other, in no more threads than there are cores and one.
 
     Parameters
@@ -133,7 +133,7 @@ class Simulator:
         self._simulation.cache_clear()
 
     def record(self, configuration: MountedSensors, run: SampledRun) -> Recording:
-        """Return the frames of a run, to be simulated when they are asked for."""
+        """Return the frames of a run, simulated on access."""
         frames = LazyFrames(len(run.times), lambda number: self.frame(configuration, run, number))
         name = f"{configuration.name} in {run.name}"
         return Recording(name, run.key, frames, configuration.types, self.site, configuration.key)

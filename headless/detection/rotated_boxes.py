@@ -77,7 +77,7 @@ def suppress(boxes: Tensor, scores: Tensor, threshold: float) -> Tensor:
     boxes : (n, 5) Tensor
         As in `paired_iou`.
     scores : (n,) Tensor
-        Of equal scores the earlier box goes first.
+        Among equal scores the earlier box has priority.
     threshold : float
         Intersection over union above which a box is removed.
 

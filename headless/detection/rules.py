@@ -1,4 +1,4 @@
-"""By which rules average precision is taken: the one table of every command."""
+"""Rules of average precision, one table for every command."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

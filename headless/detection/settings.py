@@ -16,7 +16,7 @@ CLASS_CATEGORIES = {
 }
 """Classes of the detector and the categories of road users in each.
 
-Cars and vans, and trucks and buses, look alike in sparse clouds. A common class
+Cars and vans, and trucks and buses, are similar in sparse clouds. A common class
 avoids confusing them; their sizes are regressed anyway.
 """
 
@@ -100,7 +100,7 @@ class TrainingSettings:
     learning_rate : float
         Maximum of the one-cycle schedule: warm-up over 30 % of the steps, then cosine annealing (Smith 2018).
     weight_decay : float
-        Of AdamW.
+        Weight decay of AdamW.
     least_points : int
         Road users with fewer returns are left out of loss and validation, as targets and as false positives.
     validate_every : int
@@ -108,7 +108,7 @@ class TrainingSettings:
     patience : int
         Validations without improvement before training stops.
     seed : int
-        Of the initial weights and the order of samples.
+        Seed of the initial weights and the order of samples.
     threads : int
         CPU threads of torch. The number determines the order of sums, and so the exact result; one is nearly as fast
         as two with windows of this size.

@@ -9,10 +9,10 @@ from .detector import Detector
 from .pillars import filling
 
 MAX_OVERFULL_SHARE = 0.6
-"""Share of the pillars with points that may have more than are kept: up to it no loss was told from chance.
+"""Share of the pillars with points that may have more than are kept: up to it no significant loss was found.
 
 Measured on the shipped junction with four sensors of 32 channels, where pillars
-kept fewer points than they were learnt with: `disturbances.Capped`.
+kept fewer points than in training: `disturbances.Capped`.
 """
 
 
@@ -26,7 +26,7 @@ def suitability_warnings(
     sensors : sequence of str
         Catalogue keys of the types whose clouds it is used on.
     area : DetectionArea
-        Of the site where it is used.
+        Detection area of the site.
     frame : Frame
         That it is used on.
     """
@@ -35,11 +35,11 @@ def suitability_warnings(
 
 
 def _of_types(detector: Detector, sensors: Sequence[str]) -> str:
-    learnt, foreign = detector.training_record.sensors, sorted(set(sensors) - set(detector.training_record.sensors))
-    if not learnt or not foreign:
+    trained, foreign = detector.training_record.sensors, sorted(set(sensors) - set(detector.training_record.sensors))
+    if not trained or not foreign:
         return ""
     return (
-        f"the detector has learnt from clouds of {' and '.join(learnt)}, not of {' and '.join(foreign)}: "
+        f"the detector was trained on clouds of {' and '.join(trained)}, not of {' and '.join(foreign)}: "
         "test it on clouds of these types before you trust it with them, or train it on them too"
     )
 
@@ -49,8 +49,8 @@ def _of_site(detector: Detector, site: str) -> str:
     if not site or len(sites) != 1 or site in sites:
         return ""
     return (
-        f"the detector has learnt at {sites[0]} alone, not at {site}: at other sites it may find less than the "
-        "detector that ships, which has learnt at many"
+        f"the detector was trained only at {sites[0]}, not at {site}: at other sites it may find less than the "
+        "shipped detector, which was trained at many sites"
     )
 
 

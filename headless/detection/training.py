@@ -38,7 +38,7 @@ VALIDATION_FRAMES = 18  # frames of each validation, spread over the recordings 
 STILL_RISING = 0.02  # average precision by which the last validation beats all others where more steps would gain
 LOSS_MARGIN = 1.6  # metres at the border of a window for which no loss is computed: much of what is there lies outside
 MAX_CROP_SHIFT = 0.25  # share of a window that it lies beside its road user at most
-MAX_ROTATION, MAX_STRETCH = math.radians(8.0), 0.05  # of what is learnt from; the turn is beyond quarter turns
+MAX_ROTATION, MAX_STRETCH = math.radians(8.0), 0.05  # of training samples; the rotation is in addition to quarter turns
 MAX_LIFT = 0.15  # metres by which all of a window is raised or lowered at most: a road is not known exactly
 MAX_GRADIENT_NORM = 10.0  # norm beyond which a gradient is cut, as published
 
@@ -52,7 +52,7 @@ class LearningCurve:
     loss : list of float
         Total loss of step i.
     validation : dict of int to float
-        Average precision on the frames set aside, at `matching.Rule`'s overlap, after so many steps.
+        Average precision on the validation frames, at `matching.Rule`'s overlap, by number of steps.
     """
 
     loss: list[float] = field(default_factory=list)
@@ -84,7 +84,7 @@ class TrainedDetector:
     curve: LearningCurve
 
 
-def train(  # noqa: PLR0913  # what is learnt from, how, on what, and where it begins
+def train(  # noqa: PLR0913  # data, settings, device and initial weights
     recordings: Sequence[SampledRecording],
     validation: Sequence[SampledRecording],
     network: NetworkSettings,
@@ -358,7 +358,7 @@ def _targets(sample: TrainingSample, least_points: int, device: torch.device) ->
     return TrainingTargets(
         boxes=torch.from_numpy(sample.boxes.astype(np.float32)).to(device),
         category=torch.from_numpy(sample.category).to(device),
-        learnt=torch.from_numpy(sample.returns >= least_points).to(device),
+        learnable=torch.from_numpy(sample.returns >= least_points).to(device),
     )
 
 
@@ -367,7 +367,7 @@ def _copied(state: dict[str, Any]) -> dict[str, Tensor]:
 
 
 class _Torch:
-    """What torch keeps for all threads: set by the first that asks for it, and as it was before after the last."""
+    """Global settings of torch: set by the first user, restored after the last."""
 
     def __init__(self) -> None:
         self._lock, self._users = threading.Lock(), 0

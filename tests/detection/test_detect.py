@@ -72,7 +72,7 @@ def test_figures_charts_and_detections_are_written(folder, capsys):
     assert "bev_0.7: AP" in said.out
     assert "with a score of" in said.out
     assert re.search(r"fullest frame, [\d,]+ returns: \d+\.\d\d s on \d+ cores", said.out)
-    assert any("has learnt from clouds of vlp16" in sentence for sentence in record["warnings"])
+    assert any("trained on clouds of vlp16" in sentence for sentence in record["warnings"])
 
 
 def test_the_shipped_detector_finds_the_car_and_the_bus(folder):

@@ -83,7 +83,7 @@ def test_clouds_of_other_sensor_types_are_warned_of(folder, capsys):
     manifest.write_text(json.dumps(record), encoding="utf-8")
     train.main(arguments(folder, "away", test="foreign"))
     said = capsys.readouterr().out
-    assert f"foreign: the detector has learnt from clouds of {' and '.join(learnt.sensors)}, not of another:" in said
+    assert f"foreign: the detector was trained on clouds of {' and '.join(learnt.sensors)}, not of another:" in said
 
 
 def test_a_finished_training_is_not_done_again(folder):

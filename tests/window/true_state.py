@@ -243,7 +243,7 @@ for done in range(30):
 output.mkdir()
 figure = {"average_precision": 0.7125, "interval": [0.66, 0.775], "road_users": 1234}
 rules = ("bev_0.7", "car_van_0.7", "truck_bus_0.7", "motorcycle_bicycle_0.5", "pedestrian_0.5")
-warnings = ["the detector has learnt from clouds of type1, not of type2"]
+warnings = ["the detector was trained on clouds of type1, not of type2"]
 record = {"schema": "seip-detection/1", "average_precision": dict.fromkeys(rules, figure), "warnings": warnings}
 (output / "errors.png").write_bytes(b"picture")
 (output / "detection.json").write_text(json.dumps(record))
@@ -276,7 +276,7 @@ def _detection_runs_in_another_python(window: Window) -> Steps:
     yield from window.until(lambda: not (OUT / "detection").exists(), 2)
     yield from _press(window, "seip.detect(")
     assert {path.name for path in (OUT / "detection").iterdir()} == {"detection.json", "errors.png"}
-    assert (yield from _says(window, "has learnt from clouds"))
+    assert (yield from _says(window, "trained on clouds"))
     yield from window.find("wm.path_open(")
     yield from window.picture("detected")
     preferences.own().python = ""
