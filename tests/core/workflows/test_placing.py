@@ -1,0 +1,90 @@
+"""One function places sensors for every criterion, scenario and risk measure."""
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from seip_addon.core.choosing.placement.objective import MOVED, Objective
+from seip_addon.core.choosing.placement.scenarios import PoseErrors, Scenarios
+from seip_addon.core.choosing.placement.search_limits import Acceptance
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.workflows.moved_sensors import evaluate_moved_sensors
+from seip_addon.core.workflows.placing import ACCEPTED_MESSAGE, place
+
+
+def best_of_all(survey, count, worth):
+    """Largest worth of all choices of so many poses at different positions."""
+    position = survey.site.candidates.position_of
+    return max(
+        worth(list(chosen))
+        for chosen in combinations(range(len(position)), count)
+        if len(set(position[list(chosen)])) == count
+    )
+
+
+def test_the_nominal_placement_covers_most_of_all_choices(small_survey):
+    seen = small_survey.grid.visible
+    solution = finish(place(small_survey, Objective(count=2)))
+    assert solution.placement.status == "optimal"
+    assert solution.placement.objective == best_of_all(small_survey, 2, lambda chosen: seen[chosen].any(axis=0).sum())
+    assert solution.evaluation is None
+
+
+def test_the_worst_failure_leaves_most_of_all_choices(small_survey):
+    """Of two sensors the worse one is left after the failure of the other."""
+    seen = small_survey.grid.visible
+    solution = finish(place(small_survey, Objective(count=2, failures="worst")))
+    best = best_of_all(small_survey, 2, lambda chosen: seen[chosen].sum(axis=1).min())
+    assert solution.placement.objective == pytest.approx(best)
+    assert solution.evaluation is not None
+
+
+def test_pose_errors_are_evaluated_on_held_out_scenarios(small_survey):
+    errors = Scenarios(kind="pose-errors", pose_errors=PoseErrors(position=0.3), count=4, held_out=12)
+    solution = finish(place(small_survey, Objective(count=1, scenarios=errors)))
+    assert solution.evaluation is not None
+    assert any("4 scenarios" in note for note in solution.placement.notes)
+    nominal = finish(place(small_survey, Objective(count=1, scenarios=errors, risk="none")))
+    plain = finish(place(small_survey, Objective(count=1)))
+    np.testing.assert_array_equal(nominal.placement.chosen, plain.placement.chosen)
+    assert len(nominal.placement.notes) > len(plain.placement.notes)
+
+
+def test_traffic_scenarios_need_runs(small_survey):
+    with pytest.raises(SeipError, match="traffic"):
+        finish(place(small_survey, Objective(count=1, scenarios=Scenarios(kind="traffic"))))
+
+
+def test_an_accepted_search_says_so(small_survey):
+    acceptance = Acceptance()
+    acceptance.accept()
+    solution = finish(place(small_survey, Objective(count=3), acceptance=acceptance))
+    assert solution.placement.status != "optimal"
+    assert ACCEPTED_MESSAGE in solution.placement.notes
+    assert solution.placement.bound >= solution.placement.objective > 0
+
+
+def test_sensors_at_candidate_poses_see_what_the_grid_holds(small_survey):
+    solution = finish(place(small_survey, Objective(count=2)))
+    mounted = [one.mounted for one in solution.deployment.sensors]
+    moved = finish(evaluate_moved_sensors(small_survey, solution.objective, mounted, {}))
+    assert moved.deployment.coverage == solution.deployment.coverage
+    assert moved.placement.status == MOVED
+
+
+def test_a_sensor_moved_by_hand_sees_what_its_rays_see(small_survey):
+    solution = finish(place(small_survey, Objective(count=1)))
+    (one,) = solution.deployment.sensors
+    mounted = one.mounted
+    aside = replace(mounted, xyz=mounted.xyz + np.array([0.05, 0.0, 0.0]))
+    moved = finish(evaluate_moved_sensors(small_survey, solution.objective, [aside], {aside.label: "here"}))
+    (sensor,) = moved.deployment.sensors
+    assert sensor.pose is None
+    assert sensor.position_name == "here"
+    assert moved.deployment.coverage == pytest.approx(solution.deployment.coverage, abs=0.1)
+    below = replace(mounted, xyz=mounted.xyz * [1, 1, 0] - [0, 0, 1.0])
+    with pytest.raises(SeipError, match="below the ground"):
+        finish(evaluate_moved_sensors(small_survey, solution.objective, [below], {}))
