@@ -71,7 +71,7 @@ def test_buildings_and_ground_are_in_the_scene(street, town, tmp_path, capsys):
     (["--buildings", "none.json"], "no such file"),
     (["--terrain", "none.tif"], "no such file"),
     (["--terrain", "none.laz"], "no such file"),
-    (["--terrain", "street.xodr"], "is no TIFF"),
+    (["--terrain", "street.xodr"], "is not a TIFF file"),
     (["--buildings", "street.xodr"], "no JSON"),
     (["--mesh", "none.obj", "--mesh-origin", "0", "0"], "no such file"),
 ])  # fmt: skip
