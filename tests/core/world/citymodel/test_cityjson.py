@@ -198,7 +198,7 @@ BROKEN = {
     "a flat boundary": (spoilt(lambda c: set_to("boundaries", [1, 2])(geometry(c))), "lists of lists"),
     "no boundary": (spoilt(lambda c: geometry(c).pop("boundaries")), "lists of lists"),
     "semantics too high": (spoilt(lambda c: set_to(0, 0, 7)(geometry(c)["semantics"]["values"])), "a surface 7"),
-    "semantics too few": (spoilt(lambda c: set_to(0, [0])(geometry(c)["semantics"]["values"])), "number of values of semantics"),
+    "semantics too few": (spoilt(lambda c: set_to(0, [0])(geometry(c)["semantics"]["values"])), "number of values"),
     "no level": (spoilt(lambda c: geometry(c).pop("lod")), "level of detail 'None'"),
     "a level that is none": (spoilt(lambda c: set_to("lod", "nan")(geometry(c))), "level of detail 'nan'"),
     "level 3 alone": (spoilt(lambda c: set_to("lod", "3")(geometry(c))), "no building with surfaces"),
