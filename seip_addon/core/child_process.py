@@ -1,4 +1,4 @@
-"""Programs that work for this one in a process of their own, and end with whoever waits for them."""
+"""Child processes, which end together with the code that waits for them."""
 
 import os
 import subprocess
@@ -10,7 +10,7 @@ from .progress import REPORT_INTERVAL, Progress
 
 
 def exit_status(command: Sequence[str], seconds: float) -> int | None:
-    """Run a program without output and return its exit status, None where it takes longer than some seconds.
+    """Run a program without output and return its exit status, None if it takes longer than `seconds`.
 
     Raises
     ------
@@ -39,23 +39,23 @@ def run_logged(
     folder: Path | None = None,
     environment: dict[str, str] | None = None,
 ) -> Generator[Progress, None, int]:
-    """Run a program to its end, its output to a file, and return its exit status.
+    """Run a program to its end with its output written to a file, and return its exit status.
 
     Parameters
     ----------
     log : path
-        The file for standard output and standard error.
+        File for standard output and standard error.
     progress : callable
-        Returns how far the program is, from what it has said so far.
+        Function that returns the progress from the output so far.
     folder : path, optional
-        To run it in.
+        Working folder of the program.
     environment : dict of str to str, optional
-        What the environment has beside that of this process.
+        Environment variables to set in addition to those of this process.
 
     Yields
     ------
     Progress
-        Ten times a second; the program is ended when this is closed.
+        Progress, ten times a second. Closing the generator ends the program.
 
     Raises
     ------

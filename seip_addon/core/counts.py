@@ -2,14 +2,15 @@
 
 
 def counted(number: int, one: str, several: str = "") -> str:
-    """Return a number with what it counts.
+    """Return a number followed by a noun in singular or plural.
 
     Parameters
     ----------
     number : int
+        Number of things.
     one : str
-        What a single one is called, with all words that depend on the number: "outline that crosses itself".
+        Singular, with all words that depend on the number: "outline that crosses itself".
     several : str, optional
-        What any other number, zero included, is called; by default ``one`` with an "s".
+        Plural, also used for zero; by default ``one`` with an "s".
     """
     return f"{number:,} {one if number == 1 else several or f'{one}s'}"

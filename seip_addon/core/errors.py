@@ -4,11 +4,10 @@ _MAX_LENGTH = 1000
 
 
 class SeipError(Exception):
-    """A mistake of the user's, in one sentence that names the thing and the cure.
+    """A mistake of the user, described in one sentence that names the thing and the cure.
 
-    Operators turn it into a report and headless commands into one line on standard error with exit status 1; every
-    other exception is a defect of this package and is left alone. A sentence that repeats more of a file than anybody
-    reads loses its middle.
+    Operators turn it into a report, and headless commands into one line on standard error with exit status 1. All
+    other exceptions are defects of this package and are not caught. The middle of very long sentences is cut out.
     """
 
     def __init__(self, sentence: str) -> None:

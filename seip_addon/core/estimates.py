@@ -11,25 +11,25 @@ import numpy as np
 from .arrays import Float, Integer
 from .errors import SeipError
 
-Interval = tuple[float, float]  # least and largest value that a 95 % interval holds
-ANYTHING: Interval = (-math.inf, math.inf)  # what a figure can be that knows no bounds
-SHARE: Interval = (0.0, 1.0)  # what a share or an average precision can be
+Interval = tuple[float, float]  # lower and upper end of a 95 % interval
+ANYTHING: Interval = (-math.inf, math.inf)  # range of a figure without bounds
+SHARE: Interval = (0.0, 1.0)  # range of a share or an average precision
 COUNT: Interval = (0.0, math.inf)
 CHANGE_OF_SHARE: Interval = (-1.0, 1.0)
 TAIL_PROBABILITY = 0.025  # probability on either side of an interval
 NORMAL_QUANTILE = 1.959963984540054  # value that a standard normal variable exceeds with a probability of 2.5 %
-RESAMPLES = 2000  # of a bootstrap
-MIN_BATCHES = 4  # with fewer, no interval is given for a mean
+RESAMPLES = 2000  # number of resamples of a bootstrap
+MIN_BATCHES = 4  # least number of batches for an interval of a mean
 
 
 @dataclass(frozen=True)
 class IntervalEstimate:
-    """A figure and its interval.
+    """A figure and its 95 % interval.
 
     Parameters
     ----------
     value, low, high : float
-        An end that so few draws leave open is infinite.
+        Figure, and ends of the interval; an end that the number of draws leaves open is infinite.
     """
 
     value: float
@@ -37,7 +37,7 @@ class IntervalEstimate:
     high: float
 
     def agrees_with(self, other: IntervalEstimate) -> bool:
-        """Whether the intervals of two estimates meet."""
+        """Return whether the intervals of two estimates overlap."""
         return self.low <= other.high and other.low <= self.high
 
     def describe(self, decimals: int = 2) -> str:
@@ -52,7 +52,7 @@ class IntervalEstimate:
         return f"{value} points [{low}, {high}]"
 
     def as_change(self, decimals: int = 2) -> str:
-        """Return a difference of shares, in percentage points, as so much more or less: a loss is called a loss."""
+        """Return a difference of shares as a number of percentage points more, or less for a loss."""
         gain = self.value >= 0.0
         size = self if gain else IntervalEstimate(-self.value, -self.high, -self.low)
         word = "more" if gain else "less"
@@ -62,7 +62,7 @@ class IntervalEstimate:
 
 
 def mean_of(values: Float) -> IntervalEstimate:
-    """Estimate a mean; its interval is that of the normal approximation, for some thirty draws and more.
+    """Estimate a mean with the interval of the normal approximation, for about thirty draws or more.
 
     Parameters
     ----------
@@ -76,16 +76,17 @@ def mean_of(values: Float) -> IntervalEstimate:
 
 
 def mean_over_time(values: Float, batch: Integer) -> IntervalEstimate:
-    """Estimate the mean of a time series from the means of its batches, since neighbouring values are dependent.
+    """Estimate the mean of a time series from the means of batches, because neighbouring values are dependent.
 
-    Stretches are taken as independent and as equally long (batch means; Law 2015,
-    section 9.5.3), and Student's interval is that of their means.
+    Batches are assumed to be independent and equally long (batch means; Law 2015, section 9.5.3), and the interval is
+    Student's interval of their means.
 
     Parameters
     ----------
     values : (n,) float64
+        Values of the time series.
     batch : (n,) int64
-        Batch of time of each value.
+        Batch that each value belongs to.
     """
     _, which = np.unique(batch, return_inverse=True)
     many = np.bincount(which)
@@ -98,9 +99,9 @@ def mean_over_time(values: Float, batch: Integer) -> IntervalEstimate:
 def student_reach(values: Float | Sequence[float]) -> float:
     """Return half the width of the 95 % interval of a mean (Student 1908).
 
-    Exact for values from a normal distribution however few they are. Three values, as from three seeds, can be drawn
-    with replacement in ten ways only, and a bootstrap over them would hold the mean in three of four cases instead of
-    19 of 20.
+    Exact for any number of values from a normal distribution. Three values, as from three seeds, can be drawn with
+    replacement in only ten ways, and the interval of a bootstrap over them would contain the mean in three of four
+    cases instead of 19 of 20.
 
     Parameters
     ----------
@@ -111,14 +112,16 @@ def student_reach(values: Float | Sequence[float]) -> float:
 
 
 def mean_interval(values: Sequence[float], possible: Interval = ANYTHING) -> Interval:
-    """Return the 95 % interval of the mean of what repetitions (seeds) gave; see `student_reach`.
+    """Return the 95 % interval of the mean over repetitions (seeds); see `student_reach`.
 
-    What the mean cannot be is cut off: that takes nothing from the probability with which the interval holds it.
+    Impossible values are cut off, which does not change the probability that the interval contains the mean.
 
     Parameters
     ----------
+    values : sequence of float
+        Values of the repetitions.
     possible : (float, float)
-        Least and largest value that the figure can have.
+        Least and largest possible value of the figure.
 
     Raises
     ------
@@ -139,16 +142,16 @@ def within(interval: Interval, possible: Interval) -> Interval:
 
 
 def jackknife_reach(left_out: Float) -> float:
-    """Return half the width of the 95 % interval of a figure, from its values without each of n independent samples.
+    """Return half the width of the 95 % jackknife interval of a figure.
 
     The delete-one jackknife (Tukey 1958) with Student's quantile of n − 1 degrees of freedom. A bootstrap over few
-    samples is too sure of itself: of 4 or 8 runs of traffic its percentiles hold the true figure in 77 to 89 of 100
-    cases where they should in 95.
+    samples gives intervals that are too narrow: with 4 or 8 runs of traffic its percentiles contain the true figure in
+    77 to 89 of 100 cases instead of 95.
 
     Parameters
     ----------
     left_out : (n,) float64
-        At least two.
+        Values of the figure without each of n independent samples, at least two.
     """
     number = len(left_out)
     spread = (number - 1) / number * float(((left_out - left_out.mean()) ** 2).sum())
@@ -156,18 +159,19 @@ def jackknife_reach(left_out: Float) -> float:
 
 
 def share_interval(share: float, left_out: Float, count: float) -> Interval:
-    """Return the 95 % interval of a share, from its values without each of n independent samples.
+    """Return the 95 % jackknife interval of a share.
 
-    `jackknife_reach` on the scale of log odds, where shares near 0 and 1 spread evenly to both sides: so the interval
-    lies between 0 and 1, and it holds the true share as often as it says near them, too.
+    This is `jackknife_reach` on the scale of log odds, on which shares near 0 and 1 have symmetric errors. The interval
+    lies between 0 and 1, and has the stated coverage near both ends, too.
 
     Parameters
     ----------
     share : float, 0 to 1
+        Share of all samples.
     left_out : (n,) float64, 0 to 1
-        At least two.
+        Shares without each of n independent samples, at least two.
     count : float
-        Of what the share is one: nearer to 0 and 1 than half of one no odds are told apart.
+        Number of items that the share refers to; log odds are limited to half an item from 0 and 1.
     """
     edge = 0.5 / count
 
@@ -182,8 +186,9 @@ def share_interval(share: float, left_out: Float, count: float) -> Interval:
 
 
 def student_quantile(freedom: int) -> float:
-    """Return the value that Student's t with so many degrees of freedom exceeds with a probability of 2.5 %."""
+    """Return the value that Student's t with `freedom` degrees of freedom exceeds with a probability of 2.5 %."""
     low, high = 1.0, 13.0  # between the normal quantile, 1.96, and that of one degree, 12.706
+    # Bisection: the tail probability decreases with the value, and 60 halvings reach full precision.
     for _ in range(60):
         middle = (low + high) / 2
         low, high = (middle, high) if _student_tail(middle, freedom) > TAIL_PROBABILITY else (low, middle)
@@ -204,13 +209,13 @@ def _student_tail(value: float, freedom: int) -> float:
 
 
 def percentiles(values: Float) -> Interval:
-    """Return the interval that leaves 2.5 % of the values on either side; NaN does not count."""
+    """Return the interval that leaves 2.5 % of the values on either side; NaN is ignored."""
     low, high = np.nanquantile(values, (TAIL_PROBABILITY, 1 - TAIL_PROBABILITY))
     return float(low), float(high)
 
 
 def rank_correlation(x: Float | Sequence[float], y: Float | Sequence[float]) -> float:
-    """Return Spearman's (1904) rank correlation; equal values share their mean rank; NaN where all are equal."""
+    """Return Spearman's (1904) rank correlation; equal values share their mean rank; NaN if all are equal."""
     ranks = np.array([_ranks(np.asarray(values, dtype=np.float64)) for values in (x, y)])
     centred = ranks - ranks.mean(axis=1, keepdims=True)
     scale = math.sqrt(float((centred[0] ** 2).sum() * (centred[1] ** 2).sum()))
@@ -218,9 +223,9 @@ def rank_correlation(x: Float | Sequence[float], y: Float | Sequence[float]) -> 
 
 
 def rank_agreements(x: Float, y: Float) -> tuple[Float, Float]:
-    """Return Spearman's and Kendall's (tau-b, 1945) rank correlation along the last axis; NaN where all are equal.
+    """Return Spearman's and Kendall's (tau-b, 1945) rank correlation along the last axis; NaN if all are equal.
 
-    Both from the signs of all differences of pairs; equal values share their mean rank.
+    Both follow from the signs of all pairwise differences; equal values share their mean rank.
 
     Parameters
     ----------
@@ -230,6 +235,8 @@ def rank_agreements(x: Float, y: Float) -> tuple[Float, Float]:
     -------
     spearman, kendall : (…) float64
     """
+    # The sum of a value's signs against all others is twice its centred rank: hence Spearman's from the sums, and
+    # Kendall's from the signs themselves.
     of_x, of_y = (np.sign(values[..., :, None] - values[..., None, :]) for values in (x, y))
     return _cosine(of_x.sum(axis=-1), of_y.sum(axis=-1), (-1,)), _cosine(of_x, of_y, (-2, -1))
 
@@ -240,15 +247,17 @@ def _cosine(one: Float, other: Float, axes: tuple[int, ...]) -> Float:
 
 
 def rank_correlation_interval(x: Sequence[float], y: Sequence[float], seed: int) -> Interval | None:
-    """Return the 95 % interval of the rank correlation, or None where there are too few pairs.
+    """Return the 95 % interval of the rank correlation, or None if there are too few pairs.
 
-    Bootstrap (Efron 1979) over pairs: give one pair for each configuration, with the mean over its seeds, since seeds
-    of one configuration are no new evidence of a correlation.
+    Bootstrap (Efron 1979) over pairs. Give one pair for each configuration, with the mean over its seeds, because seeds
+    of one configuration are not additional evidence of a correlation.
 
     Parameters
     ----------
+    x, y : sequence of float
+        Values of the pairs.
     seed : int
-        The same seed draws the same pairs.
+        Seed of the resamples.
     """
     if len(x) < 4 or math.isnan(rank_correlation(x, y)):
         return None
@@ -258,24 +267,24 @@ def rank_correlation_interval(x: Sequence[float], y: Sequence[float], seed: int)
 
 
 def _ranks(values: Float) -> Float:
-    """Return ranks from 0 on, the mean rank for equal values."""
+    """Return ranks from 0, with the mean rank for equal values."""
     ordered = np.sort(values)
     ranks: Float = (np.searchsorted(ordered, values) + np.searchsorted(ordered, values, side="right") - 1) / 2
     return ranks
 
 
 def quantile_of(values: Float, share: float) -> IntervalEstimate:
-    """Estimate a quantile; its interval holds whatever the distribution is (David and Nagaraja 2003, section 7.1).
+    """Estimate a quantile with a distribution-free interval (David and Nagaraja 2003, section 7.1).
 
-    The number of draws below the true quantile is binomial, so that the order statistics between which it lies follow
-    from n and ``share`` alone. The value itself is the order statistic of rank ``ceil(share · n)``.
+    The number of draws below the true quantile is binomial, so that the order statistics that enclose it depend only on
+    n and ``share``. The value is the order statistic of rank ``ceil(share · n)``.
 
     Parameters
     ----------
     values : (n,) float64
         Independent draws.
     share : float
-        0 to 1, both excluded.
+        Probability of the quantile, 0 to 1, both excluded.
     """
     ordered, number = np.sort(values), len(values)
     below = _binomial_distribution(number, share)
@@ -289,18 +298,18 @@ def quantile_of(values: Float, share: float) -> IntervalEstimate:
 
 
 def quantile_gain(values: Float, others: Float, share: float, seed: int = 0) -> IntervalEstimate:
-    """Estimate by how much a quantile exceeds another's, draw for draw under the same circumstances.
+    """Estimate the difference between the quantiles of two samples of paired draws.
 
     The interval is that of `RESAMPLES` resamples of the pairs (the percentile bootstrap, Efron 1979).
 
     Parameters
     ----------
     values, others : (n,) float64
-        Independent draws; a value and the other of the same number belong together.
+        Independent draws; values with the same index are a pair.
     share : float
-        0 to 1, both excluded.
+        Probability of the quantile, 0 to 1, both excluded.
     seed : int
-        Of the resamples.
+        Seed of the resamples.
     """
     number = len(values)
     rank = math.ceil(share * number) - 1
@@ -319,6 +328,7 @@ def _binomial_distribution(number: int, share: float) -> Float:
     """Return P(B <= b) for b = 0 … number."""
     count = np.arange(number + 1)
     factorial = np.array([math.lgamma(n + 1) for n in range(number + 1)])
+    # Logarithms keep binomial coefficients of many draws from overflowing.
     log = factorial[-1] - factorial - factorial[::-1] + count * math.log(share) + count[::-1] * math.log1p(-share)
     distribution: Float = np.cumsum(np.exp(log))
     return distribution

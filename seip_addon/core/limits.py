@@ -1,7 +1,7 @@
-"""Physical limits of what is read and typed: every number is finite and within the limits of its kind.
+"""Physical limits of numbers in files and options: each is finite and within the limits of its kind.
 
-All readers and options take their limits from here. A limit is wide enough for every real site, and narrow enough that
-nothing computed from numbers within it overflows or loses the millimetre.
+All readers and options take their limits from here. Limits are wide enough for every real site, and narrow enough that
+results computed from numbers within them neither overflow nor lose the millimetre.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from .arrays import Boolean
 from .errors import SeipError
 
-_MAX_QUOTED = 40  # characters of a value that a message repeats
-_OPEN = 1e15  # from which on messages name no end
+_MAX_QUOTED = 40  # characters of a value in a message at most
+_OPEN = 1e15  # limits from here on are not named in messages
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,12 @@ class Limits:
         return array.dtype.kind in "fiu" and bool(self.each(array).all())
 
     def fault(self, values: ArrayLike) -> str:
-        """Return what is wrong with a value, or with the first wrong one of several, as part of a sentence.
+        """Return the fault of a value, or of the first invalid one of several, as part of a sentence.
 
         Returns
         -------
         str
-            Such as ``is nan, not 0 to 1,000 m``; "" where all values are allowed.
+            Text such as ``is nan, not 0 to 1,000 m``; "" if all values are allowed.
         """
         if self.allow(values):
             return ""
@@ -81,7 +81,7 @@ class Limits:
         Parameters
         ----------
         checks : mapping of str to (value or values, Limits)
-            By the name of each quantity in words.
+            Values and limits by the name of each quantity in words.
         """
         faults = ((name, limits.fault(values)) for name, (values, limits) in checks.items())
         return next((f"{name} {fault}" for name, fault in faults if fault), "")
@@ -114,7 +114,7 @@ GROUND = Limits(-500.0, 9_000.0, "m")
 """Elevation of the ground above sea level."""
 
 ELEVATION = Limits(-10_000.0, 10_000.0, "m")
-"""Height above the zero of a map or model, of the ground and of everything on it."""
+"""Height of the ground, and of objects on it, above the zero of a map or model."""
 
 HEIGHT = Limits(0.01, 1_000.0, "m")
 """Height of an object from its foot to its top: no building is higher."""
@@ -123,7 +123,7 @@ ABOVE_GROUND = Limits(-1_000.0, 1_000.0, "m")
 """Height of a point of an object, or of a sensor, above the ground."""
 
 SIZE = Limits(0.001, 100_000.0, "m")
-"""Length, width, thickness or spacing of something that has an extent."""
+"""Length, width, thickness or spacing."""
 
 DISTANCE = Limits(0.0, 100_000.0, "m")
 """Distance, which may be zero."""

@@ -23,12 +23,12 @@ class Progress:
     Parameters
     ----------
     done, total : int
-        Finished and all units of work, ``0 <= done <= total``; a total of 0 means that it is not known.
+        Number of finished and of all units of work, ``0 <= done <= total``; a total of 0 means that it is not known.
     what : str
-        What is being worked on, for the person who waits.
+        Description of the current work for the user.
     counted : bool
-        Whether the units take about the same time, so that the time left follows from their number. Stages of work do
-        not; a search, which may end at any step, has a total of 0.
+        Whether all units take about the same time, so that the remaining time follows from their number; false for
+        stages of work. A search, which may end at any step, has a total of 0.
     """
 
     done: int
@@ -38,16 +38,16 @@ class Progress:
 
 
 class Pace:
-    """Time left of counted work, from its reports: each count of units has a pace of its own.
+    """Estimate of the remaining time of counted work from its reports, separately for each count of units.
 
     Attributes
     ----------
     first : Progress or None
-        The report that the count began with.
+        First report of the current count.
     began : float, seconds
-        When that was.
+        Time of that report.
     seconds_left : float or None
-        None where the work cannot be counted, or no unit has been finished yet.
+        Remaining time; None if the work is not counted, or no unit has been finished yet.
     """
 
     def __init__(self) -> None:
@@ -57,7 +57,7 @@ class Pace:
         self._done = 0
 
     def note(self, progress: Progress, now: float) -> None:
-        """Take a report.
+        """Update the estimate with a report.
 
         Parameters
         ----------
@@ -85,7 +85,7 @@ def finish(steps: Generator[Progress, None, Result], report: Callable[[Progress]
 
 
 def within(whole: Progress, steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
-    """Run work as one unit of a larger whole: at each step the whole's progress shows, and it can be stopped there."""
+    """Run work as one unit of a larger whole, yielding the progress of the whole at each step."""
     while True:
         try:
             next(steps)
@@ -96,7 +96,7 @@ def within(whole: Progress, steps: Generator[Progress, None, Result]) -> Generat
 
 
 def in_detail(whole: Progress, steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
-    """Run work as one unit of a larger whole of units that are equally long, and show how far it is within its unit."""
+    """Run work as one of several equally long units of a whole, yielding progress that includes that of the unit."""
     while True:
         try:
             step = next(steps)
@@ -108,12 +108,12 @@ def in_detail(whole: Progress, steps: Generator[Progress, None, Result]) -> Gene
 
 
 def in_thread(work: Callable[[threading.Event], Result], what: str) -> Generator[Progress, None, Result]:
-    """Run work that cannot yield, such as a call of a library, in a thread of its own.
+    """Run work that cannot yield, such as a call of a library, in a separate thread.
 
     Parameters
     ----------
     work : callable
-        Called with an event; once that is set nobody waits for the result, and the sooner it returns the better.
+        Function to call with an event. When the event is set, the result is not needed any more and it should return.
 
     Yields
     ------
@@ -126,7 +126,7 @@ def in_thread(work: Callable[[threading.Event], Result], what: str) -> Generator
     def run() -> None:
         try:
             result.set_result(work(stop))
-        except BaseException as error:  # noqa: BLE001 -- raised again where the result is asked for
+        except BaseException as error:  # noqa: BLE001 -- raised again by `result.result()`
             result.set_exception(error)
 
     thread = threading.Thread(target=run, daemon=True)
@@ -143,30 +143,31 @@ def in_thread(work: Callable[[threading.Event], Result], what: str) -> Generator
 def side_by_side(
     works: Sequence[Generator[Progress, None, Result]], threads: int
 ) -> Generator[Progress, None, list[Result]]:
-    """Run pieces of work at the same time, each in one thread; for work that mostly leaves Python's lock free.
+    """Run pieces of work in parallel threads, for work that mostly releases Python's global lock.
 
     Parameters
     ----------
     works : sequence of generators
-        Of progress, each of its own units.
+        Pieces of work, each with its own units of progress.
     threads : int
-        How many run at once at most.
+        Largest number of pieces that run at the same time.
 
     Yields
     ------
     Progress
-        The sum over those that have begun, ten times a second, with what the last of them does.
+        Sum over the pieces that have begun, ten times a second, with the description of the last one.
 
     Returns
     -------
     list
-        Their results, in their order.
+        Results in the order of the pieces.
     """
     stop = threading.Event()
     latest: dict[int, Progress] = {}
 
     def run(number: int) -> Result:
         def report(progress: Progress) -> None:
+            # A thread cannot be stopped from outside: it stops itself at its next report.
             latest[number] = progress
             if stop.is_set():
                 raise _Stopped
@@ -179,12 +180,12 @@ def side_by_side(
         futures = [pool.submit(run, number) for number in range(len(works))]
         while any(not future.done() for future in futures):
             for ended in wait(futures, REPORT_INTERVAL, FIRST_EXCEPTION).done:
-                ended.result()  # raises here what went wrong there
+                ended.result()  # raises the exception of that thread
             yield _sum_of(list(latest.values()), len(works))
         return [future.result() for future in futures]
     finally:
         stop.set()
-        pool.shutdown(wait=False, cancel_futures=True)  # whoever stops this need not wait for the next report
+        pool.shutdown(wait=False, cancel_futures=True)  # do not wait for the next report of each piece
 
 
 class _Stopped(BaseException):

@@ -1,4 +1,4 @@
-"""Settings with help, unit and limits, from which commands and panel make their options."""
+"""Settings with help, unit and limits, from which the options of commands and panel are made."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, dataclass, field, fields
@@ -14,17 +14,17 @@ class Setting:
     Parameters
     ----------
     help : str
-        What it is, as the options of commands say it.
+        Description, as in the help of commands.
     unit : str
-        ``m``, ``°``, ``s``, ``USD`` …; empty for what has none.
+        Unit, such as ``m``, ``°``, ``s`` or ``USD``, or "".
     minimum, maximum : float, optional
         Least and largest value that is accepted.
     option : str
         Name of the command-line option, that of the field if empty.
     metavar : str
-        What stands for the value in the help of a command.
+        Placeholder of the value in the help of a command.
     read : callable, optional
-        From the texts that were typed to the value, for settings that are more than plain numbers.
+        Function that parses the texts of an option, for settings that are not plain numbers.
     """
 
     help: str
@@ -37,12 +37,12 @@ class Setting:
 
 
 def setting(default: Any, help: str, **about: Any) -> Any:  # noqa: A002, ANN401 -- a field of any type, and the word of argparse
-    """Return a dataclass field with a default and a `Setting`, whose other parameters are given by name."""
+    """Return a dataclass field with a default and a `Setting`; other parameters of it are given by name."""
     return field(default=default, metadata={_KEY: Setting(help, **about)})
 
 
 def settings_of(kind: type) -> dict[str, tuple[Setting, Any]]:
-    """Return the settings of a dataclass with their defaults, by the names of their fields."""
+    """Return the settings of a dataclass with their defaults, by field name."""
     return {
         each.name: (each.metadata[_KEY], None if each.default is MISSING else each.default)
         for each in fields(kind)

@@ -1,4 +1,4 @@
-"""Programs of SUMO (Simulation of Urban MObility, Eclipse), which is an optional extra: found and run."""
+"""Search for and execution of the programs of SUMO (Eclipse Simulation of Urban MObility), an optional extra."""
 
 import importlib.util
 import os
@@ -16,12 +16,12 @@ MISSING = (
     "netconvert on the PATH or set SUMO_HOME (in a checkout `make sumo`, with pip `pip install --group traffic`)"
 )
 SYSTEM_HOMES = (Path("/usr/share/sumo"), Path("/usr/local/share/sumo"), Path("/opt/homebrew/share/sumo"))
-"""Where systems keep SUMO's data."""
+"""System folders for the data of SUMO."""
 
 
 @dataclass(frozen=True)
 class Sumo:
-    """SUMO's programs, and the folder that holds their ``data``, where that is known."""
+    """Programs of SUMO, and the folder that contains their ``data``, None if it was not found."""
 
     sumo: Path
     netconvert: Path
@@ -29,12 +29,12 @@ class Sumo:
 
 
 def find_sumo() -> Sumo:
-    """Find SUMO's programs: on the PATH, in ``SUMO_HOME``, or in the package ``eclipse-sumo`` of this Python.
+    """Find the programs of SUMO: on the PATH, in ``SUMO_HOME``, or in the package ``eclipse-sumo`` of this Python.
 
     Raises
     ------
     SeipError
-        They are not installed.
+        SUMO is not installed.
     """
     package = importlib.util.find_spec("sumo")
     homes = [Path(package.origin).parent] if package is not None and package.origin is not None else []
@@ -48,19 +48,21 @@ def find_sumo() -> Sumo:
 
 
 def run(programs: Sumo, program: Path, arguments: Sequence[object], what: str) -> Generator[Progress, None, None]:
-    """Run one of SUMO's programs to its end.
+    """Run a program of SUMO to its end.
 
     Parameters
     ----------
     program : Path
-        Of ``programs``.
+        Program to run, one of ``programs``.
+    arguments : sequence of object
+        Arguments of the program.
     what : str
-        What it does, for the person who waits.
+        Description of the work for the user.
 
     Raises
     ------
     SeipError
-        It fails.
+        The program fails.
     """
     environment = os.environ | ({} if programs.home is None else {"SUMO_HOME": str(programs.home)})
 
@@ -74,7 +76,7 @@ def run(programs: Sumo, program: Path, arguments: Sequence[object], what: str) -
     )
     try:
         _, complaint = yield from in_thread(lambda _stop: process.communicate(), what)
-    finally:  # also where nobody waits for it any more
+    finally:  # also if the generator is closed early
         process.kill()
         process.wait()
     if process.returncode != 0:
@@ -83,4 +85,4 @@ def run(programs: Sumo, program: Path, arguments: Sequence[object], what: str) -
 
 def _last_error(complaint: str) -> str:
     lines = [line.removeprefix("Error:").strip() for line in complaint.splitlines() if line.startswith("Error:")]
-    return lines[0].rstrip(".") if lines else "it says no reason"
+    return lines[0].rstrip(".") if lines else "it gave no reason"

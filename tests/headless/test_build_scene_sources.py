@@ -71,8 +71,8 @@ def test_buildings_and_ground_are_in_the_scene(street, town, tmp_path, capsys):
     (["--buildings", "none.json"], "no such file"),
     (["--terrain", "none.tif"], "no such file"),
     (["--terrain", "none.laz"], "no such file"),
-    (["--terrain", "street.xodr"], "is no TIFF"),
-    (["--buildings", "street.xodr"], "no JSON"),
+    (["--terrain", "street.xodr"], "is not a TIFF file"),
+    (["--buildings", "street.xodr"], "not readable JSON"),
     (["--mesh", "none.obj", "--mesh-origin", "0", "0"], "no such file"),
 ])  # fmt: skip
 def test_a_mistake_leaves_nothing_behind(more, complaint, street, tmp_path, monkeypatch):

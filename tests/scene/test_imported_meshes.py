@@ -113,7 +113,7 @@ FLAT = [(x, 0, 0) for x, _, _ in CORNERS]
      (90, 12), "which is not in the folder of the model"),
     ("box.glb", "nothing", (90, 12), "box.glb does not begin as a binary glTF"),
     ("box.dxf", "nothing", (90, 12), "of no kind that is imported"),
-    ("box.obj", obj_text(), (90_000, 12), "is no place within 2,000 m of the site"),
+    ("box.obj", obj_text(), (90_000, 12), "90000, 12 is not within 2,000 m of the site"),
     ("box.obj", obj_text(), (90, float("nan")), "--mesh-origin must be a finite number"),
     ("box.obj", obj_text(), (90, 2, 3, 4), "the place of box.obj must be"),
     ("box.obj", obj_text(), None, "each --mesh its own --mesh-origin"),

@@ -1,4 +1,4 @@
-"""Between latitude and longitude and the metres of a map whose reference is a transverse Mercator projection."""
+"""Transverse Mercator projections: conversion between latitude and longitude and the metres of a map."""
 
 import math
 import re
@@ -17,7 +17,7 @@ _GEOGRAPHIC_WKT = (
     'AUTHORITY["EPSG","6326"]],PRIMEM["Greenwich",0,AUTHORITY["EPSG","8901"]],'
     'UNIT["degree",0.0174532925199433,AUTHORITY["EPSG","9122"]],AUTHORITY["EPSG","4326"]]'
 )
-_NEWTON_STEPS = 5  # two reach the last bit away from the poles
+_NEWTON_STEPS = 5  # two reach full precision away from the poles
 _UTM = re.compile(r"EPSG:+(258|326|327)(\d\d)\b", re.IGNORECASE)
 _WORLD_DATUMS = {"WGS84", "GRS80", "ETRS89"}
 
@@ -33,9 +33,9 @@ class TransverseMercator:
     false_northing: float
 
     def __call__(self, latitude: float, longitude: float) -> tuple[float, float]:
-        """Return easting and northing, metres, of a place in radians.
+        """Return easting and northing (metres) of a latitude and longitude (radians).
 
-        After Krüger (1912) with four terms: within 1,000 km of the central meridian exact to a millimetre.
+        Series of Krüger (1912) with four terms, exact to a millimetre within 1,000 km of the central meridian.
         """
         xi, eta = self._on_sphere(latitude, longitude - self.longitude)
         origin, _ = self._on_sphere(self.latitude, 0.0)
@@ -45,9 +45,9 @@ class TransverseMercator:
         )
 
     def inverse(self, easting: Float, northing: Float) -> tuple[Float, Float]:
-        """Return latitude and longitude (n,), radians, of eastings and northings (n,), metres.
+        """Return latitudes and longitudes (n,), radians, of eastings and northings (n,), metres.
 
-        Krüger's other series, after which the latitude is found from the conformal one by Newton's method.
+        Inverse series of Krüger; the latitude follows from the conformal latitude by Newton's method.
         """
         n = _THIRD_FLATTENING
         origin, _ = self._on_sphere(self.latitude, 0.0)
@@ -64,13 +64,13 @@ class TransverseMercator:
             xi - sum(b * np.sin(2 * j * xi) * np.cosh(2 * j * eta) for j, b in pairs),
             eta - sum(b * np.cos(2 * j * xi) * np.sinh(2 * j * eta) for j, b in pairs),
         )
-        wanted = np.sin(xi) / np.hypot(np.sinh(eta), np.cos(xi))  # tangent of the conformal latitude
+        conformal = np.sin(xi) / np.hypot(np.sinh(eta), np.cos(xi))  # tangent of the conformal latitude
         longitude = self.longitude + np.arctan2(np.sinh(eta), np.cos(xi))
-        return np.arctan(_tangent_of_latitude(wanted)), (longitude + math.pi) % math.tau - math.pi
+        return np.arctan(_tangent_of_latitude(conformal)), (longitude + math.pi) % math.tau - math.pi
 
     @property
     def wkt(self) -> str:
-        """The projected reference system as well-known text 1 (OGC 01-009), which LAS files hold."""
+        """The projected reference system as well-known text 1 (OGC 01-009), as stored in LAS files."""
         zone = round((math.degrees(self.longitude) + 183) / 6)
         name, authority = "Transverse Mercator", ""
         for south in (False, True):
@@ -93,6 +93,8 @@ class TransverseMercator:
     def _on_sphere(self, latitude: float, east: float) -> tuple[float, float]:
         n = _THIRD_FLATTENING
         sine = math.sin(latitude)
+        # The ellipsoid is mapped to a sphere (conformal latitude), this by the spherical transverse Mercator
+        # projection, and the result corrected by a series in the third flattening.
         conformal = math.sinh(math.atanh(sine) - _ECCENTRICITY * math.atanh(_ECCENTRICITY * sine))
         xi = math.atan2(conformal, math.cos(east))
         eta = math.atanh(math.sin(east) / math.hypot(1.0, conformal))
@@ -111,14 +113,14 @@ class TransverseMercator:
 
 @dataclass(frozen=True)
 class GeoReference:
-    """What a map says of where on the Earth it is.
+    """Position of a map on the Earth.
 
     Parameters
     ----------
     projection : str
-        As the map gives it; empty where it gives none.
+        Projection as written in the map, or "".
     header_offset : (4,) float
-        To be added to map coordinates x, y, z (metres) for projected ones, and a heading (radians).
+        Offset from map coordinates x, y, z (metres) to projected ones, and a heading (radians).
     """
 
     projection: str = ""
@@ -126,16 +128,16 @@ class GeoReference:
 
     @property
     def mercator(self) -> TransverseMercator | None:
-        """The projection; None where it is not known, or the header turns the map."""
+        """The projection; None if it is not known, or the header rotates the map."""
         return None if self.header_offset[3] else projection(self.projection)
 
     def projected(self, points: Float) -> Float:
-        """Return easting, northing and height, metres, of points (n, 3) in map coordinates, which no heading turns."""
+        """Return easting, northing and height (metres) of points (n, 3) in map coordinates without rotation."""
         moved: Float = points + np.array(self.header_offset[:3])
         return moved
 
     def geographic(self, points: Float) -> Float | None:
-        """Return where on WGS 84 points of the map are.
+        """Return the geographic coordinates of points of the map on WGS 84.
 
         Parameters
         ----------
@@ -145,8 +147,8 @@ class GeoReference:
         Returns
         -------
         (n, 3) float64 or None
-            Longitude and latitude, degrees, and the height above the map's zero, metres; None where the projection is
-            not known.
+            Longitude and latitude, degrees, and height above the map's zero, metres; None if the projection is not
+            known.
         """
         mercator = self.mercator
         if mercator is None:
@@ -157,18 +159,18 @@ class GeoReference:
 
     @property
     def obstacle(self) -> str:
-        """Why places have no latitude and longitude, as a sentence's part; empty where they have them."""
+        """Reason why there are no geographic coordinates, as part of a sentence, or ""."""
         if self.mercator is not None:
             return ""
         if not self.projection:
             return "the scene's map names no projection"
         if self.header_offset[3] and projection(self.projection) is not None:
             return "the header of the scene's map turns its coordinates"
-        return f"the projection of the scene's map, {self.projection!r}, is none that is known"
+        return f"the projection of the scene's map, {self.projection!r}, is not supported"
 
 
 def _tangent_of_latitude(conformal: Float) -> Float:
-    """Return the tangent of the latitude (n,), given that of the conformal latitude; after Karney (2011), eq. 19-21."""
+    """Return the tangent of the latitude (n,) from that of the conformal latitude (Karney 2011, eq. 19-21)."""
     squared = _ECCENTRICITY**2
     tangent = conformal / (1 - squared)
     for _ in range(_NEWTON_STEPS):
@@ -181,10 +183,10 @@ def _tangent_of_latitude(conformal: Float) -> Float:
 
 
 def projection(geo_reference: str | None) -> TransverseMercator | None:
-    """Return the projection that a map's reference names, None where it is another or none.
+    """Return the projection of a map's reference, None if there is none or it is not supported.
 
-    UTM zones, by their EPSG codes too, and ``+proj=tmerc`` on WGS 84 or GRS 80
-    in metres are known. Where a reference shifts its datum it is another.
+    Supported are UTM zones, also by EPSG code, and ``+proj=tmerc`` on WGS 84 or GRS 80 in metres, both without a datum
+    shift.
     """
     text = geo_reference or ""
     if code := _UTM.search(text):
@@ -208,7 +210,7 @@ def projection(geo_reference: str | None) -> TransverseMercator | None:
 
 
 def middle_of_reference(geo_reference: str | None) -> tuple[float, float] | None:
-    """Return the latitude and longitude, degrees, that a reference names as its origin."""
+    """Return the latitude and longitude (degrees) of a reference's origin, None without one."""
     values = _parameters(geo_reference or "")
     pair = [values.get(name, "") for name in ("lat_0", "lon_0")]
     return (float(pair[0]), float(pair[1])) if all(map(_is_number, pair)) else None

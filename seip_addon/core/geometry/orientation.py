@@ -1,12 +1,12 @@
-r"""Orientation of sensors: rotation from a sensor's axes (x along azimuth zero, z up) to the site's.
+r"""Orientation of sensors: rotation from a sensor's axes (x along azimuth zero, z up) to those of the site.
 
 A sensor of yaw ψ, tilt θ and roll φ is rotated as
 
 .. math::
     R = R_z(ψ)\, R_y(θ)\, R_x(φ):
 
-first its azimuth zero to ψ, counter-clockwise from +x; then its nose down by θ, about the new y axis, so that the ray
-of azimuth zero and elevation zero points θ below the horizon; then it rolls about the new x axis.
+first about z, so that azimuth zero points to ψ, counter-clockwise from +x; then nose down by θ about the new y axis, so
+that the ray of azimuth zero and elevation zero points θ below the horizon; then about the new x axis.
 """
 
 import math
@@ -15,16 +15,16 @@ import numpy as np
 
 from ..arrays import Float
 
-VERTICAL_SINE = 1 - 1e-12  # sine of the tilt from which a sensor looks straight down, or up
+VERTICAL_SINE = 1 - 1e-12  # sine of the tilt from which on azimuth zero counts as pointing straight down, or up
 
 
 def orientations(yaw: Float, tilt: Float, roll: Float) -> Float:
-    """Return rotations from sensors' axes to the site's, (..., 3, 3) float64.
+    """Return rotations (..., 3, 3) float64 from the axes of sensors to those of the site.
 
     Parameters
     ----------
     yaw, tilt, roll : (...) float64, radians
-        Of one shape. Positive tilts are nose down.
+        Angles in arrays of one shape. Positive tilts are nose down.
     """
     sin_yaw, cos_yaw = np.sin(yaw), np.cos(yaw)
     sin_tilt, cos_tilt = np.sin(tilt), np.cos(tilt)
@@ -51,7 +51,7 @@ def orientation(yaw: float, tilt: float, roll: float = 0.0) -> Float:
 
 
 def angles_of(matrix: Float) -> tuple[float, float, float]:
-    """Return yaw, tilt and roll (radians) of a rotation (3, 3) from a sensor's axes to the site's."""
+    """Return yaw, tilt and roll (radians) of a rotation (3, 3) from a sensor's axes to those of the site."""
     tilt = math.atan2(-matrix[2, 0], math.hypot(matrix[0, 0], matrix[1, 0]))
     if abs(matrix[2, 0]) > VERTICAL_SINE:  # straight down or up: yaw and roll turn about one axis
         return math.atan2(-matrix[0, 1], matrix[1, 1]), tilt, 0.0
@@ -61,7 +61,7 @@ def angles_of(matrix: Float) -> tuple[float, float, float]:
 def rotated(vectors: Float, matrix: Float) -> Float:
     """Return the products of a matrix and each vector, (n, 3) float64.
 
-    They are the same bits in every batch, which those of a matrix product need not be.
+    The result for a vector has the same bits in every batch, which a matrix product does not guarantee.
 
     Parameters
     ----------
@@ -73,13 +73,14 @@ def rotated(vectors: Float, matrix: Float) -> Float:
 
 
 def describe_turn(tilt: float, yaw: float | None = None) -> str:
-    """Return how a sensor is turned as words to be put after a height: empty for one that hangs upright.
+    """Describe a sensor's tilt and yaw as text to append to a height; "" for an upright sensor.
 
     Parameters
     ----------
     tilt : float, radians
+        Tilt of the sensor.
     yaw : float, radians, optional
-        Of a sensor that does not look all round.
+        Yaw of a sensor that does not cover all azimuths.
     """
     tilted = f", tilted {np.degrees(tilt):.3g}°" if tilt else ""
     return tilted if yaw is None else f"{tilted}, yaw {np.degrees(yaw) % 360:.3g}°"

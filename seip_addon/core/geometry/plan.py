@@ -1,4 +1,4 @@
-"""Triangles seen in plan: their areas, their outline, and heights on them."""
+"""Triangles in plan: areas, outlines and heights; and robust operations on areas."""
 
 from collections.abc import Iterable
 
@@ -8,25 +8,25 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Boolean, Float, Integer
 
-MIN_AREA = 1e-9  # square metres in plan below which a triangle stands on edge and covers nothing
+MIN_AREA = 1e-9  # square metres in plan; smaller triangles are vertical and cover no area
 
 _OVERLAY_GRID = 1e-4
-_TWIN_DISTANCE = 1e-9  # metres between corners that are one corner
+_TWIN_DISTANCE = 1e-9  # metres between corners that count as one
 
 _BARYCENTRIC_SLACK = 1e-6  # slack in barycentric coordinates, so that no point falls between two triangles
 
 
 def signed_area(triangles: Float) -> Float:
-    """Return the areas (n,) of triangles (n, 3, 2 or 3) in plan, above zero where they turn counter-clockwise."""
+    """Return the areas (n,) of triangles (n, 3, 2 or 3) in plan, positive for counter-clockwise triangles."""
     along, across = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     area: Float = (along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]) / 2
     return area
 
 
 def outline(triangles: Float, grid: float = 1e-3) -> BaseGeometry:
-    """Return the union in plan of triangles (n, 3, 2 or 3), corners rounded to a grid in metres.
+    """Return the union in plan of triangles (n, 3, 2 or 3), with corners rounded to a grid in metres.
 
-    Where rounding makes that fail, corners are rounded to 0.1 mm.
+    If the union fails on that grid, corners are rounded to 0.1 mm.
     """
     lying = triangles[np.abs(signed_area(triangles)) > MIN_AREA, :, :2]
     polygons = shapely.polygons(lying)
@@ -37,7 +37,7 @@ def outline(triangles: Float, grid: float = 1e-3) -> BaseGeometry:
 
 
 def without(area: BaseGeometry, away: BaseGeometry) -> BaseGeometry:
-    """Return an area (or lines) in plan without another; where rounding makes that fail, on a grid of 0.1 mm."""
+    """Return an area (or lines) in plan without another area; on a grid of 0.1 mm if that fails by rounding."""
     try:
         return area.difference(away)
     except shapely.errors.GEOSException:
@@ -46,20 +46,21 @@ def without(area: BaseGeometry, away: BaseGeometry) -> BaseGeometry:
 
 
 def united(areas: Iterable[BaseGeometry]) -> BaseGeometry:
-    """Return the union of areas in plan that may cross themselves, corners rounded to a grid of 0.1 mm."""
+    """Return the union of areas in plan that may cross themselves, with corners rounded to a grid of 0.1 mm."""
     return shapely.union_all([shapely.make_valid(area) for area in areas], grid_size=_OVERLAY_GRID)
 
 
 def closed(area: BaseGeometry, gap: float) -> BaseGeometry:
     """Return an area in plan with cracks and gaps up to twice ``gap`` metres filled."""
+    # Morphological closing. Mitred joins bring straight edges and corners back to where they were.
     wider = _without_twins(area).buffer(gap, join_style="mitre")
     return _without_twins(wider).buffer(-gap, join_style="mitre")
 
 
 def _without_twins(area: BaseGeometry) -> BaseGeometry:
-    """Return an area whose corners are apart: unions leave some that differ by rounding.
+    """Return an area with distinct corners: unions leave some that differ only by rounding.
 
-    Between these edges have no length, or turn back on themselves, and have no mitre.
+    Edges between such corners have almost no length, or turn back on themselves, and a mitred buffer is not defined.
     """
     corners = np.unique(shapely.get_coordinates(area), axis=0)
     apart = np.unique(np.round(corners / _TWIN_DISTANCE), axis=0)
@@ -67,7 +68,7 @@ def _without_twins(area: BaseGeometry) -> BaseGeometry:
 
 
 def covered_share(area: BaseGeometry, others: shapely.STRtree) -> float:
-    """Return which share of an area in plan others cover together."""
+    """Return the share of an area in plan that others cover together."""
     over = others.geometries.take(others.query(area, predicate="intersects"))
     if not len(over) or area.area <= 0.0:
         return 0.0
@@ -84,7 +85,7 @@ def plane_height(triangles: Float, plan: Float) -> Float:
 
 
 def surface_height(plan: Float, triangles: Float) -> Float:
-    """Height of the highest surface over each plan point.
+    """Return the height of the highest surface above or below each point in plan.
 
     Parameters
     ----------
@@ -94,7 +95,7 @@ def surface_height(plan: Float, triangles: Float) -> Float:
     Returns
     -------
     (n,) float64, metres
-        NaN where no triangle lies over or under the point.
+        Heights, NaN if no triangle lies above or below the point.
     """
     point, heights = heights_over(plan, triangles)
     height = np.full(len(plan), -np.inf)
@@ -104,7 +105,7 @@ def surface_height(plan: Float, triangles: Float) -> Float:
 
 
 def heights_over(plan: Float, triangles: Float) -> tuple[Integer, Float]:
-    """Heights of all surfaces over or under each plan point.
+    """Return the heights of all surfaces above or below each point in plan.
 
     Parameters
     ----------
@@ -114,9 +115,9 @@ def heights_over(plan: Float, triangles: Float) -> tuple[Integer, Float]:
     Returns
     -------
     point : (k,) int64
-        Index of a plan point; one may come several times, or not at all.
+        Index of a point in plan; an index may occur several times, or not at all.
     height : (k,) float64, metres
-        Of a surface there.
+        Height of a surface there.
     """
     lying = triangles[np.abs(signed_area(triangles)) > MIN_AREA]
     low, high = lying[:, :, :2].min(axis=1), lying[:, :, :2].max(axis=1)
@@ -127,8 +128,9 @@ def heights_over(plan: Float, triangles: Float) -> tuple[Integer, Float]:
 
 
 def _covers(triangles: Float, plan: Float) -> Boolean:
-    """Whether each triangle (n, 3, 3) lies over or under its point (n, 2), by barycentric coordinates."""
+    """Return whether each triangle (n, 3, 3) covers its point (n, 2) in plan, by barycentric coordinates."""
     corners = triangles[:, :, :2]
+    # Areas of the triangles between the point and each side: corners[i - 2] is the corner after corners[i].
     opposite = [signed_area(np.stack([corners[:, i], corners[:, i - 2], plan], axis=1)) for i in range(3)]
     inside: Boolean = (np.stack(opposite) / signed_area(triangles) >= -_BARYCENTRIC_SLACK).all(axis=0)
     return inside

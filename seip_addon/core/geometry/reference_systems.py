@@ -1,6 +1,6 @@
-"""Between reference systems that are named by EPSG codes and the coordinates of a map.
+"""Conversion between reference systems with EPSG codes and the coordinates of a map.
 
-UTM zones and the map's own system are known here; any other goes through pyproj, where that is installed.
+UTM zones and the map's own system are built in; other systems need pyproj.
 """
 
 import importlib
@@ -16,7 +16,7 @@ from ..errors import SeipError
 from .geo_reference import GeoReference, TransverseMercator, projection
 
 HORIZONTAL = {7415: 28992, 5554: 25831, 5555: 25832, 5556: 25833}
-"""Codes of systems in plan that go with heights, and the code of the same without: heights are taken as they are."""
+"""Code of each compound system, and of its horizontal part: heights are used unchanged."""
 GEOGRAPHIC = (4326, 4258)  # longitude and latitude in degrees on WGS 84, and on ETRS89
 _CODE = re.compile(r"EPSG[\"':,/\s]+(?:[\d.]+[:/])?(\d{4,6})\b", re.IGNORECASE)
 _OWN_CODE = re.compile(r"(?:AUTHORITY|ID)\[\"EPSG\",\"?(\d{4,6})", re.IGNORECASE)
@@ -28,14 +28,14 @@ Transform = Callable[[Float], Float]
 
 @dataclass(frozen=True, eq=False)
 class Reprojection:
-    """Between a reference system and a map.
+    """Conversions between a reference system and a map.
 
     Parameters
     ----------
     to_map, from_map : callable
-        From places (n, 2) in the one to places (n, 2) in the other: metres, or degrees of longitude and latitude.
+        Conversion of places (n, 2) between system and map; metres, or degrees of longitude and latitude.
     to_geographic : callable
-        From places (n, 2) in the system to longitude and latitude (n, 2), degrees.
+        Conversion of places (n, 2) in the system to longitude and latitude (n, 2), degrees.
     """
 
     to_map: Transform
@@ -44,14 +44,16 @@ class Reprojection:
 
 
 def epsg_code(text: str) -> int | None:
-    """Return the EPSG code that a text names, such as ``EPSG:28992`` or a URL; None without one.
+    """Return the EPSG code in a text such as ``EPSG:28992`` or a URL; None without one.
 
-    Of well-known text it is that of the whole; of a compound system that of the one in plan.
+    For well-known text this is the code of the whole system; for a compound system, that of its horizontal part.
     """
     start = _PROJECTED.search(text)
     if start is None:
         found = [] if _WELL_KNOWN.match(text) else _CODE.findall(text)
         return int(found[-1]) if found else None
+    # The code of the system itself stands at the second level of brackets. Deeper ones belong to its parts, such as
+    # datum and units.
     depth, own = 0, ""
     for character in text[start.start() :]:
         depth += (character == "[") - (character == "]")
@@ -63,24 +65,26 @@ def epsg_code(text: str) -> int | None:
 
 
 def reprojection(code: int, reference: GeoReference, name: str) -> Reprojection:
-    """Return how places in a reference system lie on a map.
+    """Return the conversions between a reference system and a map.
 
     Parameters
     ----------
     code : int
         EPSG code of the system.
+    reference : GeoReference
+        Position of the map on the Earth.
     name : str
-        Of the file whose system it is, for messages.
+        Name of the file in that system, for messages.
 
     Raises
     ------
     SeipError
-        The map says not where it lies, or pyproj is needed and missing, or knows no such system.
+        The map has no known position, or pyproj is needed and missing, or does not know the system.
     """
     if reference.header_offset[3] or not reference.projection:
         why = "turns its coordinates" if reference.projection else "names no projection"
         raise SeipError(
-            f"{name} cannot be laid on the map, whose header {why}: take a map whose <geoReference> says where it lies"
+            f"{name} cannot be placed on the map, whose header {why}: use a map with a <geoReference> and no rotation"
         )
     offset = np.array(reference.header_offset[:2])
     code = HORIZONTAL.get(code, code)
@@ -100,14 +104,14 @@ def reprojection(code: int, reference: GeoReference, name: str) -> Reprojection:
     try:
         system = pyproj.CRS.from_epsg(code)
     except pyproj.exceptions.CRSError as error:
-        raise SeipError(f"{name} is in EPSG:{code}, which is no reference system that pyproj knows") from error
+        raise SeipError(f"{name} is in EPSG:{code}, which pyproj does not know: convert the file to UTM") from error
     try:
         text = reference.projection if mercator is None else mercator.wkt
         target = pyproj.CRS.from_epsg(own) if mercator is None and own else pyproj.CRS.from_user_input(text)
     except pyproj.exceptions.CRSError as error:
         raise SeipError(
-            f"the projection of the map, {reference.projection[:100]!r}, is none that pyproj knows: {name} cannot be "
-            "laid on it"
+            f"the projection of the map, {reference.projection[:100]!r}, is not known to pyproj, so {name} cannot be "
+            "placed on it: use a map with a known projection"
         ) from error
     there = pyproj.Transformer.from_crs(system, target, always_xy=True)
     degrees = pyproj.Transformer.from_crs(system, "EPSG:4326", always_xy=True)

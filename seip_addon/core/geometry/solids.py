@@ -11,7 +11,7 @@ POST_SIDES = 6
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """Faces with a material each.
+    """Vertices, and faces with a material each.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Solid:
 
 
 def join(*solids: Solid) -> Solid:
-    """Return one solid of many."""
+    """Join several solids into one."""
     offsets = np.cumsum([0, *(len(solid.vertices) for solid in solids)])
     faces = [
         tuple(corner + int(offset) for corner in face)
@@ -48,7 +48,7 @@ def from_faces(faces_xyz: Float, material: str) -> Solid:
 
 
 def prism(outline: Float, base: float, top: float, *, side: str) -> Solid:
-    """Return the upright block of one material between two heights (metres) of an outline (k, 2) that is not closed."""
+    """Return a vertical block of one material over an open outline (k, 2), between two heights (metres)."""
     floor = np.column_stack([outline, np.full(len(outline), base)])
     return block(floor, np.full(len(outline), top - base), side=side)
 
@@ -65,7 +65,7 @@ def block(base: Float, height: Float, *, side: str, cap: str | None = None) -> S
 
 
 def fence(base: Float, height: Float, thickness: float, *, side: str) -> Solid:
-    """Return upright panels of a thickness along a path (k, 3), raised by (k,) metres."""
+    """Return vertical panels along a path (k, 3), with heights (k,) and a thickness in metres."""
     panels = []
     for i in range(len(base) - 1):
         along = base[i + 1, :2] - base[i, :2]
@@ -84,7 +84,7 @@ def tube(start: Float, stop: Float, radii: tuple[float, float], material: str, *
     ----------
     start, stop : (3,) float64, metres
     radii : pair of float, metres
-        At the two ends.
+        Radii at the two ends.
     """
     axis = (stop - start) / np.linalg.norm(stop - start)
     aside = np.array([0.0, 1.0, 0.0]) if abs(axis[1]) < 0.9 else np.array([1.0, 0.0, 0.0])
@@ -99,6 +99,6 @@ def tube(start: Float, stop: Float, radii: tuple[float, float], material: str, *
 
 
 def signed_area(outline: Float) -> float:
-    """Return the area in plan of an outline (k, 2 or 3), positive where it runs counter-clockwise."""
+    """Return the area in plan of an outline (k, 2 or 3), positive if it is counter-clockwise."""
     x, y = (outline[:, :2] - outline[0, :2]).T
     return float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2

@@ -22,10 +22,10 @@ from .post_rules import RULES, RuleName, check_allowed, excluded_posts
 from .scene_geometry import ASSUMED, NamedArea, Pole, SceneGeometry, joined
 
 _MAX_ABOVE_POLE = 0.5
-"""Metres that a sensor may hang above the top of its pole, on a short mast."""
+"""Metres that a sensor may be mounted above the top of its pole, on a short mast."""
 
 MAX_SENSOR_HEIGHT = 100.0
-"""Metres above the ground; a larger height is taken for a typing error."""
+"""Metres above the ground; larger heights are rejected as typing errors."""
 
 ASSUMED_POLES = "on an assumed pole"
 """Reason for which assumed poles are dropped."""
@@ -34,7 +34,7 @@ MAX_TILT = 90.0
 """Degrees: tilts are less than this, up or down."""
 
 MAX_YAWS = 360
-"""Yaws over the circle; more are taken for a typing error."""
+"""Yaws over the circle; larger numbers are rejected as typing errors."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,11 @@ class CandidateSettings:
     heights : tuple of float, metres
         Mounting heights above the ground point.
     tilts : tuple of float, radians
-        How far a sensor's nose is turned down towards the region, the way that a
-        bracket points; negative is up. At 0 it hangs upright.
+        Angles by which a sensor's nose is tilted down towards the region, the direction of its bracket; negative is
+        up, 0 is upright.
     yaws : int
-        How many ways, evenly over the circle, sensors of a limited horizontal field of view may look; the first is
-        towards the region, and tilts are about each of them.
+        Number of directions, evenly over the circle, for sensors with a limited horizontal field of view; the first is
+        towards the region, and each is combined with all tilts.
     spacing : float, metres
         Least distance between two positions on the pavement.
     setback : float, metres
@@ -60,11 +60,11 @@ class CandidateSettings:
     clearance : float, metres
         Distance of a new post and its sensor from walls and other objects.
     bracket : float, metres
-        How far from an existing pole's axis the sensor hangs, towards the region.
+        Distance of a sensor from the axis of an existing pole, towards the region.
     assumed_poles : bool
-        Whether poles that are assumed, and stand in no map, may carry sensors.
+        Whether assumed poles, which are not in the map, may carry sensors.
     allow : tuple of str
-        Names of the rules of `post_rules.RULES` that do not apply: by default all do.
+        Names of the rules of `post_rules.RULES` that do not apply; by default all apply.
     """
 
     sensors: tuple[str, ...] = setting(
@@ -106,15 +106,15 @@ class CandidateSettings:
     )
     assumed_poles: bool = setting(
         default=False,
-        help="let poles carry sensors that are assumed, since the map has none for its traffic lights",
+        help="let assumed poles carry sensors: those of traffic lights for which the map has no post",
     )
     allow: tuple[RuleName, ...] = setting((), f"also use: {' '.join(RULES)}", metavar="RULE")
 
     def __post_init__(self) -> None:
         if not self.sensors:
-            raise SeipError("no sensor type is chosen: name at least one of the catalogue")
+            raise SeipError("no sensor type is chosen: give at least one from the catalogue")
         if not self.heights:
-            raise SeipError("no mounting height is given: name at least one, in metres")
+            raise SeipError("no mounting height is given: give at least one, in metres")
         for height in self.heights:
             if not 0 < height <= MAX_SENSOR_HEIGHT:
                 raise SeipError(
@@ -133,18 +133,18 @@ class CandidateSettings:
 
     def _check_tilts(self) -> None:
         if not self.tilts:
-            raise SeipError("no tilt is given: name at least one, in degrees; 0 is upright")
+            raise SeipError("no tilt is given: give at least one, in degrees; 0 is upright")
         for number, tilt in enumerate(self.tilts):
             if not abs(math.degrees(tilt)) < MAX_TILT:
                 raise SeipError(
                     f"a tilt must be more than -{MAX_TILT:g}° and less than {MAX_TILT:g}°, not {math.degrees(tilt):g}°"
                 )
             if tilt in self.tilts[:number]:
-                raise SeipError(f"the tilt of {math.degrees(tilt):g}° is given twice: name each tilt once")
+                raise SeipError(f"the tilt of {math.degrees(tilt):g}° is given twice: give each tilt once")
 
 
 def heights_of(texts: Sequence[str]) -> tuple[float, ...]:
-    """Return the heights in metres that texts name: each a height, or a range FROM:TO:STEP with both ends.
+    """Parse heights in metres; each text is a height, or a range FROM:TO:STEP that includes both ends.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def heights_of(texts: Sequence[str]) -> tuple[float, ...]:
 
 
 def tilts_of(texts: Sequence[str]) -> tuple[float, ...]:
-    """Return the tilts in radians that texts name in degrees: each a tilt, or a range FROM:TO:STEP with both ends.
+    """Parse tilts in degrees to radians; each text is a tilt, or a range FROM:TO:STEP that includes both ends.
 
     Raises
     ------
@@ -184,11 +184,11 @@ def tilts_of(texts: Sequence[str]) -> tuple[float, ...]:
 
 
 _MIN_STEP = 0.01
-"""Metres or degrees: a finer range is taken for a typing error."""
+"""Least step of a range, metres or degrees; finer ranges are rejected as typing errors."""
 
 
 def _named_by(text: str, above: float, most: float) -> list[float]:
-    """Return the number that a text is, or the range FROM:TO:STEP; nothing where it is neither."""
+    """Return the number in a text, or those of a range FROM:TO:STEP; an empty list if it is neither."""
     try:
         numbers = [float(part) for part in text.split(":")]
     except ValueError:
@@ -223,22 +223,21 @@ class Candidates:
     height : (c,) float64, metres
         Height of the sensor above the ground point.
     xyz : (c, 3) float64, metres
-        Optical centre. On a pole it stands off the shaft by the bracket.
+        Optical centre; on a pole it is a bracket's length away from the shaft.
     yaw : (c,) float64, radians
-        Direction of azimuth zero of the beam pattern, counter-clockwise from +x. An upright sensor that sees all
-        around alike has its azimuth zero along +x. A tilted one looks towards the region: to the nearest point of
-        it, or to its middle from within. One of a limited horizontal field of view looks there or elsewhere; see
-        `with_yaws`.
+        Direction of azimuth zero of the beam pattern, counter-clockwise from +x. Upright sensors with a full horizontal
+        field of view have azimuth zero along +x. Tilted ones point to the nearest point of the region, or to its centre
+        from within. Those with a limited horizontal field of view have several yaws; see `with_yaws`.
     tilt : (c,) float64, radians
-        How far azimuth zero is turned down, nose first, towards where the yaw points; see `orientation`.
+        Angle of azimuth zero below the horizon, in the direction of the yaw; see `orientation`.
     mandatory : (g, p) bool
-        Each row is a group of positions of which at least one must carry a sensor.
+        Groups of positions, one in each row, of which at least one must carry a sensor.
     mandatory_name : (g,) str
         Names of those groups.
     dropped : dict of str to int
-        How many positions or poses were dropped, by reason.
+        Number of dropped positions or poses, by reason.
     installation : (p,) float64, dollars, optional
-        What it costs to install a sensor at each position; None where prices are those of sensors alone.
+        Cost of installing a sensor at each position; None if prices include only the sensors.
     """
 
     position: Float
@@ -261,24 +260,23 @@ class Candidates:
         return len(self.xyz)
 
     def orientation(self, pose: int) -> Float:
-        """Return the rotation of a pose's sensor from its axes to the site's, (3, 3) float64."""
+        """Return the rotation (3, 3) float64 from the axes of a pose's sensor to those of the site."""
         return orientation(float(self.yaw[pose]), float(self.tilt[pose]))
 
 
 def generate_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Candidates:
-    """Make candidate poses at positions on the candidate areas and poles, without those that carry no sensor.
+    """Generate candidate poses on the candidate areas and poles, without those where no sensor can be mounted.
 
     Returns
     -------
     Candidates
-        Positions in order of x, y, z with pavement positions named in that
-        order; poses by position, height, tilt, sensor type.
+        Positions in order of x, y, z, with pavement positions numbered in that order; poses by position, height, tilt,
+        sensor type.
 
     Raises
     ------
     SeipError
-        A setting is out of range, no candidate is left (with what dropped
-        them), or a mandatory place holds none.
+        No candidate is left (with the reasons), or a mandatory pole or area has none.
     """
     dropped: dict[str, int] = {}
     foot, axis_offset, top, name, source, on_pole = _positions(geometry, settings, dropped)
@@ -288,6 +286,7 @@ def generate_candidates(geometry: SceneGeometry, settings: CandidateSettings) ->
     xyz = foot[position_of] + axis_offset[position_of]
     xyz[:, 2] += height
 
+    # Each test is made only for poses that passed the earlier ones, so that a dropped pose counts for one reason.
     too_high = height > top[position_of] + _MAX_ABOVE_POLE
     inside = ~too_high
     inside[inside] = inside_any(xyz[inside], geometry.occluders)
@@ -328,7 +327,7 @@ def generate_candidates(geometry: SceneGeometry, settings: CandidateSettings) ->
 def _positions(
     geometry: SceneGeometry, settings: CandidateSettings, dropped: dict[str, int]
 ) -> tuple[Float, Float, Float, Text, Text, Boolean]:
-    """Foot, offset of the optical axis from it, top, name, source and kind of each position, in order of x, y, z."""
+    """Return foot, offset of the optical centre, top, name, source and kind of each position, sorted by x, y, z."""
     poles = _free_poles(geometry, settings, dropped)
     pole_feet = np.array([pole.base for pole in poles], dtype=np.float64).reshape(-1, 3)
     pavement = _pavement_feet(geometry, settings, pole_feet, dropped)
@@ -351,12 +350,14 @@ def _positions(
 def _free_poles(geometry: SceneGeometry, settings: CandidateSettings, dropped: dict[str, int]) -> list[Pole]:
     for pole in geometry.poles:
         if pole.forbidden and pole.mandatory:
-            raise SeipError(f"pole {pole.name!r} is both forbidden and mandatory: take one of the two marks off")
+            raise SeipError(f"pole {pole.name!r} is both forbidden and mandatory: remove one of the two marks")
     forbidden = _union(geometry.forbidden_areas)
     free = [p for p in geometry.poles if not p.forbidden and not forbidden.intersects(shapely.Point(p.base[:2]))]
     for pole in geometry.poles:
         if pole.mandatory and pole not in free:
-            raise SeipError(f"mandatory pole {pole.name!r} stands in a forbidden area: take one of the two back")
+            raise SeipError(
+                f"mandatory pole {pole.name!r} stands in a forbidden area: move the area or unmark it"
+            )
     dropped["on a forbidden pole"] = len(geometry.poles) - len(free)
     usable = [pole for pole in free if settings.assumed_poles or pole.mandatory or pole.source != ASSUMED]
     dropped[ASSUMED_POLES] = len(free) - len(usable)
@@ -373,14 +374,14 @@ def _free_poles(geometry: SceneGeometry, settings: CandidateSettings, dropped: d
 def _pavement_feet(
     geometry: SceneGeometry, settings: CandidateSettings, poles: Float, dropped: dict[str, int]
 ) -> Float:
-    """(n, 3) feet of new posts: a maximal sample of the candidate areas with the given least distance."""
+    """Return the feet (n, 3) of new posts: a maximal sample of the candidate areas at the least distance."""
     area = geometry.candidate_areas
     if area.is_empty:
         return np.empty((0, 3))
     road = outline(joined(geometry.roads))
     free = area.difference(road.buffer(settings.setback)) if not road.is_empty else area
     if len(poles):
-        # A pole that stands there already serves its surroundings.
+        # An existing pole already serves the surroundings of its foot.
         free = free.difference(shapely.union_all(shapely.buffer(shapely.points(poles[:, :2]), settings.spacing / 2)))
     plan = spread(free, settings.spacing)
     forbidden = _union(geometry.forbidden_areas)
@@ -399,7 +400,7 @@ def _pavement_feet(
 
 
 def _towards(point: Float, region: BaseGeometry) -> Float:
-    """Return the unit vector in plan from a point to the region, or to its middle from within."""
+    """Return the unit vector in plan from a point to the region, or to its centre from within."""
     nearest = shapely.shortest_line(shapely.Point(point), region)
     goal = np.array(nearest.coords[-1])
     if np.hypot(*(goal - point)) < 1e-6:
@@ -410,13 +411,13 @@ def _towards(point: Float, region: BaseGeometry) -> Float:
 
 
 def headings(foot: Float, region: BaseGeometry) -> Float:
-    """Return the direction in plan from each foot to the region, or to its middle from within, (p,) radians."""
+    """Return the directions (p,) in plan from each foot to the region, or to its centre from within, radians."""
     way = np.array([_towards(point[:2], region) for point in foot])
     return np.round(np.arctan2(way[:, 1], way[:, 0]), 6)
 
 
 def _yaws(tilt: Float, position_of: Integer, foot: Float, region: BaseGeometry) -> Float:
-    """Return the yaw of each pose, (c,) radians: zero for upright ones, else the direction to the region."""
+    """Return the yaw of each pose (c,), radians: zero if upright, otherwise the direction to the region."""
     return np.where(tilt == 0, 0.0, headings(foot, region)[position_of]) if tilt.any() else np.zeros(len(tilt))
 
 
@@ -431,13 +432,13 @@ def _mandatory_groups(geometry: SceneGeometry, foot: Float, name: Text) -> list[
         if not row.any():
             raise SeipError(
                 f"{title!r} must carry a sensor but holds no candidate position: "
-                "enlarge it, free it of forbidden areas and obstacles, or ask for lower heights"
+                "enlarge it, remove forbidden areas and obstacles from it, or use lower heights"
             )
     return groups
 
 
 def assumed_pole_warnings(geometry: SceneGeometry, candidates: Candidates) -> tuple[str, ...]:
-    """Return a warning on how many poles of a scene are assumed, and whether they may carry sensors."""
+    """Return a warning with the number of assumed poles in a scene, and whether they may carry sensors."""
     assumed = sum(pole.source == ASSUMED for pole in geometry.poles)
     if not assumed:
         return ()
@@ -445,7 +446,7 @@ def assumed_pole_warnings(geometry: SceneGeometry, candidates: Candidates) -> tu
     if (candidates.pole_source == ASSUMED).any():
         return (f"{poles} assumed, not from the map, and may carry sensors: make sure that they exist",)
     carry = "carries" if assumed == 1 else "carry"
-    return (f"{poles} assumed, not from the map, and {carry} no sensors: ask for assumed poles to use them",)
+    return (f"{poles} assumed, not from the map, and {carry} no sensors: allow assumed poles to use them",)
 
 
 def _union(areas: Sequence[NamedArea]) -> BaseGeometry:
@@ -456,7 +457,7 @@ def _union(areas: Sequence[NamedArea]) -> BaseGeometry:
 
 def _none_left(dropped: dict[str, int]) -> str:
     reasons = ", ".join(f"{count} {reason}" for reason, count in dropped.items() if count)
-    cure = "enlarge SEIP Candidate Areas, add SEIP Poles, or ask for less set-back and clearance"
+    cure = "enlarge SEIP Candidate Areas, add SEIP Poles, or reduce set-back and clearance"
     rules = [name for name, rule in RULES.items() if dropped.get(rule.reason)]
     if rules:
         cure += f", or allow {' '.join(rules)}"

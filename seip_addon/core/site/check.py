@@ -24,28 +24,28 @@ from .targets import generate_targets
 MAX_ORIGIN_DISTANCE = 10_000.0
 """Metres from the origin beyond which Blender's single precision rounds coordinates to a millimetre and more."""
 MIN_REGION_SIZE, MAX_REGION_SIZE = 5.0, 10_000.0
-"""Metres across between which a region of interest is one."""
+"""Plausible sizes of a region of interest, metres."""
 MIN_PLAN_SHARE = 0.5
-"""Share of a surface's area that shows in plan, below which it counts as upright."""
+"""Ratio of a surface's area in plan to its area, below which it counts as vertical."""
 MAX_POLE_DISTANCE = 60.0
-"""Metres from the region beyond which a pole is taken to belong to another place."""
+"""Metres from the region beyond which a pole probably belongs to a different place."""
 MAX_FOOT_OFFSET = 0.5
-"""Metres between a pole's foot and the ground beyond which sensors would hang at a wrong height."""
+"""Metres between a pole's foot and the ground beyond which sensors would be at a wrong height."""
 MAX_HOLE_AREA = 10.0
-"""Square metres in plan up to which a hole in the road is rather a missing face than an island."""
+"""Square metres in plan up to which a hole in the road is a missing face rather than an island."""
 MIN_HOLE_AREA = 0.01
 """Square metres in plan below which a hole is a seam."""
 MAX_ROAD_STEP = 0.3
-"""Metres of height between road a metre apart that no vehicle drives over."""
+"""Height difference over one metre of road (metres) that vehicles cannot pass."""
 LAYER_DISTANCES = (0.05, 2.5)
-"""Metres between which one road above another is no bridge, but a mistake."""
+"""Heights (metres) of one road above another that indicate a mistake instead of a bridge."""
 SAMPLE_SPACING = 1.0
 """Metres between the samples of the road."""
 MAX_SAMPLES = 250_000
 SAME_POLE_DISTANCE = 0.05
-"""Metres in plan below which two poles stand at one place."""
+"""Metres in plan within which two poles count as being in one place."""
 MAX_NAMED = 5
-"""Objects with the same problem that are named one by one."""
+"""Number of objects with the same problem that are named individually."""
 
 Severity = Literal["ERROR", "WARNING"]
 
@@ -61,7 +61,7 @@ class Problem:
     text : str
         The problem and its remedy.
     obj : str
-        Name of the object concerned; empty where it is the scene.
+        Name of the object concerned; "" for the scene as a whole.
     """
 
     severity: Severity
@@ -76,11 +76,11 @@ class Surface:
     Parameters
     ----------
     role : str
-        As in ``regions``, ``roads``, …: see `ROLES`.
+        Role, a key of `ROLES`.
     name : str
-        Of the object, or of the one that instances it.
+        Name of the object, or of the one that instances it.
     triangles : (n, 3, 3) float64, metres
-        In local site axes.
+        Triangles in local site axes.
     """
 
     role: str
@@ -98,7 +98,7 @@ ROLES = {
     "forbidden_areas": "Forbidden areas",
     "mandatory_areas": "Mandatory areas",
 }
-"""What a surface may mean, and how that is called."""
+"""Roles of surfaces, with their titles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,13 +108,15 @@ class SceneContents:
     Parameters
     ----------
     surfaces : tuple of Surface
-        Without faulty ones.
+        Surfaces, without faulty ones.
+    poles : tuple of Pole
+        Poles.
     geometry : SceneGeometry or None
-        None where something is missing that a survey needs.
+        Geometry for a survey; None if a required part is missing.
     problems : tuple of Problem
         Problems found while reading.
     complaint : str
-        Why there is no geometry; empty where there is.
+        Reason why there is no geometry, or "".
     """
 
     surfaces: tuple[Surface, ...]
@@ -135,17 +137,17 @@ class SiteCheck:
 def check_site(
     contents: SceneContents, lay_out: Callable[[SceneGeometry], tuple[Site, Sequence[str]]]
 ) -> Generator[Progress, None, SiteCheck]:
-    """Check a scene: count what it holds and find problems that would affect a result.
+    """Check a scene: count its contents and find problems that would affect a result.
 
     Parameters
     ----------
     lay_out : callable
-        Lays targets and candidates into the scene as a survey would, and returns the site and its warnings.
+        Function that makes the site of a scene, with targets and candidates, and returns it with warnings.
 
     Yields
     ------
     Progress
-        Looks taken, of all.
+        Number of completed checks.
 
     Returns
     -------
@@ -186,7 +188,7 @@ def _in_order(problems: Iterable[Problem]) -> tuple[Problem, ...]:
 
 
 def _named_in(text: str, contents: SceneContents) -> str:
-    """Return the name of the object that a sentence is about."""
+    """Return the name of the object that a message quotes, or ""."""
     names = [surface.name for surface in contents.surfaces] + [pole.name for pole in contents.poles]
     return next((name for name in names if f"{name!r}" in text), "")
 
@@ -278,15 +280,15 @@ def _far(contents: SceneContents) -> Iterator[Problem]:
 
 
 def _upright(contents: SceneContents) -> Iterator[Problem]:
-    """Find upright surfaces among those that should be level, as from a model with another axis up."""
+    """Find vertical surfaces among those that should be level, as in a model with a different up axis."""
     for surface in contents.surfaces:
         if surface.role in {"region", "roads", "candidate_areas", "weighted_regions"}:
             side = np.linalg.norm(_normals(surface.triangles), axis=1).sum() / 2
             if np.abs(signed_area(surface.triangles)).sum() < MIN_PLAN_SHARE * side:
                 yield Problem(
                     "WARNING",
-                    f"{surface.name!r} among the {ROLES[surface.role].lower()} stands more than it lies: turn it so "
-                    "that z is up, or take it out.",
+                    f"{surface.name!r} among the {ROLES[surface.role].lower()} is mostly vertical: rotate it so "
+                    "that z is up, or remove it.",
                     surface.name,
                 )
 
@@ -316,7 +318,7 @@ def _without_road(contents: SceneContents, plans: dict[str, BaseGeometry]) -> It
                 yield Problem(
                     "WARNING",
                     f"{surface.name!r} among the {ROLES[role].lower()} lies outside the region of interest: "
-                    "move it or take it out.",
+                    "move it or remove it.",
                     surface.name,
                 )
 
@@ -369,7 +371,7 @@ def _level(high: float) -> str:
 
 
 def _named(culprits: list[tuple[str, str]], one: str, several: str) -> Iterator[Problem]:
-    """Name a few culprits one by one, and the others together: as one object, or as several."""
+    """Yield problems for the first few objects individually, and one for all others together."""
     yield from (Problem("WARNING", text, name) for name, text in culprits[:MAX_NAMED])
     rest = culprits[MAX_NAMED:]
     if rest:
@@ -398,7 +400,7 @@ def _duplicates(contents: SceneContents) -> Iterator[Problem]:
 
 
 def _road_problems(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterator[Problem]:
-    """Find problems of the road within the region: holes, steps, and one road closely above another."""
+    """Find problems of the road within the region: holes, steps, and roads close above each other."""
     region, road = plans["region"], plans["roads"]
     within = region.intersection(road)
     if within.area == 0:
@@ -408,7 +410,7 @@ def _road_problems(contents: SceneContents, plans: dict[str, BaseGeometry]) -> I
     spacing = max(SAMPLE_SPACING, math.sqrt(region.area / MAX_SAMPLES))
     try:
         places = generate_targets(region, triangles, spacing).xyz
-    except SeipError:  # too narrow for the grid: nothing to be seen of steps
+    except SeipError:  # too narrow for the grid: steps cannot be checked
         return
     yield from _steps(contents, places, spacing)
     yield from _layers(contents, places, triangles)
@@ -440,7 +442,7 @@ def _steps(contents: SceneContents, places: Float, spacing: float) -> Iterator[P
         yield Problem(
             "WARNING",
             f"The road has steps or slopes over {MAX_ROAD_STEP:.0%} at {counted(len(steep), 'place')}, up to "
-            f"{rise[worst]:.2g} m at {_place(point)}: targets there lie on no road, unless it is a bridge's edge.",
+            f"{rise[worst]:.2g} m at {_place(point)}: targets there are not on the road, unless it is a bridge's edge.",
             _nearest_road(contents, point),
         )
 
@@ -454,14 +456,14 @@ def _layers(contents: SceneContents, places: Float, triangles: Float) -> Iterato
         yield Problem(
             "WARNING",
             f"Road lies {LAYER_DISTANCES[0]:g} to {LAYER_DISTANCES[1]:g} m above other road at "
-            f"{counted(len(hidden), 'place')}, as at {_place(at)}: targets lie on the upper one; take out what is "
-            "no road.",
+            f"{counted(len(hidden), 'place')}, as at {_place(at)}: targets lie on the upper one; remove surfaces that "
+            "are not road.",
             _nearest_road(contents, at),
         )
 
 
 def _nearest_road(contents: SceneContents, place: BaseGeometry) -> str:
-    """Return the name of the road object whose faces come nearest to a place in plan."""
+    """Return the name of the road object with the face nearest to a place in plan."""
     centre = np.array(place.centroid.coords[0])
 
     def distance(surface: Surface) -> float:

@@ -1,7 +1,7 @@
 """Removal of geometry beyond every sensor's range of the region.
 
-Ray casters compute in float32 about the middle of all triangles, whose steps grow with the extent: one object
-that was forgotten far away costs every return its accuracy, and the search for near surfaces its speed.
+Ray casters compute in float32 relative to the centre of all triangles, and the resolution of float32 decreases with the
+extent: a single distant object makes every return less accurate, and the search for near surfaces slower.
 """
 
 from __future__ import annotations
@@ -20,28 +20,28 @@ from ..counts import counted
 from .scene_geometry import Mesh, SceneGeometry
 
 _RANGE_SLACK = 1.0
-"""Metres beyond the range that are kept, for all that a return may be off."""
+"""Metres kept beyond the range, because returns have errors."""
 
 
 def without_far_objects(
     geometry: SceneGeometry, around: BaseGeometry, reach: float
 ) -> tuple[SceneGeometry, tuple[str, ...]]:
-    """Leave out the triangles that no ray can end on.
+    """Remove the triangles that no ray can reach.
 
     Parameters
     ----------
     around : shapely geometry
-        In plan, what every ray that counts begins or ends in: the region of interest, or the sensors.
+        Area in plan in which every relevant ray begins or ends: the region of interest, or the sensors.
     reach : float, metres
         Length of the longest such ray.
 
     Returns
     -------
     geometry : SceneGeometry
-        The same object where nothing is left out.
+        Geometry without distant triangles; the same object if there are none.
     warnings : tuple of str
-        One sentence that names what was left out, or none: ground that the builder laid out, and that goes on beyond
-        the range, belongs there.
+        A sentence that names the objects left out, if any. Ground made by the builder that only extends beyond the
+        range is not reported.
     """
     if math.isinf(reach):
         return geometry, ()
@@ -68,8 +68,8 @@ def without_far_objects(
     triangles = f"{counted(count, 'triangle')} of {counted(len(far), 'object')} {'lies' if count == 1 else 'lie'}"
     sentence = (
         f"{triangles} beyond every sensor's range of {reach:,.0f} m and {'is' if count == 1 else 'are'} left "
-        f"out; the farthest, of {far[farthest][0]!r}, lie {distances[farthest]:,.0f} m away: "
-        "where they do not belong there, move them or take them away"
+        f"out; the farthest, of {far[farthest][0]!r}, are {distances[farthest]:,.0f} m away: "
+        "move or remove them if they do not belong there"
     )
     return replace(geometry, **left), (sentence,)
 

@@ -1,4 +1,4 @@
-"""What it costs to install a sensor at a position, beside the sensor's own price."""
+"""Cost of installing a sensor at a position, in addition to the price of the sensor."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .candidates import Candidates
 
 DEFAULTS = Path(__file__).with_name("installed_cost.toml")
 MOST = 1e9
-"""Dollars or metres above which a figure is taken for a typing error."""
+"""Largest figure in dollars or metres; larger ones are rejected as typing errors."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,11 @@ class InstalledCost:
     Parameters
     ----------
     new_post_usd, existing_pole_usd : float
-        Of a post that is put up for the sensor, and of mounting it on a pole that is there.
+        Cost of a new post for the sensor, and of mounting it on an existing pole.
     mast_arm_usd, mast_arm_beyond_m : float
-        Of an arm, where the sensor hangs farther (metres) than that from the axis of an existing pole.
+        Cost of an arm, and distance (metres) from the axis of an existing pole beyond which one is needed.
     power_new_post_usd, power_existing_pole_usd, backhaul_usd : float
-        Of electricity and of the line that takes the data away.
+        Costs of electricity and of the data line.
     """
 
     new_post_usd: float
@@ -42,12 +42,14 @@ class InstalledCost:
     backhaul_usd: float
 
     def over(self, candidates: Candidates, bracket: float) -> Candidates:
-        """Return candidates whose positions cost what they do here.
+        """Return candidates with the cost of installation at each position.
 
         Parameters
         ----------
+        candidates : Candidates
+            Candidate poses.
         bracket : float, metres
-            How far from the axis of an existing pole sensors hang.
+            Distance of sensors from the axis of an existing pole.
         """
         arm = self.mast_arm_usd if bracket > self.mast_arm_beyond_m else 0.0
         pole = self.existing_pole_usd + arm + self.power_existing_pole_usd
@@ -56,12 +58,12 @@ class InstalledCost:
 
 
 def load_installed_cost(path: str | os.PathLike[str] | None = None) -> InstalledCost:
-    """Return the shipped table, or that of a file over it.
+    """Return the shipped table, updated with the values of a file if one is given.
 
     Raises
     ------
     SeipError
-        The file cannot be read, or one of its keys or values is none of the table's.
+        The file cannot be read, or has an unknown key or an invalid value.
     """
     table = _read(DEFAULTS)
     if path is not None:
@@ -78,13 +80,13 @@ def _read(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise SeipError(f"cannot read the installed costs {path}: {error.strerror}") from error
     except ValueError as error:
-        raise SeipError(f"the installed costs {path} are no TOML: {error}") from error
+        raise SeipError(f"the installed costs {path} are not valid TOML: {error}") from error
 
 
 def _check(name: str, value: object, path: str | os.PathLike[str]) -> None:
     known = [each.name for each in fields(InstalledCost)]
     if name not in known:
-        raise SeipError(f"{path} has the key {name!r}, which no installed cost has; there are {', '.join(known)}")
+        raise SeipError(f"{path} has the unknown key {name!r}; the keys of installed costs are {', '.join(known)}")
     number = value if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
     if not 0 <= number <= MOST:
         raise SeipError(f"{name} in {path} must be a number from 0 to {MOST:g}, not {value!r}")

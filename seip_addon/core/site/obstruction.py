@@ -1,4 +1,4 @@
-"""Obstruction of posts and sensors by objects around or near them."""
+"""Obstruction of posts and sensors by objects around them."""
 
 from __future__ import annotations
 
@@ -13,24 +13,26 @@ from ..geometry.winding_number import enclosed
 from .scene_geometry import Mesh, SceneGeometry, joined
 
 _POST_FOOT = 0.3
-"""Metres above the ground from which a post must keep clear: kerbs and plinths are no walls."""
+"""Metres above the ground above which a post must be clear of objects: kerbs and plinths do not obstruct it."""
 
 _MIN_OBSTACLE_HEIGHT, _MIN_OBSTACLE_WIDTH = 1.0, 0.5
-"""Metres of height and of width up to which an object hides next to nothing from a sensor on a post."""
+"""Height and width (metres) up to which an object hides almost no area from a sensor on a post."""
 
 NO_OBSTACLES_MESSAGE = (
     "nothing in this scene can hide anything: no building, tree or wall stands between sensors and road, so that "
-    "coverage says where the rings of the sensors fall, not what they can see; describe or model what stands there"
+    "coverage shows where the rings of the sensors fall, not what they can see; describe or model the objects there"
 )
 
 
 def bareness_warnings(geometry: SceneGeometry, places: Float | None = None) -> tuple[str, ...]:
-    """Return a warning where no occluder but poles is large enough, and in the right place, to hide anything.
+    """Return a warning if no occluder except poles has a size and a position to hide anything.
 
     Parameters
     ----------
+    geometry : SceneGeometry
+        Scene to check.
     places : (n, 2) float64, metres, optional
-        Positions of sensors and targets in plan: only what stands between them counts.
+        Positions of sensors and targets in plan: only objects between them are considered.
     """
     poles = {pole.name for pole in geometry.poles}
     others = [mesh.triangles for mesh in geometry.occluders if mesh.name not in poles]
@@ -42,7 +44,7 @@ def bareness_warnings(geometry: SceneGeometry, places: Float | None = None) -> t
 
 
 def _reaches_into(triangles: Float, area: BaseGeometry) -> bool:
-    """Return whether a triangle (n, 3, 3) of an object lies in an area in plan, at least in part."""
+    """Return whether a triangle (n, 3, 3) of an object lies at least partly in an area in plan."""
     return bool(shapely.intersects(area, shapely.convex_hull(shapely.multipoints(triangles[:, :, :2]))).any())
 
 
@@ -55,7 +57,7 @@ def can_hide(corners: Float) -> bool:
 
 
 def inside_any(points: Float, meshes: Sequence[Mesh]) -> Boolean:
-    """Whether each point lies inside some object, by its winding number."""
+    """Return whether each point lies inside an object, by its winding number."""
     inside = np.zeros(len(points), dtype=bool)
     for mesh in meshes:
         if not len(mesh.triangles):
@@ -67,10 +69,10 @@ def inside_any(points: Float, meshes: Sequence[Mesh]) -> Boolean:
 
 
 def post_blocked(foot: Float, height: Float, clearance: float, meshes: Sequence[Mesh]) -> Boolean:
-    """Whether a post with its sensor comes closer than ``clearance`` to an object.
+    """Return whether a post with its sensor is closer than ``clearance`` to an object.
 
-    A triangle counts when it is that close in plan and its span of heights
-    meets the post's: on the safe side for leaning faces.
+    A triangle obstructs a post if it is that close in plan and its range of heights overlaps that of the post, which is
+    on the safe side for inclined faces.
     """
     blocked = np.zeros(len(foot), dtype=bool)
     triangles = joined(meshes)
@@ -79,6 +81,7 @@ def post_blocked(foot: Float, height: Float, clearance: float, meshes: Sequence[
     low, high = triangles.min(axis=1), triangles.max(axis=1)
     posts = shapely.STRtree(shapely.points(foot[:, :2]))
     boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
+    # Bounding boxes first: convex hulls are only made of the few triangles near a post.
     near = np.unique(posts.query(boxes, predicate="dwithin", distance=clearance)[0])
     shadows = shapely.convex_hull(shapely.multipoints(shapely.points(triangles[near, :, :2])))
     shadow, post = posts.query(shadows, predicate="dwithin", distance=clearance)

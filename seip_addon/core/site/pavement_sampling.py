@@ -1,4 +1,4 @@
-"""Points spread over an area in plan, evenly and as close as they may stand."""
+"""Sampling of an area in plan by points as close to each other as a least distance allows."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ _TILE = 128
 """Columns and rows of a tile of the fine grid."""
 
 MAX_POSITIONS = 20_000
-"""Limit on positions: each is cast from at every height with every type."""
+"""Limit on positions: rays are cast from each at every height with every type."""
 
 
 def spread(area: BaseGeometry, spacing: float) -> Float:
-    """Spread points over an area, none closer than ``spacing`` and no room left for another.
+    """Sample an area with points at least ``spacing`` apart, without room for another one.
 
-    A maximal Poisson-disc sample drawn from a fine grid in order of x, then y:
-    deterministic, uniform on wide areas, and evenly spaced along narrow strips,
-    which a plain grid of that spacing would hit or miss by chance.
+    A maximal Poisson-disc sample drawn from a fine grid in order of x, then y: deterministic, uniform on wide areas,
+    and evenly spaced along narrow strips, which a plain grid of that spacing would hit or miss by chance.
 
     Parameters
     ----------
     area : shapely geometry
-        In plan, metres.
+        Area in plan, metres.
     spacing : float, metres
+        Least distance between two points.
 
     Returns
     -------
@@ -56,9 +56,11 @@ def spread(area: BaseGeometry, spacing: float) -> Float:
     fine = _grid_points_within(area, x, y, step)
     points = np.column_stack((x[fine // len(y)], y[fine % len(y)]))
     free = np.ones(len(fine), dtype=bool)
-    ahead = np.arange(_FINE_STEPS + 1) * len(y)  # to the columns at and after a point's that hold its surroundings
+    ahead = np.arange(_FINE_STEPS + 1) * len(y)  # offsets to the columns from a point's own onwards within the spacing
     taken = []
     at = 0
+    # Take the first free grid point, and block those within the spacing around it. Points before it in the order are
+    # taken or blocked already, so that only its own and the following columns need to be searched.
     while at < len(fine) and free[at:].any():
         at += int(np.argmax(free[at:]))
         taken.append(at)
@@ -71,10 +73,10 @@ def spread(area: BaseGeometry, spacing: float) -> Float:
 
 
 def _grid_points_within(area: BaseGeometry, x: Float, y: Float, step: float) -> Integer:
-    """Return which points of a grid lie in an area, (n,) int64: ``column * len(y) + row``, ascending.
+    """Return the indices (n,) of grid points in an area, ``column * len(y) + row``, in ascending order.
 
-    Only tiles of the grid that the area meets are looked at, so that the time grows with
-    the area and the length of its edge, and not with its extent.
+    Only tiles of the grid that meet the area are tested, so that the time grows with the area and the length of its
+    edge, not with its extent.
     """
     shapely.prepare(area)
     tiles = np.array([[0, len(x), 0, len(y)]])
@@ -94,7 +96,7 @@ def _grid_points_within(area: BaseGeometry, x: Float, y: Float, step: float) -> 
 
 
 def _quarters(tiles: Integer) -> Integer:
-    """Divide tiles (n, 4), each from a column to a column and from a row to a row, into those that are not empty."""
+    """Divide tiles (n, 4), ranges of columns and rows with ends excluded, into their non-empty quarters."""
     left, right, bottom, top = tiles.T
     column, row = (left + right) // 2, (bottom + top) // 2
     parts = [

@@ -1,4 +1,4 @@
-"""Rules on where a new post may stand, by name; a survey may allow what a rule excludes."""
+"""Named rules that exclude positions of new posts; a survey may switch off each rule."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MIN_ISLAND_WIDTH = 4.0
 
 @dataclass(frozen=True)
 class Rule:
-    """One rule that excludes positions.
+    """A rule that excludes positions.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Rule:
     reason : str
         Reason in counts of excluded positions, as in "12 on a driveway".
     clearance : float, metres
-        Distance from the areas within which posts are excluded as well.
+        Distance around the areas within which posts are excluded as well.
     """
 
     title: str
@@ -47,12 +47,12 @@ RULES: dict[RuleName, Rule] = {
     "islands": Rule("Narrow islands", f"on an island narrower than {MIN_ISLAND_WIDTH:g} m"),
     "power-poles": Rule("Power poles", "power poles"),
 }
-"""The rules in the order in which they are applied: a position is counted for the first that excludes it."""
+"""Rules in order of application: a position is counted for the first rule that excludes it."""
 
 
 @dataclass(frozen=True, eq=False)
 class KeepOffArea:
-    """An area in plan that a rule keeps new posts off, local site axes in metres."""
+    """An area in plan from which a rule excludes new posts, local site axes in metres."""
 
     name: str
     polygon: BaseGeometry
@@ -60,7 +60,7 @@ class KeepOffArea:
 
 
 def check_allowed(names: Sequence[str]) -> None:
-    """Raise SeipError where a name is not that of a rule."""
+    """Raise SeipError if a name is not that of a rule."""
     for name in names:
         if name not in RULES:
             raise SeipError(f"there is no rule {name!r} to allow: choose among {', '.join(RULES)}")
@@ -69,22 +69,23 @@ def check_allowed(names: Sequence[str]) -> None:
 def excluded_posts(
     plan: Float, areas: Sequence[KeepOffArea], road: BaseGeometry, allow: Collection[str]
 ) -> dict[RuleName, Boolean]:
-    """Positions that each rule excludes, without those that an earlier rule excludes.
+    """Return the positions excluded by each rule, without those excluded by an earlier rule.
 
     Parameters
     ----------
     plan : (n, 2) float64, metres
         Positions of new posts.
     areas : sequence of KeepOffArea
+        Areas with their rules.
     road : shapely geometry
-        Outline of the carriageways in plan: islands follow from it.
+        Outline of the carriageways in plan, from which islands follow.
     allow : collection of str
         Names of the rules that do not apply.
 
     Returns
     -------
     dict of str to (n,) bool
-        By rule, only rules that apply to new posts.
+        Excluded positions by rule, for the rules that apply to new posts.
     """
     left = np.ones(len(plan), dtype=bool)
     excluded: dict[RuleName, Boolean] = {}
@@ -103,7 +104,7 @@ def excluded_posts(
 def narrow_islands(road: BaseGeometry, width: float = MIN_ISLAND_WIDTH) -> BaseGeometry:
     """Return the islands and medians between carriageways that are narrower than ``width`` metres.
 
-    These are the gaps that a morphological closing of the carriageway fills. Its mitred offsets keep the corners of
+    These are the gaps filled by a morphological closing of the carriageway. Mitred offsets preserve the corners of
     wider areas, which a closing with a disc would fill as well.
     """
     return road if road.is_empty else without(closed(road, width / 2), road)

@@ -16,7 +16,7 @@ class Role(Enum):
     FORBIDDEN_AREAS = "forbidden areas"
     MANDATORY_AREAS = "mandatory areas"
     DRESSING = "dressing"
-    """Looks alone: no ray ends on it."""
+    """Appearance only: no ray ends on these objects."""
 
 
 AREA_OVERLAYS = {
@@ -26,4 +26,4 @@ AREA_OVERLAYS = {
     Role.MANDATORY_AREAS: (0.06, "mandatory veil"),
     Role.CANDIDATE_AREAS: (0.03, "candidate veil"),
 }
-"""Height above the ground (metres) and material of areas that are not there to be seen."""
+"""Height above the ground (metres) and material of overlays that mark areas."""

@@ -15,13 +15,13 @@ from .post_rules import KeepOffArea, RuleName
 from .sources import SourceCount, count_sources
 
 DEFAULT_WEIGHT = 2.0
-"""Of a weighted region that does not say its own."""
+"""Weight of a weighted region that has none."""
 
 DEFAULT_REFLECTIVITY = 0.3
-"""Of a surface that is not known to reflect otherwise."""
+"""Reflectivity of surfaces for which none is known."""
 
 OTHER_LEVELS = "Roads on other levels"
-"""Name of the ground that is roads of other levels than the studied one; plans show it."""
+"""Name of the ground made of roads on other levels than the studied one; plans show it."""
 
 FROM_MAP, DESCRIBED, ASSUMED = "map", "site description", "assumed"
 FROM_EXTRACT, FROM_CITY_MODEL, FROM_SURVEY = "extract", "city model", "survey"
@@ -36,15 +36,15 @@ class Mesh:
     Parameters
     ----------
     name : str
-        The object's name, for messages.
+        Name of the object, for messages.
     triangles : (n, 3, 3) float64, metres
-        Corners in local site axes, z up.
+        Triangles in local site axes, z up.
     reflectivity : (n,) float64, optional
-        Share of the light (0 to 1) that each triangle scatters back; `DEFAULT_REFLECTIVITY` where not given.
+        Share of the light (0 to 1) that each triangle scatters back; `DEFAULT_REFLECTIVITY` if not given.
     source : str
-        Who says that it is there, as of a `Pole`.
+        Source of the object, as in `Pole`.
     height_assumed, width_assumed : bool
-        Whether that source does not give its height, or its width, as of lanes.
+        Whether the source lacks its height, or its width, as for lanes.
     """
 
     name: str
@@ -61,7 +61,7 @@ def joined(meshes: Sequence[Mesh]) -> Float:
 
 
 def ordered_surfaces(meshes: Sequence[Mesh]) -> tuple[Float, Float]:
-    """Return the triangles of all meshes and the reflectivity of each, in an order that no order of meshes changes.
+    """Return the triangles of all meshes and their reflectivity, in an order independent of that of the meshes.
 
     Returns
     -------
@@ -84,17 +84,17 @@ class Pole:
     Parameters
     ----------
     name : str
-        The object's name.
+        Name of the object.
     base : (3,) float64, metres
         Foot of the post, local site axes.
     height : float or None, metres
-        Top of the post above its foot; None where that is not known, and any height will do.
+        Height of the post; None if it is unknown, which allows any height of sensors.
     forbidden, mandatory : bool
-        No sensor may hang here; at least one sensor must.
+        Whether the pole must carry no sensor, or at least one.
     source : str
-        `FROM_MAP`, `DESCRIBED`, `ASSUMED` or `FROM_EXTRACT`; empty where the user put it into the scene.
+        `FROM_MAP`, `DESCRIBED`, `ASSUMED` or `FROM_EXTRACT`; "" for poles that the user added to the scene.
     keep_off : str or None
-        Rule that keeps sensors off the pole, unless it is allowed; None where none does.
+        Rule that excludes sensors from the pole, unless it is allowed; None if there is none.
     """
 
     name: str
@@ -143,20 +143,20 @@ class SceneGeometry:
     region : shapely geometry
         Region of interest in plan.
     weighted_regions, forbidden_areas, mandatory_areas : tuple of NamedArea
-        In plan. A weighted region multiplies the weight of the targets in it.
-        At least one sensor must stand in each mandatory area.
+        Areas in plan. A weighted region multiplies the weight of the targets in it. At least one sensor must stand in
+        each mandatory area.
     candidate_areas : shapely geometry
-        Where a new post may stand, in plan.
+        Area in plan for new posts.
     poles : tuple of Pole
         Existing posts that can carry a sensor.
     keep_off_areas : tuple of KeepOffArea
-        Where rules keep new posts off, in plan.
+        Areas in plan from which rules exclude new posts.
     geo_reference : GeoReference
-        Where on the Earth the scene's map is.
+        Position of the scene's map on the Earth.
     places : tuple of NamedArea
-        Streets and crossings of the map, in plan: results name them, and nothing else depends on them.
+        Streets and crossings of the map in plan; used only to name them in results.
     attribution : tuple of str
-        Credits that the sources of the scene demand; results carry them.
+        Credits required by the sources of the scene, which results repeat.
     """
 
     name: str
@@ -176,7 +176,7 @@ class SceneGeometry:
     keep_off_areas: tuple[KeepOffArea, ...] = ()
 
     def sources(self) -> tuple[SourceCount, ...]:
-        """Count the surfaces of which the scene says where they come from, by kind and source."""
+        """Count the surfaces with a known source, by kind and source."""
         return count_sources(
             (mesh.name, mesh.source, mesh.height_assumed or mesh.width_assumed or mesh.source == ASSUMED)
             for mesh in (*self.roads, *self.ground, *self.occluders)

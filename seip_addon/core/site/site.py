@@ -25,7 +25,7 @@ __all__ = ["Candidates", "Site", "Targets", "make_site"]
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """A site: targets, candidates and static triangles, all that visibility and placement need.
+    """Targets, candidates and static triangles of a site: the input of visibility and placement.
 
     Parameters
     ----------
@@ -36,15 +36,15 @@ class Site:
     region : shapely geometry
         Region of interest in plan, local.
     triangles : (n, 3, 3) float64, metres
-        All static surfaces that a ray which counts can end on, roads included.
+        All static surfaces that a relevant ray can reach, roads included.
     reflectivity : (n,) float64, 0 to 1
-        Of each.
+        Reflectivity of each triangle.
     geo_reference : GeoReference
-        Where on the Earth the scene's map is.
+        Position of the scene's map on the Earth.
     sources : tuple of SourceCount
-        Where the scene's surfaces come from.
+        Sources of the scene's surfaces.
     attribution : tuple of str
-        Credits that these sources demand.
+        Credits required by these sources.
     """
 
     name: str
@@ -61,7 +61,7 @@ class Site:
     def geographic(self, points: Float) -> Float | None:
         """Return longitude, latitude (degrees, WGS 84) and height above the map's zero of local points, all (n, 3).
 
-        None where the map's projection is not known.
+        None if the map's projection is not known.
         """
         return self.geo_reference.geographic(points + self.origin)
 
@@ -80,14 +80,14 @@ def make_site(
     grid_spacing : float, metres
         Distance between neighbouring targets.
     reach : float, metres
-        What is farther from the region ends no ray that counts, and is left out.
+        Distance from the region beyond which surfaces are left out, because no relevant ray reaches them.
     models : mapping of str to LidarModel
-        The sensor types; those that are not in it look all round.
+        Sensor types; those missing have a full horizontal field of view.
 
     Returns
     -------
     Site
-        The same whatever the objects are called and whatever their order.
+        Site, independent of the names of objects and of their order.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Sources of a scene: where each kind of object comes from, and how many heights are assumed."""
+"""Sources of a scene: counts of objects by kind and source, and of assumed sizes."""
 
 import re
 from collections import Counter
@@ -11,7 +11,7 @@ from ..limits import COUNT
 _NUMBER = re.compile(r"[ ._]*\d+( of the [a-z ]+)?$")
 
 
-_JOINERS = "\u200c\u200d"  # which writing of Persian and Hindi needs, and emoji
+_JOINERS = "\u200c\u200d"  # needed in Persian and Hindi, and for emoji
 
 
 @dataclass(frozen=True)
@@ -21,11 +21,11 @@ class SourceCount:
     Parameters
     ----------
     kind : str
-        Such as ``Building``: their name without its number.
+        Name of the objects without their number, such as ``Building``.
     source : str
-        As in `scene_geometry.Pole`.
+        Source, as in `scene_geometry.Pole`.
     count, assumed : int
-        How many there are, and how many of these are assumed to be there, or to be as high or as wide as they are.
+        Number of objects, and number of these whose existence, height or width is assumed.
     """
 
     kind: str
@@ -35,7 +35,7 @@ class SourceCount:
 
 
 def one_line(text: str) -> str:
-    """Return a text of a file without line breaks, and without characters that change how others are shown."""
+    """Return a text from a file without line breaks and without control characters."""
     if not text.isprintable():
         text = "".join(one if one.isprintable() or one in _JOINERS else " " for one in text)
     return " ".join(text.split())
@@ -57,7 +57,7 @@ def count_sources(objects: Iterable[tuple[str, str, bool]]) -> tuple[SourceCount
 
 
 def source_table(rows: Iterable[SourceCount]) -> list[tuple[str, ...]]:
-    """Return the cells of a table, its heading first."""
+    """Return the rows of the table of sources, heading first."""
     heading = ("part", "source", "count", "measured", "assumed")
     cells = [
         (row.kind, row.source, f"{row.count:,}", f"{row.count - row.assumed:,}", f"{row.assumed:,}") for row in rows
@@ -66,7 +66,7 @@ def source_table(rows: Iterable[SourceCount]) -> list[tuple[str, ...]]:
 
 
 def source_lines(rows: Iterable[SourceCount]) -> list[str]:
-    """Return the table as lines of text."""
+    """Return the table of sources as lines of text."""
     cells = source_table(rows)
     widths = [max(len(row[column]) for row in cells) for column in range(5)]
     return [

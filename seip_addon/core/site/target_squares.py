@@ -1,4 +1,4 @@
-"""Squares of road that targets stand for, draped over the road surface."""
+"""Squares of road around targets, draped over the road surface."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from .site import Targets
 
 
 def target_squares(targets: Targets) -> Float:
-    """Return the corners of a square round each target, draped over the slopes of the road.
+    """Return the corners of a square around each target, draped over the slopes of the road.
 
-    A corner that several squares share has the mean height of their targets.
+    A corner shared by several squares has the mean height of their targets.
 
     Returns
     -------
     (t, 4, 3) float64, metres
-        Counter-clockwise from the lower left.
+        Corners counter-clockwise from the lower left.
     """
     half = targets.spacing / 2.0
     corners = targets.xyz[:, None, :2] + half * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])

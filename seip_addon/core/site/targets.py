@@ -19,23 +19,23 @@ MAX_TARGETS = 2_000_000
 """Limit on the targets of a grid."""
 
 MIN_SPACING, MAX_SPACING = 0.01, 1000.0
-"""Metres between which a spacing makes sense."""
+"""Least and largest spacing, metres."""
 
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """The road points to be seen.
+    """Points of the road that sensors should cover.
 
     Parameters
     ----------
     xyz : (t, 3) float64, metres
-        On the road surface, local site axes.
+        Positions on the road surface, local site axes.
     weight : (t,) float64
         Importance in the weighted problem, 1 outside every weighted region.
     central : (t,) bool
-        Whether the target lies in some weighted region.
+        Whether the target lies in a weighted region.
     spacing : float, metres
-        Side of the square that each target stands for.
+        Side of the square that each target represents.
     """
 
     xyz: Float
@@ -51,11 +51,10 @@ class Targets:
 def generate_targets(
     region: BaseGeometry, road: Float, spacing: float, weighted_regions: Sequence[NamedArea] = ()
 ) -> Targets:
-    """Lay a uniform grid over the region and keep the points that lie on the road.
+    """Generate targets: the points of a uniform grid over the region that lie on the road.
 
-    The grid is centred in the region's bounding box, so that moving the whole
-    scene moves the targets with it. Where road surfaces lie above each other
-    the target stands on the highest.
+    The grid is centred in the region's bounding box, so that moving the whole scene moves the targets with it. If road
+    surfaces lie above each other, the target is on the highest.
 
     Parameters
     ----------
@@ -66,18 +65,18 @@ def generate_targets(
     spacing : float, metres
         Distance between neighbouring targets.
     weighted_regions : sequence of NamedArea
-        Where they overlap, weights multiply.
+        Regions with weights, which multiply in overlaps.
 
     Returns
     -------
     Targets
-        In order of x, then y.
+        Targets in order of x, then y.
 
     Raises
     ------
     SeipError
-        The spacing is not positive or far too small, the region is empty, or
-        no grid point lies on the road inside it.
+        The spacing is out of range or gives too many targets, the region is empty, or no grid point lies on the road
+        inside it.
     """
     if not MIN_SPACING <= spacing <= MAX_SPACING:
         raise SeipError(f"the grid spacing must be {MIN_SPACING:g} to {MAX_SPACING:g} m, not {spacing}")
@@ -100,7 +99,7 @@ def generate_targets(
         inside = shapely.intersects_xy(area.polygon, xyz[:, 0], xyz[:, 1])
         weight[inside] *= area.weight
         central |= inside
-    # A micrometre of rounding takes off what the map's far origin left of noise.
+    # Rounding to a micrometre removes noise that comes from the distant origin of map coordinates.
     return Targets(np.round(xyz, 6), weight, central, float(spacing))
 
 

@@ -1,4 +1,4 @@
-"""Weather: what rain and fog take from a LiDAR's light, and what water does to roads."""
+"""Weather: extinction of a LiDAR's light by rain and fog, and reflectivity of wet roads."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from ..settings import setting
 from .scene_geometry import DEFAULT_REFLECTIVITY, Mesh, SceneGeometry
 
 RAIN_EXTINCTION, RAIN_EXPONENT = 3.65e-4, 0.63
-"""Of rain of 1 mm/h, in 1/m: drops of Marshall and Palmer (1948) with the extinction efficiency 2 of large spheres."""
+"""Extinction of rain of 1 mm/h in 1/m, and its exponent: drops of Marshall and Palmer (1948), efficiency 2."""
 
 CONTRAST_AT_VISIBILITY = 3.0
 """Optical depth of the meteorological optical range, at which 5 % of the light is left (WMO No. 8): ln 20."""
 
 WET_FACTOR = 0.55
-"""What a film of water leaves of a rough surface's near infrared reflectivity of 0.1 to 0.2: light that leaves the
-surface is partly reflected back under the film (Lekner and Dorf 1988, refractive index 1.33)."""
+"""Factor for the near infrared reflectivity (0.1 to 0.2) of a rough surface under a film of water: light that leaves
+the surface is partly reflected back under the film (Lekner and Dorf 1988, refractive index 1.33)."""
 
 
 @dataclass(frozen=True)
 class Weather:
-    """Weather that a sensor looks through; none by default.
+    """Weather in which sensors measure; clear by default.
 
     Parameters
     ----------
     rain : float, mm/h
-        Rain wets the road too.
+        Rain rate; rain also wets the road.
     visibility : float, metres
         Meteorological optical range in fog or snow.
     wet_road : bool
@@ -41,7 +41,7 @@ class Weather:
     Raises
     ------
     SeipError
-        There is less than no rain, or no visibility.
+        Rain is negative or too strong, or the visibility is too low.
     """
 
     rain: float = setting(0.0, "rain, which wets the road too", unit="mm/h", minimum=0.0, metavar="MM/H")
@@ -58,7 +58,7 @@ class Weather:
 
     @property
     def extinction(self) -> float:
-        """What the air takes of the light on each way, in 1/m."""
+        """Extinction coefficient of the air, in 1/m, for light in one direction."""
         return float(RAIN_EXTINCTION * self.rain**RAIN_EXPONENT + CONTRAST_AT_VISIBILITY / self.visibility)
 
     @property
@@ -67,13 +67,13 @@ class Weather:
         return self.wet_road or self.rain > 0
 
     def words(self) -> tuple[str, ...]:
-        """Return the words of which `weather_of` makes this weather."""
+        """Return the words that `weather_of` parses to this weather."""
         rain = (f"rain={self.rain!r}",) if self.rain > 0 else ()
         fog = (f"visibility={self.visibility!r}",) if math.isfinite(self.visibility) else ()
         return (*rain, *fog, *(("wet",) if self.wet_road else ()))
 
     def through(self, model: LidarModel) -> LidarModel:
-        """Return a sensor that looks through this weather."""
+        """Return a sensor model for this weather."""
         return model.in_air(self.extinction) if self.extinction > 0 else model
 
     def over(self, geometry: SceneGeometry) -> SceneGeometry:
@@ -84,12 +84,12 @@ class Weather:
 
 
 def weather_of(words: Sequence[str]) -> Weather:
-    """Return the weather of words as commands take them: ``rain=10``, ``visibility=200``, ``wet``.
+    """Parse weather from the words of commands: ``rain=10``, ``visibility=200``, ``wet``.
 
     Raises
     ------
     SeipError
-        A word is none of these, or its number makes no sense.
+        A word is unknown, or its number is invalid.
     """
     given: dict[str, Any] = {}
     for word in words:

@@ -1,4 +1,4 @@
-"""The ways that sensors of a limited horizontal field of view may look."""
+"""Yaws of sensors with a limited horizontal field of view."""
 
 from __future__ import annotations
 
@@ -15,32 +15,33 @@ from ..sensing.lidar.model import LidarModel
 from .candidates import Candidates, headings
 
 NOTHING_BEFORE = "looking past all targets"
-"""Reason for which poses are dropped."""
+"""Reason for dropping poses."""
 
 
 def with_yaws(
     candidates: Candidates, models: Mapping[str, LidarModel], yaws: int, region: BaseGeometry, targets: Float
 ) -> Candidates:
-    """Turn sensors of a limited field of view to several yaws: evenly, the first towards the region.
+    """Repeat poses of sensors with a limited field of view for several yaws, evenly and the first towards the region.
 
-    Yaws with which no target lies within the field of view in plan are left out, as are positions that keep no pose.
+    Yaws without a target in the field of view in plan are left out, and so are positions without a pose.
 
     Parameters
     ----------
     candidates : Candidates
-        With one yaw at each position, height and tilt.
+        Candidates with one yaw at each position, height and tilt.
     models : mapping of str to LidarModel
-        Sensor types that are not in it look all round.
+        Sensor types; those missing have a full horizontal field of view.
     yaws : int
-        How many, over the circle.
+        Number of yaws over the circle.
     region : shapely geometry
         Region of interest in plan.
     targets : (t, 3) float64, metres
+        Positions of the targets.
 
     Returns
     -------
     Candidates
-        Poses of sensors that look all round are as they were; those of others follow each other in order of their yaws.
+        Poses of sensors with a full field of view are unchanged; those of others follow each other in order of yaw.
 
     Raises
     ------
@@ -51,6 +52,7 @@ def with_yaws(
     one_way = np.array([key in models and not models[key].all_round for key in kinds], dtype=bool)
     if not one_way.any():
         return candidates
+    # Repeat each pose once for each of its yaws; `turn` counts the repeats of a pose from 0.
     many = np.where(one_way, yaws, 1)[kind]
     pose = np.repeat(np.arange(len(candidates)), many)
     turn = np.arange(len(pose)) - np.repeat(np.cumsum(many) - many, many)
@@ -66,9 +68,7 @@ def with_yaws(
         seen = _any_within(candidates.xyz[first], ahead, models[str(kinds[number])].field_of_view, targets)
         looks[own] = seen[position[own], turn[own]]
     if not looks.any():
-        raise SeipError(
-            f"no candidate is left ({len(pose)} {NOTHING_BEFORE}): ask for more yaws, or for a wider field of view"
-        )
+        raise SeipError(f"no candidate is left ({len(pose)} {NOTHING_BEFORE}): use more yaws, or a wider field of view")
     turned = {name: getattr(candidates, name)[pose[looks]] for name in ("sensor", "height", "xyz", "tilt")}
     left = replace(candidates, **turned, position_of=position[looks], yaw=yaw[looks])
     dropped = {NOTHING_BEFORE: int((~looks).sum())} if not looks.all() else {}
@@ -76,7 +76,7 @@ def with_yaws(
 
 
 def _any_within(xyz: Float, ahead: Float, field_of_view: float, targets: Float) -> Boolean:
-    """Return for which yaws (p, y) some target lies within the field of view in plan of a sensor at (p, 3)."""
+    """Return whether a target lies in the field of view in plan, for each yaw (p, y) of sensors at (p, 3)."""
     within = np.zeros(ahead.shape, dtype=bool)
     for place, yaws, row in zip(xyz, ahead, within, strict=True):
         azimuth = np.arctan2(targets[:, 1] - place[1], targets[:, 0] - place[0])
@@ -89,7 +89,7 @@ def _without_empty_positions(candidates: Candidates) -> Candidates:
     used, position_of = np.unique(candidates.position_of, return_inverse=True)
     mandatory = candidates.mandatory[:, used]
     for name in candidates.mandatory_name[~mandatory.any(axis=1)]:
-        raise SeipError(f"{str(name)!r} must carry a sensor, but with no yaw does one there have a target before it")
+        raise SeipError(f"{str(name)!r} must carry a sensor, but no yaw there has a target in view: use more yaws")
     names = ("position", "position_name", "on_pole", "pole_source")
     of_positions = {name: getattr(candidates, name)[used] for name in names}
     return replace(candidates, **of_positions, position_of=position_of.astype(np.int64), mandatory=mandatory)

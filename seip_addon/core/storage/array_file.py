@@ -22,10 +22,10 @@ from ..errors import SeipError
 from ..limits import Limits
 from .files import digest, whole_file
 
-MAX_BYTES = 1 << 32  # bytes of all arrays of a file together at most: 4 GiB
-MAX_HEADER_BYTES = 1 << 27  # bytes of the header, four for each of its characters: 128 MiB
-MAX_TEXT_LENGTH = 256  # characters of an entry of an array of text at most
-_OLD_VERSION = 1  # the version of files that hold no digest
+MAX_BYTES = 1 << 32  # largest total size of the arrays of a file: 4 GiB
+MAX_HEADER_BYTES = 1 << 27  # largest header, with four bytes for each character: 128 MiB
+MAX_TEXT_LENGTH = 256  # largest number of characters of an entry in an array of text
+_OLD_VERSION = 1  # version of files without a digest
 _READ_AT_ONCE = 1 << 18  # bytes
 _MAX_DEFLATE_RATIO = 1032  # bytes that one byte of DEFLATE can stand for (RFC 1951)
 
@@ -34,11 +34,11 @@ _NPY = re.compile(
     rb"\{'descr': '([<|][a-zA-Z]\d{1,9})', 'fortran_order': (True|False), 'shape': \(([\d, ]*)\), \} *\n",
     re.DOTALL,
 )
-"""How NumPy begins an array in a file, with its type and shape."""
+"""Header of an array as NumPy writes it, with its type and shape."""
 
 
 class ContentError(ValueError):
-    """What is wrong with the content of a file, as a part of a sentence."""
+    """Fault in the content of a file, as part of a sentence."""
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ class ArrayRule:
     Parameters
     ----------
     dtype : str
-        NumPy's name of its type; ``U`` is text of any length up to `MAX_TEXT_LENGTH`.
+        NumPy name of the type; ``U`` is text of any length up to `MAX_TEXT_LENGTH`.
     shape : tuple of int and str
-        Length of each axis; a text is a variable that has one value across all arrays of a file.
+        Length of each axis; a str is a variable with one value across all arrays of a file.
     limits : Limits, optional
         Allowed range of the values. Arrays of floating-point numbers always have one.
     """
@@ -64,7 +64,7 @@ class ArrayRule:
             raise ValueError("an array of floating-point numbers needs limits")
 
     def check(self, name: str, array: NDArray[Any]) -> None:
-        """Raise `ContentError` where values lie outside the limits."""
+        """Raise `ContentError` if values lie outside the limits."""
         if self.limits is not None and not self.limits.allow(array):
             worst = array[~self.limits.each(array)].flat[0]
             raise ContentError(f"{name} has the value {worst:g}, not {self.limits}")
@@ -72,9 +72,9 @@ class ArrayRule:
 
 @dataclass(frozen=True)
 class ArrayFile:
-    """A kind of file that holds named arrays and a header: npz, with JSON as the text ``header``.
+    """A format for files of named arrays and a header: npz, with JSON as the text ``header``.
 
-    The header holds a digest of itself and of the arrays; that of version 1 holds none.
+    The header contains a digest of itself and of the arrays, except in version 1.
 
     Parameters
     ----------
@@ -83,15 +83,15 @@ class ArrayFile:
     version : int
         Version of the format.
     what : str
-        What a file holds, for messages: "visibility grid".
+        Kind of file for messages: "visibility grid".
     remedy : str
-        How to get a new one, for messages: "delete it and compute it again".
+        Way to get a new file, for messages: "delete it and compute it again".
     arrays : mapping of str to ArrayRule
         All arrays of a file, by name.
     compressed : bool
         Whether arrays are deflated; noisy measurements hardly compress.
     undigested : bool
-        Whether files of version 1 are read as well. Those of other versions are refused.
+        Whether files of version 1 are read as well. Other versions are rejected.
     """
 
     schema: str
@@ -103,7 +103,7 @@ class ArrayFile:
     undigested: bool = False
 
     def save(self, path: str | os.PathLike[str], header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Write a header, whose values JSON knows, and the arrays by their names."""
+        """Write a header with values that JSON supports, and the arrays by name."""
         typed = {
             name: np.asarray(arrays[name], dtype=None if rule.dtype == "U" else rule.dtype, order="C")
             for name, rule in self.arrays.items()
@@ -111,21 +111,21 @@ class ArrayFile:
         full = {"schema": self.schema, "version": self.version, **header}
         text = json.dumps({**full, "digest": _digest(full, typed)}, ensure_ascii=False, allow_nan=False)
         write = np.savez_compressed if self.compressed else np.savez
-        content = io.BytesIO()  # NumPy leaves an archive unclosed that the disk had no room for
+        content = io.BytesIO()  # written to memory first: NumPy leaves an archive open if the disk is full
         write(content, header=np.array(text), **typed)
         with whole_file(path) as temporary:
             temporary.write_bytes(content.getvalue())
 
     @contextmanager
     def reading(self, path: str | os.PathLike[str]) -> Iterator[tuple[dict[str, Any], dict[str, NDArray[Any]]]]:
-        """Yield the header and the arrays; what a block trips over in them is the file's fault.
+        """Yield the header and the arrays; errors raised in the block are reported as a damaged file.
 
         Sizes are compared with the rules and with each other before any array is read.
 
         Raises
         ------
         SeipError
-            The file is not there, damaged, something else, or of another version.
+            The file does not exist, is damaged, or has a different format or version.
         """
         try:
             with Path(path).open("rb") as file, _archive(file) as archive:
@@ -137,22 +137,22 @@ class ArrayFile:
         except FileNotFoundError as error:
             raise SeipError(f"there is no {self.what} {path}; {self.remedy}") from error
         except ContentError as error:
-            raise SeipError(f"{path} is no {self.what}, or is damaged: {error}; {self.remedy}") from error
+            raise SeipError(f"{path} is damaged or not a {self.what}: {error}; {self.remedy}") from error
         except READ_ERRORS as error:
-            raise SeipError(f"{path} is no {self.what}, or is damaged; {self.remedy}") from error
+            raise SeipError(f"{path} is damaged or not a {self.what}; {self.remedy}") from error
         if not known:
-            raise SeipError(f"{path} is no {self.what} of this version; {self.remedy}")
+            raise SeipError(f"{path} is not a {self.what} of this version; {self.remedy}")
 
     def _read_arrays(self, archive: zipfile.ZipFile, header: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
         members = {f"{name}.npy": name for name in self.arrays}
         names = archive.namelist()
         if sorted(names) != sorted([*members, "header.npy"]):
-            raise ContentError("other arrays than these belong into it")
+            raise ContentError("it has missing or additional arrays")
         self._check_claims({members[name]: _claim(archive, name) for name in members})
         arrays = {name: _array(archive, member) for member, name in members.items()}
         content = {name: value for name, value in header.items() if name != "digest"}
         if (header["version"] != _OLD_VERSION or "digest" in header) and header["digest"] != _digest(content, arrays):
-            raise ContentError("its content is not what was written")
+            raise ContentError("its content differs from its digest")
         for name, rule in self.arrays.items():
             rule.check(name, arrays[name])
         return arrays
@@ -176,7 +176,7 @@ class ArrayFile:
 
 
 def _archive(file: BinaryIO) -> zipfile.ZipFile:
-    """Open an archive that begins with the file, as NumPy asks for: others may have anything before it."""
+    """Open an archive that starts at the first byte, as NumPy requires; zip archives may have other data before."""
     if file.read(4) != b"PK\x03\x04":
         raise ContentError("it does not begin with an array")
     return zipfile.ZipFile(file)
@@ -195,7 +195,7 @@ def _read_header(archive: zipfile.ZipFile) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Claim:
-    """What a member says of its array, and at which byte that begins."""
+    """Type, shape and order of an array as claimed by its member of the archive, and the byte where it begins."""
 
     dtype: np.dtype[Any]
     shape: tuple[int, ...]
@@ -209,24 +209,24 @@ class _Claim:
 
 
 def _claim(archive: zipfile.ZipFile, member: str) -> _Claim:
-    """Return what a member claims, once its size bears it out."""
+    """Return the claim of a member after checking it against the size of the member."""
     info = archive.getinfo(member)
     if info.flag_bits & 1 or info.compress_type not in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}:
-        raise ContentError(f"{member} is packed as NumPy packs none")
+        raise ContentError(f"{member} uses an unsupported compression method")
     with archive.open(info) as stream:
         begin = _NPY.match(stream.read(256))
     if begin is None:
-        raise ContentError(f"{member} is no array")
+        raise ContentError(f"{member} is not an array")
     shape = tuple(int(length) for length in begin[3].decode().split(",") if length.strip())
     claim = _Claim(np.dtype(begin[1].decode()), shape, "F" if begin[2] == b"True" else "C", begin.end())
     size = claim.begin + claim.size
     if size != info.file_size or size > _MAX_DEFLATE_RATIO * (info.compress_size + 1):
-        raise ContentError(f"{member} claims {size:,} bytes and has none of them")
+        raise ContentError(f"{member} claims {size:,} bytes, which differs from its size in the file")
     return claim
 
 
 def _array(archive: zipfile.ZipFile, member: str) -> NDArray[Any]:
-    """Read an array. NumPy parses the claim as a source, which older Pythons cannot do in two threads at once."""
+    """Read an array without NumPy, which parses the header as Python source: not thread-safe in older Pythons."""
     claim = _claim(archive, member)
     array = np.empty(math.prod(claim.shape), claim.dtype)
     rest = array.view(np.uint8).data
@@ -247,11 +247,11 @@ def _digest(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> st
 
 
 def _refuse_constant(name: str) -> NoReturn:
-    raise ContentError(f"its header holds the number {name}")
+    raise ContentError(f"its header has the number {name}")
 
 
 READ_ERRORS = (
     *(OSError, EOFError, ArithmeticError, AttributeError, ValueError, LookupError, TypeError, RuntimeError),
     *(MemoryError, zipfile.BadZipFile, zlib.error),
 )
-"""What reading an npz, or taking from it what should be there, raises where the file is not what it should be."""
+"""Exceptions raised by reading a damaged npz file, or by using its contents."""

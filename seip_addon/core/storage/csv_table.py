@@ -1,4 +1,4 @@
-"""CSV tables for spreadsheets: names from maps and scenes are text there, never formulas."""
+"""CSV tables for spreadsheets, in which names from maps and scenes are never taken for formulas."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from collections.abc import Iterable, Sequence
 from .files import whole_file
 
 _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\n", "\N{FULLWIDTH EQUALS SIGN}", "\N{FULLWIDTH PLUS SIGN}")
-"""Characters at which spreadsheets take a cell for a formula (OWASP, "CSV Injection")."""
+"""First characters of cells that spreadsheets take for formulas (OWASP, "CSV Injection")."""
 
 
 def save_csv(path: str | os.PathLike[str], columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     """Write a table as CSV in UTF-8, one line for each row.
 
-    Texts that a spreadsheet would take for a formula get an apostrophe in front, which spreadsheets do not show.
+    Texts that a spreadsheet would take for formulas are prefixed by an apostrophe, which spreadsheets do not show.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def save_csv(path: str | os.PathLike[str], columns: Sequence[str], rows: Iterabl
 def _cell(value: object) -> object:
     if not isinstance(value, str):
         return value
-    value = value.replace("\r", " ")  # which the csv module leaves unquoted, and readers take for a new row
+    value = value.replace("\r", " ")  # the csv module leaves it unquoted, and readers take it for a new row
     if not value.lstrip(" ").startswith(_FORMULA_STARTS):
         return value
     return value if all(map(_is_number, value.split())) else f"'{value}"

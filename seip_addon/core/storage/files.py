@@ -20,16 +20,16 @@ from numpy.typing import NDArray
 
 from ..errors import SeipError
 
-_UMASK = os.umask(0)  # once: to read it is to change it, for all threads
+_UMASK = os.umask(0)  # read once at import, because reading changes it for all threads
 os.umask(_UMASK)
 
 
 @contextmanager
 def locked_file(path: Path) -> Iterator[None]:
-    """Lock a file that is to be written against other processes while the block runs.
+    """Lock a file against writing by other processes while the block runs.
 
-    The lock is a file of its own next to ``path``, which is gone afterwards: ``path`` itself may not be there yet, and
-    is replaced as a whole. What a killed process leaves of it locks nothing.
+    The lock is a separate file next to ``path`` that is removed afterwards: ``path`` itself may not exist yet, and is
+    replaced as a whole. A lock file left by a killed process does not lock anything.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def locked_file(path: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        if sys.platform == "win32":  # which deletes no file that is open
+        if sys.platform == "win32":  # Windows cannot delete a file that is open
             os.close(handle)
             lock.unlink(missing_ok=True)
         else:
@@ -55,7 +55,7 @@ def locked_file(path: Path) -> Iterator[None]:
 
 
 def _locked(lock: Path) -> int | None:
-    """Return an open file that is locked and still has its name, None where another process holds it."""
+    """Return the descriptor of the locked file, None if another process holds the lock."""
     while True:
         handle = os.open(lock, os.O_RDWR | os.O_CREAT)
         try:
@@ -65,6 +65,8 @@ def _locked(lock: Path) -> int | None:
                 os.close(handle)
                 return None
         try:
+            # The last holder may have removed the name between open and lock. Then the lock is on a file without a
+            # name, which a third process would not see: open the new one.
             if os.fstat(handle).st_ino == lock.stat().st_ino:
                 return handle
         except FileNotFoundError:
@@ -74,16 +76,16 @@ def _locked(lock: Path) -> int | None:
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary name beside ``path`` that becomes ``path`` once all is written.
+    """Yield a temporary file next to ``path`` that is renamed to ``path`` after the block.
 
-    The temporary name keeps the suffix of ``path``, so that libraries which choose a format by suffix do the same for
-    both. Nothing is left behind when the block raises, `KeyboardInterrupt` included, no empty folder either; what a
-    killed process left in the folder is removed.
+    The temporary name keeps the suffix of ``path``, for libraries that choose a format by suffix. If the block raises,
+    even `KeyboardInterrupt`, neither the file nor an empty folder is left. Temporary files of killed processes in the
+    folder are removed.
 
     Parameters
     ----------
     path : path-like
-        The file to write. Its folder is made when it is missing.
+        File to write. Its folder is created if it is missing.
 
     Raises
     ------
@@ -108,17 +110,19 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def unfinished_name(folder: Path, name: str) -> Path:
-    """Return a name in a folder for an unfinished file or folder, which a later run removes if this process is killed.
+    """Return a name for an unfinished file or folder, which a later run removes if this process is killed.
 
     Parameters
     ----------
+    folder : Path
+        Folder for it.
     name : str
-        With which it ends, so that libraries which choose a format by suffix choose the same.
+        End of the name, for libraries that choose a format by suffix.
 
     Raises
     ------
     SeipError
-        The folder cannot be made or read.
+        The folder cannot be created or read.
     """
     with _writing(folder / name):
         folder.mkdir(parents=True, exist_ok=True)
@@ -127,17 +131,17 @@ def unfinished_name(folder: Path, name: str) -> Path:
 
 
 def check_folder(folder: Path) -> tuple[Path, ...]:
-    """Make a folder for results, and raise SeipError where it cannot be written.
+    """Create a folder for results and check that it can be written.
 
     Returns
     -------
     tuple of path
-        The folders that were made: for `remove_empty`, should nothing be written to them.
+        Folders that were created, to pass to `remove_empty` if no file is written to them.
 
     Raises
     ------
     SeipError
-        The folder cannot be made or written.
+        The folder cannot be created or written.
     """
     made: tuple[Path, ...] = ()
     try:
@@ -152,14 +156,14 @@ def check_folder(folder: Path) -> tuple[Path, ...]:
 
 
 def remove_empty(folders: Iterable[Path]) -> None:
-    """Remove the folders that are empty, the innermost first; those that hold something are kept."""
+    """Remove the folders that are empty, innermost first."""
     for folder in sorted(folders, key=lambda one: -len(one.parts)):
-        with suppress(OSError):  # it holds something, or is gone
+        with suppress(OSError):  # it is not empty, or does not exist
             folder.rmdir()
 
 
 def _make_folder(folder: Path) -> tuple[Path, ...]:
-    """Make a folder and its parents; return those that were missing."""
+    """Create a folder and its parents; return those that were missing."""
     missing = tuple(one for one in (folder, *folder.parents) if not one.exists())
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -170,24 +174,24 @@ def _make_folder(folder: Path) -> tuple[Path, ...]:
 
 
 def lock_folder(folder: Path) -> int:
-    """Lock a folder against other processes until this one ends, however it ends.
+    """Lock a folder against other processes until this process ends, normally or not.
 
     Parameters
     ----------
     folder : path
-        It is there.
+        Existing folder.
 
     Returns
     -------
     int
-        What holds the lock: a file descriptor, whose closing opens it.
+        File descriptor that holds the lock until it is closed.
 
     Raises
     ------
     SeipError
         Another process holds the lock.
     """
-    windows = sys.platform == "win32"  # which opens no folders as files
+    windows = sys.platform == "win32"  # Windows cannot open folders as files
     handle = os.open(folder / _LOCK_NAME, os.O_RDWR | os.O_CREAT) if windows else os.open(folder, os.O_RDONLY)
     try:
         _lock(handle)
@@ -202,7 +206,7 @@ def lock_folder(folder: Path) -> int:
 
 
 def unlock_folder(folder: Path, lock: int) -> None:
-    """End the lock that `lock_folder` returned."""
+    """Release the lock that `lock_folder` returned."""
     os.close(lock)
     if sys.platform == "win32":
         with suppress(OSError):  # another process has it by now
@@ -210,12 +214,12 @@ def unlock_folder(folder: Path, lock: int) -> None:
 
 
 def save_json(path: str | os.PathLike[str], value: object) -> None:
-    """Write a value as JSON for people and programs: indented, UTF-8, and without NaN or infinity.
+    """Write a value as JSON: indented, UTF-8, without NaN or infinity.
 
     Raises
     ------
     ValueError
-        The value holds a number that is not finite: JSON has no sign for it.
+        The value contains a number that is not finite, which JSON cannot represent.
     SeipError
         The folder or the file cannot be written.
     """
@@ -225,12 +229,12 @@ def save_json(path: str | os.PathLike[str], value: object) -> None:
 
 
 def digest(*parts: NDArray[Any] | str | bytes | float | None) -> str:
-    """Return the SHA-256 of values, with the shape and type of each array among them.
+    """Return the SHA-256 of values, including the shape and type of arrays.
 
     Parameters
     ----------
     *parts : ndarray, str, bytes, float, int or None
-        What the digest stands for, in order.
+        Values to digest, in order.
 
     Returns
     -------
@@ -241,6 +245,8 @@ def digest(*parts: NDArray[Any] | str | bytes | float | None) -> str:
     for part in parts:
         if isinstance(part, np.ndarray):
             array = np.ascontiguousarray(part)
+            # Fixed byte order, and a prefix with type and length: equal content gives equal digests on every platform,
+            # and ("ab", "c") differs from ("a", "bc").
             little = array.astype(array.dtype.newbyteorder("<"), copy=False)
             state.update(f"array{array.shape}{little.dtype.str};".encode())
             state.update(little.tobytes())
@@ -251,11 +257,11 @@ def digest(*parts: NDArray[Any] | str | bytes | float | None) -> str:
     return state.hexdigest()
 
 
-_PREFIX = ".seip-"  # how the names of unfinished files begin; the number of the process that writes them follows
-_MARK = secrets.token_hex(4)  # of this process: in a container another one may have had the same number before
-_STALE_SECONDS = 86400.0  # seconds after which an unfinished file counts as abandoned where processes cannot be queried
+_PREFIX = ".seip-"  # start of the names of unfinished files, followed by the id of the process that writes them
+_MARK = secrets.token_hex(4)  # mark of this process: in a container an earlier one may have had the same id
+_STALE_SECONDS = 86400.0  # age of abandoned unfinished files on systems where processes cannot be queried
 
-_LOCK_NAME = ".seip-lock"  # in a folder, where folders cannot be opened as files
+_LOCK_NAME = ".seip-lock"  # lock file in a folder, on systems that cannot open folders as files
 _LOCK_ERRORS = {errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
 
 if sys.platform == "win32":
@@ -276,7 +282,7 @@ def _own_prefix() -> str:
 
 @functools.cache
 def _remove_leftovers(folder: Path) -> None:
-    """Remove unfinished files of processes that were killed, once in a process."""
+    """Remove unfinished files of killed processes; cached, so that each folder is searched once in a process."""
     with os.scandir(folder) as entries:
         for entry in entries:
             number, dash, _ = entry.name.removeprefix(_PREFIX).partition("-")
@@ -290,7 +296,7 @@ def _remove_leftovers(folder: Path) -> None:
 def _is_nobodys(entry: os.DirEntry[str], process: int) -> bool:
     if process == os.getpid():
         return not entry.name.startswith(_own_prefix())
-    if sys.platform == "win32":  # asking for a process there means stopping it
+    if sys.platform == "win32":  # on Windows os.kill would stop the process instead of querying it
         return time.time() - entry.stat().st_mtime > _STALE_SECONDS
     try:
         os.kill(process, 0)
@@ -306,7 +312,7 @@ _SPACE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 @contextmanager
 def _writing(path: Path) -> Iterator[None]:
-    """Report an error of the operating system in the block as one of writing a file."""
+    """Convert an OSError in the block to a SeipError about writing a file."""
     try:
         yield
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Dataclasses from JSON, each value held to the type of its field, and settings as JSON."""
+"""Conversion of dataclasses from JSON, with every value checked against its field, and of settings to JSON."""
 
 import math
 import reprlib
@@ -23,21 +23,21 @@ _PLAIN: dict[type, tuple[str, tuple[type, ...]]] = {
     tuple: ("a list", (list, tuple)),
     dict: ("an object", (dict,)),
 }
-"""What each type is called in messages, and the types of values that stand for it."""
+"""Name of each type in messages, and the types of JSON values that are accepted for it."""
 
 
 def from_json(kind: type[Value], content: object, where: str = "") -> Value:
-    """Return the dataclass that a JSON value holds: its keys are the names of the fields.
+    """Return a dataclass from a JSON value whose keys are the names of the fields.
 
     Fields are ``str``, ``bool``, ``int``, ``float`` (whole numbers stay as they are), ``object`` (anything), literals,
-    dataclasses, and tuples, mappings by name and unions of these. A type that is annotated with `Limits` holds values
-    within them: ``Annotated[float, PRICE]``. Keys without a field are passed over. Settings in radians are in degrees
-    in JSON, under their name with ``_deg``.
+    dataclasses, and tuples, mappings by name and unions of these. Values of a type annotated with `Limits` must lie
+    within them: ``Annotated[float, PRICE]``. Keys without a field are ignored. Settings in radians are in degrees in
+    JSON, under their name with ``_deg``.
 
     Parameters
     ----------
     where : str
-        What stands before the names of fields in messages.
+        Prefix of field names in messages.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def from_json(kind: type[Value], content: object, where: str = "") -> Value:
 
 
 def as_json(value: object) -> Any:  # noqa: ANN401 -- values of any kind
-    """Return the JSON value of a dataclass, from which `from_json` makes an equal one."""
+    """Return a dataclass as a JSON value that `from_json` converts back to an equal one."""
     if is_dataclass(value) and not isinstance(value, type):
         return {_key(value, each): _written(value, each) for each in fields(value)}
     return [as_json(one) for one in value] if isinstance(value, tuple | list) else value
@@ -66,7 +66,7 @@ def _key(kind: object, each: "Field[Any]") -> str:
 
 def _written(holder: object, each: "Field[Any]") -> object:
     value = getattr(holder, each.name)
-    # a millionth of a degree hides the last bits in which platforms differ
+    # rounding to a millionth of a degree hides the last bits, which differ between platforms
     return round(math.degrees(value), 6) + 0.0 if _is_angle(holder, each.name) else as_json(value)
 
 

@@ -11,28 +11,28 @@ from importlib.machinery import ModuleSpec, PathFinder
 from ..errors import SeipError
 from .files import digest
 
-CORE = __package__.rpartition(".")[0]  # the core's full name: Blender gives extensions another than a checkout has
+CORE = __package__.rpartition(".")[0]  # full name of the core, which differs between Blender extensions and a checkout
 
 _OURS = (CORE, "headless")
 
-_ONE_AT_A_TIME = threading.Lock()  # before Python 3.11.8 sources parsed in two threads at once end in a SystemError
+_ONE_AT_A_TIME = threading.Lock()  # before Python 3.11.8 parsing in two threads at once raises a SystemError
 
 
 def source_digest(module: str) -> str:
-    """Return a digest of the sources of a module and of all that it imports, directly or not.
+    """Return a digest of the sources of a module and of all modules that it imports, directly or indirectly.
 
-    What counts are the modules of the core and of `headless`, wherever in a module they are imported, and the
-    packages that hold them. Sources are read through their loaders, so that they may lie in an archive; none is run.
+    Modules of the core and of `headless` are included, also if imported within functions, and the packages that contain
+    them. Sources are read through their loaders, so that they may be in an archive; no source is executed.
 
     Parameters
     ----------
     module : str
-        Its full name; of a module that asks for itself, ``__name__``.
+        Full name of the module, such as ``__name__``.
 
     Raises
     ------
     SeipError
-        A source is not there.
+        A source is missing.
     """
     with _ONE_AT_A_TIME:
         return _digest(module)
@@ -45,7 +45,7 @@ def _digest(module: str) -> str:
 
 
 def _sources(module: str) -> dict[str, str]:
-    """Return the sources of a module and of what it imports, by full name."""
+    """Return the sources of a module and of the modules that it imports, by full name."""
     sources: dict[str, str] = {}
     waiting = [module]
     while waiting:
@@ -56,14 +56,14 @@ def _sources(module: str) -> dict[str, str]:
         read = getattr(spec and spec.loader, "get_source", None)  # of files, archives and folders without a module
         source = read and read(name)
         if spec is None or source is None:
-            raise SeipError(f"the source of {name} is not there: install the program again")
+            raise SeipError(f"the source of {name} is missing: install the program again")
         sources[name] = source
         waiting += [name.rpartition(".")[0], *_imported(spec, source)]
     return sources
 
 
 def _spec(name: str) -> ModuleSpec | None:
-    """Find a module without importing the packages that hold it, as `importlib.util.find_spec` does."""
+    """Find a module without importing its packages, which `importlib.util.find_spec` would do."""
     if name in sys.modules:
         return sys.modules[name].__spec__
     package = name.rpartition(".")[0]
@@ -80,7 +80,7 @@ def _is_ours(name: str) -> bool:
 
 
 def _imported(spec: ModuleSpec, source: str) -> Iterator[str]:
-    """Yield the full names of the modules of ours that a module imports, wherever in it."""
+    """Yield the full names of the project's modules that a module imports anywhere in its source."""
     package = spec.name if spec.submodule_search_locations is not None else spec.name.rpartition(".")[0]
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
@@ -91,6 +91,6 @@ def _imported(spec: ModuleSpec, source: str) -> Iterator[str]:
                 continue
             yield name
             found = _spec(name)
-            if found is not None and found.submodule_search_locations is not None:  # else they are no modules
+            if found is not None and found.submodule_search_locations is not None:  # otherwise names are not modules
                 parts = (f"{name}.{alias.name}" for alias in node.names)
                 yield from (part for part in parts if _spec(part) is not None)

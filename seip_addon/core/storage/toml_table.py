@@ -1,4 +1,4 @@
-"""TOML files of users, checked against the keys that their tables may have."""
+"""TOML files of users, checked against the allowed keys of their tables."""
 
 import difflib
 import tomllib
@@ -9,13 +9,13 @@ from typing import Any, TypeGuard
 from ..errors import SeipError
 from ..limits import MAP_NUMBER, Limits
 
-Reader = Callable[[Any], Any]  # from a value to what it stands for; its `ValueError` says what it must be instead
-REQUIRED = object()  # the default of a key that must be there
+Reader = Callable[[Any], Any]  # converts a value; raises a `ValueError` that names the accepted values
+REQUIRED = object()  # default of a required key
 
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a table: how its value is read, and what it is where it is left out."""
+    """Reader and default of a key of a table."""
 
     read: Reader
     default: Any = REQUIRED
@@ -27,7 +27,7 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
     Raises
     ------
     SeipError
-        It is no TOML.
+        The text is not valid TOML.
     """
     try:
         return tomllib.loads(text)
@@ -36,17 +36,17 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
 
 
 def read_table(content: Mapping[str, Any], where: str, keys: Mapping[str, Key]) -> dict[str, Any]:
-    """Return the values of a table, each key of ``keys`` with one.
+    """Return the values of a table for all keys of ``keys``.
 
     Parameters
     ----------
     where : str
-        Name for messages: its file, and its number in it.
+        Location for messages: the file, and the number of the table in it.
 
     Raises
     ------
     SeipError
-        A key is missing, unknown (close ones are offered), or has a value of the wrong kind.
+        A key is missing or unknown (close ones are suggested), or has a value of the wrong type.
     """
     values = {}
     for name, key in keys.items():
@@ -68,7 +68,7 @@ def read_table(content: Mapping[str, Any], where: str, keys: Mapping[str, Key]) 
 
 
 def text(value: object) -> str:
-    """Read a text that is not empty."""
+    """Return a value if it is a text and not empty."""
     if not isinstance(value, str) or not value:
         raise ValueError("must be a text in quotes")
     return value
@@ -88,7 +88,7 @@ def number(limits: Limits) -> Reader:
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Whether a value is a finite number of earthly size; whole numbers of any length are valid TOML."""
+    """Return whether a value is a finite number of plausible size; TOML allows integers of any length."""
     return (
         isinstance(value, (int, float)) and not isinstance(value, bool) and MAP_NUMBER.least < value < MAP_NUMBER.most
     )

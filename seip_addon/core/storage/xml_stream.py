@@ -1,4 +1,4 @@
-"""XML files read as they stream by: they may be larger than memory, and nothing in them is trusted."""
+"""Streaming reader of untrusted XML files, which may be larger than memory."""
 
 import gzip
 import os
@@ -15,28 +15,28 @@ from ..progress import Progress
 Attributes = dict[str, str]
 
 SUMO_CURE = "let SUMO finish writing it"
-_MAX_QUOTED = 60  # characters of a file that a message repeats
+_MAX_QUOTED = 60  # characters of a file in a message at most
 _CHUNK = 1 << 20
-_MAX_TOKEN = 8 << 20  # bytes of one tag, comment or text: expat reads an unfinished one again with each chunk
-_MAX_DEPTH = 1000  # elements within each other: maps and simulations have a dozen, and each level costs memory
-_MAX_RATIO = 200  # of unpacked to packed bytes; DEFLATE reaches 1,032 on content that says nothing
-_ALWAYS_UNPACKED = 1 << 30  # bytes that any file may unpack to: standing traffic repeats itself as well
+_MAX_TOKEN = 8 << 20  # bytes of one tag, comment or text: expat scans an unfinished one again with each chunk
+_MAX_DEPTH = 1000  # nested elements: maps and simulations have a dozen, and each level costs memory
+_MAX_RATIO = 200  # ratio of unpacked to packed bytes; DEFLATE reaches 1,032 on content without information
+_ALWAYS_UNPACKED = 1 << 30  # unpacked bytes accepted for any file: stationary traffic compresses very well, too
 _GZIP = b"\x1f\x8b"
 
 
 class _Unpacked(gzip.GzipFile):
-    """Content of a gzip file up to a number of bytes."""
+    """A gzip file that can be read up to a number of unpacked bytes."""
 
     def __init__(self, file: BinaryIO, most: int, name: str) -> None:
         super().__init__(fileobj=file)
         self._left, self._file_name = most, name
 
     def read(self, size: int | None = -1) -> bytes:
-        """Return up to some bytes, refusing a file that unpacks to far more than it holds."""
+        """Return up to `size` bytes; raise an error if the file unpacks to too many."""
         return self._counted(super().read(size))
 
     def read1(self, size: int = -1) -> bytes:
-        """Return what is at hand, as `read` does."""
+        """Return available bytes, with the same check as `read`."""
         return self._counted(super().read1(size))
 
     def _counted(self, content: bytes) -> bytes:
@@ -44,25 +44,25 @@ class _Unpacked(gzip.GzipFile):
         if self._left < 0:
             raise SeipError(
                 f"{self._file_name} unpacks to more than {_MAX_RATIO} times its size, which no map or simulation does: "
-                "take another file"
+                "use a different file"
             )
         return content
 
 
 @contextmanager
 def opened(path: str | os.PathLike[str]) -> Iterator[tuple[BinaryIO, Callable[[], Progress]]]:
-    """Open a file, unpacked where it is packed with gzip.
+    """Open a file, unpacking it if it is compressed with gzip.
 
     Yields
     ------
     stream : binary file
     progress : callable
-        How much of the file has been read.
+        Function that returns the progress through the file.
 
     Raises
     ------
     SeipError
-        The file is not there, cannot be read, or is damaged; also from within the block.
+        The file does not exist, cannot be read, or is damaged; also raised for errors within the block.
     """
     name = Path(path).name
     try:
@@ -88,14 +88,14 @@ def read_tags(
     *,
     cure: str = SUMO_CURE,
 ) -> Generator[Progress, None, None]:
-    """Call ``take`` with the name and the attributes of each element, in the order of the file.
+    """Call ``take`` with the name and the attributes of each element in a file, in order.
 
     Parameters
     ----------
     leave : callable, optional
-        Called with the name of each element where it ends.
+        Called with the name of each element at its end.
     cure : str
-        What to do where the XML is broken.
+        What to do if the XML is broken, for messages.
 
     Yields
     ------
@@ -105,8 +105,8 @@ def read_tags(
     Raises
     ------
     SeipError
-        The file cannot be read, is not well-formed XML, or declares a document type: none is needed, and through
-        one a file can reach for other files or blow up in memory.
+        The file cannot be read, is not well-formed XML, or declares a document type: none is needed, and through one a
+        file can read other files or exhaust memory.
     """
     name = Path(path).name
     parser = _parser(name, take, leave, cure)
@@ -125,24 +125,24 @@ def read_tags(
             parser.Parse(b"", True)  # noqa: FBT003  # takes no name
         except expat.ExpatError as error:
             raise SeipError(f"{name} is broken or unfinished XML ({error}); {cure}") from error
-        except (LookupError, ValueError) as error:  # of an encoding that Python knows not, or expat does not take
+        except (LookupError, ValueError) as error:  # an encoding that Python or expat does not support
             raise SeipError(f"{name} is XML in an encoding that cannot be read ({error}); save it as UTF-8") from error
 
 
 def _parser(
     name: str, take: Callable[[str, Attributes], object], leave: Callable[[str], object] | None, cure: str
 ) -> expat.XMLParserType:
-    """Return a parser that refuses document types and deep nesting; see `read_tags`."""
+    """Return a parser that rejects document types and deep nesting; see `read_tags`."""
     depth = 0
 
     def refuse(*_: object) -> None:
-        raise SeipError(f"{name} declares a document type or entities, which may not be; remove them")
+        raise SeipError(f"{name} declares a document type or entities, which are not allowed; remove them")
 
     def start(tag: str, attributes: Attributes) -> None:
         nonlocal depth
         depth += 1
         if depth > _MAX_DEPTH:
-            raise SeipError(f"{name} has more than {_MAX_DEPTH:,} elements within each other; {cure}")
+            raise SeipError(f"{name} has more than {_MAX_DEPTH:,} nested elements; {cure}")
         take(tag, attributes)
 
     def end(tag: str) -> None:
@@ -163,10 +163,10 @@ def _parser(
 
 
 def short(text: str) -> str:
-    """Return a text out of a file as a message repeats it: cut where it is long."""
+    """Return a text from a file for a message, shortened if it is long."""
     return text if len(text) <= _MAX_QUOTED else f"{text[:_MAX_QUOTED]}…"
 
 
 def quoted(text: str) -> str:
-    """Return a text out of a file as a message quotes it: cut where it is long, and on one line."""
+    """Return a text from a file quoted for a message: on one line, shortened if it is long."""
     return repr(short(text))

@@ -101,7 +101,7 @@ def test_map_coordinates_are_too_far_for_single_precision():
 
 def test_what_stands_is_no_road():
     stands = dataclasses.replace(ROAD, name="upright", triangles=ROAD.triangles[:, :, [0, 2, 1]])
-    assert one(found(*SOUND.surfaces, stands), "stands more than it lies") == ("WARNING", "upright")
+    assert one(found(*SOUND.surfaces, stands), "mostly vertical") == ("WARNING", "upright")
 
 
 def test_a_pole_far_from_the_region_and_one_above_the_ground():

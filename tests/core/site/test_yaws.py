@@ -88,9 +88,9 @@ def test_a_position_from_which_no_yaw_looks_at_a_target_is_none():
     assert "far" not in made.position_name
     assert set(made.position_of) == set(range(len(made.position)))
     assert made.mandatory.shape == (0, len(made.position))
-    with pytest.raises(SeipError, match="'far' must carry a sensor, but with no yaw"):
+    with pytest.raises(SeipError, match="'far' must carry a sensor, but no yaw"):
         site_of(settings, looking(20), poles=(replace(far, mandatory=True),), region=region)
-    with pytest.raises(SeipError, match=r"no candidate is left \(1 looking past all targets\): ask for more yaws"):
+    with pytest.raises(SeipError, match=r"no candidate is left \(1 looking past all targets\): .*more yaws"):
         site_of(settings, looking(20), poles=(far,), region=region, candidate_areas=shapely.Polygon())
 
 

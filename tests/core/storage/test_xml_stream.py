@@ -57,7 +57,7 @@ def test_elements_nested_without_end_are_refused_at_once(tmp_path):
     path = tmp_path / "place.osm.gz"
     path.write_bytes(gzip.compress(b"<a>" * 1_000_000))
     tags: list[str] = []
-    with pytest.raises(SeipError, match=r"place\.osm\.gz has more than 1,000 elements within each other"):
+    with pytest.raises(SeipError, match=r"place\.osm\.gz has more than 1,000 nested elements"):
         finish(read_tags(path, lambda tag, _: tags.append(tag)))
     assert len(tags) == 1000
 

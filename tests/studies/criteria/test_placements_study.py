@@ -270,7 +270,7 @@ def test_a_damaged_file_of_frames_gets_a_sentence(tmp_path):
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 255
     path.write_bytes(content)
-    with pytest.raises(SeipError, match=r"is no file of detections, or is damaged.*delete it"):
+    with pytest.raises(SeipError, match=r"is damaged.*file of detections.*delete it"):
         load_frames(path)
 
 

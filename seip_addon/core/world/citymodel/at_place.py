@@ -1,4 +1,4 @@
-"""The buildings of a city model that stand at a place of a map."""
+"""Buildings of a city model at a place of a map."""
 
 import math
 from collections.abc import Generator
@@ -32,16 +32,16 @@ UNUSABLE = (f"building {_FAULTS} is", f"buildings {_FAULTS} are")
 
 @dataclass(frozen=True)
 class AskedBuildings:
-    """A city model that is asked for, and where it lies.
+    """A requested city model and its position.
 
     Parameters
     ----------
     path : Path
-        CityJSON.
+        CityJSON file.
     epsg : int or None
-        Code of its reference system; None: that which it names.
+        EPSG code of its reference system; None to use the one in the file.
     origin : (x, y, z) or None
-        Map coordinates of its own zero, metres, in place of a reference system: then its heights count as they are.
+        Map coordinates of its zero, metres, instead of a reference system; its heights are then used unchanged.
     """
 
     path: Path
@@ -52,26 +52,33 @@ class AskedBuildings:
 def with_city_model(
     description: SiteDescription, asked: AskedBuildings, reference: GeoReference, area: BaseGeometry
 ) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...]]]:
-    """Add the buildings of a city model to a description, in place of those of an extract that they cover.
+    """Add the buildings of a city model to a description, replacing buildings of an extract that they cover.
 
-    Each stands with its lowest point on the lowest ground under it: a road map's zero of heights is not the model's.
+    The lowest point of each building is put on the lowest ground under it, because heights of the model and of the map
+    have different zeros.
 
     Parameters
     ----------
+    description : SiteDescription
+        Description to add to.
+    asked : AskedBuildings
+        City model.
     reference : GeoReference
-        Of the map.
+        Position of the map on the Earth.
     area : shapely geometry
-        What reaches into it counts, map coordinates.
+        Area of interest, map coordinates; buildings that reach into it are added.
 
     Returns
     -------
     description : SiteDescription
+        Description with the buildings added.
     notes : tuple of str
+        Messages about buildings left out or replaced.
 
     Raises
     ------
     SeipError
-        The model cannot be read, cannot be laid on the map, or has no building there.
+        The model cannot be read, cannot be placed on the map, or has no building there.
     """
     yield Progress(0, 0, f"reading {asked.path.name}")
     model = read_city_model(asked.path)
@@ -103,7 +110,7 @@ def with_city_model(
     kept, dropped = without_covered_buildings(description, solids)
     notes = [f"{counted(number, *reason)} left out of {model.name}" for reason, number in left_out.items()]
     if dropped:
-        notes.append(f"{counted(dropped, 'building')} of the extract gave way to the city model's")
+        notes.append(f"{counted(dropped, 'building')} of the extract replaced by those of the city model")
     return replace(kept, solids=(*kept.solids, *solids)).with_attribution(model.attribution), tuple(notes)
 
 
@@ -123,13 +130,13 @@ def _to_map(model: CityModel, asked: AskedBuildings, reference: GeoReference) ->
 
 
 def _plan(vertices: Float, faces: Float) -> BaseGeometry:
-    """Return the area of a solid in plan; of walls alone that which they surround at most."""
+    """Return the area of a solid in plan; for a solid of walls only, their convex hull."""
     area = outline(vertices[faces])
     return area if not area.is_empty else shapely.convex_hull(shapely.multipoints(vertices[:, :2]))
 
 
 def _elsewhere(path: Path, model: CityModel, reference: GeoReference, area: BaseGeometry) -> SeipError:
-    """Return where a model lies and where the place is, as an error."""
+    """Return an error that names the positions of a model and of the place."""
     x, y = np.median(model.vertices[:, :2], axis=0)
     place = area.centroid
     distance = math.dist((x, y), (place.x, place.y))
@@ -139,6 +146,6 @@ def _elsewhere(path: Path, model: CityModel, reference: GeoReference, area: Base
         where, there = (f"latitude {latitude:.5f}, longitude {longitude:.5f}" for longitude, latitude, _ in degrees)
     how_far = f"{distance / 1000:,.1f} km" if math.isfinite(distance) else "far"
     return SeipError(
-        f"{path.name} has no building at the place: it lies about {where}, {how_far} from the place at {there}; take "
-        "the model of the place"
+        f"{path.name} has no building at the place: it lies about {where}, {how_far} from the place at {there}; use a "
+        "model that covers the place"
     )

@@ -1,6 +1,6 @@
-"""Buildings of a CityJSON file (1.1 and 2.0) as they are read: polygons with holes and what each of them is.
+"""Buildings of a CityJSON file (1.1 and 2.0): polygons with holes, and the kind of each surface.
 
-After https://www.cityjson.org/specs/2.0.1; nothing in a file is trusted.
+Follows https://www.cityjson.org/specs/2.0.1; all contents of a file are checked.
 """
 
 import json
@@ -23,16 +23,16 @@ VERSIONS = ("1.1", "2.0")
 HIGHEST_LOD = 2.2
 MAX_BYTES = 300_000_000
 MAX_VERTICES = 3_000_000
-MAX_DEPTH = 20  # of parts of parts
+MAX_DEPTH = 20  # levels of parts within parts
 NO_DETAIL = (
-    "building without surfaces of a level of detail that is read is",
-    "buildings without surfaces of a level of detail that is read are",
+    "building without surfaces of a supported level of detail is",
+    "buildings without surfaces of a supported level of detail are",
 )
 """Reason to leave out a building, for one and for several."""
 INSIDE = {"InteriorWallSurface", "CeilingSurface", "FloorSurface"}
-"""Surfaces within a building, which nobody sees from the street."""
+"""Surfaces within a building, which are not visible from the street."""
 _SHELL_DEPTH = {"MultiSurface": 0, "CompositeSurface": 0, "Solid": 1, "MultiSolid": 2, "CompositeSolid": 2}
-"""How many lists are around the surfaces of a geometry."""
+"""Number of nested lists around the surfaces of a geometry."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +42,9 @@ class Surface:
     Parameters
     ----------
     rings : tuple of (n,) int64
-        Vertices of its outline, counter-clockwise seen from outside, and of its holes.
+        Vertex indices of its outline, counter-clockwise seen from outside, and of its holes.
     kind : str
-        Such as ``RoofSurface``; empty where the file does not say.
+        Kind such as ``RoofSurface``, or "".
     """
 
     rings: tuple[Integer, ...]
@@ -53,7 +53,7 @@ class Surface:
 
 @dataclass(frozen=True, eq=False)
 class ModelledBuilding:
-    """A building with its parts, by its id in the file."""
+    """Id and surfaces of a building, parts included."""
 
     id: str
     surfaces: tuple[Surface, ...]
@@ -66,15 +66,15 @@ class CityModel:
     Parameters
     ----------
     name : str
-        Of its file.
+        Name of its file.
     epsg : int or None
-        Code of its reference system.
+        EPSG code of its reference system.
     vertices : (n, 3) float64
-        In its own system, metres.
+        Vertices in its reference system, metres.
     left_out : Counter
-        How many objects were left out, by reason: as of one object, and as of several.
+        Number of objects left out, by reason (singular and plural).
     attribution : str
-        Title of the model, its point of contact and its date, as far as the metadata state them.
+        Title, point of contact and date of the model, as far as given in the metadata.
     """
 
     name: str
@@ -91,20 +91,20 @@ def read_city_model(path: Path) -> CityModel:
     Raises
     ------
     SeipError
-        The file cannot be read, is no CityJSON of a known version, holds too much, or contradicts itself.
+        The file cannot be read, is not CityJSON of a known version, is too large, or is inconsistent.
     """
     content = _parsed(path)
     reader = _Reader(path.name, content)
     buildings = tuple(reader.buildings())
     if not buildings:
         raise SeipError(
-            f"{path.name} has no building with surfaces of level of detail 1 to {HIGHEST_LOD}: take a model that has"
+            f"{path.name} has no building with surfaces of level of detail 1 to {HIGHEST_LOD}: use a model with these"
         )
     return CityModel(path.name, _code(content), reader.vertices, buildings, reader.left_out, _attribution(content))
 
 
 def _attribution(content: dict[str, Any]) -> str:
-    """Return the metadata that a credit is made of; what is not text is passed over."""
+    """Return the credit from the metadata; values that are not text are skipped."""
     metadata = content.get("metadata")
     metadata = metadata if isinstance(metadata, dict) else {}
     contact = metadata.get("pointOfContact")
@@ -123,23 +123,23 @@ def _parsed(path: Path) -> dict[str, Any]:
         raise SeipError(f"no such file: {path}; check its path") from error
     except OSError as error:
         raise SeipError(f"cannot read {path}: {error.strerror or error}; check that it is a readable file") from error
-    except (ValueError, RecursionError) as error:  # of JSON, of text, of numbers that are none
+    except (ValueError, RecursionError) as error:  # invalid JSON, encoding or numbers
         sequence = "a sequence of features is collected into one model by cjseq collect"
         why = sequence if "Extra data" in str(error) else f"{str(error)[:120]}; download the model again"
-        raise SeipError(f"{name} is no JSON that can be read: {why}") from error
+        raise SeipError(f"{name} is not readable JSON: {why}") from error
     if not isinstance(content, dict) or content.get("type") != "CityJSON":
-        raise SeipError(f"{name} is no CityJSON: its type must be 'CityJSON'; convert it (citygml-tools to-cityjson)")
+        raise SeipError(f"{name} is not CityJSON: its type must be 'CityJSON'; convert it (citygml-tools to-cityjson)")
     version = str(content.get("version", ""))[:20]
     if not version.startswith(VERSIONS):
         raise SeipError(
-            f"{name} is CityJSON of version {version!r}, and {' and '.join(VERSIONS)} are read: convert it "
+            f"{name} is CityJSON of version {version!r}, and {' and '.join(VERSIONS)} are supported: convert it "
             f"(cjio {name} upgrade save new.city.json)"
         )
     return content
 
 
 def _refuse_constant(constant: str) -> NoReturn:
-    raise ValueError(f"{constant} is no number")
+    raise ValueError(f"{constant} is not a number")
 
 
 def _code(content: Mapping[str, Any]) -> int | None:
@@ -152,7 +152,7 @@ _CUT = "cut the place out of it (cjio model.city.json subset --bbox minx miny ma
 
 
 class _Reader:
-    """The objects of a file, walked from buildings to their parts."""
+    """Reader of the objects of a file, from buildings to their parts."""
 
     def __init__(self, name: str, content: Mapping[str, Any]) -> None:
         self._name = name
@@ -214,7 +214,7 @@ class _Reader:
         return listed
 
     def _with_parts(self, root: str, children: Mapping[str, list[str]], reached: set[str]) -> Iterator[tuple[str, int]]:
-        """Yield a building and its parts, each with its depth; what is built onto it counts as a part."""
+        """Yield the ids of a building and its parts with their depth; installations count as parts."""
         waiting = [(root, 0)]
         while waiting:
             number, depth = waiting.pop()
@@ -225,7 +225,7 @@ class _Reader:
             waiting += [(child, depth + 1) for child in reversed(children.get(number, []))]
 
     def _chosen(self, family: Sequence[tuple[str, int]]) -> Iterator[Mapping[str, Any]]:
-        """Yield the geometry of each object that counts: a whole gives way to parts in more detail."""
+        """Yield the geometry to use for each object; a whole is left out if its parts have more detail."""
         best = [(depth, self._best(number)) for number, depth in family]
         finest = max((lod for depth, (lod, _) in best if depth > 0), default=0.0)
         for depth, (lod, geometry) in best:
@@ -233,7 +233,7 @@ class _Reader:
                 yield geometry
 
     def _best(self, number: str) -> tuple[float, Mapping[str, Any] | None]:
-        """Return the level of detail and the geometry of an object that counts, 0 and None where none does."""
+        """Return the highest supported level of detail of an object and its geometry, or 0 and None."""
         listed = self._objects[number].get("geometry", [])
         if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
             self._refuse(f"geometry of {number[:60]!r} must be a list of tables")
@@ -276,13 +276,13 @@ class _Reader:
                 yield Surface(tuple(self._ring(ring) for ring in self._list(boundary)), kind)
 
     def _flat(self, boundaries: object, values: object, depth: int) -> Iterator[tuple[object, object]]:
-        """Yield surfaces and what they are; of a solid the outer shell alone."""
+        """Yield surfaces with their semantic values; of a solid only the outer shell."""
         listed = self._list(boundaries)
         given = values if isinstance(values, list) else []
         if depth == 1:
             listed, given = listed[:1], given[:1]
         if values is not None and len(given) != len(listed):
-            self._refuse("the values of semantics are not as many as the surfaces")
+            self._refuse("the number of values of semantics differs from the number of surfaces")
         for place, one in enumerate(listed):
             value = given[place] if given else None
             if depth > 0:

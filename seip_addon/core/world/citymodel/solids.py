@@ -10,12 +10,12 @@ from ...arrays import Float, Integer
 from ...geometry.solids import Solid
 from .cityjson import CityModel, ModelledBuilding, Surface
 
-MIN_AREA = 1e-4  # square metres below which a surface, or a triangle of it, shows nothing
-STEEP = 0.3  # upward share of a normal from which on a surface that is not named is a roof
+MIN_AREA = 1e-4  # square metres: smaller surfaces are ignored
+STEEP = 0.3  # vertical component of a normal above which a surface without a kind is a roof
 
 
 def building_solid(model: CityModel, building: ModelledBuilding, side: str) -> Solid | None:
-    """Return a building as a solid of triangles; None where no surface has an area.
+    """Return a building as a solid of triangles; None if no surface has an area.
 
     Parameters
     ----------
@@ -24,8 +24,8 @@ def building_solid(model: CityModel, building: ModelledBuilding, side: str) -> S
 
     Returns
     -------
-    Solid
-        In the coordinates of the model, corners shared.
+    Solid or None
+        Solid in the coordinates of the model, with shared corners.
     """
     triangles, materials = [], []
     for surface in building.surfaces:
@@ -41,11 +41,13 @@ def building_solid(model: CityModel, building: ModelledBuilding, side: str) -> S
 
 
 def _triangles(vertices: Float, surface: Surface) -> Iterator[tuple[Integer, Float]]:
-    """Yield triangles (n, 3) of indices and the normal (3,) of a surface, nothing where it has no area."""
+    """Yield vertex indices of triangles (n, 3) and the normal (3,) of a surface; none if it has no area."""
     rings = [_without_repeats(ring) for ring in surface.rings]
     if not rings or len(rings[0]) < 3:
         return
     rings = [ring for ring in rings if len(ring) >= 3]
+    # Newell's method: the sum of cross products of successive corners is twice the vector area, also for outlines that
+    # are not quite planar or not convex.
     corners = vertices[rings[0]] - vertices[rings[0][0]]
     area = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0) / 2
     size = float(np.linalg.norm(area))
@@ -55,6 +57,8 @@ def _triangles(vertices: Float, surface: Surface) -> Iterator[tuple[Integer, Flo
     if len(rings) == 1 and len(rings[0]) == 3:
         yield rings[0][None], normal
         return
+    # Two axes in the plane of the surface, from the coordinate axis least parallel to the normal; `plane` has the
+    # orientation of the surface, so that counter-clockwise triangles face outwards.
     across = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
     across /= np.linalg.norm(across)
     plane = np.column_stack([across, np.cross(normal, across)])
@@ -73,7 +77,8 @@ def _triangles(vertices: Float, surface: Surface) -> Iterator[tuple[Integer, Flo
     along, aside = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
     turn = along[:, 0] * aside[:, 1] - along[:, 1] * aside[:, 0]
     places[turn < 0] = places[turn < 0, ::-1]
-    # Where an outline crosses itself the corner nearest to the crossing stands for it.
+    # Where an outline crosses itself, the crossing is replaced by the nearest corner.
+    # Triangles come back as coordinates: find the vertex of each corner, so that heights are those of the file.
     nearest = shapely.STRtree(shapely.points(flat)).nearest(shapely.points(places.reshape(-1, 2)))
     found = indices[nearest].reshape(-1, 3)
     distinct = (found[:, 0] != found[:, 1]) & (found[:, 1] != found[:, 2]) & (found[:, 0] != found[:, 2])

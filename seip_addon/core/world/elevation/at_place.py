@@ -1,4 +1,4 @@
-"""The ground at a place of a map, from an elevation model or a laser survey."""
+"""Ground at a place of a map, from an elevation model or a laser survey."""
 
 import math
 from collections.abc import Generator
@@ -37,26 +37,26 @@ from .obstacles import (
 )
 from .point_cloud import is_survey, read_points, survey_system
 
-SMOOTHING = 4.0  # metres: standard deviation of the Gaussian that heights are smoothed by, about a lane's width
+SMOOTHING = 4.0  # metres: standard deviation of the Gaussian that smooths heights, about the width of a lane
 CELL, MAX_CELLS = 1.0, 1500  # metres of a cell, and cells along a side at most: larger places have larger ones
-POINTS_PER_CELL, MAX_CELL = 2.0, 5.0  # of a survey, and metres
-GROUND = 2  # class of a survey's points
-TRAFFIC_MARGIN = 1.0  # metres beside the carriageway within which what is not classified is traffic
-MODEL_MARGIN = 1.0  # metres beside a building of a city model within which a survey's points are that building
-MIN_COVERED = 0.5  # share of the place of which heights are known, below which a model is that of another place
-FLAT, MIN_FLAT = 0.25, 0.6  # a map is flat where such a share of its lanes is within this (metres) of one height
+POINTS_PER_CELL, MAX_CELL = 2.0, 5.0  # least mean number of survey points in a cell, and largest cell in metres
+GROUND = 2  # class of ground points in a survey
+TRAFFIC_MARGIN = 1.0  # metres around the carriageway within which unclassified points are traffic
+MODEL_MARGIN = 1.0  # metres around a building of a city model within which survey points belong to it
+MIN_COVERED = 0.5  # least share of the place with known heights; otherwise the file belongs to a different place
+FLAT, MIN_FLAT = 0.25, 0.6  # a map is flat if at least this share of its lanes is within this (metres) of one height
 
 
 @dataclass(frozen=True)
 class AskedTerrain:
-    """A file of ground that is asked for.
+    """A requested file of ground heights.
 
     Parameters
     ----------
     path : Path
-        GeoTIFF, LAS or LAZ.
+        GeoTIFF, LAS or LAZ file.
     epsg : int or None
-        Code of a survey's reference system; None: that which it names.
+        EPSG code of a survey's reference system; None to use the one in the file.
     """
 
     path: Path
@@ -65,17 +65,18 @@ class AskedTerrain:
 
 @dataclass(frozen=True, eq=False)
 class MapSurroundings:
-    """What of a map the ground at a place depends on, map coordinates.
+    """Data of a map that the ground at a place depends on, map coordinates.
 
     Parameters
     ----------
     reference : GeoReference
+        Position of the map on the Earth.
     area : shapely geometry
-        The place.
+        Area of the place.
     lanes : (n, 3) float64, metres
         Points of the map's lanes there.
     carriageway : shapely geometry
-        On which what a survey does not classify is traffic.
+        Area in which unclassified points of a survey are traffic.
     """
 
     reference: GeoReference
@@ -87,21 +88,32 @@ class MapSurroundings:
 def with_terrain(
     description: SiteDescription, asked: AskedTerrain, around: MapSurroundings
 ) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...], tuple[Merging, ...]]]:
-    """Lay the flat map of a place on the ground, and add what a survey has above it.
+    """Add ground heights to the description of a place with a flat map, and the objects of a survey.
 
-    A map with heights of its own keeps them, and gets from a survey what stands there alone.
+    A map with heights keeps them; from a survey only the objects are added.
+
+    Parameters
+    ----------
+    description : SiteDescription
+        Description of the place.
+    asked : AskedTerrain
+        File of heights.
+    around : MapSurroundings
+        Map at the place.
 
     Returns
     -------
     description : SiteDescription
+        Description with ground and objects added.
     notes : tuple of str
+        Messages about the sources of heights and objects.
     merging : tuple of Merging
-        What was tried to make few boxes of what a survey has above the ground.
+        Tolerances that were tried to merge the objects of a survey into few boxes.
 
     Raises
     ------
     SeipError
-        The file cannot be read, does not cover the place, or the map has heights of its own.
+        The file cannot be read or does not cover the place; or it is an elevation model, and the map has heights.
     """
     path = asked.path
     yield Progress(0, 0, f"reading {path.name}")
@@ -109,8 +121,7 @@ def with_terrain(
     if not is_flat and not is_survey(path):
         low, high = around.lanes[:, 2].min(), around.lanes[:, 2].max()
         raise SeipError(
-            f"the map has heights of its own there ({low:.1f} to {high:.1f} m), which its roads keep: leave out "
-            "--terrain"
+            f"the map has its own heights there ({low:.1f} to {high:.1f} m), which its roads keep: leave out --terrain"
         )
     if not is_survey(path):
         model = read_geotiff(path)
@@ -123,6 +134,7 @@ def with_terrain(
     standing = _standing(points, classes, around, description)
     raster = obstacle_raster(smooth, points[standing], classes[standing])
     boxes, tried = chosen_boxes(raster, np.random.default_rng(_SEED))
+    # A map with heights may use a different zero: objects move by the median difference between lanes and ground.
     raised = 0.0 if is_flat else float(np.median(around.lanes[:, 2] - smooth.at(around.lanes[:, :2])))
     added = tuple(_placed(name, solid, raised) for name, solid in solids(raster, boxes))
     description, dropped = without_covered_buildings(description, added)
@@ -131,11 +143,11 @@ def with_terrain(
         cells = int((raster.kind >= 0).sum())
         stand = counted(len(boxes), "box stands", "boxes stand")
         notes.append(
-            f"{stand} for {counted(cells, 'cell')} of {smooth.step:g} m that {path.name} has above "
-            f"{MIN_ABOVE:g} m: this changes {chosen_merging(tried).changed:.2%} of {RAYS:,} random lines of sight"
+            f"{stand} for {counted(cells, 'cell')} of {smooth.step:g} m with objects above {MIN_ABOVE:g} m in "
+            f"{path.name}: this changes {chosen_merging(tried).changed:.2%} of {RAYS:,} random lines of sight"
         )
     if dropped:
-        notes.append(f"{counted(dropped, 'building')} of the extract gave way to the survey's")
+        notes.append(f"{counted(dropped, 'building')} of the extract replaced by those of the survey")
     relief = Relief(smooth, level) if is_flat else None
     return replace(description, relief=relief, solids=(*description.solids, *added)), tuple(notes), tried
 
@@ -152,7 +164,7 @@ def _heights_note(path: Path, smooth: HeightRaster) -> str:
 
 
 def _survey_points(asked: AskedTerrain, around: MapSurroundings) -> Generator[Progress, None, tuple[Float, Integer]]:
-    """Return the points of a survey at a place (n, 3), map coordinates in plan, and their classes (n,)."""
+    """Return the points of a survey at a place (n, 3), in map coordinates in plan, and their classes (n,)."""
     path = asked.path
     named, middle = survey_system(path)
     code = asked.epsg or named
@@ -173,7 +185,7 @@ def _survey_points(asked: AskedTerrain, around: MapSurroundings) -> Generator[Pr
 
 
 def _surveyed_ground(points: Float, classes: Integer, area: BaseGeometry, name: str) -> HeightRaster:
-    """Return the mean height of the ground's points in each cell."""
+    """Return a raster with the mean height of ground points in each cell, NaN in cells without any."""
     raster = empty_raster(area, points)
     rows, columns = raster.heights.shape
     column, row = np.floor((points[:, :2] - raster.low) / raster.step + 0.5).astype(np.int64).T
@@ -181,7 +193,7 @@ def _surveyed_ground(points: Float, classes: Integer, area: BaseGeometry, name: 
     cell, is_ground = row * columns + column, inside & (classes == GROUND)
     covered = float(np.mean(np.bincount(cell[inside], minlength=rows * columns) > 0))
     if covered < MIN_COVERED:
-        raise SeipError(f"{name} has points on {covered:.0%} of the place: take the survey of the whole place")
+        raise SeipError(f"{name} has points on {covered:.0%} of the place: use a survey that covers all of it")
     count = np.bincount(cell[is_ground], minlength=rows * columns)
     total = np.bincount(cell[is_ground], points[is_ground, 2], minlength=rows * columns)
     heights = np.where(count > 0, total / np.maximum(count, 1), np.nan)
@@ -189,10 +201,11 @@ def _surveyed_ground(points: Float, classes: Integer, area: BaseGeometry, name: 
 
 
 def _standing(points: Float, classes: Integer, around: MapSurroundings, description: SiteDescription) -> Boolean:
-    """Return which points count as something that stands: no traffic, and no building that a city model has."""
+    """Return which points belong to objects, excluding traffic and buildings that a city model contains."""
     road = around.carriageway.buffer(TRAFFIC_MARGIN)
     shapely.prepare(road)
     traffic: Boolean = np.isin(classes, UNCLASSIFIED) & shapely.contains_xy(road, points[:, :2])
+    # Vegetation stays: a tree above the roof of a modelled building is not part of the building.
     modelled = shapely.union_all([one.outline for one in description.solids]).buffer(MODEL_MARGIN)
     shapely.prepare(modelled)
     known: Boolean = shapely.contains_xy(modelled, points[:, :2]) & ~np.isin(classes, VEGETATION)
@@ -224,19 +237,19 @@ def _of_model(model: GeoTiff, reference: GeoReference, area: BaseGeometry) -> He
 
 
 def _elsewhere(name: str, covered: float, middle: Float, reference: GeoReference, area: BaseGeometry) -> SeipError:
-    """Return where a file lies, whose middle is at a longitude and latitude (2,), and where the place is."""
+    """Return an error that names the position of a file, by its middle (longitude, latitude), and of the place."""
     place = reference.geographic(np.array([[area.centroid.x, area.centroid.y, 0.0]]))
     there = "" if place is None else f", and the place is at latitude {place[0, 1]:.5f}, longitude {place[0, 0]:.5f}"
     return SeipError(
         f"{name} has heights for {covered:.0%} of the place: its middle is at latitude {middle[1]:.5f}, longitude "
-        f"{middle[0]:.5f}{there}; take the file of the place"
+        f"{middle[0]:.5f}{there}; use a file that covers the place"
     )
 
 
 def empty_raster(area: BaseGeometry, points: Float | None = None) -> HeightRaster:
-    """Return a raster over an area and what smoothing needs around it, without heights.
+    """Return a raster without heights over an area and the margin that smoothing needs.
 
-    Where points (n, 3) are given its cells are large enough to hold some `POINTS_PER_CELL` each.
+    If points (n, 3) are given, cells are large enough to hold about `POINTS_PER_CELL` points each.
     """
     low_x, low_y, high_x, high_y = area.buffer(4 * SMOOTHING).bounds
     size = max(high_x - low_x, high_y - low_y)

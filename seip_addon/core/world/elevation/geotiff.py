@@ -17,16 +17,16 @@ from ...limits import GROUND, LATITUDE, LONGITUDE, MAP_COORDINATE, Limits
 from ...site.sources import one_line
 
 MAX_PIXELS = 150_000_000
-MAX_PIXELS_PER_BYTE = 1032  # of compressed files: beyond what DEFLATE reaches with pixels of any type
+MAX_PIXELS_PER_BYTE = 1032  # in compressed files: more than DEFLATE achieves with pixels of any type
 SMALL = 1_000_000
-"""Pixels that any file may have, whatever its size."""
+"""Number of pixels that is accepted for a file of any size."""
 _SCALE, _TIE_POINT, _TRANSFORMATION, _KEYS, _NO_DATA, _COPYRIGHT = 33550, 33922, 34264, 34735, 42113, 33432
 _RASTER_TYPE, _GEOGRAPHIC, _PROJECTED, _LINEAR_UNIT, _VERTICAL_UNIT = 1025, 2048, 3072, 3076, 4099
 PIXEL = Limits(1e-9, 1e5)
-"""Step from a pixel to the next, metres or degrees."""
+"""Distance between neighbouring pixels, metres or degrees."""
 _METRE, _NOT_SAID, _OWN = 9001, 0, 32767
 _BROKEN = (OSError, SyntaxError, ValueError, TypeError, KeyError, IndexError, struct.error, EOFError, OverflowError)
-"""What Pillow raises for files that are damaged."""
+"""Exceptions that Pillow raises for damaged files."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,15 +36,15 @@ class GeoTiff:
     Parameters
     ----------
     name : str
-        Of its file.
+        Name of its file.
     epsg : int
-        Code of its reference system.
+        EPSG code of its reference system.
     corner : (2,) float64
-        Place of the middle of the first pixel: metres, or degrees of longitude and latitude.
+        Centre of the first pixel: metres, or degrees of longitude and latitude.
     step : (2,) float64
-        From a pixel to the next to the east, and to the next to the south.
+        Distance to the next pixel in the east, and in the south.
     heights : (rows, columns) float64, metres
-        From north to south; NaN where there is none.
+        Heights from north to south; NaN for none.
     copyright : str
         Text of the file's Copyright tag, or "".
     """
@@ -69,7 +69,7 @@ class GeoTiff:
 
     @property
     def middle(self) -> Float:
-        """Its middle, (1, 2)."""
+        """Centre of the model, (1, 2)."""
         rows, columns = self.heights.shape
         middle: Float = self.corner + self.step * [1, -1] * np.array([columns - 1, rows - 1]) / 2
         return middle[None]
@@ -81,7 +81,7 @@ def read_geotiff(path: Path) -> GeoTiff:
     Raises
     ------
     SeipError
-        The file cannot be read, is too large, has no georeference that is known, or no heights.
+        The file cannot be read, is too large, or has no supported georeference or no heights.
     """
     name = path.name
     if not path.is_file():
@@ -94,18 +94,18 @@ def read_geotiff(path: Path) -> GeoTiff:
                 if picture.width * picture.height > MAX_PIXELS:
                     raise _too_large(name)
                 if picture.width * picture.height > max(MAX_PIXELS_PER_BYTE * path.stat().st_size, SMALL):
-                    raise SeipError(f"{name} holds far fewer bytes than its size in pixels needs: write it again")
+                    raise SeipError(f"{name} has far fewer bytes than its number of pixels needs: write it again")
                 tags = {number: picture.tag_v2.get(number) for number in _TAGS}  # type: ignore[attr-defined]
                 bands = len(picture.getbands())
                 values = np.asarray(picture, dtype=np.float64)
     except Image.DecompressionBombError as error:
         raise _too_large(name) from error
     except UnidentifiedImageError as error:
-        raise SeipError(f"{name} is no TIFF: give an elevation model as GeoTIFF (gdal_translate in dem.tif)") from error
+        raise SeipError(f"{name} is not a TIFF file: export it as GeoTIFF (gdal_translate in dem.tif)") from error
     except _BROKEN as error:
         raise SeipError(f"{name} is a TIFF that cannot be read ({str(error)[:80]}); {_CONVERT}") from error
     if bands != 1 or values.ndim != 2 or min(values.shape) < 2:
-        raise SeipError(f"{name} is a picture and no elevation model: one band of heights is needed")
+        raise SeipError(f"{name} is a picture, not an elevation model: give a file with one band of heights")
     try:
         epsg, corner, step = _placed(tags, values.shape)
         no_data = tags[_NO_DATA]
@@ -117,24 +117,22 @@ def read_geotiff(path: Path) -> GeoTiff:
     with np.errstate(invalid="ignore"):
         values[empty | ~((values >= GROUND.least) & (values <= GROUND.most))] = np.nan
     if not np.isfinite(values).any():
-        raise SeipError(
-            f"{name} holds no height between {GROUND.least:g} and {GROUND.most:g} m: give heights in metres"
-        )
+        raise SeipError(f"{name} has no height between {GROUND.least:g} and {GROUND.most:g} m: give heights in metres")
     return GeoTiff(name, epsg, corner, step, values, one_line(str(tags[_COPYRIGHT] or "")))
 
 
 _TAGS = (_SCALE, _TIE_POINT, _TRANSFORMATION, _KEYS, _NO_DATA, _COPYRIGHT)
 _CONVERT = (
-    "write it anew (gdal_translate -co COMPRESS=DEFLATE -co PREDICTOR=1 in.tif out.tif, or gdalwarp -t_srs EPSG:…)"
+    "write it again (gdal_translate -co COMPRESS=DEFLATE -co PREDICTOR=1 in.tif out.tif, or gdalwarp -t_srs EPSG:…)"
 )
 
 
 _PROJECTED_CODES = Limits(1024, 32766)
-"""Codes of EPSG that a key of GeoTIFF may hold."""
+"""EPSG codes that a GeoTIFF key may contain."""
 
 
 class _UnplacedError(ValueError):
-    """Why a file lies nowhere."""
+    """Reason why a file has no usable georeference."""
 
 
 def _too_large(name: str) -> SeipError:
@@ -145,12 +143,12 @@ def _too_large(name: str) -> SeipError:
 
 
 def _placed(tags: dict[int, Any], shape: tuple[int, ...]) -> tuple[int, Float, Float]:
-    """Return reference system, place of the first pixel and step between pixels."""
+    """Return the EPSG code, the centre of the first pixel and the distances between pixels."""
     rows, columns = shape
     if tags[_TRANSFORMATION] is not None:
         matrix = np.array(tags[_TRANSFORMATION], dtype=np.float64).reshape(4, 4)
         if matrix[0, 1] or matrix[1, 0]:
-            raise _UnplacedError("is turned against its reference system")
+            raise _UnplacedError("is rotated against its reference system")
         step, corner = np.array([matrix[0, 0], -matrix[1, 1]]), matrix[:2, 3]
     elif tags[_SCALE] is not None and tags[_TIE_POINT] is not None:
         step = np.array(tags[_SCALE][:2], dtype=np.float64)
@@ -167,12 +165,13 @@ def _placed(tags: dict[int, Any], shape: tuple[int, ...]) -> tuple[int, Float, F
         raise _UnplacedError("names no reference system by an EPSG code")
     for unit in (_LINEAR_UNIT, _VERTICAL_UNIT):
         if keys.get(unit, _NOT_SAID) not in (_NOT_SAID, _METRE):
-            raise _UnplacedError("does not count in metres")
+            raise _UnplacedError("is not in metres")
     if not _PROJECTED_CODES.allow(code):
         raise _UnplacedError("names no reference system by an EPSG code")
     if (_PROJECTED not in keys or code in GEOGRAPHIC) and not (
         LONGITUDE.allow(corner[0]) and LATITUDE.allow(corner[1])
     ):
         raise _UnplacedError("has a georeference that lies nowhere on Earth")
+    # PixelIsArea (the default) places the corner of a pixel, PixelIsPoint its centre.
     is_point = keys.get(_RASTER_TYPE) == 2
     return int(code), corner if is_point else corner + step * [0.5, -0.5], step

@@ -1,7 +1,7 @@
-"""What stands above the ground in a survey, as few boxes as keep lines of sight.
+"""Objects above the ground in a survey, as the fewest boxes that preserve lines of sight.
 
-Cells of a raster hold the highest point of what stands there and where it begins. Neighbours of one kind and nearly one
-height are merged into boxes; random rays tell how often a box hides what its cells do not, or the other way round.
+Cells of a raster contain the highest and the lowest point of an object. Neighbouring cells of one kind and nearly the
+same height are merged into boxes; random rays measure how often boxes and cells block different lines of sight.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,33 +14,33 @@ from ...arrays import Boolean, Float, Integer
 from ...geometry.height_raster import HeightRaster
 from ...geometry.solids import Solid, join
 
-MIN_ABOVE = 2.0  # metres above the ground below which nothing counts: road users stand there
+MIN_ABOVE = 2.0  # metres above the ground: lower points are ignored, because road users are there
 UNCLASSIFIED, VEGETATION, BUILDING = (0, 1), (3, 4, 5), (6,)
-CROWN_BASE = 2.5  # metres above the ground from which on a crown stands free; lower ones reach the ground
+CROWN_BASE = 2.5  # metres above the ground from which on the space below a crown is free; lower ones reach the ground
 TOLERANCES = (2.0, 1.0, 0.5, 0.25, 0.0)
-"""Metres that the cells of a box may lie above or below its top, coarsest first."""
-MAX_CHANGED = 0.005  # share of rays whose state may differ
+"""Largest distance of the tops of cells from the top of their box (metres), coarsest first."""
+MAX_CHANGED = 0.005  # largest share of rays that may be blocked differently
 RAYS, RAY_LENGTH, RAY_STEP = 4000, 60.0, 0.25  # metres
 EYES, TARGETS = (3.0, 8.0), (0.3, 1.7)  # metres above the ground between which rays begin and end
 FOUNDATION = 0.5  # metres that boxes reach into the ground
-TILE = 50.0  # metres: boxes of a kind within one are one object
+TILE = 50.0  # metres: boxes of one kind within a tile form one object
 KINDS = ("Surveyed obstacle", "Surveyed vegetation", "Surveyed building")
 MATERIALS = (("wall", "wall"), ("leaves", "leaves"), ("facade grey", "roof"))
-"""Walls and tops of each kind."""
+"""Materials of walls and tops for each kind."""
 
 
 @dataclass(frozen=True, eq=False)
 class ObstacleRaster:
-    """What stands on a raster of ground.
+    """Obstacles on a raster of ground heights.
 
     Parameters
     ----------
     ground : HeightRaster
-        Its places are the middles of the cells.
+        Ground heights at the centres of the cells.
     kind : (rows, columns) int64
-        Index of `KINDS`; -1 where nothing stands.
+        Index of `KINDS`; -1 for empty cells.
     low, top : (rows, columns) float64, metres
-        Between which something stands, heights as of the ground.
+        Lowest and highest point of the obstacle, with the same zero as the ground.
     """
 
     ground: HeightRaster
@@ -51,7 +51,7 @@ class ObstacleRaster:
 
 @dataclass(frozen=True)
 class Box:
-    """Rows and columns of a raster, from the first up to one after the last, and heights in metres."""
+    """Ranges of rows and columns of a raster (end excluded), and heights in metres."""
 
     kind: int
     rows: tuple[int, int]
@@ -62,7 +62,7 @@ class Box:
 
 @dataclass(frozen=True)
 class Merging:
-    """How many boxes a tolerance (metres) leaves, and for which share of random rays they change the line of sight."""
+    """Number of boxes for a tolerance (metres), and share of random rays that these boxes block differently."""
 
     tolerance: float
     boxes: int
@@ -70,15 +70,18 @@ class Merging:
 
 
 def obstacle_raster(ground: HeightRaster, points: Float, classes: Integer) -> ObstacleRaster:
-    """Return what stands on the ground by a survey.
+    """Return the obstacles on the ground from the points of a survey.
 
-    Cells with fewer than two neighbours are left out: posts and wires are narrower than a cell.
+    Cells with fewer than two occupied neighbours are left out: posts and wires are narrower than a cell.
 
     Parameters
     ----------
+    ground : HeightRaster
+        Heights of the ground.
     points : (n, 3) float64, metres
+        Points of the survey.
     classes : (n,) int64
-        As of a `PointCloud`; other classes than `UNCLASSIFIED`, `VEGETATION` and `BUILDING` do not count.
+        Classes as in `PointCloud`; only `UNCLASSIFIED`, `VEGETATION` and `BUILDING` are used.
     """
     shape = ground.heights.shape
     column, row = np.floor((points[:, :2] - ground.low) / ground.step + 0.5).astype(np.int64).T
@@ -91,32 +94,33 @@ def obstacle_raster(ground: HeightRaster, points: Float, classes: Integer) -> Ob
     top, low, of_kind = np.full(shape[0] * shape[1], -np.inf), np.full(shape[0] * shape[1], np.inf), np.full(shape, -1)
     np.maximum.at(top, cell, height)
     np.minimum.at(low, cell, height)
-    for number in (1, 0, 2):  # what is more than leaves hides down to the ground
+    for number in (1, 0, 2):  # vegetation first, as anything more solid blocks the view down to the ground
         of_kind.ravel()[cell[kind == number]] = number
     top, low = top.reshape(shape), low.reshape(shape)
     of_kind[_neighbours(of_kind >= 0) < 2] = -1
-    hangs = (of_kind == 1) & (low - ground.heights > CROWN_BASE)
-    return ObstacleRaster(ground, of_kind, np.where(hangs, low, ground.heights - FOUNDATION), top)
+    raised = (of_kind == 1) & (low - ground.heights > CROWN_BASE)
+    return ObstacleRaster(ground, of_kind, np.where(raised, low, ground.heights - FOUNDATION), top)
 
 
 def merged(raster: ObstacleRaster, tolerance: float) -> tuple[Box, ...]:
-    """Return boxes that together cover all cells where something stands, and no other.
+    """Return boxes that together cover exactly the occupied cells.
 
-    Each is as long as cells of its kind follow each other whose tops, and whose undersides where they hang, lie within
-    twice the tolerance, and then as wide.
+    A box extends along its row as far as cells of its kind follow each other with tops (and undersides, for raised
+    crowns) within twice the tolerance, and then over as many rows as this holds for.
     """
     free = raster.kind >= 0
     boxes = []
-    hangs = raster.low > raster.ground.heights
+    raised = raster.low > raster.ground.heights
+    # Greedy cover: the first free cell in reading order is the corner of the next box.
     for row, column in np.argwhere(free).tolist():
         if not free[row, column]:
             continue
 
         def fits(rows: slice, columns: slice, at: tuple[int, int] = (row, column)) -> bool:
-            alike = (raster.kind[rows, columns] == raster.kind[at]) & (hangs[rows, columns] == hangs[at])
-            if not (free[rows, columns] & alike).all():
+            same = (raster.kind[rows, columns] == raster.kind[at]) & (raised[rows, columns] == raised[at])
+            if not (free[rows, columns] & same).all():
                 return False
-            spreads = [np.ptp(raster.top[rows, columns])] + [np.ptp(raster.low[rows, columns])] * bool(hangs[at])
+            spreads = [np.ptp(raster.top[rows, columns])] + [np.ptp(raster.low[rows, columns])] * bool(raised[at])
             return bool(max(spreads) <= 2 * tolerance)
 
         right, down = column + 1, row + 1
@@ -127,14 +131,14 @@ def merged(raster: ObstacleRaster, tolerance: float) -> tuple[Box, ...]:
         rows, columns = slice(row, down), slice(column, right)
         free[rows, columns] = False
         top, low = raster.top[rows, columns], raster.low[rows, columns]
-        foot = (low.min() + low.max()) / 2 if hangs[row, column] else low.min()
+        foot = (low.min() + low.max()) / 2 if raised[row, column] else low.min()
         middle = (float(top.min()) + float(top.max())) / 2
         boxes.append(Box(int(raster.kind[row, column]), (row, down), (column, right), float(foot), middle))
     return tuple(boxes)
 
 
 def of_boxes(raster: ObstacleRaster, boxes: Sequence[Box]) -> ObstacleRaster:
-    """Return the raster that boxes stand for."""
+    """Return the raster with the heights of boxes instead of cells."""
     kind, low, top = np.full(raster.kind.shape, -1), raster.low.copy(), raster.top.copy()
     for box in boxes:
         cells = slice(*box.rows), slice(*box.columns)
@@ -143,7 +147,7 @@ def of_boxes(raster: ObstacleRaster, boxes: Sequence[Box]) -> ObstacleRaster:
 
 
 def chosen_boxes(raster: ObstacleRaster, rng: np.random.Generator) -> tuple[tuple[Box, ...], tuple[Merging, ...]]:
-    """Return the fewest boxes that change at most `MAX_CHANGED` of random lines of sight, and what tolerances do."""
+    """Return the fewest boxes that change at most `MAX_CHANGED` of random lines of sight, and all tolerances tried."""
     begin, end = random_rays(raster, rng)
     true = blocked(raster, begin, end)
     choices = [merged(raster, tolerance) for tolerance in TOLERANCES]
@@ -158,16 +162,17 @@ def chosen_boxes(raster: ObstacleRaster, rng: np.random.Generator) -> tuple[tupl
 
 
 def chosen_merging(tried: Sequence[Merging]) -> Merging:
-    """Return the coarsest merging that changes few enough lines of sight; without tolerance none is changed."""
+    """Return the coarsest merging that changes few enough lines of sight; a tolerance of zero changes none."""
     return next(one for one in tried if one.changed <= MAX_CHANGED)
 
 
 def random_rays(raster: ObstacleRaster, rng: np.random.Generator) -> tuple[Float, Float]:
-    """Return where rays begin and end (n, 3): at a sensor's height where nothing stands, and at a road user's."""
+    """Return starts and ends (n, 3) of rays: from sensor height above free cells to the height of road users."""
     empty = np.flatnonzero(raster.kind.ravel() < 0)
     if not len(empty):
         return np.empty((0, 3)), np.empty((0, 3))
     places = raster.ground.places[rng.choice(empty, RAYS)]
+    # The square root makes ends uniform over the disc.
     angle, length = rng.uniform(0, 2 * np.pi, RAYS), RAY_LENGTH * np.sqrt(rng.random(RAYS))
     ends = places + length[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     ends = np.clip(ends, raster.ground.low, raster.ground.places[-1])
@@ -176,7 +181,7 @@ def random_rays(raster: ObstacleRaster, rng: np.random.Generator) -> tuple[Float
 
 
 def blocked(raster: ObstacleRaster, begin: Float, end: Float) -> Boolean:
-    """Return whether something stands between two places (n, 3) each, looked up at least each `RAY_STEP` metres."""
+    """Return whether an obstacle lies between starts and ends (n, 3), sampled at least every `RAY_STEP` metres."""
     steps = int(np.ceil(RAY_LENGTH / RAY_STEP))
     hit: Boolean = np.zeros(len(begin), dtype=np.bool_)
     for share in np.linspace(0.0, 1.0, steps + 1):
@@ -188,7 +193,7 @@ def blocked(raster: ObstacleRaster, begin: Float, end: Float) -> Boolean:
 
 
 def solids(raster: ObstacleRaster, boxes: Sequence[Box]) -> Iterator[tuple[str, Solid]]:
-    """Yield the name and the solid of all boxes of a kind in a tile, in the coordinates of the raster."""
+    """Yield the name and the solid of the boxes of each kind and tile, in the coordinates of the raster."""
     tiles: dict[tuple[int, int, int], list[Solid]] = {}
     for box in boxes:
         ((x, y), (far_x, far_y)) = (
@@ -209,7 +214,7 @@ _BOX = ((0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7), (4, 5, 6, 7), (3
 
 
 def _neighbours(there: Boolean) -> NDArray[np.int64]:
-    """Return how many of the eight cells around each are there."""
+    """Return the number of occupied cells among the eight around each cell."""
     padded = np.pad(there.astype(np.int64), 1)
     rows, columns = there.shape
     around = [padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3) if (i, j) != (1, 1)]

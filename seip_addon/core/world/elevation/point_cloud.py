@@ -1,4 +1,4 @@
-"""Laser surveys (LAS, LAZ), read with laspy where that is installed."""
+"""Laser surveys (LAS, LAZ), read with laspy if it is installed."""
 
 import importlib
 import struct
@@ -18,13 +18,13 @@ from ...progress import Progress
 
 SURVEY_SUFFIXES = (".las", ".laz")
 POINTS_PER_STEP = 2_000_000
-MAX_POINTS = 40_000_000  # at a place
+MAX_POINTS = 40_000_000  # points at a place
 _PROJECTED_KEY = 3072
-_HEADER_BYTES, _HEADER_BYTES_1_4 = 227, 375  # of LAS 1.0 to 1.2, and of 1.4
+_HEADER_BYTES, _HEADER_BYTES_1_4 = 227, 375  # headers of LAS 1.0 to 1.2, and of 1.4
 _RECORD_BYTES, _EXTENDED_RECORD_BYTES = 54, 60  # before the content of a variable-length record
 _LASZIP_USER, _VARIABLE_CHUNKS = b"laszip encoded", 2**32 - 1
 _PACKED = 0x80  # bit of the point format that LAZ sets
-_MAX_PACKED_POINTS = 1_000  # for each byte of LAZ: flat ground measured evenly takes far more
+_MAX_PACKED_POINTS = 1_000  # per byte of LAZ: even flat ground measured evenly needs far more bytes
 _SCALE = Limits(1e-9, 1e3, "m")
 _OFFSET = MAP_COORDINATE
 
@@ -36,9 +36,9 @@ class PointCloud:
     Parameters
     ----------
     points : (n, 3) float64, metres
-        In the survey's own system.
+        Points in the survey's reference system.
     classes : (n,) int64
-        As the ASPRS numbers them: 2 ground, 3 to 5 vegetation, 6 building.
+        Classes of the ASPRS: 2 ground, 3 to 5 vegetation, 6 building.
     """
 
     points: Float
@@ -46,12 +46,12 @@ class PointCloud:
 
 
 def is_survey(path: Path) -> bool:
-    """Return whether a file is a survey by its name."""
+    """Return whether a file name is that of a survey."""
     return path.suffix.lower() in SURVEY_SUFFIXES
 
 
 def survey_system(path: Path) -> tuple[int | None, Float]:
-    """Return the EPSG code of a survey, None where it names none, and the middle of its points (1, 2).
+    """Return the EPSG code of a survey, None if it names none, and the centre of its points (1, 2).
 
     Raises
     ------
@@ -63,12 +63,12 @@ def survey_system(path: Path) -> tuple[int | None, Float]:
 
 
 def read_points(path: Path, low: Float, high: Float) -> Generator[Progress, None, PointCloud]:
-    """Read the points of a survey between two corners in plan (2,), metres of its own system.
+    """Read the points of a survey between two corners in plan (2,), in its reference system.
 
     Raises
     ------
     SeipError
-        The file is damaged, or holds more than `MAX_POINTS` there.
+        The file is damaged, or has more than `MAX_POINTS` there.
     """
     points, classes, count, done = [], [], 0, 0
     with _opened(path) as reader:
@@ -109,14 +109,14 @@ def _opened(path: Path) -> Any:  # noqa: ANN401  # laspy has no types
 
 
 def _check_header(path: Path) -> None:
-    """Compare what the header of a survey announces with the size of the file: laspy takes it at its word.
+    """Check the header of a survey against the size of the file, because laspy trusts it.
 
     Fields and sizes are those of the ASPRS LAS specification 1.4 R15, sections 2.4 to 2.7.
 
     Raises
     ------
     ValueError
-        The file cannot hold what its header announces, or a scale, offset or bound is not a sensible number.
+        The file is too short for its header, or a scale, offset or bound is not a plausible number.
     """
     size = path.stat().st_size
     with path.open("rb") as file:
@@ -151,12 +151,12 @@ def _check_header(path: Path) -> None:
 
 
 def _check_records(file: BinaryIO, count: int, begin: int, end: int, header_bytes: int) -> list[bytes]:
-    """Check that variable-length records lie one after the other between two bytes of a file; return those of LASzip.
+    """Check that variable-length records follow each other between two bytes of a file; return those of LASzip.
 
     Raises
     ------
     ValueError
-        They do not.
+        A record reaches beyond the end.
     """
     at, extended = begin, header_bytes == _EXTENDED_RECORD_BYTES
     found: list[bytes] = []
@@ -179,7 +179,7 @@ def _check_records(file: BinaryIO, count: int, begin: int, end: int, header_byte
 def _check_packing(
     file: BinaryIO, records: Sequence[bytes], data: int, size: int, points: int, point_bytes: int
 ) -> None:
-    """Check how LAZ says that its points are packed: LASzip 1.4, header and chunk table.
+    """Check the description of packed points in LAZ: LASzip 1.4, header and chunk table.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ def _check_packing(
 
 def _damaged(path: Path, error: Exception) -> SeipError:
     first = (str(error).strip().splitlines() or ["no reason given"])[0]
-    return SeipError(f"{path.name} is no LAS or LAZ file that can be read ({first[:100]}); download it again")
+    return SeipError(f"{path.name} is not a readable LAS or LAZ file ({first[:100]}); download it again")
 
 
 def _laspy(path: Path) -> ModuleType:
@@ -231,12 +231,12 @@ def _laspy(path: Path) -> ModuleType:
         return importlib.import_module("laspy")
     except ModuleNotFoundError as error:
         raise SeipError(
-            f"reading {path.name} needs {error.name}, which is not here; pip install laspy lazrs"
+            f"reading {path.name} needs {error.name}, which is not installed; pip install laspy lazrs"
         ) from error
 
 
 def _code(header: Any) -> int | None:  # noqa: ANN401  # laspy has no types
-    """Return the code of the system in plan: of a compound one there is another for heights."""
+    """Return the code of the horizontal system; a compound system has a separate code for heights."""
     for record in header.vlrs:
         text = getattr(record, "string", None)
         if isinstance(text, str) and (code := epsg_code(text)) is not None:

@@ -1,4 +1,4 @@
-"""The map of an extract's streets with heights of its own: on the ground, on bridges, and in underpasses."""
+"""Maps of the streets of an extract with heights: on the ground, on bridges, and in underpasses."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -11,12 +11,12 @@ from ..opendrive.profile import profile
 from ..opendrive.road_map import RoadMap
 
 Profiles = Mapping[str, tuple[Float, Float]]
-"""For each road, by its id, places (n,) along it, and the heights (n,) there, metres."""
+"""Stations (n,) along each road and heights (n,) there, metres, by road id."""
 _PROFILE = re.compile(r"<elevationProfile\s*/>|<elevationProfile>.*?</elevationProfile>", re.DOTALL)
 
 
 def raised_map(road_map: RoadMap, profiles: Profiles) -> RoadMap:
-    """Return a map whose roads have other heights, straight between the places that are given."""
+    """Return a map with new heights of roads, linear between the given stations."""
     records = {
         number: [(s, (height, slope, 0.0, 0.0)) for s, height, slope in _records(*own)]
         for number, own in profiles.items()
@@ -26,16 +26,16 @@ def raised_map(road_map: RoadMap, profiles: Profiles) -> RoadMap:
 
 
 def raised_text(text: str, road_map: RoadMap, profiles: Profiles) -> str:
-    """Return the text of a map whose roads have other heights.
+    """Return the text of a map with new heights of roads.
 
     Parameters
     ----------
     text : str
-        As netconvert writes it: each road with one profile of heights.
+        Map as written by netconvert, with one elevation profile for each road.
     road_map : RoadMap
-        The same map as it is read.
+        The same map.
     profiles : Profiles
-        Of all its roads.
+        Heights of all its roads.
     """
     elements = (
         "".join(
@@ -48,7 +48,7 @@ def raised_text(text: str, road_map: RoadMap, profiles: Profiles) -> str:
 
 
 def _records(along: Float, heights: Float) -> Iterator[tuple[float, float, float]]:
-    """Yield place, height and slope of each straight piece."""
+    """Yield station, height and slope of each linear piece."""
     lengths = np.diff(along)
     slopes = np.divide(np.diff(heights), lengths, out=np.zeros(len(lengths)), where=lengths > 0)
     yield from zip(along[:-1].tolist(), heights[:-1].tolist(), slopes.tolist(), strict=True)

@@ -24,12 +24,12 @@ _MAX_BYTES = 1 << 30  # of a map at most: 1 GiB
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """An XML element, and how to name it to a person.
+    """An XML element, with its location for messages.
 
     Parameters
     ----------
     place : str
-        Where it stands, such as ``town.xodr, road 17``.
+        Location of the element, such as ``town.xodr, road 17``.
     """
 
     element: Element
@@ -49,27 +49,31 @@ class Node:
                 yield from child.children(*rest) if rest else (child,)
 
     def child(self, *path: str) -> Node | None:
-        """Return the first element reached by going down ``path``, None where there is none."""
+        """Return the first element reached by going down ``path``, None if there is none."""
         return next(self.children(*path), None)
 
     def within(self, place: str) -> Node:
-        """Return the same element, standing in a place that has a name of its own."""
+        """Return the same element with a more specific location."""
         return Node(self.element, f"{self.place}, {place}")
 
     def text(self, name: str, default: str | None = None) -> str:
-        """Return an attribute; without a default it must be there."""
+        """Return an attribute; it is required if there is no default."""
         value = self.element.get(name, default)
         if value is None:
             raise SeipError(f"{self.place}: <{self.tag}> has no {name!r}; OpenDRIVE asks for it, export the map again")
         return value.strip()
 
     def number(self, name: str, default: float | None = None, *, most: float = MAP_NUMBER.most) -> float:
-        """Return an attribute as a number of earthly size; without a default it must be there.
+        """Return an attribute as a number of plausible size; it is required if there is no default.
 
         Parameters
         ----------
+        name : str
+            Name of the attribute.
+        default : float, optional
+            Value of a missing attribute.
         most : float
-            What its amount may be at most, where that is known better.
+            Largest absolute value, if this is known more closely.
         """
         if default is not None and name not in self.element.attrib:
             return default
@@ -79,7 +83,7 @@ class Node:
         except ValueError:
             value = math.nan
         if not MAP_NUMBER.allow(value):
-            raise SeipError(f"{self.place}: {name}={text!r} of <{self.tag}> is no sensible number; correct the map")
+            raise SeipError(f"{self.place}: {name}={text!r} of <{self.tag}> is not a plausible number; correct the map")
         if abs(value) > most:
             raise SeipError(
                 f"{self.place}: {name}={value:g} of <{self.tag}> is beyond {most:g} m; correct it in the map"
@@ -101,7 +105,7 @@ class Node:
         return int(value)
 
     def flag(self, name: str, *, default: bool = False) -> bool:
-        """Return an attribute as a truth value, in any of the spellings that exporters use."""
+        """Return an attribute as a bool, in any of the spellings that exporters use."""
         return self.text(name, str(default)).lower() in ("true", "yes", "1")
 
 
@@ -110,9 +114,9 @@ _OTHER_FILE_STARTS = {
     b"PK\x03\x04": "is a zip archive; unpack it",
     b"BZh": "is compressed with bzip2; unpack it (bunzip2)",
     b"\xfd7zXZ": "is compressed with xz; unpack it (unxz)",
-    b"BLENDER": "is a .blend, no map; open it in Blender",
+    b"BLENDER": "is a .blend file, not a map; open it in Blender",
 }
-"""How files begin that are given in place of a map."""
+"""First bytes of other formats that are given in place of a map, and what to do with such a file."""
 
 
 def _refuse_other_formats(path: str | os.PathLike[str], name: str) -> None:
@@ -133,7 +137,7 @@ def read_document(path: str | os.PathLike[str]) -> Node:
     ------
     SeipError
         The file cannot be read, is not well-formed, or declares a document type: OpenDRIVE needs none, and through one
-        a file can reach for other files or blow up in memory.
+        a file can read other files or exhaust memory.
     """
     name = os.path.basename(os.fspath(path))  # noqa: PTH119 - works for any path-like, existing or not
     try:

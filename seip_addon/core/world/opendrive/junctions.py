@@ -1,4 +1,4 @@
-"""Junctions: their area, by their id or name, and by where they are."""
+"""Junctions of a map: area, and search by id, name, streets or position."""
 
 import difflib
 from collections.abc import Iterable
@@ -13,7 +13,7 @@ from .lanes import LaneSurface
 from .road_map import Junction, RoadMap
 
 STREETS = " / "
-"""Between the names of streets that meet at a junction."""
+"""Separator between the names of streets that meet at a junction."""
 _MAX_GAP = 0.005  # metres
 _MAX_END_DISTANCE = 0.5  # metres from a junction to the end of a lane that leads to it
 
@@ -26,14 +26,18 @@ def junction_area(surfaces: Iterable[LaneSurface], junction_id: str) -> BaseGeom
 
 
 def find_junction(road_map: RoadMap, surfaces: Iterable[LaneSurface], id_or_name: str) -> Junction:
-    """Return the junction with an id or, failing that, the only one with a name, or where streets meet.
+    """Return the junction with an id or, if there is none, the only one with a name or where given streets meet.
 
-    Streets are given as ``High Street / Mill Lane``; of several junctions of both the first counts.
+    Streets are given as ``High Street / Mill Lane``; if they meet at several junctions, the first one is returned.
 
     Parameters
     ----------
+    road_map : RoadMap
+        Map to search.
     surfaces : iterable of LaneSurface
-        The lanes of the map; a junction without any is no place to work on.
+        Lanes of the map; a junction without lanes cannot be studied.
+    id_or_name : str
+        Id, name or streets of the junction.
 
     Raises
     ------
@@ -98,9 +102,9 @@ def nearest_junctions(
     return tuple(sorted(found, key=lambda pair: pair[1])[:k])
 
 
-def _close(road_map: RoadMap, asked: str) -> str:
+def _close(road_map: RoadMap, name: str) -> str:
     known = [text for junction in road_map.junctions for text in (junction.id, junction.name) if text]
     if not known:
         return "the map has no junctions, choose a place by its coordinates"
-    close = difflib.get_close_matches(asked, known, n=5, cutoff=0.4) or known[:5]
+    close = difflib.get_close_matches(name, known, n=5, cutoff=0.4) or known[:5]
     return f"the closest: {', '.join(dict.fromkeys(close))}"

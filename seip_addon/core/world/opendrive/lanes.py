@@ -1,4 +1,4 @@
-"""The surfaces of lanes as strips between a left and a right edge."""
+"""Surfaces of lanes as strips between a left and a right edge."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from .road_map import Lane, LaneSection, Road, RoadFrame
 from .sampling import sample
 
 _MIN_TRIANGLE_AREA = 1e-9  # square metres
-_MAX_HEIGHT, _MAX_WIDTH = ELEVATION.most, 1_000.0  # metres; beyond them a number of the map has slipped
+_MAX_HEIGHT, _MAX_WIDTH = ELEVATION.most, 1_000.0  # metres; values beyond are errors of the map
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +30,9 @@ class LaneSurface:
     lane_id : int
         Positive to the left of the centre lane, negative to the right.
     lane_type : str
-        As in the file: ``driving``, ``shoulder``, ``sidewalk``, ``parking``, ...
+        Type as in the file: ``driving``, ``shoulder``, ``sidewalk``, ``parking``, ...
     s : (n,) float64, metres
-        Where along the road the points of the edges are.
+        Stations of the edge points along the road.
     left, right : (n, 3) float64, metres
         Edges in map coordinates, as seen along the reference line.
     """
@@ -49,19 +49,19 @@ class LaneSurface:
 
     @cached_property
     def triangles(self) -> Float:
-        """The surface as (m, 3, 3) float64 triangles in map coordinates, normals up, none without area."""
+        """Surface as (m, 3, 3) float64 triangles in map coordinates, with normals up, without empty triangles."""
         left, right = self.left, self.right
         near_right = np.stack([right[:-1], right[1:], left[1:]], axis=1)
         near_left = np.stack([right[:-1], left[1:], left[:-1]], axis=1)
         triangles = np.stack([near_right, near_left], axis=1).reshape(-1, 3, 3)
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        # Inside a bend tighter than the lane is far from the reference line a strip turns over.
+        # In a bend with a radius below the distance from the reference line the strip folds over: turn such faces up.
         upward = np.where((normals[:, 2] < 0.0)[:, None, None], triangles[:, ::-1], triangles)
         return np.asarray(upward[np.linalg.norm(normals, axis=1) > 2.0 * _MIN_TRIANGLE_AREA])
 
     @cached_property
     def polygon(self) -> BaseGeometry:
-        """The surface in plan; several polygons where it narrows to nothing in between."""
+        """Surface in plan; several polygons if its width is zero in between."""
         outline = Polygon(np.concatenate([self.left[:, :2], self.right[::-1, :2]]))
         if outline.is_valid:
             return outline
@@ -72,13 +72,15 @@ class LaneSurface:
 def lane_surfaces(road: Road, tolerance: float = 0.02) -> tuple[LaneSurface, ...]:
     """Return the surfaces of all lanes of a road that have an area.
 
-    Elevation, superelevation, crossfall, shape, level lanes and lane heights are part of them; across, a lane is
-    straight from edge to edge. Lane sections shorter than a micrometre are left out.
+    They include elevation, superelevation, crossfall, shape, level lanes and lane heights; across, a lane is straight
+    from edge to edge. Lane sections shorter than a micrometre are left out.
 
     Parameters
     ----------
+    road : Road
+        Road of the map.
     tolerance : float, metres
-        Greatest distance between a true edge and the straight lines that stand for it.
+        Greatest distance between a true edge and the straight lines that approximate it.
 
     Returns
     -------
@@ -105,7 +107,7 @@ def lane_surfaces(road: Road, tolerance: float = 0.02) -> tuple[LaneSurface, ...
 
 
 def _check_size(points: Float, place: str) -> None:
-    """Raise an error where edges of lanes, (k, lanes, 2, 3), are where no road is."""
+    """Raise an error if edges of lanes, (k, lanes, 2, 3), have an implausible height or distance."""
     highest = float(np.abs(points[..., 2]).max(initial=0.0))
     if highest > _MAX_HEIGHT:
         raise SeipError(f"{place}: it lies at {highest:,.0f} m above or below zero; correct the elevation in the map")
@@ -115,12 +117,13 @@ def _check_size(points: Float, place: str) -> None:
 
 
 def _knots(road: Road, section: LaneSection) -> list[float]:
-    """Return the section's ends and the places between them where some record begins or a width comes to nothing."""
+    """Return the ends of a section and the stations in between where a record begins or a width becomes zero."""
     lanes = (*section.left, *section.right)
     profiles = (
         *(road.elevation, road.superelevation, road.left_crossfall, road.right_crossfall, road.lane_offset),
         *(of_lane for lane in lanes for of_lane in (lane.width, lane.border, lane.inner_height, lane.outer_height)),
     )
+    # Widths below zero count as zero (`_width`), which gives the edge a kink at the zero: it needs a point there.
     vanishing = (lane.width.zeros(section.end) for lane in lanes)
     starts = np.concatenate([road.reference_line.s, road.shape.s, *(p.start for p in profiles), *vanishing])
     inside = starts[(starts > section.start) & (starts < section.end)]
@@ -147,6 +150,8 @@ def _side_edges(
 
     point = frame.origin + t[:, None] * frame.left + rise(t)[:, None] * frame.up
     for lane in lanes:
+        # Lanes are built outwards, each from the outer edge of the one before. A level lane continues horizontally from
+        # there; other lanes follow the cross section of the road.
         width = _width(lane, s, np.abs(t - centre))
         outer_t = t + side * width
         if lane.level:

@@ -45,18 +45,18 @@ class PlacedObject:
     Parameters
     ----------
     road_id, id, name : str
-        As in the file; copies share them.
+        Ids and name as in the file; copies share them.
     kind : str
-        The type in lower case, such as ``building`` or ``tree``.
+        Type in lower case, such as ``building`` or ``tree``.
     position : (3,) float64, metres
-        Its origin in map coordinates.
+        Origin in map coordinates.
     yaw, pitch, roll : float, radians
-        Turns about z, then y, then x; yaw counter-clockwise from +x.
+        Rotations about z, then y, then x; yaw counter-clockwise from +x.
     length, width, height, radius : float, metres
-        Of its box or cylinder, zero where the file says nothing.
+        Size of its box or cylinder, zero if the file does not give it.
     outlines : tuple of Outline
-        Where there are any, they are the shape. A continuous strip has one:
-        closed if it has a width, else a line along which a wall stands.
+        Shape of the object, if there are any. A continuous strip has one: closed if the strip has a width, otherwise a
+        line along which a wall stands.
     """
 
     road_id: str
@@ -75,12 +75,14 @@ class PlacedObject:
 
 
 def placed_objects(road_map: RoadMap, *, area: BaseGeometry | None = None) -> tuple[PlacedObject, ...]:
-    """Return the objects of a map, copies of repeated ones in place of these.
+    """Return the objects of a map, with repeated objects replaced by their copies.
 
     Parameters
     ----------
+    road_map : RoadMap
+        Map with the objects.
     area : shapely geometry, optional
-        In plan, map coordinates. Only objects with their origin or an outline in it count.
+        Area in plan, map coordinates. Only objects that reach into it are returned.
 
     Raises
     ------
@@ -112,7 +114,7 @@ def _placed(road: Road, obj: RoadObject) -> Iterator[PlacedObject]:
 
 
 def _steps(road: Road, obj: RoadObject, repeat: Repeat) -> Float:
-    """Return where the copies of a row stand, metres from its start."""
+    """Return the positions of the copies in a row, metres from its start."""
     length = min(repeat.length, road.length - repeat.s)
     if repeat.distance == 0.0 or length <= 0.0:
         return np.zeros(1)
@@ -124,7 +126,7 @@ def _steps(road: Road, obj: RoadObject, repeat: Repeat) -> Float:
 
 
 def _in_row(obj: RoadObject, repeat: Repeat, along: float) -> RoadObject:
-    """Return the copy of an object some metres along a row."""
+    """Return the copy of an object at a distance (metres) along a row."""
     share = along / repeat.length if repeat.length > 0.0 else 0.0
 
     def between(ends: tuple[float, float]) -> float:
@@ -143,7 +145,7 @@ def _in_row(obj: RoadObject, repeat: Repeat, along: float) -> RoadObject:
 
 
 def _place(road: Road, original: RoadObject, obj: RoadObject) -> PlacedObject:
-    """Return an object in map coordinates; ``original`` says where the corners on the road were meant."""
+    """Return an object in map coordinates; corners on the road move with it from the place of ``original``."""
     position = _point(road, obj.s, obj.t, obj.z_offset)
     yaw = float(road.frame(np.array([obj.s])).heading[0]) + obj.heading
     turn = orientation(yaw, obj.pitch, obj.roll)
@@ -178,13 +180,13 @@ def _place(road: Road, original: RoadObject, obj: RoadObject) -> PlacedObject:
 
 
 def _strip(road: Road, obj: RoadObject, repeat: Repeat) -> PlacedObject:
-    """Return a row without gaps as one object with one outline."""
+    """Return a row without gaps as a single object with one outline."""
     end = min(repeat.s + repeat.length, road.length)
     begin = min(repeat.s, end)
     width = np.array(repeat.width) if any(repeat.width) else 2.0 * np.array(repeat.radius)
 
     def lines(s: Float) -> Float:
-        """Return the left and right edge at the foot, and as a third line how far the top stands above it."""
+        """Return the left and right edge at the foot, and the height of the top above it as a third line."""
         share = (s - repeat.s) / repeat.length
         t, half = np.interp(share, _ENDS, repeat.t), np.interp(share, _ENDS, width) / 2.0
         up = np.interp(share, _ENDS, repeat.z_offset)
@@ -208,7 +210,7 @@ def _strip(road: Road, obj: RoadObject, repeat: Repeat) -> PlacedObject:
 
 
 def _point(road: Road, s: float, t: float, up: float) -> Float:
-    """Return the point, (3,), some metres straight above a place of the road."""
+    """Return the point (3,) at a height (metres) vertically above a place of the road."""
     return np.asarray(_lifted(road.place(np.array([s]), np.array([t])), np.array([up]))[0])
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...arrays import Float
 
-_MIN_TERM = 1e-12  # terms of a cubic smaller than this, in relation to the largest, move no zero that can be told
+_MIN_TERM = 1e-12  # terms of a cubic below this share of the largest one do not move its zeros noticeably
 _MAX_IMAGINARY_PART = 1e-9  # imaginary parts below this come from rounding
 
 
@@ -14,13 +14,13 @@ _MAX_IMAGINARY_PART = 1e-9  # imaginary parts below this come from rounding
 class Profile:
     """Value ``a + b·ds + c·ds² + d·ds³`` with ``ds`` counted from the start of the record in force.
 
-    A record is in force up to the start of the next one; of two that start at one place the later counts. Before the
+    A record is in force up to the start of the next one; of two with the same start, the later counts. Before the
     first record its first value holds, and without any record the value is zero.
 
     Parameters
     ----------
     start : (n,) float64, metres
-        Where each record begins, ascending.
+        Start of each record along the road, ascending.
     coefficients : (n, 4) float64
         ``a, b, c, d`` of each record.
     """
@@ -48,6 +48,8 @@ class Profile:
     def zeros(self, end: float) -> Float:
         """Return where the values pass through zero before ``end``, (k,) metres along the road in any order."""
         span = np.append(self.start[1:], end) - self.start
+        # Scaled to ds from 0 to 1, a cubic has no zero if its other terms together are smaller than the constant one.
+        # This rules out nearly all records without solving them.
         scaled = self.coefficients * span[:, None] ** np.arange(4)
         may_cross = (span > 0.0) & (np.abs(scaled[:, 1:]).sum(axis=1) >= np.abs(scaled[:, 0]))
         found = [np.empty(0)]

@@ -53,8 +53,8 @@ def read_map(path: str | os.PathLike[str]) -> RoadMap:
     Raises
     ------
     SeipError
-        There is no such file, it is no well-formed or harmless XML, no OpenDRIVE, has no roads, or a number in it makes
-        no sense; the message names the road and the element.
+        The file does not exist, is not well-formed or not safe XML, is not OpenDRIVE, has no roads, or has an
+        implausible number; the message names the road and the element.
     """
     root = read_document(path)
     if root.tag != "OpenDRIVE":
@@ -82,7 +82,7 @@ def read_map(path: str | os.PathLike[str]) -> RoadMap:
 
 
 def with_attribution(text: str, attribution: Iterable[str]) -> str:
-    """Return the text of a map with credits in its header, which `read_map` reads again."""
+    """Return the text of a map with credits in its header, in the form that `read_map` reads."""
     elements = "".join(f"<userData code={quoteattr(ATTRIBUTION)} value={quoteattr(one)}/>" for one in attribution)
     return text.replace("</header>", f"{elements}</header>", 1)
 
@@ -137,7 +137,7 @@ def _reference_line(road: Node) -> ReferenceLine:
         pieces=tuple(_piece(node) for node in nodes),
     )
     if line.end > _MAX_ROAD_LENGTH:
-        raise SeipError(f"{road.place}: its <geometry> reaches {line.end:g} m; no road is that long, correct the map")
+        raise SeipError(f"{road.place}: its <geometry> reaches {line.end:g} m, longer than any road; correct the map")
     return line
 
 
@@ -194,7 +194,7 @@ def _cubic(node: Node) -> tuple[float, float, float, float]:
 
 
 def _sections(road: Node, end: float) -> tuple[LaneSection, ...]:
-    """Return the lane sections; a side that a one-sided section does not carry goes on as it was before."""
+    """Return the lane sections; a side missing from a one-sided section continues from the section before."""
     nodes = sorted(road.children("lanes", "laneSection"), key=lambda node: node.number("s"))
     starts = [max(node.number("s"), 0.0) for node in nodes]
     sections = []
@@ -234,7 +234,7 @@ def _lane_profile(lane: Node, name: str, start: float) -> Profile:
 
 
 def _height(lane: Node, edge: str, start: float) -> Profile:
-    """Return the height of an edge, which ramps from each record to the next."""
+    """Return the height of an edge, linear from each record to the next."""
     nodes = sorted(lane.children("height"), key=lambda node: node.number("sOffset", 0.0))
     if not nodes:
         return ZERO_PROFILE

@@ -1,7 +1,7 @@
-"""The reference line of a road in plan: lines, arcs, clothoids and cubic curves.
+"""Reference line of a road in plan: lines, arcs, clothoids and cubic curves.
 
-All follow ASAM OpenDRIVE 1.8, section "Geometry". A piece of any kind is
-evaluated at distances along itself, to well below a nanometre.
+All follow ASAM OpenDRIVE 1.8, section "Geometry". A piece of any kind is evaluated at distances along it, to well below
+a nanometre.
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class Clothoid:
     Parameters
     ----------
     curvature : float, 1/m
-        At the start, positive to the left.
+        Curvature at the start, positive to the left.
     rate : float, 1/m²
         Change of the curvature per metre.
     """
@@ -47,6 +47,8 @@ class Clothoid:
             # The chord of an arc points half as far round, and np.sinc keeps the straight line exact.
             chord = distance * np.sinc(heading / (2.0 * np.pi))
             return chord * np.cos(heading / 2.0), chord * np.sin(heading / 2.0), heading
+        # Fresnel integrals by Gauss-Legendre quadrature over panels that turn by at most a radian each: there 16 nodes
+        # are exact to rounding. The end of each panel is the sum of those before it.
         farthest = float(np.max(distance, initial=0.0))
         panels = 1 + int(self.turn(farthest))
         size = farthest / panels or 1.0
@@ -58,19 +60,19 @@ class Clothoid:
         return x, y, heading
 
     def _displacement(self, start: Float, length: Float) -> Float:
-        """Return x and y, (2, k) metres, by which the curve moves on over lengths of at most a radian's turn."""
+        """Return the displacements (2, k), metres, over lengths in which the curve turns by at most a radian."""
         along = start[:, None] + length[:, None] * _NODES
         heading = along * (self.curvature + along * self.rate / 2.0)
         return np.stack([length * (np.cos(heading) @ _WEIGHTS), length * (np.sin(heading) @ _WEIGHTS)])
 
     def turn(self, length: float) -> float:
-        """Return an upper bound of the angle, in radians, that the curve turns through over a length."""
+        """Return an upper bound on the angle (radians) that the curve turns through over a length."""
         return length * max(abs(self.curvature), abs(self.curvature + length * self.rate))
 
 
 @dataclass(frozen=True, eq=False)
 class Cubic:
-    """Plane curve ``(u(p), v(p))`` of two cubic polynomials, found by the distance along it.
+    """Plane curve ``(u(p), v(p))`` of two cubic polynomials, evaluated at distances along it.
 
     Parameters
     ----------
@@ -98,11 +100,13 @@ class Cubic:
         return powers @ self.u, powers @ self.v, np.arctan2(dv, du)
 
     def _parameter(self, arc: Float) -> Float:
-        """Invert the arc length by Newton's method, held between the knots by bisection."""
+        """Invert the arc length by Newton's method, safeguarded between the knots by bisection."""
         panel = np.clip(np.searchsorted(self.distances, arc, side="right") - 1, 0, len(self.distances) - 2)
         low, high = self.parameters[panel], self.parameters[panel + 1]
         first, base = low, self.distances[panel]
         p = np.interp(arc, self.distances, self.parameters)
+        # Arc length increases with p, so the sign of the excess tells which end of the bracket to move. A Newton step
+        # that leaves the bracket, or has no finite speed to divide by, is replaced by halving it.
         for _ in range(60):
             excess = base + _arc_length(self.u, self.v, first, p) - arc
             low, high = np.where(excess <= 0.0, p, low), np.where(excess >= 0.0, p, high)
@@ -126,8 +130,8 @@ def param_poly3(
 ) -> Cubic:
     """Return the parametric cubic with p from 0 to ``end`` (1 or the length) over a length of road.
 
-    The standard ties p to s at both ends alone; in between s is the distance
-    along the curve. Where the arc and the stated length differ, s is stretched.
+    The standard relates p to s only at both ends; in between, s is the distance along the curve. If the length of the
+    arc differs from the stated length, s is stretched.
     """
     curve = _cubic(np.array(u), np.array(v), end)
     return Cubic(curve.u, curve.v, curve.parameters, curve.distances, float(curve.distances[-1]) / length)
@@ -150,12 +154,12 @@ def _arc_length(u: Float, v: Float, start: Float, end: Float) -> Float:
 
 @dataclass(frozen=True, eq=False)
 class ReferenceLine:
-    """Pieces in a row, each with its own start in map coordinates.
+    """Sequence of pieces, each with its own start in map coordinates.
 
     Parameters
     ----------
     s : (n,) float64, metres
-        Where each piece begins along the road, ascending.
+        Start of each piece along the road, ascending.
     length : (n,) float64, metres
         Length of each piece.
     start : (n, 3) float64

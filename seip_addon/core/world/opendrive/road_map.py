@@ -1,4 +1,4 @@
-"""A map as it is read: roads with their profiles, lanes, objects and signals, and junctions."""
+"""Data model of a map: roads with profiles, lanes, objects and signals, and junctions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...arrays import Float
 from .profile import LateralShape, Profile
 from .reference_line import ReferenceLine
 
-MIDDLE_STEP = 10.0  # metres along a road between the places that may be a map's middle
+MIDDLE_STEP = 10.0  # metres along a road between the candidates for the middle of a map
 
 
 @dataclass(frozen=True)
@@ -30,14 +30,14 @@ class Lane:
     id : int
         Positive to the left of the centre lane, negative to the right.
     type : str
-        As in the file: ``driving``, ``sidewalk``, ...
+        Type as in the file: ``driving``, ``sidewalk``, ...
     level : bool
         Whether the lane keeps level instead of following superelevation and crossfall.
     width, border : Profile
-        Over metres along the road. A border is the offset of the outer edge
-        from the centre lane and counts where there is no width.
+        Profiles over metres along the road. A border is the offset of the outer edge from the centre lane and is used
+        if there is no width.
     inner_height, outer_height : Profile
-        How far the edges stand above the road surface, over metres along the road.
+        Heights of the edges above the road surface, over metres along the road.
     """
 
     id: int
@@ -64,7 +64,7 @@ class Corner:
     """A corner of an object's outline.
 
     ``along`` and ``aside`` are s and t of the road (`on_road`) or u and v of the object, ``up`` is dz or z, all in
-    metres; ``height`` is None where the file does not say.
+    metres; ``height`` is None if the file does not give it.
     """
 
     on_road: bool
@@ -76,7 +76,7 @@ class Corner:
 
 @dataclass(frozen=True)
 class ObjectOutline:
-    """Corners of an outline in their order, and whether it closes."""
+    """Corners of an outline in their order, and whether it is closed."""
 
     corners: tuple[Corner, ...]
     closed: bool
@@ -84,7 +84,7 @@ class ObjectOutline:
 
 @dataclass(frozen=True)
 class Repeat:
-    """A row of copies of an object, or a continuous strip where ``distance`` is zero.
+    """A row of copies of an object, or a continuous strip if ``distance`` is zero.
 
     Each pair holds the values at the start and the end of the row, in metres.
     """
@@ -102,7 +102,7 @@ class Repeat:
 
 @dataclass(frozen=True)
 class RoadObject:
-    """An object as the file gives it, in road coordinates (metres, radians)."""
+    """An object as in the file, in road coordinates (metres, radians)."""
 
     id: str
     name: str
@@ -123,14 +123,14 @@ class RoadObject:
 
 @dataclass(frozen=True)
 class RoadSignal:
-    """A signal as the file gives it, in the coordinates of the road on which it stands (metres, radians).
+    """A signal as in the file, in the coordinates of the road on which it stands (metres, radians).
 
     Parameters
     ----------
     road_id : str
-        The road on which it stands, which need not be the one that it applies to.
+        Road on which it stands, which may differ from the road that it applies to.
     place : (x, y, z, heading) or None
-        Where it stands, if the file says that in map coordinates.
+        Position, if the file gives it in map coordinates.
     """
 
     road_id: str
@@ -147,7 +147,7 @@ class RoadSignal:
 
 @dataclass(frozen=True)
 class RoadLink:
-    """What follows at an end of a road: a ``junction``, or the ``start`` or ``end`` of a ``road``, by its id."""
+    """Link at an end of a road to a ``junction``, or to the ``start`` or ``end`` of a ``road``, by its id."""
 
     kind: str
     id: str
@@ -156,23 +156,23 @@ class RoadLink:
 
 @dataclass(frozen=True, eq=False)
 class Road:
-    """A road: its reference line in plan, the profiles along it and what stands beside it.
+    """A road: its reference line in plan, the profiles along it, its objects and its signals.
 
     Parameters
     ----------
     id, name : str
-        As in the file; the name may be empty.
+        Id and name as in the file; the name may be empty.
     elevation, lane_offset : Profile
-        Metres over metres along the road.
+        Profiles in metres over metres along the road.
     superelevation, left_crossfall, right_crossfall : Profile
-        Radians over metres along the road. A road with superelevation above
-        zero falls to the right; crossfall above zero falls outwards.
+        Profiles in radians over metres along the road. With superelevation above zero a road falls to the right; with
+        crossfall above zero it falls outwards.
     shape : LateralShape
-        Height of the surface above the plane that these make.
+        Height of the surface above the plane given by these.
     sections : tuple of LaneSection
-        In order along the road.
+        Lane sections in order along the road.
     predecessor, successor : RoadLink or None
-        What follows at its start and at its end.
+        Links at its start and at its end.
     """
 
     id: str
@@ -216,7 +216,7 @@ class Road:
 
 @dataclass(frozen=True, eq=False)
 class RoadFrame:
-    """The moving axes of a road at k places.
+    """Moving axes of a road at k stations.
 
     Superelevation turns the road about its reference line, which itself climbs at the pitch of the elevation profile.
 
@@ -258,21 +258,21 @@ class RoadFrame:
 
 @dataclass(frozen=True, eq=False)
 class RoadMap:
-    """All that is read of an OpenDRIVE file.
+    """Contents of an OpenDRIVE file.
 
     Parameters
     ----------
     name : str
-        Name in the header, or else the name of the file.
+        Name in the header, or the name of the file if there is none.
     header_offset : (4,) float64
-        x, y, z in metres and heading in radians of the header's ``<offset>``.
-        It is not applied: map coordinates are the file's own.
+        x, y, z in metres and heading in radians of the header's ``<offset>``. It is not applied: map coordinates are
+        those of the file.
     geo_reference : str or None
-        As in the file, valid or not.
+        Projection as in the file, valid or not.
     roads : tuple of Road
-        In the order of the file.
+        Roads in the order of the file.
     junctions : tuple of Junction
-        In the order of the file.
+        Junctions in the order of the file.
     attribution : tuple of str
         Credits in the header's ``<userData code="attribution">``.
     """
@@ -285,12 +285,12 @@ class RoadMap:
     attribution: tuple[str, ...] = ()
 
     def junctions_with_roads(self) -> tuple[Junction, ...]:
-        """Return the junctions that some road belongs to, in the order of the file: others are no place to work on."""
+        """Return the junctions that have roads, in the order of the file."""
         used = {road.junction_id for road in self.roads}
         return tuple(junction for junction in self.junctions if junction.id in used)
 
     def middle(self) -> tuple[float, float]:
-        """Return the place on a reference line, x and y in metres, that is nearest to the middle of the map."""
+        """Return x and y (metres) of the point on a reference line nearest to the middle of the map."""
         lines = [road.frame(np.linspace(0.0, road.length, 2 + int(road.length / MIDDLE_STEP))) for road in self.roads]
         plan = np.concatenate([line.origin[:, :2] for line in lines])
         from_middle = plan - (plan.min(axis=0) + plan.max(axis=0)) / 2

@@ -10,39 +10,39 @@ from ...errors import SeipError
 
 Curves = Callable[[Float], Float]
 
-_MIN_LENGTH = 1e-6  # metres; less carries nothing but slivers
-_KNOT_OFFSET = 1e-9  # metres short of a knot the records before it are still in force
-_MAX_STEP = 25.0  # metres, in which no road turns so often that the sampled quarters hide it
+_MIN_LENGTH = 1e-6  # metres; shorter intervals are slivers
+_KNOT_OFFSET = 1e-9  # metres before a knot at which the records before it are still in force
+_MAX_STEP = 25.0  # metres in which no road turns so often that sampling its quarters misses it
 _MIN_STEP = 1e-3  # metres
-_MAX_SPLITS = 10_000  # at once; a winding mountain road of 100 km in one piece asks for fewer
+_MAX_SPLITS = 10_000  # at once; a winding mountain road of 100 km in one piece needs fewer
 _QUARTERS = np.linspace(0.0, 1.0, 5)
 # The greatest deviation of a cubic from its chord is at most 1.03 times the greatest one at the quarters.
 _MARGIN = 0.9
 
 
 def sample(curves: Curves, knots: Iterable[float], tolerance: float, place: str) -> tuple[Float, Float]:
-    """Return points along curves, such that straight lines between them stay within a tolerance.
+    """Return points along curves such that straight lines between them are within a tolerance of the curves.
 
-    Between two knots the curves are smooth; at a knot they may jump, and then
-    the points before and after the jump are both returned.
+    Between two knots the curves are smooth. At a knot they may jump: then the points before and after the jump are both
+    returned.
 
     Parameters
     ----------
     curves : callable
-        From (k,) metres along the road to (k, m, 3) points of m curves.
+        Function from (k,) metres along the road to (k, m, 3) points of m curves.
     knots : iterable of float, metres
-        The first and the last one bound the range.
+        Ends of the range, and stations where the curves may jump.
     tolerance : float, metres
         Greatest distance between a curve and its chord.
     place : str
-        What is sampled, for messages.
+        Description of the sampled object, for messages.
 
     Returns
     -------
     s : (n,) float64, metres
-        Along the road.
+        Stations along the road.
     points : (n, m, 3) float64, metres
-        Both are empty if the range is shorter than a micrometre.
+        Points of the curves; s and points are empty if the range is shorter than a micrometre.
     """
     bounds = np.unique(np.fromiter(knots, dtype=np.float64))
     begin, end = bounds[:-1], bounds[1:]
@@ -57,9 +57,10 @@ def sample(curves: Curves, knots: Iterable[float], tolerance: float, place: str)
 
 
 def _refined(curves: Curves, begin: Float, end: Float, tolerance: float, place: str) -> Float:
-    """Return the starts of all steps by which intervals are to be walked."""
+    """Return the starts of the steps into which intervals are divided."""
     begin, end = _in_steps(begin, end)
     finished = [np.empty(0)]
+    # Halve all intervals at once whose points at the quarters are too far from the chord, until none is left.
     while begin.size:
         s = begin[:, None] + (end - begin)[:, None] * _QUARTERS
         points = curves(s.ravel()).reshape(*s.shape, -1, 3)
@@ -85,7 +86,7 @@ def _in_steps(begin: Float, end: Float) -> tuple[Float, Float]:
 
 
 def _distinct(s: Float, points: Float) -> NDArray[np.bool_]:
-    """Return which samples to keep: before a knot only where the curves jump there."""
+    """Return which samples to keep: the sample before a knot only if the curves jump there."""
     keep = np.ones(len(s), dtype=np.bool_)
     moved = np.abs(np.diff(points, axis=0)).reshape(max(len(s) - 1, 0), -1).max(axis=1, initial=0.0)
     keep[:-1] = (np.diff(s) > _MIN_LENGTH) | (moved > _MIN_LENGTH)

@@ -15,22 +15,22 @@ from .road_map import Road, RoadMap, RoadSignal
 class PlacedSignal:
     """A signal in map coordinates.
 
-    Maps disagree on what is given, the foot of the post or the lamp above the carriageway.
+    Depending on the map this is the foot of the post or the lamp above the carriageway.
 
     Parameters
     ----------
     road_id : str
-        The road that its place is given on, not always the one that it applies to;
-        where the place is given in map coordinates, the one that it applies to.
+        Road of its position, which may differ from the road that it applies to; if the position is given in map
+        coordinates, the road that it applies to.
     id, name, kind : str
-        As in the file; ``kind`` is its type.
+        Id, name and type as in the file.
     dynamic : bool
         Whether it changes, as a traffic light does.
     position : (3,) float64, metres
-        In map coordinates.
+        Position in map coordinates.
     yaw : float, radians
-        By the standard the direction of the traffic that it is meant for,
-        counter-clockwise from +x; some exporters give the one it faces.
+        Direction of the controlled traffic by the standard, counter-clockwise from +x; some exporters give the
+        direction that the signal faces.
     """
 
     road_id: str
@@ -43,7 +43,7 @@ class PlacedSignal:
 
 
 def placed_signals(road_map: RoadMap, *, area: BaseGeometry | None = None) -> tuple[PlacedSignal, ...]:
-    """Return the signals of a map, those in an area of the plan (map coordinates) if one is given.
+    """Return the signals of a map, only those in an area in plan (map coordinates) if one is given.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def placed_signals(road_map: RoadMap, *, area: BaseGeometry | None = None) -> tu
 def _placed(owner: Road, signal: RoadSignal, roads: dict[str, Road]) -> PlacedSignal:
     if signal.road_id not in roads:
         raise SeipError(
-            f"road {owner.id}: signal {signal.id} stands on road {signal.road_id}, which is not there; correct the map"
+            f"road {owner.id}: signal {signal.id} is on road {signal.road_id}, which the map lacks; correct the map"
         )
     if signal.place is not None:
         position, yaw = np.array(signal.place[:3]), signal.place[3]

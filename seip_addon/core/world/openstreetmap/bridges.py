@@ -1,4 +1,4 @@
-"""Grade-separated crossings of an extract: streets on bridges and in underpasses, and the height that they need."""
+"""Grade-separated crossings of an extract: streets on bridges and in underpasses, with the clearance required."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,26 +17,26 @@ HEADROOMS = {
     **dict.fromkeys(("rail", "light_rail", "subway", "narrow_gauge"), 5.5),
     **dict.fromkeys(("footway", "path", "cycleway", "pedestrian", "steps", "bridleway", "corridor"), 2.5),
 }
-"""Clear height (metres) above a way of a kind that is not a road; above roads and trams it is `ROAD_HEADROOM`."""
+"""Clear height (metres) above ways that are not roads; roads and trams have `ROAD_HEADROOM`."""
 ROAD_HEADROOM = 4.5
 MAX_LAYER = 5
-LANE_WIDTH, KERBSIDE, NARROW = 3.5, 2.0, 4.0  # metres: of a lane, beside the lanes, and of a way that is not a road
-_SHARED = 0.5  # metres about a node of both ways within which they meet and do not cross
+LANE_WIDTH, KERBSIDE, NARROW = 3.5, 2.0, 4.0  # metres: a lane, the strip next to the lanes, a way that is not a road
+_SHARED = 0.5  # metres around a node of both ways within which they meet, not cross
 _NO_ROAD = {"construction", "proposed", "abandoned", "razed", "platform", "elevator", "services", "rest_area"}
 
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """A street on a bridge, or in an underpass, and a way that it crosses there.
+    """Crossing of a street on a bridge, or in an underpass, with another way.
 
     Parameters
     ----------
     street : int
-        Id of the street that is raised or lowered, as it is written for netconvert.
+        Id of the street that is raised or lowered, as written for netconvert.
     way, other : Way
-        That street, and what it crosses.
+        That street, and the way that it crosses.
     layers : (int, int)
-        Of both.
+        Layers of both.
     rise : float, metres
         Height of the upper road above the lower one.
     """
@@ -49,7 +49,7 @@ class Crossing:
 
     @property
     def is_bridge(self) -> bool:
-        """Whether the street is the upper one."""
+        """Whether the street is the upper of the two ways."""
         return self.layers[0] > self.layers[1]
 
     def __str__(self) -> str:
@@ -64,10 +64,11 @@ class Structures:
     Parameters
     ----------
     crossings : tuple of Crossing
+        Crossings of streets with ways on a different layer.
     bridges : frozenset of int
-        Ids of all streets on bridges, those that cross nothing of the extract too.
+        Ids of all streets on bridges, including those that cross no way of the extract.
     ends : frozenset of int
-        Nodes at the ends of streets that cross others on a level of their own.
+        Nodes at the ends of the streets that are raised or lowered.
     """
 
     crossings: tuple[Crossing, ...]
@@ -81,12 +82,12 @@ class Structures:
 
     @property
     def apart(self) -> frozenset[int]:
-        """Ids of the streets whose heights are not those of the ground."""
+        """Ids of the streets that do not follow the ground."""
         return self.bridges | self.layers.keys()
 
 
 def layer(tags: Tags) -> int:
-    """Return the layer of a way: 0 on the ground, above it on bridges."""
+    """Return the layer of a way: 0 on the ground, positive on bridges, negative below."""
     if tags.get("tunnel") == "building_passage":
         return 0
     on_bridge = is_bridge(tags)
@@ -106,16 +107,18 @@ def is_bridge(tags: Tags) -> bool:
 def structures(extract: Extract, streets: Sequence[tuple[int, Way]], lines: Mapping[int, Float]) -> Structures:
     """Return the grade-separated crossings of streets with each other, with railways and with paths.
 
-    A way on a bridge, or on a layer of its own, counts where it crosses a way of another layer without a common node.
-    Water is below the ground as it is: a bridge over it needs no height.
+    A street on a layer other than 0 has a crossing where it passes a way of a different layer without a common node.
+    Bridges over water are not crossings: water is below the ground already, and they need no extra height.
 
     Parameters
     ----------
     streets : sequence of (id, Way)
         Streets as they are written for netconvert.
     lines : mapping of int to (n, 2) float64, metres
-        Where the nodes are, by their ids.
+        Positions of the nodes by id.
     """
+    # Streets are pieces of ways of the extract and share their tags objects, so that the identity of the tags finds the
+    # whole ways that the pieces stand for. Railways and paths, which are not written, are added as ways to be crossed.
     own = {id(way.tags) for _, way in streets}
     ways = [way for _, way in streets]
     ways += [way for way in extract.ways.values() if id(way.tags) not in own and _headroom(way.tags) is not None]
@@ -130,6 +133,7 @@ def structures(extract: Extract, streets: Sequence[tuple[int, Way]], lines: Mapp
             pair = (levels[index], levels[near])
             if not _moves(*pair) or _where(plans[index], plans[near]).is_empty:
                 continue
+            # The clearance is that of the lower way, whichever of the two it is.
             below = ways[near] if pair[0] > pair[1] else ways[index]
             rise = (_headroom(below.tags) or ROAD_HEADROOM) + DECK
             found.append(Crossing(streets[index][0], ways[index], ways[near], pair, rise))
@@ -139,12 +143,14 @@ def structures(extract: Extract, streets: Sequence[tuple[int, Way]], lines: Mapp
 
 
 def _moves(own: int, other: int) -> bool:
-    """Return whether the street on one layer leaves the ground for a way on another layer."""
+    """Return whether a street on layer `own` leaves the ground because of a way on layer `other`."""
+    # Exactly one of two ways on different layers is moved: the upper one if it is above the ground, otherwise the lower
+    # one. Each crossing is therefore found once.
     return own > max(other, 0) or own < other <= 0
 
 
 def _headroom(tags: Tags) -> float | None:
-    """Return the clear height (metres) above a way, None for what a bridge needs no height above."""
+    """Return the clear height (metres) above a way, None for ways over which a bridge needs no extra height."""
     if tags.get("tunnel", "no") not in ("no", "building_passage") or tags.get("area") == "yes":
         return None
     railway, highway = tags.get("railway"), tags.get("highway")
@@ -158,27 +164,27 @@ def _headroom(tags: Tags) -> float | None:
 
 
 def half_width(tags: Tags, lanes: int) -> float:
-    """Return half the width of a way with a number of lanes, metres; 0 lanes where it is not a road."""
+    """Return half the width of a way with a number of lanes, metres; `lanes` is 0 for ways that are not roads."""
     width = metres(tags.get("width"), 60.0) or (LANE_WIDTH * lanes if lanes else NARROW)
     return width / 2 + (KERBSIDE if lanes else 0.0)
 
 
 def lanes_of(tags: Tags) -> int:
-    """Return about how many lanes a way has, 0 where it is not a road."""
+    """Return the approximate number of lanes of a way, 0 if it is not a road."""
     if tags.get("highway") is None or tags["highway"] in HEADROOMS:
         return 0
     return int(count(tags.get("lanes"), 12) or (1 if tags.get("oneway") == "yes" else 2))
 
 
 def _where(line: Float, other: Float) -> BaseGeometry:
-    """Return where two lines (n, 2) meet in plan elsewhere than about the corners that both have."""
+    """Return the intersection of two lines (n, 2) in plan, without the surroundings of nodes that both share."""
     common = shapely.LineString(line).intersection(shapely.LineString(other))
     shared = sorted(set(map(tuple, line.tolist())) & set(map(tuple, other.tolist())))
     return common.difference(shapely.multipoints(np.array(shared)).buffer(_SHARED)) if shared else common
 
 
 def _called(tags: Tags) -> str:
-    """Return what a message calls a way."""
+    """Return the name of a way in messages."""
     name = tags.get("name") or tags.get("ref")
     if name:
         return name
@@ -188,17 +194,19 @@ def _called(tags: Tags) -> str:
 
 
 def corridors(crossing: Crossing, street: Float, other: Float) -> Iterator[tuple[BaseGeometry, BaseGeometry]]:
-    """Yield the areas in plan of both ways about each place where they cross.
+    """Yield the areas in plan of both ways around each place where they cross.
 
     Parameters
     ----------
     street, other : (n, 2) float64, metres
-        The ways' lines.
+        Lines of the two ways.
     """
     halves = [half_width(way.tags, lanes_of(way.tags)) for way in (crossing.way, crossing.other)]
     lines = [shapely.LineString(line) for line in (street, other)]
     areas = [line.buffer(half, cap_style="flat") for line, half in zip(lines, halves, strict=True)]
     common = _where(street, other)
+    # Two ways may cross several times. Parts of the overlap without an intersection of the lines are places where wide
+    # ways only run close to each other.
     for place in shapely.get_parts(areas[0].intersection(areas[1])):
         if place.intersects(common):
             near = place.buffer(sum(halves))

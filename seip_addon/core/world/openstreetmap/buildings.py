@@ -1,7 +1,7 @@
 """Buildings of an extract: footprints, parts, heights and roofs.
 
-Heights and roofs are read as Simple 3D Buildings of the OpenStreetMap wiki asks: ``height`` is that of the ridge,
-``min_height`` where the walls begin, and parts stand in place of the outline that they lie in.
+Heights and roofs follow the Simple 3D Buildings scheme of the OpenStreetMap wiki: ``height`` is the height of the
+ridge, ``min_height`` that of the foot of the walls, and parts replace the outline that contains them.
 """
 
 import math
@@ -30,15 +30,15 @@ LOW_BUILDINGS = {
     **dict.fromkeys(("house", "detached", "semidetached_house", "bungalow", "terrace", "farm"), 7.0),
     **dict.fromkeys(("greenhouse", "toilets", "transformer_tower", "static_caravan"), 3.0),
 }
-"""Heights (metres) that are assumed for kinds of buildings that are alike everywhere."""
-USUAL_HEIGHT = 9.0  # metres that other buildings without a height are assumed to have where too few others are known
-MIN_KNOWN = 5  # buildings of known height in an extract from which on their median is assumed for others
+"""Heights (metres) that are assumed for kinds of buildings that are similar everywhere."""
+USUAL_HEIGHT = 9.0  # metres: assumed height of other buildings if too few heights in the extract are known
+MIN_KNOWN = 5  # buildings of known height from which on their median is assumed for others
 NO_BUILDINGS = {"no", "none", "proposed", "construction", "ruins", "demolished", "razed", "abandoned:building"}
 NO_PARTS = {"no", "balcony", "steps", "ramp", "base"}
 SLAB = 0.4  # metres: thickness of a roof that stands on posts
 USUAL_ROOF = 2.5  # metres: height of a roof without one, and at most half of the building's
 PASSAGE_REACH = 8.0  # metres from the middle of a street through a building to the edge of its carriageway at most
-FULLY_PARTED = 0.1  # share of an outline that may lie beside its parts before the rest is a building of its own
+FULLY_PARTED = 0.1  # share of an outline outside its parts from which on the rest is a separate building
 _NOWHERE = shapely.Polygon()
 
 
@@ -55,7 +55,7 @@ def buildings(shapes: PlanShapes, area: BaseGeometry, passages: BaseGeometry = _
     Parameters
     ----------
     area, passages : shapely geometry
-        In map coordinates; passages are roads over which buildings begin at `CLEARANCE`.
+        Areas in map coordinates; passages are carriageways over which buildings begin at `CLEARANCE`.
     """
     found = [one for one in _footprints(shapes) if one.area.intersects(area)]
     usual = _usual_height([one.tags for one in found])
@@ -64,6 +64,8 @@ def buildings(shapes: PlanShapes, area: BaseGeometry, passages: BaseGeometry = _
     solids = []
     for one in found:
         body = one.area
+        # Parts describe a building in detail, so the outline around them only remains where no part covers it. A part
+        # belongs to an outline that contains more than half of it: mapped edges do not match exactly.
         if not one.is_part and parts:
             within = [
                 parts[index].area
@@ -74,6 +76,7 @@ def buildings(shapes: PlanShapes, area: BaseGeometry, passages: BaseGeometry = _
                 body = one.area.difference(shapely.union_all(within))
                 if body.area < FULLY_PARTED * one.area.area:
                     continue
+        # A building over a passage is split in plan: outside the passage it stands on the ground, over it at a height.
         above = body.intersection(passages)
         for piece, least in ((body if above.is_empty else without(body, passages), 0.0), (above, CLEARANCE)):
             solids += [_building(part, one.tags, usual, least, is_part=one.is_part) for part in polygons(piece)]
@@ -81,7 +84,7 @@ def buildings(shapes: PlanShapes, area: BaseGeometry, passages: BaseGeometry = _
 
 
 def passages(shapes: PlanShapes, carriageway: BaseGeometry) -> BaseGeometry:
-    """Return where the carriageway leads through buildings."""
+    """Return the part of the carriageway that leads through buildings."""
     lines = [
         shapes.line(way)
         for way in shapes.extract.ways.values()
@@ -96,6 +99,7 @@ def _footprints(shapes: PlanShapes) -> Iterator[_Footprint]:
     drawn: set[int] = set()  # ways that are the outlines of relations
     known: set[tuple[str, bytes]] = set()
     everything: list[Mapping[int, Way | Relation]] = [extract.relations, extract.ways]
+    # Relations come first, so that the ways that form their outlines are not read as further buildings.
     for elements in everything:
         for number, element in elements.items():
             kind = _kind(element.tags)
@@ -117,7 +121,7 @@ def _footprints(shapes: PlanShapes) -> Iterator[_Footprint]:
 
 
 def _kind(tags: Tags) -> str | None:
-    """Return ``building`` or ``part``, None for what is neither or lies underground."""
+    """Return ``building`` or ``part``; None for elements that are neither, or underground."""
     if tags.get("location") == "underground" or re.fullmatch(r"-[1-9]\d*", tags.get("layer", "")):
         return None
     if tags.get("building:part", "no") not in NO_PARTS:
@@ -126,7 +130,7 @@ def _kind(tags: Tags) -> str | None:
 
 
 def known_height(tags: Tags) -> float | None:
-    """Return the height of a building's ridge over the ground that its tags give, metres."""
+    """Return the height of a building's ridge above the ground from its tags, metres; None without one."""
     height = metres(tags.get("height", tags.get("building:height")), MAX_HEIGHT)
     if height is not None:
         return height
@@ -146,7 +150,7 @@ def _low(tags: Tags) -> float | None:
 
 
 def _building(outline: shapely.Polygon, tags: Tags, usual: float, least: float, *, is_part: bool) -> Building | None:
-    """Return a building, or a part of one, that begins at ``least`` metres; None where nothing of it is above."""
+    """Return a building, or a part, that begins at ``least`` metres or higher; None if it ends below that."""
     height, is_known = known_height(tags), True
     base = metres(tags.get("min_height", tags.get("building:min_height")), MAX_HEIGHT)
     if base is None:
@@ -179,7 +183,7 @@ def _is_roofed(tags: Tags) -> bool:
 
 
 def _roof_height(tags: Tags) -> float | None:
-    """Return the height of a roof that tags give, metres."""
+    """Return the height of a roof from its tags, metres; None without one."""
     own = metres(tags.get("roof:height"), MAX_HEIGHT)
     levels = count(tags.get("roof:levels"), MAX_LEVELS)
     return own or (levels * STOREY if levels else None)
@@ -189,7 +193,7 @@ _POINTS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "
 
 
 def _heading(tags: Tags) -> float | None:
-    """Return the direction in which a roof falls, radians counter-clockwise from east; None where it is not said."""
+    """Return the downward direction of a roof, radians counter-clockwise from east; None without a tag."""
     text = tags.get("roof:direction", "").upper()
     if text in _POINTS:
         bearing = 22.5 * _POINTS.index(text)

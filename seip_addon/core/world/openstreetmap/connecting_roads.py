@@ -1,7 +1,7 @@
-"""Mending of the map that netconvert writes, where roads do not meet at junctions.
+"""Repair of maps written by netconvert whose roads do not meet at junctions.
 
 netconvert cuts each road where its junction begins. Where nodes of a street lie close together, as in a roundabout, the
-cut road may turn back over its last piece; what connects to it is then a straight line across the island or the corner.
+cut road may turn back over its last piece; its connecting road is then a straight line across the island or the corner.
 Lanes of a junction that end in one lane all widen to its width, so that the edge of the carriageway jumps there.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 
 MAX_TURN_BACK = math.radians(120.0)  # between two pieces of a road: a sharper turn is an error of the cut
 MAX_MISFIT = math.radians(20.0)  # between a connecting road and the road that it leads from or into
-MAX_SWING = math.radians(80.0)  # between the chord of a curve and its ends: others would swing out, and are left alone
+MAX_SWING = math.radians(80.0)  # between the chord of a curve and its ends: others would swing out, and stay as is
 MAX_STUB = 1.0  # metres of a road beyond a curve that turns back
 MIN_LENGTH = 0.5  # metres: shorter connecting roads are left as they are
 CURVE_STEPS = 64  # straight pieces by which the length of a curve is measured
@@ -32,7 +32,7 @@ _LANE_LINK = re.compile(r'<(predecessor|successor) id="(-?\d+)"/>')
 
 @dataclass(frozen=True)
 class _Frame:
-    """A place on a reference line, metres, and its heading, radians."""
+    """Position on a reference line, metres, and its heading, radians."""
 
     x: float
     y: float
@@ -45,7 +45,7 @@ class _Frame:
 
 @dataclass(frozen=True)
 class _Piece:
-    """One ``<geometry>``: its attributes and the element in it, as they are in the file."""
+    """One ``<geometry>`` of the file: its attributes and the text of its inner element."""
 
     start: _Frame
     length: float
@@ -53,7 +53,7 @@ class _Piece:
 
     @property
     def end(self) -> _Frame:
-        """Where it ends: a line, or a cubic curve over a parameter from 0 to 1."""
+        """End of the piece, which is a line or a cubic curve over a parameter from 0 to 1."""
         given = {key: float(value) for key, value in _ATTRIBUTE.findall(self.shape) if key != "pRange"}
         if not given:
             u, v, along, aside = self.length, 0.0, 1.0, 0.0
@@ -72,11 +72,11 @@ class _Road:
     Parameters
     ----------
     text : str
-        Its element.
+        Text of its element.
     pieces : tuple of _Piece
-        Of the reference line.
+        Pieces of the reference line.
     is_cut : bool
-        Whether pieces that turned back were left out.
+        Whether pieces that turned back were removed.
     links : dict of str to (str, str)
         Id and end of the road at its ``predecessor`` and its ``successor``.
     widths : dict of int to (float, float)
@@ -91,7 +91,7 @@ class _Road:
 
     @property
     def in_junction(self) -> bool:
-        """Whether it connects roads in a junction."""
+        """Whether the road connects others within a junction."""
         return 'junction="-1"' not in self.text.split(">", 1)[0]
 
     @property
@@ -106,11 +106,11 @@ class _Road:
 
 
 def mended_text(text: str) -> str:
-    """Return the text of a map of netconvert whose connecting roads lead from the end of one road to that of another.
+    """Return the text of a map of netconvert with connecting roads that lead from one road to the next without gaps.
 
     Roads that turn back at an end are cut there. A connecting road that does not begin or end in the direction of the
-    roads that it joins becomes a cubic curve between them, and its lanes have at each end the widths of the lanes that
-    they join: of several that join one lane, all but the innermost taper to nothing.
+    roads that it joins becomes a cubic curve between them. Its lanes take the widths of the lanes that they join at
+    each end; if several join one lane, all except the innermost taper to zero.
     """
     roads = {_number(match[0]): _read(match[0]) for match in _ROAD.finditer(text)}
 
@@ -142,13 +142,15 @@ def _read(element: str) -> _Road:
 
 
 def _without_turns_back(pieces: Sequence[_Piece]) -> Sequence[_Piece]:
-    """Return the pieces of a reference line without first and last ones that turn back."""
+    """Return the pieces of a reference line without pieces at its ends that turn back."""
 
     def turns_back(one: _Piece, other: _Piece) -> bool:
         before = one.start if one is other else one.end
         after = other.end if one is other else other.start
         return _turn(before.heading, after.heading) > MAX_TURN_BACK
 
+    # A single curve that turns back, with only a stub beyond it, is replaced by its chord: cutting it off would remove
+    # a part of the road that exists. Then remove pieces that turn back against their neighbour, from both ends.
     if len(pieces) > 1 and turns_back(pieces[-2], pieces[-2]) and pieces[-1].length <= MAX_STUB:
         pieces = [*pieces[:-2], _straight(pieces[-2])]
     if len(pieces) > 1 and turns_back(pieces[1], pieces[1]) and pieces[0].length <= MAX_STUB:
@@ -176,13 +178,15 @@ def _lane_widths(lane: str, length: float) -> tuple[float, float] | None:
     records = [{key: float(value) for key, value in _ATTRIBUTE.findall(width)} for width in _WIDTH.findall(lane)]
     if not records:
         return None
+    # Widths are cubic polynomials of the distance from the start of their record (OpenDRIVE): the value at the end of
+    # the road comes from the last record.
     last = records[-1]
     along = length - last["sOffset"]
     return records[0]["a"], sum(last[term] * along**power for power, term in enumerate("abcd"))
 
 
 def _joined(road: _Road, roads: Mapping[str, _Road]) -> tuple[_Road, _Road] | None:
-    """Return the roads that a connecting road leads from and into; None for other roads."""
+    """Return the roads before and after a connecting road; None for roads of a different kind."""
     before, after = (road.links.get(which, ("", "")) for which in ("predecessor", "successor"))
     if not road.in_junction or before[1] != "end" or after[1] != "start" or not {before[0], after[0]} <= roads.keys():
         return None
@@ -190,9 +194,11 @@ def _joined(road: _Road, roads: Mapping[str, _Road]) -> tuple[_Road, _Road] | No
 
 
 def _connected(road: _Road, before: _Road, after: _Road) -> str:
-    """Return the element of a connecting road that meets the roads before and after it."""
+    """Return the text of a connecting road adjusted to meet the roads before and after it."""
     links = {lane: dict(_LANE_LINK.findall(match[0])) for match in _LANE.finditer(road.text) if (lane := int(match[1]))}
     pieces: Sequence[_Piece] = road.pieces
+    # The reference line of a connecting road is the inner edge of its innermost lane. Its ends therefore lie on the
+    # inner edges of the lanes that this lane joins.
     inner = min(road.widths, key=abs, default=0)
     if links.get(inner, {}).keys() >= {"predecessor", "successor"}:
         first, last = int(links[inner]["predecessor"]), int(links[inner]["successor"])
@@ -210,7 +216,7 @@ def _connected(road: _Road, before: _Road, after: _Road) -> str:
 
 
 def _leads_to(start: _Frame, end: _Frame) -> bool:
-    """Return whether a curve leads from one place to another without swinging out."""
+    """Return whether a curve between two frames is long enough and does not swing out."""
     x, y = end.x - start.x, end.y - start.y
     chord = math.atan2(y, x)
     swing = max(_turn(start.heading, chord), _turn(end.heading, chord))
@@ -220,7 +226,9 @@ def _leads_to(start: _Frame, end: _Frame) -> bool:
 def _joined_widths(
     road: _Road, links: Mapping[int, Mapping[str, str]], before: _Road, after: _Road
 ) -> Iterator[tuple[int, tuple[float, float]]]:
-    """Yield each lane that joins two others, and its widths at its start and end."""
+    """Yield each lane that joins two others, with its widths at its start and end."""
+    # Innermost lanes come first and take the full width of the lane that they join. Others that join the same lane have
+    # zero width there, so that the carriageway is not wider than the road that it leads into.
     taken: tuple[set[int], set[int]] = (set(), set())
     for lane in sorted(road.widths, key=abs):
         found = links.get(lane, {})
@@ -235,13 +243,17 @@ def _joined_widths(
 
 
 def _curve(start: _Frame, end: _Frame) -> _Piece:
-    """Return a cubic curve between two places that has their headings; of a part of a circle it is one."""
+    """Return a cubic curve between two frames that has their headings; it approximates a circular arc if one fits."""
     cos, sin = math.cos(start.heading), math.sin(start.heading)
     x, y = end.x - start.x, end.y - start.y
     turn = math.remainder(end.heading - start.heading, math.tau)
+    # Cubic Hermite curve with end tangents of equal length. For an arc of angle θ and chord c the usual Bézier handle,
+    # 4/3·tan(θ/4)·radius, gives tangents of c/cos²(θ/4) = 2c/(1 + cos(θ/2)).
     handle = 2.0 * math.hypot(x, y) / (1.0 + math.cos(turn / 2.0))  # three times that of a Bézier curve
     stop = np.array([cos * x + sin * y, cos * y - sin * x])
     first, last = handle * np.array([1.0, 0.0]), handle * np.array([math.cos(turn), math.sin(turn)])
+    # Coefficients of p(t) = first·t + second·t² + third·t³ from p(1) = stop and p'(1) = last, in the frame of the start
+    # (OpenDRIVE's u and v).
     second, third = 3 * stop - 2 * first - last, first + last - 2 * stop
     at = np.linspace(0.0, 1.0, CURVE_STEPS + 1)[:, None]
     length = float(np.hypot(*np.diff(at * (first + at * (second + at * third)), axis=0).T).sum())
@@ -251,7 +263,7 @@ def _curve(start: _Frame, end: _Frame) -> _Piece:
 
 
 def _written(road: _Road, pieces: Sequence[_Piece], widths: Mapping[int, tuple[float, float]] | None = None) -> str:
-    """Return the element of a road with other pieces and widths; its heights are stretched to its length."""
+    """Return the text of a road with new pieces and widths, and its heights stretched to the new length."""
     length = sum(piece.length for piece in pieces)
     places = np.concatenate([[0.0], np.cumsum([piece.length for piece in pieces])])
     plan = "".join(
@@ -269,6 +281,7 @@ def _written(road: _Road, pieces: Sequence[_Piece], widths: Mapping[int, tuple[f
             return match[0]
         slope = (own[1] - own[0]) / length
         record = f'<width sOffset="0" a="{own[0]:.8f}" b="{slope:.8f}" c="0" d="0"/>'
+        # One linear record replaces all records of the lane: the first is exchanged, the others are deleted.
         first, *others = _WIDTH.findall(match[0])
         lane = match[0].replace(first, record, 1)
         for other in others:
@@ -279,7 +292,8 @@ def _written(road: _Road, pieces: Sequence[_Piece], widths: Mapping[int, tuple[f
 
 
 def _stretched(record: str, by: float) -> str:
-    """Return a record of heights along a road whose length has changed by a factor."""
+    """Return an elevation record scaled along its road by a factor."""
     given = {key: float(value) for key, value in _ATTRIBUTE.findall(record)}
+    # With s' = by·s the height stays the same if the coefficient of the n-th power is divided by by**n.
     powers = {"s": -1, "a": 0, "b": 1, "c": 2, "d": 3}
     return "<elevation " + " ".join(f'{key}="{given[key] / by**power:.8f}"' for key, power in powers.items()) + "/>"

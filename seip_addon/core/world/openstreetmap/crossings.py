@@ -1,4 +1,4 @@
-"""Crossings of named streets in an extract: places that people know by two names."""
+"""Crossings of named streets in an extract."""
 
 import math
 from collections import defaultdict
@@ -9,18 +9,18 @@ from ..opendrive.junctions import STREETS
 from .extract import Extract, rings
 from .streets import is_roundabout, is_street
 
-ONE_CROSSING = 60.0  # metres between nodes of the same streets that are one crossing, as those of two carriageways are
+ONE_CROSSING = 60.0  # metres: nodes of the same streets within this distance are one crossing (dual carriageways)
 EARTH_RADIUS = 6_371_000.0  # metres
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """A place at which streets of different names meet.
+    """A place where streets of different names meet.
 
     Parameters
     ----------
     streets : tuple of str
-        Their names, in alphabetical order.
+        Names of the streets, in alphabetical order.
     latitude, longitude : float, degrees
     """
 
@@ -30,12 +30,12 @@ class Crossing:
 
     @property
     def name(self) -> str:
-        """The streets' names, as `junctions.find_junction` knows them."""
+        """Names of the streets in the form that `junctions.find_junction` accepts."""
         return STREETS.join(self.streets)
 
 
 def named_crossings(extract: Extract) -> tuple[Crossing, ...]:
-    """Return the crossings of an extract's named streets, by name; a roundabout is one crossing."""
+    """Return the crossings of an extract's named streets, sorted by name; a roundabout is one crossing."""
     streets = [way for way in extract.ways.values() if "highway" in way.tags and is_street(way.tags)]
     round_ways = [way for way in streets if is_roundabout(way.tags)]
     ring_of = {node: number for number, ring in enumerate(rings(round_ways)[0]) for node in ring}
@@ -44,6 +44,7 @@ def named_crossings(extract: Extract) -> tuple[Crossing, ...]:
     for way in streets:
         for node in way.nodes:
             if node in extract.nodes:
+                # All nodes of a roundabout share one key, negative unlike ids in the database of OpenStreetMap.
                 place = -1 - ring_of[node] if node in ring_of else node
                 nodes[place].add(node)
                 if "name" in way.tags:
@@ -59,7 +60,7 @@ def named_crossings(extract: Extract) -> tuple[Crossing, ...]:
 
 
 def _apart(places: list[tuple[float, float]]) -> Iterator[tuple[float, float]]:
-    """Yield the middles of places that lie together."""
+    """Yield the centres of groups of places that lie close to each other."""
     waiting = sorted(places)
     while waiting:
         group = [place for place in waiting if _metres(waiting[0], place) <= ONE_CROSSING]
@@ -68,7 +69,7 @@ def _apart(places: list[tuple[float, float]]) -> Iterator[tuple[float, float]]:
 
 
 def _metres(one: tuple[float, float], other: tuple[float, float]) -> float:
-    """Return the distance of two places near each other."""
+    """Return the distance between two places near each other (latitude, longitude), metres."""
     north = math.radians(other[0] - one[0])
     east = math.radians(other[1] - one[1]) * math.cos(math.radians(one[0]))
     return EARTH_RADIUS * math.hypot(north, east)

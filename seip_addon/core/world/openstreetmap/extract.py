@@ -1,4 +1,4 @@
-"""An extract of OpenStreetMap as it is read: nodes, ways and relations with their tags."""
+"""Extracts of OpenStreetMap: nodes, ways and relations with their tags, read from XML."""
 
 import itertools
 import math
@@ -15,17 +15,17 @@ from ...site.sources import one_line
 from ...storage.xml_stream import Attributes, quoted, read_tags
 
 MAX_ELEMENTS = 3_000_000  # nodes, ways and relations that are kept at most: about a city
-EARTH_RADIUS = 6_350_000.0  # metres: the least there is, so that windows are no smaller than asked for
-MAX_LATITUDE = 85.0  # degrees: nearer to a pole no projection of streets holds
+EARTH_RADIUS = 6_350_000.0  # metres: below the smallest real radius, so that windows are no smaller than requested
+MAX_LATITUDE = 85.0  # degrees: projections of streets do not hold nearer to a pole
 _OTHER_FORMATS = {
     b"\x00\x00\x00": "is in the PBF format; convert it (osmium cat place.osm.pbf -o place.osm)",
     b"BZh": "is compressed with bzip2; unpack it (bunzip2)",
     b"PK\x03\x04": "is a zip archive; unpack it",
     b"\xfd7zXZ": "is compressed with xz; unpack it (unxz)",
-    b"BLENDER": "is a .blend, no extract; open it in Blender",
+    b"BLENDER": "is a .blend file, not an extract; open it in Blender",
     b"{": "is JSON; download the place as OpenStreetMap XML (.osm)",
 }
-"""How files begin that are given in place of an extract."""
+"""First bytes of other formats that are given in place of an extract, and what to do with such a file."""
 MAX_TAG = 255  # characters of a tag's value, as in the database of OpenStreetMap
 MAX_ID = 2**62
 OPENSTREETMAP = "© OpenStreetMap contributors (ODbL)"
@@ -41,7 +41,7 @@ Window = tuple[float, float, float, float]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Node:
-    """A place by latitude and longitude, degrees, and its tags."""
+    """Latitude and longitude of a node, degrees, and its tags."""
 
     latitude: float
     longitude: float
@@ -50,20 +50,20 @@ class Node:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Way:
-    """Nodes in a row, by their ids, and its tags."""
+    """Ids of the nodes of a way, in order, and its tags."""
 
     nodes: tuple[int, ...]
     tags: Tags
 
     @property
     def is_closed(self) -> bool:
-        """Whether it ends where it begins."""
+        """Whether the way is a ring: its last node is its first."""
         return len(self.nodes) > 3 and self.nodes[0] == self.nodes[-1]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Relation:
-    """Members (kind, id, role) and tags."""
+    """Members (kind, id, role) of a relation, and its tags."""
 
     members: tuple[tuple[str, int, str], ...]
     tags: Tags
@@ -76,13 +76,13 @@ class Extract:
     Parameters
     ----------
     name : str
-        Of its file.
+        Name of its file.
     nodes, ways, relations : dict
-        By their ids, in the order of the file.
+        Elements by id, in the order of the file.
     notes : tuple of str
-        What of the file was left out, and why.
+        Messages about elements that were left out, with the reason.
     attribution : str
-        Credit that the data demand, with their date where the file states one.
+        Credit required by the data, with their date if the file has one.
     """
 
     name: str
@@ -93,13 +93,13 @@ class Extract:
     attribution: str = ""
 
     def line(self, way: Way) -> list[Node]:
-        """Return the nodes of a way that the extract holds: one that was cut off has fewer than the way."""
+        """Return the nodes of a way that the extract contains; a way that is cut off has fewer nodes than ids."""
         return [self.nodes[number] for number in way.nodes if number in self.nodes]
 
 
 @dataclass
 class _Collected:
-    """What has been read so far, and the element that is being read."""
+    """Elements read so far, with counts for notes and the credit of the data."""
 
     nodes: dict[int, Node] = field(default_factory=dict)
     ways: dict[int, Way] = field(default_factory=dict)
@@ -114,7 +114,7 @@ class _Collected:
 
     @property
     def attribution(self) -> str:
-        """The credit of the data: OpenStreetMap's, except where the file names another holder of its rights."""
+        """Credit of the data: OpenStreetMap's unless the file names a different holder of its rights."""
         own = self.holder and "openstreetmap" not in self.holder.casefold()
         credit = f"© {self.holder}" if own else OPENSTREETMAP
         if self.date:
@@ -128,18 +128,18 @@ def read_extract(path: Path, within: Window | None = None) -> Generator[Progress
     Parameters
     ----------
     within : (4,) float, degrees, optional
-        South, west, north, east: what lies outside is passed over, but for the next node of a street that leaves it.
+        South, west, north, east. Elements outside are skipped, except the next node of a street that leaves it.
 
     Yields
     ------
     Progress
-        Of the file.
+        Progress through the file.
 
     Raises
     ------
     SeipError
-        The file cannot be read, is another format, is no well-formed XML, declares entities, holds ids or coordinates
-        that are no numbers, or more than `MAX_ELEMENTS` elements.
+        The file cannot be read, has a different format, is not well-formed XML, declares entities, has ids that are not
+        whole numbers, or has more than `MAX_ELEMENTS` elements.
     """
     _refuse_other_formats(path)
     collected = _Collected()
@@ -147,7 +147,7 @@ def read_extract(path: Path, within: Window | None = None) -> Generator[Progress
     yield from read_tags(path, reader.start, reader.end, cure="download the extract again")
     if collected.root not in ("osm", "osmChange"):
         raise SeipError(
-            f"{path.name} is no extract of OpenStreetMap: its first element is <{collected.root[:40]}>; "
+            f"{path.name} is not an extract of OpenStreetMap: its first element is <{collected.root[:40]}>; "
             "download the place as OpenStreetMap XML (.osm)"
         )
     if not collected.nodes or collected.near == 0:
@@ -158,11 +158,11 @@ def read_extract(path: Path, within: Window | None = None) -> Generator[Progress
         )
     notes = []
     if collected.repeated:
-        notes.append(f"{path.name} gives {counted(collected.repeated, 'element')} twice: the later one counts")
+        notes.append(f"{path.name} has {counted(collected.repeated, 'element')} twice: the later one is used")
     if collected.misplaced:
         notes.append(
-            f"{path.name} gives {counted(collected.misplaced, 'node')} no place on Earth below {MAX_LATITUDE:g} "
-            "degrees of latitude and is read without"
+            f"{path.name} has {counted(collected.misplaced, 'node')} without valid coordinates below {MAX_LATITUDE:g} "
+            "degrees of latitude, which were skipped"
         )
     extract = Extract(
         path.name, collected.nodes, collected.ways, collected.relations, tuple(notes), collected.attribution
@@ -171,7 +171,7 @@ def read_extract(path: Path, within: Window | None = None) -> Generator[Progress
 
 
 def cropped(extract: Extract, within: Window) -> Extract:
-    """Return what of an extract lies within a window, and the next node of each street and track that leaves it."""
+    """Return the part of an extract within a window, with the next node of each street and track that leaves it."""
     south, west, north, east = within
     inside = {
         number
@@ -181,6 +181,8 @@ def cropped(extract: Extract, within: Window) -> Extract:
     ways = {number: way for number, way in extract.ways.items() if not inside.isdisjoint(way.nodes)}
     kept = set(inside)
     for way in ways.values():
+        # A street that leaves the window would otherwise end at its last node inside, possibly far from the edge. Areas
+        # need no such node: their outlines are closed by a straight line (`plan_shapes`).
         if "highway" in way.tags or "railway" in way.tags:
             for one, other in itertools.pairwise(way.nodes):
                 if one in inside or other in inside:
@@ -190,7 +192,7 @@ def cropped(extract: Extract, within: Window) -> Extract:
 
 
 class _Reader:
-    """Handlers of a stream of XML that collect elements."""
+    """Handlers for a stream of XML tags that collect elements."""
 
     def __init__(self, name: str, within: Window | None, into: _Collected) -> None:
         self._name, self._within, self._into = name, within, into
@@ -200,10 +202,10 @@ class _Reader:
         self._members: list[tuple[str, int, str]] = []
         self._deleted = False
         self._middle = None if within is None else (within[1] + within[3]) / 2
-        """Longitude that others are counted from, so that places on both sides of the date line are neighbours."""
+        """Longitude around which others are unwrapped, so that places on both sides of the date line are neighbours."""
 
     def start(self, tag: str, attributes: Attributes) -> None:
-        """Take the beginning of an element."""
+        """Process the start tag of an element."""
         if not self._into.root:
             self._into.root = tag
             self._into.holder = one_line(attributes.get("copyright", "")[:MAX_TAG])
@@ -223,12 +225,14 @@ class _Reader:
             self._members.append((attributes.get("type", ""), self._id(attributes, "ref"), attributes.get("role", "")))
 
     def end(self, tag: str) -> None:
-        """Take the end of an element."""
+        """Process the end tag of an element."""
         if tag not in ("node", "way", "relation") or self._deleted:
             return
         into, tags = self._into, self._tags or _NO_TAGS
         number = self._id(self._attributes, "id")
         if tag == "node":
+            # Ways refer to nodes before it is known which nodes they need, so nodes are kept in a wider band: the next
+            # node of a street that leaves the window may lie far beyond its edge. `cropped` removes the rest.
             place = self._place()
             if place is None or not self._is_within(*place, NEXT_NODE):
                 return
@@ -256,12 +260,12 @@ class _Reader:
         if abs(number) < MAX_ID:
             return number
         raise SeipError(
-            f"{self._name}: {name}={quoted(text)} of an element is no whole number below 2^62; "
+            f"{self._name}: {name}={quoted(text)} of an element is not a whole number below 2^62; "
             "download the extract again"
         )
 
     def _place(self) -> tuple[float, float] | None:
-        """Return latitude and longitude, None where they are no place that streets can be projected from."""
+        """Return latitude and longitude, degrees; None if they are missing, invalid, or too near to a pole."""
         try:
             latitude, longitude = float(self._attributes["lat"]), float(self._attributes["lon"])
         except (KeyError, ValueError):
@@ -275,7 +279,7 @@ class _Reader:
         return None
 
     def _is_within(self, latitude: float, longitude: float, beyond: float = 0.0) -> bool:
-        """Return whether a place lies within the window, or so many metres beyond it."""
+        """Return whether a place lies within the window widened by `beyond` metres."""
         if self._within is None:
             return True
         south, west, north, east = self._within
@@ -303,15 +307,17 @@ def rings(ways: Sequence[Way]) -> tuple[list[list[int]], int]:
     Returns
     -------
     rings : list of list of int
-        Each without its first node repeated at the end.
+        Rings, without the first node repeated at the end.
     open : int
-        Number of ways that are part of no ring.
+        Number of ways that are not part of a ring.
     """
     lines = [way.nodes for way in ways if len(way.nodes) > 1]
     at: dict[int, list[int]] = {}  # the ways that end at a node
     for index, line in enumerate(lines):
         for end in {line[0], line[-1]}:
             at.setdefault(end, []).append(index)
+    # Follow unused ways from end to start until the ring closes or no way continues it. Ways may point in either
+    # direction. Used ways are removed from the front of their lists, so that each is looked at only a few times.
     used = [False] * len(lines)
     found, left = [], 0
     for first, line in enumerate(lines):
@@ -341,7 +347,7 @@ def _refuse_other_formats(path: Path) -> None:
         with path.open("rb") as file:
             start = file.read(16)
     except OSError:
-        return  # the reader says what is the matter
+        return  # the reader reports the error
     for mark, cure in _OTHER_FORMATS.items():
         if start.lstrip(b"\xef\xbb\xbf \t\r\n" if mark == b"{" else b"").startswith(mark):
             raise SeipError(f"{path.name} {cure}")

@@ -1,4 +1,4 @@
-"""On which side of the road traffic keeps, by what an extract shows and where it lies."""
+"""Left- or right-hand traffic of an extract, from its tags, its roundabouts and its location."""
 
 import itertools
 import math
@@ -37,19 +37,21 @@ _LEFT_HAND = (
     ("the Bahamas", 21.9, -79.3, 27.3, -72.7),
     ("Guyana and Suriname", 1.8, -60.0, 8.3, -54.0),
 )
-"""Regions of left-hand traffic as south, west, north, east in degrees: coarse, for where an extract shows nothing.
+"""Regions of left-hand traffic as south, west, north, east in degrees: coarse, for extracts without other evidence.
 
 East is above 180 where a region reaches across the date line.
 """
-_MIN_EVIDENCE = 3.0  # right angles of turn in roundabouts
+_MIN_EVIDENCE = 3.0  # right angles that roundabouts turn in all, at least
 
 
 def drives_on_the_left(extract: Extract) -> tuple[bool, str]:
-    """Return whether traffic keeps to the left, and how that is known."""
+    """Return whether traffic keeps to the left, and the reason for a message."""
     for way in extract.ways.values():
         side = way.tags.get("driving_side")
         if side in ("left", "right"):
-            return side == "left", "a street's driving_side says so"
+            return side == "left", "a street has the tag driving_side"
+    # Roundabouts are one-way in the order of their nodes: counter-clockwise in right-hand traffic, clockwise in
+    # left-hand traffic. Angles add up over ways that are only parts of a roundabout, too.
     turn = sum(_turn(extract, way) for way in _roundabouts(extract))
     if abs(turn) > _MIN_EVIDENCE * math.pi / 2:
         return turn < 0.0, "its roundabouts turn that way"
@@ -66,7 +68,7 @@ def _roundabouts(extract: Extract) -> Iterator[Way]:
 
 
 def _turn(extract: Extract, way: Way) -> float:
-    """Return by which angle a way turns in all, radians counter-clockwise."""
+    """Return the total angle that a way turns by, radians counter-clockwise."""
     nodes = extract.line(way)
     if len(nodes) < 3:
         return 0.0

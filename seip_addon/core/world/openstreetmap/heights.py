@@ -1,16 +1,17 @@
 """Heights of the streets of an extract: on the ground, on bridges with their ramps, and in underpasses.
 
-A map of OpenStreetMap says which street leads over which, and not how high. Each street on a bridge is raised by what
-it needs over what it crosses; the streets next to it lead up to it at a realistic grade, and are raised no more than
-that. With grades as limits between neighbouring places, and needed heights at crossings, these are the smallest heights
-``h ≥ ground`` that satisfy
+OpenStreetMap contains which street leads over which, but not how high. Each street on a bridge is raised by the
+clearance that it needs over the way below; the streets next to it lead up to it at a realistic grade, and are raised no
+more than necessary. With grades as limits between neighbouring places, and clearances at crossings, these are the
+smallest heights ``h ≥ ground`` that satisfy
 
     |h[u] − h[v]| ≤ grade · distance(u, v)    for places u, v next to each other
     h[u] ≥ h[v] + rise                        where the street at u crosses above the one at v
 
-The smallest solution is a longest path from the ground (difference constraints): raise each crossing in turn and spread
-each height over the streets by a search as Dijkstra's, highest first. Each round settles one more crossing of the path,
-so that more rounds than crossings mean that there is no solution. Underpasses are the same upside down, and come first.
+The smallest solution is a longest path from the ground (a system of difference constraints): raise each crossing in
+turn and propagate its height over the streets as in Dijkstra's algorithm, highest first. Each round settles one more
+crossing of the path, so that more rounds than crossings mean that there is no solution. Underpasses are solved first,
+with all heights negated.
 """
 
 import heapq
@@ -40,9 +41,9 @@ GRADE, LINK_GRADE = 0.06, 0.08
 MAX_RISE = 30.0  # metres that a street lies above or below the ground at most
 SAME_SURFACE = 3.0  # metres between places of streets whose lanes lie on each other
 SAME_LINE = 2.0  # metres between the lines of both directions of a street at most
-PARALLEL = math.radians(35.0)  # by which a street turns at most from the way that it was made of
+PARALLEL = math.radians(35.0)  # largest angle between a street and the way that it was made from
 BANK = 8.0  # metres beyond the end of a bridge, where smoothed ground is as high as the bank that carries it
-NEAR_CROSSING = 40.0  # metres from a crossing in which the ends of streets tell the height of a junction
+NEAR_CROSSING = 40.0  # metres from a crossing within which the ends of streets give the height of a junction
 _TOLERANCE = 1e-6  # metres
 
 
@@ -53,9 +54,9 @@ class StreetHeights:
     Parameters
     ----------
     above_ground : Profiles
-        Of all roads, above the ground of the map; on bridges above the straight line between their ends.
+        Heights of all roads above the ground of the map; on bridges above the straight line between their ends.
     profiles : Profiles
-        Of all roads, on that ground.
+        Heights of all roads with the ground added.
     bridges : frozenset of str
         Ids of the roads on bridges.
     notes : tuple of str
@@ -80,20 +81,22 @@ def street_heights(
     shapes: PlanShapes,
     ground: Ground | None = None,
 ) -> StreetHeights:
-    """Return the heights of streets that are laid on the ground and cross each other on bridges.
+    """Return the heights of streets on the ground, with bridges and underpasses where they cross.
 
     Parameters
     ----------
     road_map : RoadMap
-        As netconvert makes it.
+        Map made by netconvert.
     lanes : mapping of str to sequence of LaneSurface
-        Of each of its roads.
+        Lanes of each road by its id.
     sources : mapping of str to str
-        Of which way each of its roads was made, as `netconvert.convert` returns it.
+        Way that each road was made from, as returned by `netconvert.convert`.
     streets : StreetFile
-        The streets, with their bridges and underpasses.
+        Streets with their bridges and underpasses.
+    shapes : PlanShapes
+        Shapes of the extract in map coordinates.
     ground : callable, optional
-        How far the ground lies above the map's own heights; by default it does not.
+        Height of the ground above the heights of the map; zero by default.
     """
     if not streets.structures.crossings and ground is None:
         return StreetHeights({}, {}, frozenset(), ())
@@ -112,14 +115,22 @@ def has_heights(road_map: RoadMap) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Strand:
-    """A street between two junctions: both of its directions, whose heights are the same.
+    """A street between two junctions, with the roads of both directions, which share their heights.
 
     Parameters
     ----------
     nodes : (n,) int64
-        Its places, in the order of the first road.
+        Indices of its places, in the order of the first road.
     roads : tuple of (Road, bool)
-        And whether a road leads the other way.
+        Roads, and whether each leads opposite to the first.
+    layer : int
+        Layer of the way, 0 on the ground.
+    is_bridge : bool
+        Whether the street lies on a bridge.
+    grade : float
+        Steepest grade.
+    street : int
+        Id of the way that it was made from, 0 if unknown.
     """
 
     nodes: Integer
@@ -137,7 +148,7 @@ class _Strand:
 
 @dataclass(eq=False)
 class _Network:
-    """Places along streets, and the difference in height that is allowed between those next to each other."""
+    """Graph of places along streets, with the largest height difference between neighbouring places."""
 
     road_map: RoadMap
     lanes: Mapping[str, Sequence[LaneSurface]]
@@ -160,6 +171,8 @@ class _Network:
     limits: list[list[tuple[int, float]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        # Places are sampled along streets only. Roads within junctions get no places: they link the ends of streets,
+        # and their heights follow from these ends (`above_ground`).
         own = [road for road in self.road_map.roads if road.junction_id is None]
         places, headings, grounds = [np.empty((0, 2))], [np.empty(0)], [np.empty(0)]
         count = 0
@@ -181,6 +194,8 @@ class _Network:
         self.layers = np.array([one.layer for one in self.strands], dtype=np.int64)[of_strand]
         self.streets = np.array([one.street for one in self.strands], dtype=np.int64)[of_strand]
         for strand in self.strands:
+            # Under a bridge the ground drops to a valley, water or another street. Its baseline is the straight line
+            # between its ends, and it lies no lower than the banks just beyond them.
             if strand.is_bridge:
                 ends = strand.nodes[[0, -1]]
                 self.rise[strand.nodes] = _straight(self.rise[ends], len(strand.nodes))
@@ -190,6 +205,9 @@ class _Network:
         self.limits = [[] for _ in range(count)]
         on_bank = self._on_bank()
         for one, other, limit in self._pairs():
+            # Terrain may be steeper than the grade, so the limit is never below the difference that exists already: the
+            # start is then feasible, and heights move only where a crossing needs it. On a bank that difference is an
+            # artefact of smoothed ground, and does not count.
             natural = 0.0 if on_bank[one] and on_bank[other] else abs(float(self.start[one] - self.start[other]))
             allowed = max(limit, natural)
             self.limits[one].append((other, allowed))
@@ -207,13 +225,13 @@ class _Network:
         return np.zeros(len(xy)) if self.ground is None else self.ground(xy)
 
     def _outside(self, ends: Integer) -> Float:
-        """Return places (2, 2) beyond both ends of a bridge."""
+        """Return the points (2, 2) `BANK` metres beyond both ends of a bridge."""
         along = np.column_stack([np.cos(self.heading[ends]), np.sin(self.heading[ends])])
         outside: Float = self.xy[ends] + BANK * along * [[-1.0], [1.0]]
         return outside
 
     def _on_bank(self) -> Boolean:
-        """Return which places are on a bridge or next to its end: the ground does not tell their heights."""
+        """Return which places (n,) are on a bridge or next to its end, where ground heights are not reliable."""
         on_bank: Boolean = np.isfinite(self.banks)
         if on_bank.any():
             tree = shapely.STRtree(shapely.points(self.xy[on_bank]))
@@ -221,11 +239,14 @@ class _Network:
         return on_bank
 
     def _pairs(self) -> Iterator[tuple[int, int, float]]:
-        """Yield places next to each other, and by how much their heights may differ, metres."""
+        """Yield pairs of neighbouring places, and the largest difference of their heights, metres."""
         for strand in self.strands:
+            # Along each street: the lane on the inside of a bend is shorter than the reference line, and so the
+            # steepest.
             steps = np.min([self._steps(road, len(strand.nodes), back=back) for road, back in strand.roads], axis=0)
             for one, other, length in zip(strand.nodes[:-1].tolist(), strand.nodes[1:].tolist(), steps, strict=True):
                 yield one, other, strand.grade * float(length)
+        # Across junctions: between all ends of streets, and along each connecting road.
         for ends in self.meeting.values():
             for one, other in itertools.combinations(sorted(ends), 2):
                 yield one, other, GRADE * float(np.hypot(*(self.xy[other] - self.xy[one])))
@@ -233,6 +254,8 @@ class _Network:
             start, end = self._end(road.predecessor), self._end(road.successor)
             if road.junction_id is not None and start is not None and end is not None:
                 yield start, end, GRADE * float(self._steps(road, 2, back=False)[0])
+        # Where lanes of different streets lie on each other, as at a fork, their surfaces must not come apart. Streets
+        # of different layers may well lie above each other there.
         points = shapely.points(self.xy)
         first, second = shapely.STRtree(points).query(points, predicate="dwithin", distance=SAME_SURFACE)
         known = {node: number for number, strand in enumerate(self.strands) for node in strand.nodes.tolist()}
@@ -241,7 +264,7 @@ class _Network:
                 yield one, other, GRADE * float(np.hypot(*(self.xy[other] - self.xy[one])))
 
     def _steps(self, road: Road, places: int, *, back: bool) -> Float:
-        """Return the lengths in plan between places along a road, (n - 1,) metres, of the shortest lane."""
+        """Return the lengths in plan between places along a road on its shortest lane, (n - 1,) metres."""
         along = np.linspace(0.0, road.length, places)
         lengths = [np.diff(along)]
         for lane in in_groups(self.lanes[road.id], CARRIAGEWAY):
@@ -253,14 +276,14 @@ class _Network:
         return shortest[::-1] if back else shortest
 
     def _end(self, link: RoadLink | None) -> int | None:
-        """Return the place at the end of a road."""
+        """Return the place at the end of a linked road, None without one."""
         if link is None or link.id not in self.strand_of:
             return None
         return self.strand_of[link.id].node_at(link.id, link.contact)
 
     @cached_property
     def meeting(self) -> dict[str, set[int]]:
-        """Return the places at which streets end at each junction; where one leads into another likewise."""
+        """Places at the ends of streets by junction id; a joint of two roads outside junctions has a key of its own."""
         meeting: dict[str, set[int]] = {}
         for strand in self.strands:
             for road, _ in strand.roads:
@@ -274,7 +297,7 @@ class _Network:
         return meeting
 
     def cells(self) -> list[shapely.Polygon]:
-        """Return the area in plan of the lanes about each place."""
+        """Return the area in plan covered by the lanes around each place."""
         found: list[list[Float]] = [[] for _ in range(len(self.xy))]
         for strand in self.strands:
             for road, back in strand.roads:
@@ -287,13 +310,14 @@ class _Network:
         return [shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *one]))) for one in found]
 
     def of_way(self, nodes: Integer, ids: Sequence[int], layer: int, heading: float) -> Integer:
-        """Return the places of a way, by its ids; where its roads have those of others by layer and direction."""
+        """Return those of `nodes` that belong to a way, by its ids; without any, by layer and direction."""
         named: Integer = nodes[np.isin(self.streets[nodes], ids)]
-        alike: Integer = nodes[(self.layers[nodes] == layer) & self._is_parallel(nodes, heading)]
-        return named if len(named) else alike
+        # netconvert may merge ways into one road, which then has the id of only one of them
+        similar: Integer = nodes[(self.layers[nodes] == layer) & self._is_parallel(nodes, heading)]
+        return named if len(named) else similar
 
     def leads_on(self, nodes: Integer, street: int, heading: float) -> Integer:
-        """Return which places are those of streets that go on straight where a street ends."""
+        """Return those of `nodes` on streets that continue straight from the ends of a street."""
         ends = {node for one in self.strands if one.street == street for node in one.nodes[[0, -1]].tolist()}
         met = set().union(*(nodes_there for nodes_there in self.meeting.values() if nodes_there & ends))
         streets = [one.street for one in self.strands if met & set(one.nodes[[0, -1]].tolist())]
@@ -306,7 +330,7 @@ class _Network:
         return parallel
 
     def above_ground(self, heights: Float) -> Profiles:
-        """Return places along all roads, and how high these are above the ground, from heights (n,) of streets."""
+        """Return stations along each road and heights above the ground there, from the heights (n,) of places."""
         above = heights - self.rise
         found: dict[str, tuple[Float, Float]] = {}
         for strand in self.strands:
@@ -318,6 +342,7 @@ class _Network:
                 along = _stations(road.length)
                 own = road.elevation(along)
                 ends = [self._linked(link, found) for link in (road.predecessor, road.successor)]
+                # A connecting road keeps its own shape in height, shifted linearly so that both ends meet its streets.
                 known = [end for end in ends if end is not None]
                 if known:
                     own += np.interp(along, [0.0, road.length], [known[0] - own[0], known[-1] - own[-1]])
@@ -325,7 +350,7 @@ class _Network:
         return found
 
     def on_ground(self, road: Road, along: Float, above: Float) -> tuple[Float, Float]:
-        """Return places (n,) along a road and the heights there, from those above the ground."""
+        """Return stations (n,) along a road and heights there, from the heights above the ground."""
         x, y, _ = road.reference_line(along)
         rise = self._rise(np.column_stack([x, y]))
         if road.id in self.strand_of and self.strand_of[road.id].is_bridge:
@@ -333,7 +358,7 @@ class _Network:
         return along, above + rise
 
     def _linked(self, link: RoadLink | None, found: Profiles) -> float | None:
-        """Return the height of the end of a road, metres."""
+        """Return the height of the end of a linked road, metres; None without one."""
         if link is None or link.id not in found:
             return None
         return float(found[link.id][1][-1 if link.contact == "end" else 0])
@@ -341,16 +366,18 @@ class _Network:
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Where a street crosses something.
+    """Location of a grade-separated crossing.
 
     Parameters
     ----------
+    crossing : Crossing
+        Ways that cross.
     own : (n,) int64
         Places of the street on the bridge or in the underpass.
     others : (m,) int64
-        Places of the street that it crosses; none where that is not a street.
+        Places of the crossed street; empty if the crossed way is not a street.
     ground : float, metres
-        Height of what is not a street.
+        Height of a crossed way that is not a street.
     """
 
     crossing: Crossing
@@ -370,7 +397,7 @@ class _Place:
 
 
 def _crossing_places(network: _Network, shapes: PlanShapes) -> list[_Place]:
-    """Return where streets cross on bridges and in underpasses."""
+    """Return the locations of crossings on bridges and in underpasses."""
     crossings = network.structures.crossings
     if not crossings:
         return []
@@ -386,6 +413,9 @@ def _crossing_places(network: _Network, shapes: PlanShapes) -> list[_Place]:
             continue  # heights of the extract are those of its bridges, too
         own, other = shapes.line(crossing.way), shapes.line(crossing.other)
         for street_area, other_area in corridors(crossing, own, other):
+            # The clearance must hold wherever the street covers the crossed way, including lanes beside its centre
+            # line: take all places whose lanes overlap the crossed area, on the street and on what continues it
+            # straight.
             common = street_area.intersection(other_area)
             if common.is_empty:
                 continue
@@ -405,7 +435,7 @@ def _crossing_places(network: _Network, shapes: PlanShapes) -> list[_Place]:
 def _places_of(
     network: _Network, tree: shapely.STRtree, common: BaseGeometry, ids: Sequence[int], layer: int, heading: float
 ) -> Integer:
-    """Return the places of a street in an area where it is crossed, or those next to a junction there."""
+    """Return the places of a crossed street in the common area, or else near it, as within a junction."""
     for area in (common, common.centroid.buffer(NEAR_CROSSING)):
         near = np.sort(tree.query(area, predicate="intersects"))
         found = network.of_way(near, ids, layer, heading) if ids else near[:0]
@@ -415,18 +445,21 @@ def _places_of(
 
 
 def _heading(line: Float, place: Float) -> float:
-    """Return the direction of a line (n, 2) next to a place (2,), radians."""
+    """Return the direction of the segment of a line (n, 2) nearest to a point (2,), radians."""
     pieces = shapely.linestrings(np.stack([line[:-1], line[1:]], axis=1))
     x, y = np.diff(line, axis=0)[int(np.argmin(shapely.distance(pieces, shapely.Point(place))))]
     return math.atan2(y, x)
 
 
 def _separated(network: _Network, places: Sequence[_Place]) -> tuple[Float, list[Crossing]]:
-    """Return the heights (n,) of all places, and the crossings that no grade allows to separate.
+    """Return the heights (n,) of all places, and the crossings that cannot be separated within the grades.
 
-    Each bridge is settled in turn: one that makes the task impossible stays as it was.
+    Each bridge is added in turn; one that leaves no solution stays flat.
     """
     banks = {node: float(network.banks[node]) for node in np.flatnonzero(np.isfinite(network.banks)).tolist()}
+    # Underpasses first, with all heights negated, then bridges on top of the result. All crossings of one street form a
+    # group: a bridge that clears only some of the ways below it would be of no use. Groups accepted before are solved
+    # again with each new one, because it may raise the streets that they cross.
     heights, flat, settled = _spread(network.limits, network.start, banks), [], list[_Place]()
     for down in (True, False):
         streets: dict[int, list[_Place]] = {}
@@ -443,12 +476,17 @@ def _separated(network: _Network, places: Sequence[_Place]) -> tuple[Float, list
 
 
 def _settled(network: _Network, heights: Float, places: Sequence[_Place], *, down: bool) -> Float | None:
-    """Return heights (n,) from which all crossings are separated, None where no grade allows it."""
+    """Return heights (n,) that separate all crossings, starting from `heights`; None if the grades do not allow it."""
     sign = -1.0 if down else 1.0
     heights = sign * heights
+    # One round raises every street that is too low over the highest place that it crosses, and propagates this. A
+    # street raised in one round may be crossed by another: chains of n crossings need n rounds, and one more to
+    # confirm.
     for _ in range(len(places) + 1):
         wanted: dict[int, float] = {}
         for place in places:
+            # With heights negated the lower street of an underpass is the one to be "raised". Crossings of the other
+            # kind only count where the crossed way is a street, whose height may have changed.
             moved, still = (place.lower, place.upper) if down else (place.upper, place.lower)
             if len(moved) and (place.crossing.is_bridge != down or len(still)):
                 other = float(heights[still].max()) if len(still) else sign * place.ground
@@ -465,10 +503,12 @@ def _settled(network: _Network, heights: Float, places: Sequence[_Place], *, dow
 
 
 def _spread(limits: Sequence[Sequence[tuple[int, float]]], heights: Float, wanted: Mapping[int, float]) -> Float:
-    """Return the least heights (n,) that are no lower than before, nor than wanted, and within the limits."""
+    """Return the smallest heights (n,) within the limits that are at least `heights` and at least `wanted`."""
     heights = heights.copy()
     waiting = [(-height, node) for node, height in wanted.items()]
     heapq.heapify(waiting)
+    # Dijkstra's algorithm with the highest place first (heapq is a min-heap, hence negated heights). Limits are not
+    # negative, so a place has its final height when it is first taken from the heap; later entries are lower.
     while waiting:
         negative, node = heapq.heappop(waiting)
         if -negative > heights[node]:
@@ -483,15 +523,17 @@ def _flat_notes(crossings: Iterable[Crossing]) -> Iterator[str]:
     """Yield a note for each crossing that is built on one level."""
     for text in dict.fromkeys(map(str, crossings)):
         yield (
-            f"{text} is built flat: the streets that join both are too short to climb there at {GRADE:.0%} "
+            f"{text} is built flat: the streets that connect both are too short to climb there at {GRADE:.0%} "
             f"({LINK_GRADE:.0%} on ramps)"
         )
 
 
 def _both_directions(roads: Sequence[Road], sources: Mapping[str, str]) -> list[tuple[tuple[Road, bool], ...]]:
-    """Return roads, both directions of a street together, and whether each leads the other way than the first."""
+    """Return the roads grouped by street, with a flag for each that leads opposite to the first of its group."""
     found: dict[str, list[tuple[Road, bool]]] = {}
     for road in roads:
+        # netconvert marks the backward direction of a way with a minus sign. Both roads share heights only if they also
+        # lie on the same line; carriageways that were drawn apart stay separate.
         source = sources.get(road.id, f"road {road.id}")
         key = source.removeprefix("-")
         if key in found and _is_other_direction(found[key][0][0], road):
@@ -516,7 +558,7 @@ def _straight(ends: Float, places: int) -> Float:
 
 
 def _across(lanes: Sequence[LaneSurface], along: Float) -> list[Float]:
-    """Return corners of lanes at places along their road, (n, 2) each."""
+    """Return the edge points of lanes at stations along their road, a list of (n, 2)."""
     found = []
     for lane in lanes:
         inside = along[(along >= lane.s[0] - _TOLERANCE) & (along <= lane.s[-1] + _TOLERANCE)]
@@ -528,6 +570,6 @@ def _across(lanes: Sequence[LaneSurface], along: Float) -> list[Float]:
 
 
 def _way_id(source: str) -> int:
-    """Return the id of the way that a road was made of, 0 where it is unknown."""
+    """Return the id of the way that a road was made from, 0 if it is unknown."""
     digits = "".join(itertools.takewhile(str.isdigit, source.removeprefix("-")))
     return int(digits) if digits else 0

@@ -1,4 +1,4 @@
-"""Ground beside the streets of an extract that new posts keep off: ways, crossing landings, private ground."""
+"""Ground next to the streets of an extract where new posts are not allowed: ways, crossing landings, private ground."""
 
 from collections.abc import Iterator, Sequence
 
@@ -32,29 +32,29 @@ PRIVATE_KINDS = {
     ("amenity", "parking"),
     ("amenity", "fuel"),
 }
-"""Areas that are private ground unless they are said to be public."""
+"""Areas that are private ground unless tagged as public."""
 AREA_KINDS = ("leisure", "landuse", "amenity", "natural", "surface", "place")
 """Keys of areas of ground that ``access`` may make private."""
 BOUNDARIES = {"Wall", "Fence", "Hedge", "Wire fence", "City wall", "Noise barrier"}
 """Barriers behind which the ground is private."""
 MIN_PUBLIC_STRIP, BEHIND = 1.0, 5.0
 """Metres between carriageway and a barrier that leave room for a post in front, and depth of the ground behind."""
-STEP = 2.0  # metres of a barrier whose far side is found at once
+STEP = 2.0  # metres: length of the pieces of a barrier whose far sides are determined separately
 
 
 def keep_off_areas(
     shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeometry, ways: Sequence[SideWay], walls: Sequence[Wall]
 ) -> Iterator[KeepOffArea]:
-    """Yield the areas about a place that rules keep new posts off, map coordinates.
+    """Yield the areas around a place from which rules exclude new posts, map coordinates.
 
     Parameters
     ----------
     area : shapely geometry
-        The surroundings of the place, prepared.
+        Surroundings of the place, prepared.
     carriageway : shapely geometry
-        Of the map.
+        Carriageway of the map.
     ways : sequence of SideWay
-        Ways beside the road, of which some have a rule.
+        Ways next to the road, some of which have a rule.
     walls : sequence of Wall
         Barriers.
     """
@@ -70,7 +70,9 @@ def keep_off_areas(
 
 
 def _landings(shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeometry) -> Iterator[BaseGeometry]:
-    """Yield the ground in front of crossings: mapped ones, and those that are a mere point of a street."""
+    """Yield the ground in front of crossings, mapped as ways or as single nodes of a street."""
+    # Crossings mapped as ways come first; their nodes are remembered, because the shared node of the street usually has
+    # tags of a crossing too, and would count twice.
     kerbside = carriageway.buffer(LANDING_DEPTH).difference(carriageway)
     shapely.prepare(kerbside)
     crossed: set[int] = set()
@@ -87,6 +89,9 @@ def _landings(shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeometry)
             tags = shapes.extract.nodes[number].tags
             if tags.get("highway") != "crossing" or tags.get("crossing") == "no" or number in crossed:
                 continue
+            # A single node has no direction across the street: take the normal to the chord of its neighbours, long
+            # enough for any street, and keep the parts of the strip near the node. Others lie on a different
+            # carriageway.
             before, after = line[max(index - 1, 0)], line[min(index + 1, len(line) - 1)]
             along = (after - before) / (np.hypot(*(after - before)) or 1.0)
             aside = MAX_CROSSING_LENGTH / 2 * np.array([-along[1], along[0]])
@@ -99,7 +104,7 @@ def _landings(shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeometry)
 
 
 def _extended(line: Float) -> Float:
-    """Return a line (n, 2) that goes on straight at both ends."""
+    """Return a line (n, 2) extended straight at both ends."""
 
     def beyond(end: Float, before: Float) -> Float:
         way = end - before
@@ -134,13 +139,15 @@ def _is_private(tags: Tags) -> bool:
 
 
 def _behind_barriers(walls: Sequence[Wall], carriageway: BaseGeometry) -> Iterator[BaseGeometry]:
-    """Yield the ground behind walls, fences and hedges, as seen from the carriageway.
+    """Yield the ground behind walls, fences and hedges, seen from the carriageway.
 
     A barrier at the kerb itself protects a pavement and has public ground behind it.
     """
     lines = [shapely.LineString(wall.line) for wall in walls if wall.name in BOUNDARIES]
     if not lines or carriageway.is_empty:
         return
+    # For each short piece of a barrier, "behind" is the continuation of the shortest line from the carriageway to its
+    # middle. Strips that meet a carriageway again belong to barriers between two roads, with no private ground behind.
     pieces = [shapely.get_coordinates(line) for line in shapely.segmentize(lines, STEP)]
     start, stop = (np.concatenate([piece[cut] for piece in pieces]) for cut in (slice(-1), slice(1, None)))
     middle = (start + stop) / 2

@@ -1,4 +1,4 @@
-"""Crossings of pedestrians in the map of an extract: mapped ones in place of those that netconvert guesses."""
+"""Pedestrian crossings in the map of an extract: mapped crossings replace those that netconvert guesses."""
 
 import itertools
 import math
@@ -25,7 +25,7 @@ from .streets import StreetFile
 MAPPED_AROUND = 40.0  # metres from a mapped crossing within which no crossing is guessed
 MAX_AWAY = 15.0  # metres from a crossing to the lanes of its street: in the map these end where a junction begins
 ALONG_STREET = math.radians(30.0)  # between a crossed street and its lanes
-LINE_STEP = 1.0  # metres between the places of a road that the nearest to a crossing is looked for at
+LINE_STEP = 1.0  # metres between the points of a road among which the nearest to a crossing is found
 _OBJECTS = re.compile(r"<objects\s*/>|<objects>.*?</objects>", re.DOTALL)
 _ROAD = re.compile(r'<road [^>]*?id="([^"]*)".*?</road>', re.DOTALL)
 _GUESSED_AT = re.compile(r":(.*)_c\d+")
@@ -35,7 +35,7 @@ _GUESSED = re.compile(r'<object id="([^"]*)" type="crosswalk".*?</object>\s*', r
 
 @dataclass(frozen=True, eq=False)
 class _Crossed:
-    """A place where a street is crossed: its node, middle (2,), direction of the street (2,) and extent along it."""
+    """A mapped crossing: its node, middle (2,), direction of the street (2,) and extent along it, metres."""
 
     node: int
     middle: Float
@@ -51,16 +51,24 @@ def with_mapped_crossings(
     shapes: PlanShapes,
     joints: Collection[str] = (),
 ) -> tuple[RoadMap, str]:
-    """Return a map, and its text, whose crossings are those of the extract.
+    """Return a map, and its text, with the crossings of the extract.
 
-    A guessed crossing stays where streets meet and the extract maps none nearby; its name says that it is assumed.
+    A guessed crossing remains where streets meet and the extract maps none nearby; its name marks it as assumed.
 
     Parameters
     ----------
+    road_map : RoadMap
+        Map of the streets.
+    text : str
+        The same map as text.
     lanes : mapping of str to sequence of LaneSurface
-        Of each road of the map.
+        Lanes of each road of the map by its id.
+    streets : StreetFile
+        Streets that the map was made from.
+    shapes : PlanShapes
+        Shapes of the extract in map coordinates.
     joints : collection of str
-        Names of the junctions in which a street only goes on: nothing tells that it is crossed there.
+        Names of junctions where a street only continues: crossings guessed there have no evidence.
     """
     driven = [lane for own in lanes.values() for lane in in_groups(own, CARRIAGEWAY) if lane.junction_id is None]
     crossed = [_on_carriageway(one, driven) for one in _crossed_places(streets, shapes)]
@@ -84,18 +92,21 @@ def guessed_crossings(road_map: RoadMap, area: BaseGeometry) -> int:
 
 
 def _crossed_places(streets: StreetFile, shapes: PlanShapes) -> Iterator[_Crossed]:
-    """Yield where streets are crossed: nodes that are crossings, and nodes shared with a way that is one."""
+    """Yield the places where streets are crossed: nodes tagged as crossings, and nodes shared with a crossing way."""
     extract = shapes.extract
     widths = dict(_crossing_nodes(extract))
     ways = [way for way in streets.ways.values() if "highway" in way.tags]
+    # Number of street segments at each node: a node with more than two is a junction.
     arms = Counter(itertools.chain.from_iterable(pair for way in ways for pair in itertools.pairwise(way.nodes)))
     done: set[int] = set()
     for way in ways:
         known = [number for number in way.nodes if number in extract.nodes]
         for index, number in enumerate(known):
-            if number not in widths or number in done or arms[number] > 2:  # where streets meet, no place is told
+            if number not in widths or number in done or arms[number] > 2:  # a junction has no single street direction
                 continue
             done.add(number)
+            # The chord between the neighbouring nodes gives the direction of the street; at an end the node itself
+            # serves.
             before, middle, after = (
                 shapes.point(extract.nodes[known[min(max(place, 0), len(known) - 1)]])
                 for place in (index - 1, index, index + 1)
@@ -118,7 +129,7 @@ def _crossing_nodes(extract: Extract) -> Iterator[tuple[int, float]]:
 
 @dataclass(frozen=True, eq=False)
 class _Laid:
-    """A crossing on the carriageway: its node, middle (2,), heading of the street, and size along and across it."""
+    """A crossing fitted to the carriageway: its node, middle (2,), street heading, and size along and across it."""
 
     node: int
     middle: Float
@@ -128,25 +139,29 @@ class _Laid:
 
 
 def _on_carriageway(crossed: _Crossed, lanes: Sequence[LaneSurface]) -> _Laid:
-    """Return a crossing from edge to edge of the carriageway of its street.
+    """Return a crossing that spans the carriageway of its street from edge to edge.
 
-    The width is that of the street where its lanes are nearest: a junction of the map may begin before the crossing.
+    Its width is measured where the lanes of the street are nearest: in the map, a junction may begin before it.
     """
     heading = math.atan2(crossed.along[1], crossed.along[0])
     aside = np.array([-crossed.along[1], crossed.along[0]])
     here = shapely.Point(crossed.middle)
-    beside = [
+    along_street = [
         shapely.make_valid(lane.polygon)
         for lane in lanes
         if _is_along(lane, heading) and lane.polygon.dwithin(here, MAX_AWAY + MAX_CROSSING_LENGTH / 2)
     ]
-    if beside:
-        area = shapely.union_all(beside).buffer(MAX_SEAM, join_style="mitre")
+    if along_street:
+        # The buffer closes seams between lanes; it is taken off the measured width again at the end.
+        area = shapely.union_all(along_street).buffer(MAX_SEAM, join_style="mitre")
         nearest = shapely.get_coordinates(shapely.shortest_line(here, area))[1]
+        # Move the section along the street to its nearest lanes, just beyond their end, and measure there. The crossing
+        # itself keeps its place along the street, and moves sideways to the middle of the carriageway.
         shift = float((nearest - crossed.middle) @ crossed.along)
         middle = crossed.middle + (shift + math.copysign(MAX_SEAM, shift) * (shift != 0.0)) * crossed.along
         reach = MAX_CROSSING_LENGTH / 2 * aside
         across = shapely.LineString([middle - reach, middle + reach]).intersection(area)
+        # Carriageways divided by an island give several sections, of which the nearest is crossed here.
         parts = [part for part in shapely.get_parts(across) if part.length > 2 * MAX_SEAM]
         part = min(parts, key=lambda one: float(one.distance(shapely.Point(middle))), default=None)
         if part is not None and part.dwithin(shapely.Point(middle), MAX_AWAY):
@@ -157,14 +172,14 @@ def _on_carriageway(crossed: _Crossed, lanes: Sequence[LaneSurface]) -> _Laid:
 
 
 def _is_along(lane: LaneSurface, heading: float) -> bool:
-    """Return whether a lane leads along a street somewhere."""
+    """Return whether some part of a lane is parallel to a street heading."""
     x, y = np.diff((lane.left + lane.right)[:, :2], axis=0).T
     turns = np.arctan2(y, x) - heading
     return bool((np.abs(np.remainder(turns + math.pi / 2, math.pi) - math.pi / 2) < ALONG_STREET).any())
 
 
 def _by_road(crossed: Sequence[_Laid], road_map: RoadMap) -> dict[str, list[RoadObject]]:
-    """Return the crossings as objects of the roads that pass nearest to them."""
+    """Return the crossings as road objects, by the id of the nearest road."""
     if not crossed:
         return {}
     roads = [road for road in road_map.roads if road.length > 0.0]
@@ -202,7 +217,7 @@ def _object(crossed: _Laid, road: Road, s: float) -> RoadObject:
 
 
 def _kept(road: Road, mapped: BaseGeometry, joints: Collection[str]) -> Iterator[RoadObject]:
-    """Yield the objects of a road without the guessed crossings at joints and near mapped ones."""
+    """Yield the objects of a road except guessed crossings at joints and near mapped crossings."""
     for one in road.objects:
         if one.kind != CROSSING:
             yield one
@@ -213,10 +228,12 @@ def _kept(road: Road, mapped: BaseGeometry, joints: Collection[str]) -> Iterator
 
 
 def _written(text: str, roads: Sequence[Road]) -> str:
-    """Return the text of a map of netconvert with the crossings of its roads."""
+    """Return the text of a map of netconvert with the crossings of `roads`."""
     objects = {road.id: road.objects for road in roads}
 
     def road_text(match: re.Match[str]) -> str:
+        # Guessed crossings are removed from the text or marked by a name; mapped ones, which have no outline, are
+        # added.
         kept = {one.id for one in objects[match[1]]}
         new = "".join(_element(one) for one in objects[match[1]] if not one.outlines)
 

@@ -21,15 +21,15 @@ def convert(streets: StreetFile, source: Path, target: Path) -> Generator[Progre
     Parameters
     ----------
     streets : StreetFile
-        What was written to ``source``.
+        Streets as written to ``source``.
     target : Path
-        The map to write.
+        Map to write.
 
     Returns
     -------
     dict of str to str
-        For each road of the map the way that it was made of: its id, with a minus sign where the road leads the other
-        way, and what netconvert adds.
+        Source of each road of the map: the id of the way that it was made from, with a minus sign if the road leads
+        the opposite way, and a suffix that netconvert adds.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def convert(streets: StreetFile, source: Path, target: Path) -> Generator[Progre
     """
     programs = find_sumo()
     if programs.home is None:
-        raise SeipError("SUMO's files are not found beside its programs: set SUMO_HOME to the folder that holds them")
+        raise SeipError("SUMO's data files were not found near its programs: set SUMO_HOME to the folder with them")
     types = ",".join(str(programs.home / "data" / "typemap" / name) for name in TYPE_FILES)
     options: list[object] = [
         *("--osm-files", source, "--opendrive-output", target, "--type-files", types),
@@ -50,12 +50,14 @@ def convert(streets: StreetFile, source: Path, target: Path) -> Generator[Progre
     ]
     if streets.left_hand:
         options += ["--lefthand", "--opendrive-output.lefthand-left"]
-    # netconvert joins slip lanes of any length, and what leads over a street with what lies below
+    # netconvert would join the ends of slip lanes of any length, and the ends of bridges with junctions below them
     apart = sorted(streets.structures.ends.union(streets.slip_ends, *streets.roundabouts))
     if apart:
         options += ["--junctions.join-exclude", ",".join(map(str, apart))]
     if streets.elevated:
         options += ["--osm.elevation"]
+    # --geometry.remove merges consecutive edges. Streets on bridges and in underpasses must stay separate roads,
+    # because their heights differ from those of the streets next to them. netconvert names the parts of a way `id#n`.
     kept = [
         f"{sign}{number}{part}"
         for number, way in sorted(streets.ways.items())
@@ -73,7 +75,7 @@ def convert(streets: StreetFile, source: Path, target: Path) -> Generator[Progre
 
 
 def _sources(text: str) -> dict[str, str]:
-    """Return the way that each road of a map was made of, as netconvert notes it in the map."""
+    """Return the source way of each road of a map, from the ``sumoId`` that netconvert writes."""
     found = {}
     for piece in re.split(r"(?=<road )", text):
         road, source = _ROAD.match(piece), _SOURCE.search(piece)
@@ -83,9 +85,10 @@ def _sources(text: str) -> dict[str, str]:
 
 
 def _without_dates(text: str, streets: StreetFile) -> str:
-    """Return a map that is the same whenever it is made, and says on which side traffic keeps.
+    """Return the text of a map without dates, with a rule for left-hand traffic and with corrected names.
 
-    Names in it are escaped once: netconvert escapes them twice. Its own ids (``:12_0``) are not names of streets.
+    Without dates the same streets give the same bytes. netconvert escapes names twice, which is undone, and writes
+    internal ids (``:12_0``) as names of roads, which are removed.
     """
     text = re.sub(r"&amp;(amp|apos|gt|lt|quot);", r"&\1;", text)
     text = re.sub(r"<!--.*?-->\s*", "", text, count=1, flags=re.DOTALL)

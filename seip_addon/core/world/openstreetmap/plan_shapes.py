@@ -1,4 +1,4 @@
-"""Footprints and lines of an extract in metres of a map: mended where that can be, else left out and counted."""
+"""Footprints and lines of an extract in map coordinates; invalid ones are repaired, or left out and counted."""
 
 import math
 from collections import Counter
@@ -12,10 +12,10 @@ from ...arrays import Float
 from ...geometry.geo_reference import TransverseMercator
 from .extract import Extract, Node, Relation, Way, rings
 
-MIN_FOOTPRINT = 0.5  # square metres below which an outline is none
+MIN_FOOTPRINT = 0.5  # square metres: smaller outlines are ignored
 OUTER_ROLES, INNER_ROLES = {"outer", "outline", "part", ""}, {"inner"}
 
-# what is counted in `PlanShapes.dropped`: one of it, and several
+# reasons counted in `PlanShapes.dropped`: singular and plural
 MENDED = ("outline that crosses itself was mended", "outlines that cross themselves were mended")
 NOT_CLOSED = (
     "outline that is not closed, or is cut off by the extract, was closed",
@@ -26,7 +26,7 @@ TOO_LITTLE = (
     "outlines of which the extract has too little were left out",
 )
 PIECES = ("piece of an outline that does not close was left out", "pieces of outlines that do not close were left out")
-DRAWN_TWICE = ("outline that is drawn twice counts once", "outlines that are drawn twice count once")
+DRAWN_TWICE = ("outline that is drawn twice was used once", "outlines that are drawn twice were used once")
 
 
 class PlanShapes:
@@ -37,7 +37,7 @@ class PlanShapes:
     to_map : TransverseMercator
         Projection of the map.
     offset : (2,) float64, metres
-        What the map's header subtracts from projected coordinates.
+        Offset in the map's header, which is subtracted from projected coordinates.
     """
 
     def __init__(self, extract: Extract, to_map: TransverseMercator, offset: Float) -> None:
@@ -45,15 +45,15 @@ class PlanShapes:
         self._to_map, self._offset = to_map, offset
         self._known: dict[int, tuple[float, float]] = {}
         self.dropped: Counter[tuple[str, str]] = Counter()
-        """What was left out or mended, by reason."""
+        """Number of elements left out or repaired, by reason."""
 
     def point(self, node: Node) -> Float:
-        """Return where a node is, (2,) metres."""
+        """Return the position of a node, (2,) metres."""
         place: Float = np.array(self._to_map(math.radians(node.latitude), math.radians(node.longitude))) - self._offset
         return place
 
     def line(self, way: Way) -> Float:
-        """Return the nodes (n, 2) of a way that the extract holds, metres, without repeats one after the other."""
+        """Return the nodes of a way that the extract contains (n, 2), metres, without consecutive repeats."""
         points = [self._place(number) for number in way.nodes if number in self.extract.nodes]
         kept = [point for place, point in enumerate(points) if place == 0 or point != points[place - 1]]
         return np.array(kept).reshape(-1, 2)
@@ -66,7 +66,7 @@ class PlanShapes:
         area : shapely geometry
             Prepared.
         values : set of str or None
-            Of the tag; None: any.
+            Accepted values of the tag; None accepts any.
         """
         for way in self.extract.ways.values():
             if key in way.tags and (values is None or way.tags[key] in values):
@@ -75,10 +75,10 @@ class PlanShapes:
                     yield way, line
 
     def footprint(self, element: Way | Relation) -> BaseGeometry | None:
-        """Return the area of a closed way or of a multipolygon relation, None where there is none.
+        """Return the area of a closed way or of a multipolygon relation; None if it has no usable outline.
 
-        A way that the extract cuts off, and one that is not closed, are closed by a straight line where three corners
-        are left; an outline that crosses itself is made valid.
+        A way that is not closed, or is cut off by the extract, is closed by a straight line if at least three corners
+        and half of its nodes are left. An outline that crosses itself is made valid.
         """
         area = self._of_way(element) if isinstance(element, Way) else self._of_relation(element)
         if area is None or area.is_empty:
@@ -86,6 +86,7 @@ class PlanShapes:
         if not area.is_valid:
             self.dropped[MENDED] += 1
             area = shapely.make_valid(area)
+        # make_valid may leave lines and points besides polygons.
         parts = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon" and part.area >= MIN_FOOTPRINT]
         return shapely.union_all(parts) if parts else None
 
@@ -105,6 +106,8 @@ class PlanShapes:
         if not outer:
             return None
         inner = self._joined(relation, INNER_ROLES)
+        # Holes are subtracted from the union of all outer rings: roles are explicit, so that it need not be known which
+        # hole belongs to which ring.
         area = shapely.union_all([shapely.make_valid(ring) for ring in outer])
         return area.difference(shapely.union_all([shapely.make_valid(ring) for ring in inner]))
 
@@ -131,7 +134,7 @@ class PlanShapes:
 
 
 def _is_nearly_whole(way: Way, line: Float) -> bool:
-    """Return whether an outline has at least half of its nodes."""
+    """Return whether an outline still has at least half of its nodes."""
     return 2 * len(line) >= len(way.nodes)
 
 
@@ -141,7 +144,7 @@ def polygons(area: BaseGeometry) -> Iterator[shapely.Polygon]:
 
 
 def spaced(line: Float, spacing: float) -> Float:
-    """Return points (n, 2) along a line (k, 2): its ends, and between them at about a spacing, metres."""
+    """Return equidistant points (n, 2) along a line (k, 2), ends included, about `spacing` metres apart."""
     path = shapely.LineString(line)
     gaps = max(round(path.length / spacing), 1)
     points = shapely.line_interpolate_point(path, np.linspace(0.0, path.length, gaps + 1))

@@ -11,17 +11,19 @@ _FEET = re.compile(
 
 
 def metres(text: str | None, most: float) -> float | None:
-    """Return a length in metres; of several (``3;4``) the greatest.
+    """Parse a length in metres; the largest of several (``3;4``).
 
     Parameters
     ----------
+    text : str or None
+        Value of a tag.
     most : float, metres
-        A length that is not above zero, or above this, counts as none.
+        Largest valid length.
 
     Returns
     -------
     float or None
-        None where the text is no such length.
+        None if the text has no length above zero and up to ``most``.
     """
     lengths = [_metres(one.strip().lower()) for one in (text or "").split(";")]
     sound = [length for length in lengths if length is not None and 0.0 < length <= most]
@@ -29,7 +31,7 @@ def metres(text: str | None, most: float) -> float | None:
 
 
 def count(text: str | None, most: float) -> float | None:
-    """Return how many levels, lanes or the like: a number from 0 to ``most``, of several the greatest; else None."""
+    """Parse a count (levels, lanes) between 0 and ``most``; the largest of several, None if there is no valid one."""
     numbers = [match for one in (text or "").split(";") if (match := _PLAIN.fullmatch(one.strip())) and not match[2]]
     sound = [value for match in numbers if 0.0 <= (value := _number(match[1])) <= most]
     return max(sound, default=None)

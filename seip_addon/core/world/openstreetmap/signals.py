@@ -1,7 +1,7 @@
 """Traffic signals of an extract, matched to the junctions that they control.
 
-Many are mapped where traffic stops, some metres before the junction: there netconvert drops them. They are written at
-the junction that the traffic there comes to first.
+Many signals are mapped where traffic stops, some metres before the junction. netconvert drops them there, so they are
+written at the first junction that this traffic reaches.
 """
 
 import math
@@ -12,23 +12,23 @@ from ...arrays import Float
 from .extract import Extract, Tags, Way
 
 SIGNAL_REACH = 40.0  # metres from a stop line to the junction that its signals control, at most
-CROSSING_REACH = 15.0  # metres from signals of a pedestrian crossing, which need not be those of a junction
+CROSSING_REACH = 15.0  # metres: the same for signals of a pedestrian crossing, which need not belong to a junction
 BEHIND_REACH = 15.0  # metres from signals back to the junction that they stand behind, at most
 _REVERSED = ("-1", "reverse")
 
 
 @dataclass(frozen=True)
 class Signals:
-    """Signals of the streets of an extract.
+    """Traffic signals of the streets of an extract.
 
     Parameters
     ----------
     junctions : frozenset of int
-        Nodes of the junctions that signals are mapped in front of.
+        Nodes of junctions with signals mapped nearby.
     moved : frozenset of int
         Nodes of those signals.
     unmatched : tuple of int
-        Nodes of signals that no junction follows.
+        Nodes of signals without a junction within reach.
     """
 
     junctions: frozenset[int]
@@ -43,7 +43,7 @@ def matched_signals(extract: Extract, streets: Sequence[Way], lines: Mapping[int
     ----------
     streets : sequence of Way
     lines : mapping of int to (2,) float64, metres
-        Where the nodes are, by their ids.
+        Positions of the nodes by id.
     """
     beside: dict[int, list[int]] = {}
     found: dict[int, list[tuple[Way, int]]] = {}
@@ -63,7 +63,7 @@ def matched_signals(extract: Extract, streets: Sequence[Way], lines: Mapping[int
             reach = CROSSING_REACH
         ahead = {following for way, place in places for following in _ahead(way, place, tags)}
         ends = [end for following in sorted(ahead) for end in _first_junction(node, following, beside, lines, reach)]
-        if not ends:  # where the signals themselves stand: behind the junction
+        if not ends:  # mapped at the post itself, which may stand behind the junction
             behind = set(beside[node]) - ahead
             ends = [end for one in sorted(behind) for end in _first_junction(node, one, beside, lines, BEHIND_REACH)]
         if ends:
@@ -79,13 +79,13 @@ def _is_junction(neighbours: Sequence[int]) -> bool:
 
 
 def _direction(tags: Tags) -> str | None:
-    """Return for which direction of a way signals are: ``forward`` or ``backward``, None where for both."""
+    """Return the direction of a way that signals control: ``forward`` or ``backward``, None for both."""
     given = tags.get("traffic_signals:direction", tags.get("direction"))
     return given if given in ("forward", "backward") else None
 
 
 def _ahead(way: Way, place: int, tags: Tags) -> Iterator[int]:
-    """Yield the nodes next to signals to which their traffic goes."""
+    """Yield the nodes next to signals towards which the controlled traffic drives."""
     oneway = way.tags.get("oneway", "no")
     direction = _direction(tags)
     one_way = oneway in ("yes", "true", "1") or way.tags.get("junction") in ("roundabout", "circular")
@@ -98,7 +98,7 @@ def _ahead(way: Way, place: int, tags: Tags) -> Iterator[int]:
 def _first_junction(
     node: int, following: int, beside: Mapping[int, Sequence[int]], lines: Mapping[int, Float], reach: float
 ) -> Iterator[tuple[float, int]]:
-    """Yield distance and node of the junction that a street comes to first within reach, metres."""
+    """Yield distance (metres) and node of the first junction along a street, if it is within reach."""
     away = 0.0
     while True:
         away += math.dist(lines[node], lines[following])
@@ -107,6 +107,7 @@ def _first_junction(
         if _is_junction(beside[following]):
             yield away, following
             return
+        # Not a junction, so at most one neighbour is left besides the node that the walk came from.
         onward = sorted(set(beside[following]) - {node})
         if not onward:
             return

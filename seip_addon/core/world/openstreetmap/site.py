@@ -1,4 +1,4 @@
-"""From an extract of OpenStreetMap to a map of its streets and a description of what stands beside them."""
+"""Map of the streets in an extract of OpenStreetMap, and a description of the objects next to them."""
 
 import difflib
 import itertools
@@ -53,35 +53,36 @@ from .streets import (
 
 EXTRACT_SUFFIXES = (".osm", ".osm.gz", ".osm.xml")
 STREET_REACH = 450.0  # metres beyond the region within which streets are laid out: traffic comes from there
-MAX_JUNCTION_DISTANCE = 60.0  # metres from a place to the junction that is meant at most
+MAX_JUNCTION_DISTANCE = 60.0  # metres from a requested place to its junction at most
 NAMES = ("name", "name:en", "alt_name", "ref")
 """Tags that name a street."""
 RANKS = (*(kind for kind in CLASSES if not kind.endswith("_link")), "service", *CLASSES)
 """Classes of streets, the highest first, and slip roads last."""
 MAX_ROUNDABOUT = 200.0  # metres across which a roundabout is one place at most
-MIN_RAMP = 0.05  # metres by which a bridge or ramp moves a street that a note names
-MAX_NAMED = 6  # streets that a note names
-MAX_SHOWN = 12  # letters of a tag's value that a note shows
-STANDS_AROUND = 20.0  # metres beyond the scene within which what stands there counts
+MIN_RAMP = 0.05  # metres: notes list streets that a bridge or ramp moves by at least this much
+MAX_NAMED = 6  # street names in a note at most
+MAX_SHOWN = 12  # characters of a tag's value in a note at most
+STANDS_AROUND = 20.0  # metres beyond the scene within which objects are included
 
 
 @dataclass(frozen=True)
 class ExtractPlace:
-    """Which place of an extract is studied.
+    """Place of an extract to study.
 
     Parameters
     ----------
     near : (latitude, longitude) or None, degrees
+        Position of the place.
     streets : tuple of str
-        Names of two streets, or more, that meet there, in place of ``near``.
+        Names of two or more streets that meet there, instead of ``near``.
     radius, approaches : float or None, metres
-        As of a `SiteDescription`; without either the region follows the approaches of the junction.
+        See `SiteDescription`; without either the region follows the approaches of the junction.
     service : bool
         Whether driveways and aisles are streets.
     left_hand : bool or None
-        On which side traffic keeps; None: as the extract shows.
+        Whether traffic keeps to the left; None to derive it from the extract.
     level : tuple of str
-        Names of streets on the level that is studied.
+        Names of streets on the level to study.
     """
 
     near: tuple[float, float] | None = None
@@ -94,42 +95,44 @@ class ExtractPlace:
 
     @property
     def reach(self) -> float:
-        """How far the region may reach from the place, metres."""
+        """Largest distance of the region from the place, metres."""
         return self.radius or self.along + MAX_JUNCTION_DISTANCE
 
     @property
     def along(self) -> float:
-        """How far the region follows the approaches of a junction, metres."""
+        """Length of the approaches of a junction in the region, metres."""
         return self.approaches or DEFAULT_RADIUS
 
 
 def is_extract(path: Path) -> bool:
-    """Return whether a file is an extract by its name."""
+    """Return whether a file name is that of an extract."""
     return path.name.lower().endswith((*EXTRACT_SUFFIXES, ".pbf"))
 
 
 @dataclass(frozen=True, eq=False)
 class ExtractSite:
-    """The streets of an extract about a place, and what stands there.
+    """Streets of an extract around a place, and the objects there.
 
     Parameters
     ----------
     road_map : RoadMap
-        The streets as netconvert lays them out: flat, unless the extract has heights.
+        Map of the streets made by netconvert: flat, unless the extract has heights.
     map_text : str
-        The same as text.
+        The same map as text.
     description : SiteDescription
+        Objects next to the streets, and the extent of the region.
     notes : tuple of str
-        What was assumed or left out.
+        Messages about assumptions and omissions.
     streets : StreetFile
+        Streets as written for netconvert.
     sources : mapping of str to str
-        Of which way each road was made, as `netconvert.convert` returns it.
+        Way that each road was made from, as returned by `netconvert.convert`.
     shapes : PlanShapes
-        The extract on the map.
+        Shapes of the extract in map coordinates.
     lanes : mapping of str to tuple of LaneSurface
-        Of each road of the map.
+        Lanes of each road of the map by its id.
     area : shapely geometry
-        What notes tell of: about as far as the region of interest reaches, map coordinates.
+        Area that notes refer to, about the region of interest; map coordinates.
     """
 
     road_map: RoadMap
@@ -143,7 +146,7 @@ class ExtractSite:
     area: BaseGeometry
 
     def on_ground(self) -> "ExtractSite":
-        """Return the streets on the ground of the description, on bridges and in underpasses."""
+        """Return the same site with its streets raised to the ground, onto bridges and into underpasses."""
         relief = self.description.relief
         ground = None if relief is None else relief.rise
         heights = street_heights(self.road_map, self.lanes, self.sources, self.streets, self.shapes, ground)
@@ -164,7 +167,7 @@ class ExtractSite:
         return raised
 
     def _ramp_notes(self, heights: StreetHeights) -> Iterator[str]:
-        """Yield a note on streets in the area whose heights are assumed: bridges, underpasses and their ramps."""
+        """Yield a note on the assumed heights of bridges, underpasses and their ramps in the area."""
         names = street_names(self.road_map)
         moved: dict[str, float] = {}
         for number, (along, above) in heights.above_ground.items():
@@ -189,21 +192,27 @@ class ExtractSite:
 
 
 def site_of_extract(path: Path, place: ExtractPlace, map_path: Path) -> Generator[Progress, None, ExtractSite]:
-    """Lay out the streets of an extract about a place, and describe what stands there.
+    """Make a map of the streets of an extract around a place, and a description of the objects there.
 
     Parameters
     ----------
+    path : Path
+        Extract.
+    place : ExtractPlace
+        Place to study.
     map_path : Path
-        Where the map of the streets is written (.xodr); its folder takes a file in between.
+        Map of the streets to write (.xodr). A temporary file is written next to it.
 
     Raises
     ------
     SeipError
-        The extract cannot be read or holds no such place or no street there, or SUMO is missing.
+        The extract cannot be read, or lacks the place or a street there, or SUMO is missing.
     """
     if place.near is None and not place.streets:
         raise SeipError(f'{path.name} needs a place: --near-latlon LAT LON, or --junction "One Street" "Other Street"')
     _check(place)
+    # Streets are laid out well beyond the region, for traffic; 200 m more hold the junction that was named, whose
+    # centre may lie away from the place.
     most = place.reach + STREET_REACH + 200.0
     extract = yield from read_extract(path, None if place.near is None else window(*place.near, most))
     near, place_notes = (place.near, ()) if place.near else _meeting_place(extract, place.streets)
@@ -226,6 +235,8 @@ def site_of_extract(path: Path, place: ExtractPlace, map_path: Path) -> Generato
     shapes, middle = _shapes(extract, road_map, near)
     surfaces = {road.id: lane_surfaces(road) for road in road_map.roads}
     map_text = map_path.read_text(encoding="utf-8")
+    # A "junction" where one street only continues, with other lanes or width, is not a place to study, nor one where
+    # pedestrians are known to cross.
     lanes = without_plain_joints(list(itertools.chain(*surfaces.values())))
     meeting = {lane.junction_id for lane in lanes}
     joints = {junction.name for junction in road_map.junctions if junction.id not in meeting}
@@ -241,7 +252,8 @@ def site_of_extract(path: Path, place: ExtractPlace, map_path: Path) -> Generato
     reach = place.reach if place.radius else max(place.reach, _reach(lanes, together, middle) + place.along)
     carriageway = _carriageway(lanes, middle, reach)
     area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
-    beside = surroundings(shapes, area, carriageway)
+    stands_there = surroundings(shapes, area, carriageway)
+    # Notes only concern the region of interest, not the streets that are laid out for traffic.
     seen = shapely.Point(middle).buffer(place.radius or _reach(lanes, together, middle) + place.along)
     tunnels = _tunnels(extract, shapes, seen, place.level)
     _check_level(place.level, tunnels, road_map)
@@ -252,7 +264,7 @@ def site_of_extract(path: Path, place: ExtractPlace, map_path: Path) -> Generato
     is_junction = bool(junction) and junction[0][1] <= (place.radius or math.inf)
     near_streets = [way for way in streets.ways.values() if seen.intersects(_path(shapes, way))]
     description = replace(
-        beside,
+        stands_there,
         name=STREETS.join(names) or f"{'Junction' if is_junction else 'Street'} at {near[0]:.5f}, {near[1]:.5f}",
         near=None if place.radius is None else (float(middle[0]), float(middle[1])),
         junction=junction[0][0].id if place.radius is None else None,
@@ -302,19 +314,19 @@ def _lone_signals(nodes: Sequence[Node]) -> Iterator[str]:
 
 
 def _path(shapes: PlanShapes, way: Way) -> BaseGeometry:
-    """Return the line of a way, map coordinates; an empty one where the extract has less than two of its nodes."""
+    """Return the line of a way, map coordinates; empty if the extract has fewer than two of its nodes."""
     line = shapes.line(way)
     return shapely.LineString(line if len(line) > 1 else None)
 
 
 def _assumed_widths(ways: Iterable[Way]) -> frozenset[str]:
-    """Return the groups of lanes whose widths the extract does not give for some streets: always those of pavements."""
+    """Return the groups of lanes whose widths are assumed for some streets; those of pavements always are."""
     known = all(has_widths(way.tags) for way in ways if "highway" in way.tags)
     return frozenset({"sidewalk", "biking"}) if known else frozenset({"sidewalk", "biking", "driving"})
 
 
 def _assumed_lanes(ways: Iterable[Way]) -> Iterator[str]:
-    """Yield notes on streets whose number of lanes the extract does not give."""
+    """Yield notes on streets without a number of lanes in the extract."""
     streets: dict[int, list[str]] = {}
     for way in ways:
         if "highway" in way.tags and not has_lane_count(way.tags) and not implausible_lanes(way.tags):
@@ -328,23 +340,23 @@ def _assumed_lanes(ways: Iterable[Way]) -> Iterator[str]:
 
 
 def _implausible_lanes(ways: Iterable[Way]) -> Iterator[str]:
-    """Yield a note on each street whose tags give a number of lanes that cannot be."""
+    """Yield a note on each street whose tags give an implausible number of lanes."""
     notes = []
     for way in ways:
         given = implausible_lanes(way.tags) if "highway" in way.tags else {}
         if given:
             name = {**way.tags, **shown_name(way.tags)}.get("name") or UNNAMED_ROAD
-            said = ", ".join(
+            values = ", ".join(
                 f"{key}={value[:MAX_SHOWN]}{'…' * (len(value) > MAX_SHOWN)}" for key, value in given.items()
             )
             lanes = sum(lane_counts(way.tags).values())
             are = counted(lanes, "lane in all is", "lanes in all are")
-            notes.append(f"the extract gives {name} {said}, which is not a plausible number of lanes: {are} assumed")
+            notes.append(f"the extract gives {name} {values}, which is not a plausible number of lanes: {are} assumed")
     yield from dict.fromkeys(notes)
 
 
 def _tunnels(extract: Extract, shapes: PlanShapes, seen: BaseGeometry, level: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of streets of the level that lie in tunnels in an area, as the extract spells them."""
+    """Return the names of streets of the level that lie in tunnels in an area, in the spelling of the extract."""
     wanted = {name.strip().casefold() for name in level}
     found = (
         next(way.tags[key] for key in NAMES if way.tags.get(key, "").casefold() in wanted)
@@ -357,13 +369,13 @@ def _tunnels(extract: Extract, shapes: PlanShapes, seen: BaseGeometry, level: Se
 
 
 def _check_level(level: Sequence[str], tunnels: Sequence[str], road_map: RoadMap) -> None:
-    """Refuse a level whose street lies in a tunnel as a whole."""
+    """Raise an error if all streets of the level lie in tunnels."""
     known = {text.casefold() for road in road_map.roads for text in (road.id, road.name)}
     hidden = [name for name in tunnels if name.casefold() not in known]
     if hidden and not any(name.strip().casefold() in known for name in level):
         raise SeipError(
             f"{hidden[0]} lies in a tunnel at this place, and scenes leave tunnels out: choose a street on the "
-            "surface by --level, or none"
+            "surface with --level, or leave --level out"
         )
 
 
@@ -371,13 +383,13 @@ def _tunnel_notes(tunnels: Sequence[str]) -> Iterator[str]:
     """Yield a note on streets of the level that lie in tunnels."""
     for name in tunnels:
         yield (
-            f"{name} lies in a tunnel at this place: scenes leave tunnels out, so that the streets above are studied, "
+            f"{name} lies in a tunnel at this place, and scenes leave tunnels out: the streets above are studied, "
             f"and {name} only where it is in the open"
         )
 
 
 def _assumed_crossings(number: int) -> Iterator[str]:
-    """Yield a note on crossings that the extract does not map."""
+    """Yield a note on crossings that are not mapped in the extract."""
     if number:
         are = counted(number, "crossing of pedestrians at junctions is", "crossings of pedestrians at junctions are")
         yield f"{are} assumed: the extract maps none there"
@@ -386,10 +398,10 @@ def _assumed_crossings(number: int) -> Iterator[str]:
 def _check(place: ExtractPlace) -> None:
     for name, length in (("radius", place.radius), ("approaches", place.approaches)):
         if length is not None and not 0.0 < length < math.inf:
-            raise SeipError(f"--{name} {length:g} is no length: give metres above zero")
+            raise SeipError(f"--{name} {length:g} is not a valid length: give metres above zero")
     if place.near is not None and not (abs(place.near[0]) <= MAX_LATITUDE and abs(place.near[1]) <= 180.0):
         raise SeipError(
-            f"--near-latlon {place.near[0]:g} {place.near[1]:g} is no place with streets: give degrees, the latitude "
+            f"--near-latlon {place.near[0]:g} {place.near[1]:g} is not a valid place: give degrees, the latitude "
             f"first, up to {MAX_LATITUDE:g}, then the longitude, up to 180"
         )
     if place.near is None and len({name.strip().casefold() for name in place.streets} - {""}) < len(place.streets):
@@ -399,19 +411,25 @@ def _check(place: ExtractPlace) -> None:
 def surroundings_of_map(
     path: Path, road_map: RoadMap, description: SiteDescription, middle: Float, reach: float
 ) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...]]]:
-    """Add to a description what an extract says of the surroundings of a place on a map.
+    """Add the surroundings of a place on a map, read from an extract, to a description.
 
     Parameters
     ----------
+    path : Path
+        Extract.
+    road_map : RoadMap
+        Map that the place is on.
+    description : SiteDescription
+        Description to add to.
     middle : (2,) float64, metres
-        Of the place, map coordinates.
+        Centre of the place, map coordinates.
     reach : float, metres
-        How far the region may reach from it.
+        Largest distance of the region from it.
 
     Raises
     ------
     SeipError
-        The extract cannot be read, or the map names no projection that places it.
+        The extract cannot be read or has no objects at the place, or the map has no known projection.
     """
     extract = yield from read_extract(path)
     shapes = PlanShapes(extract, _projection(road_map), road_map.header_offset[:2])
@@ -419,19 +437,19 @@ def surroundings_of_map(
     area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
     found = surroundings(shapes, area, _carriageway(lanes, middle, reach))
     if not found.has_objects:
-        raise SeipError(f"{path.name} has nothing that stands at the place: take the extract of the map's own place")
+        raise SeipError(f"{path.name} has no objects at the place: use an extract of the area of the map")
     dropped = [counted(number, *reason) for reason, number in shapes.dropped.items() if number]
     found = replace(found, attribution=(extract.attribution,))
     return description.with_objects_of(found), (*extract.notes, *dropped)
 
 
 def place_on_map(road_map: RoadMap, near: tuple[float, float]) -> tuple[float, float]:
-    """Return where a place of latitude and longitude (degrees) is on a map, x and y in metres.
+    """Return the map coordinates x and y (metres) of a latitude and longitude (degrees).
 
     Raises
     ------
     SeipError
-        The map names no projection that is known.
+        The map has no known projection.
     """
     east, north = _projection(road_map)(math.radians(near[0]), math.radians(near[1]))
     return east - float(road_map.header_offset[0]), north - float(road_map.header_offset[1])
@@ -441,14 +459,14 @@ def _projection(road_map: RoadMap) -> TransverseMercator:
     to_map = projection(road_map.geo_reference)
     if to_map is None or road_map.header_offset[3]:
         raise SeipError(
-            f"map {road_map.name!r} names no projection that latitudes and longitudes can be laid on it with: "
+            f"map {road_map.name!r} has no projection for latitudes and longitudes: "
             "its <geoReference> must be a UTM zone or a transverse Mercator projection"
         )
     return to_map
 
 
 def _shapes(extract: Extract, road_map: RoadMap, near: tuple[float, float]) -> tuple[PlanShapes, Float]:
-    """Return the shapes of an extract on a map, and where the place is there, (2,) metres."""
+    """Return the shapes of an extract in map coordinates, and the position of the place there, (2,) metres."""
     shapes = PlanShapes(extract, _projection(road_map), road_map.header_offset[:2])
     return shapes, np.array(place_on_map(road_map, near))
 
@@ -460,7 +478,9 @@ def _carriageway(lanes: Sequence[LaneSurface], middle: Float, reach: float) -> B
 
 
 def _roundabouts(road_map: RoadMap, streets: StreetFile, extract: Extract) -> tuple[frozenset[str], ...]:
-    """Return the ids of the junctions of each roundabout; of one that is a whole quarter each stays its own."""
+    """Return the junction ids of each roundabout up to `MAX_ROUNDABOUT` across; larger ones are left out."""
+    # netconvert names junctions by their node. A ring road around a whole quarter is tagged as a roundabout too; its
+    # junctions are separate places.
     by_node = {junction.name: junction.id for junction in road_map.junctions}
     found = []
     for nodes in streets.roundabouts:
@@ -471,7 +491,7 @@ def _roundabouts(road_map: RoadMap, streets: StreetFile, extract: Extract) -> tu
 
 
 def _reach(lanes: Sequence[LaneSurface], junctions: Collection[str], middle: Float) -> float:
-    """Return how far junctions reach from a place, metres."""
+    """Return the largest distance from a place to the lanes within junctions, metres."""
     corners = [lane.left[:, :2] - middle for lane in lanes if lane.junction_id in junctions]
     return float(np.hypot(*np.concatenate([np.zeros((1, 2)), *corners]).T).max())
 
@@ -484,10 +504,11 @@ def _title(
     roundabouts: Sequence[frozenset[str]],
     ranks: Mapping[str, int],
 ) -> list[str]:
-    """Return the names of the streets that a place is titled by.
+    """Return the names of up to two streets for the title of a place.
 
-    With a radius these are the streets of the nearest junction within it, of a level only where its streets meet; where
-    there is none, the level's streets, or the nearest street.
+    These are streets of the nearest junction. With a radius the junction must lie within it and, with a level, one of
+    the streets of the level must meet there. If there is no such junction, the streets of the level are used, or the
+    nearest street.
     """
     near = nearest_junctions(road_map, lanes, float(middle[0]), float(middle[1]), len(road_map.junctions))
     on_level = {name.strip().casefold() for name in place.level}
@@ -511,14 +532,14 @@ def _title(
 def _street_names(
     road_map: RoadMap, lanes: Sequence[LaneSurface], junction_id: str, together: Collection[str]
 ) -> tuple[str, ...]:
-    """Return the names of the streets that meet at junctions that are one, first those of the one in the middle."""
+    """Return the names of the streets at a group of junctions that form one, those of the central junction first."""
     meeting = streets_of_junctions(road_map, lanes)
     numbers = sorted(together, key=lambda number: (number != junction_id, number))
     return tuple(dict.fromkeys(name for number in numbers for name in meeting.get(number, ())))
 
 
 def _ranks(ways: Iterable[Way]) -> defaultdict[str, int]:
-    """Return the rank of each street by its name: that of its highest class, slip roads last."""
+    """Return the rank of each street by name: the rank of its highest class, with slip roads last."""
     ranks: defaultdict[str, int] = defaultdict(lambda: len(RANKS))
     for way in ways:
         name = {**way.tags, **shown_name(way.tags)}.get("name", "")
@@ -530,7 +551,7 @@ def _ranks(ways: Iterable[Way]) -> defaultdict[str, int]:
 def _headings(
     road_map: RoadMap, lanes: Sequence[LaneSurface], junctions: Collection[str]
 ) -> defaultdict[str, list[float]]:
-    """Return the directions, radians, of each street that meets junctions, by its name."""
+    """Return the directions (radians) of each street at a group of junctions, by street name."""
     area = shapely.union_all([lane.polygon for lane in lanes if lane.junction_id in junctions])
     names = {road.id: road.name for road in road_map.roads}
     headings: defaultdict[str, list[float]] = defaultdict(list)
@@ -542,18 +563,21 @@ def _headings(
 
 
 def _crossing_pair(names: Sequence[str], headings: Mapping[str, Sequence[float]]) -> list[str]:
-    """Return the first of names, and the first of the others whose street does not go on from that one's."""
+    """Return the first name, and the first other name whose street crosses that one instead of continuing it."""
 
     def crosses(name: str) -> bool:
         pairs = itertools.product(headings.get(names[0], ()), headings.get(name, ()))
+        # Directions are compared modulo 180 degrees: a street that continues the other under a new name is in line with
+        # it.
         return any(abs(math.remainder(one - other, math.pi)) > SAME_DIRECTION for one, other in pairs)
 
+    # The sort is stable, so that names keep their rank among those that cross, and among those that do not.
     others = sorted(names[1:], key=lambda name: not crosses(name))
     return [*names[:1], *others[:1]]
 
 
 def _spelt(extract: Extract, name: str) -> str:
-    """Return the name of a street, in whatever letters it was asked for, as the extract spells it."""
+    """Return the name of a street in the spelling of the extract, from any of its names."""
     wanted = name.strip().casefold()
     for way in _streets_called(extract, name):
         shown = {**way.tags, **shown_name(way.tags)}
@@ -564,14 +588,14 @@ def _spelt(extract: Extract, name: str) -> str:
 
 
 def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[tuple[float, float], tuple[str, ...]]:
-    """Return latitude and longitude of where streets meet, and a note where they meet in several places.
+    """Return the latitude and longitude where streets meet, and a note if they meet in several places.
 
-    It is the mean of the nodes that they share and that lie together; the most nodes count.
+    Nodes that the streets share are grouped by distance; the result is the mean of the largest group.
     """
     named = {name: _streets_called(extract, name) for name in names}
     for name, ways in named.items():
         if not ways:
-            raise SeipError(f"{extract.name} has no street called {name!r}; {_alike(extract, name)}")
+            raise SeipError(f"{extract.name} has no street called {name!r}; {_similar_names(extract, name)}")
     nodes = [{number for way in ways for number in way.nodes} for ways in named.values()]
     shared = sorted(set.intersection(*nodes) & extract.nodes.keys())
     if not shared:
@@ -579,6 +603,8 @@ def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[tuple[floa
         raise SeipError(f"{both} do not meet in {extract.name}: name streets that share a node")
     groups: list[list[Node]] = []
     for node in (extract.nodes[number] for number in shared):
+        # Single-linkage clustering: a node merges all groups that have a node near it. Dual carriageways that cross
+        # share up to four nodes, which are one place.
         met = [group for group in groups if any(_distance(node, other) < MAX_JUNCTION_DISTANCE for other in group)]
         groups = [*(group for group in groups if group not in met), [node, *itertools.chain(*met)]]
     places = [
@@ -589,14 +615,14 @@ def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[tuple[floa
         return places[0], ()
     first, *others = [f"{latitude:.5f} {longitude:.5f}" for latitude, longitude in places[:4]]
     note = (
-        f"{' and '.join(names)} meet in {len(places)} places, of which the one at {first} counts: for another give "
+        f"{' and '.join(names)} meet in {len(places)} places; the one at {first} is used: for a different one give "
         f"--near-latlon {' or '.join(others)}"
     )
     return places[0], (note,)
 
 
 def _distance(one: Node, other: Node) -> float:
-    """Return the distance between two nodes that are not far from each other, metres."""
+    """Return the distance between two nodes near each other, metres."""
     north = math.radians(one.latitude - other.latitude)
     east = math.radians(one.longitude - other.longitude) * math.cos(math.radians(one.latitude))
     return EARTH_RADIUS * math.hypot(north, east)
@@ -611,7 +637,7 @@ def _streets_called(extract: Extract, name: str) -> list[Way]:
     ]
 
 
-def _alike(extract: Extract, name: str) -> str:
+def _similar_names(extract: Extract, name: str) -> str:
     known = sorted({way.tags["name"] for way in extract.ways.values() if "name" in way.tags and is_street(way.tags)})
     close = difflib.get_close_matches(name, known, n=4, cutoff=0.4) or known[:5]
     return f"the closest: {', '.join(close)}" if close else "its streets have no names"

@@ -1,4 +1,4 @@
-"""What stands beside the streets of an extract: trees, lamps, posts, walls, shelters; and ways that are no road."""
+"""Objects next to the streets of an extract: trees, lamps, posts, walls, shelters, and ways that are not roads."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -32,16 +32,16 @@ BARRIERS = {
     "noise_barrier": (3.5, 0.2, "wall"),
     "wire_fence": (1.2, 0.04, "steel"),
 }
-"""Height and thickness (metres) that are assumed for a kind of ``barrier``, and its material."""
+"""Assumed height and thickness (metres) of each kind of ``barrier``, and its material."""
 POST_KINDS = {
     ("power", "pole"): 9.0,
     ("man_made", "utility_pole"): 8.0,
     ("man_made", "pole"): 6.0,
     ("man_made", "mast"): 10.0,
 }
-"""Heights (metres) that are assumed for posts, by key and value."""
+"""Assumed heights (metres) of posts, by key and value."""
 POWER_POLES = {"power", "utility_pole"}
-"""Keys and values of posts that carry lines, and belong to who runs these."""
+"""Keys and values of posts that carry lines and belong to the operator of these."""
 SIGNAL_HEIGHT, SIGNAL_ARM = 6.0, 0.0
 SHELTER_SIZE, SHELTER_HEIGHT, SHELTER_ROOF = (4.0, 1.5), 2.5, 0.15  # metres: length and depth, height, and roof
 FOOTWAYS = "Footways"
@@ -54,18 +54,20 @@ WAY_WIDTHS: dict[str, tuple[float, str, str, RuleName | None]] = {
     "service": (3.5, "asphalt shoulder", "Driveways", "driveways"),
     "track": (3.0, "asphalt shoulder", "Driveways", "driveways"),
 }
-"""Width (metres), material and name of ways that are not roads, and the rule that keeps new posts off them."""
+"""Width (metres), material and name of ways that are not roads, and the rule that excludes new posts from them."""
 
 
 def surroundings(shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeometry) -> SiteDescription:
-    """Return what an extract says of the surroundings of a place.
+    """Return a description of the surroundings of a place from an extract.
 
     Parameters
     ----------
+    shapes : PlanShapes
+        Shapes of the extract in map coordinates.
     area : shapely geometry
-        What reaches into it counts; map coordinates.
+        Area of interest, map coordinates; objects that reach into it are included.
     carriageway : shapely geometry
-        Of the map: signals on it hang over its lanes, and are no posts.
+        Carriageway of the map. Signals on it are mounted above its lanes, and have no posts.
     """
     shapely.prepare(area)
     shapely.prepare(carriageway)
@@ -89,7 +91,7 @@ def surroundings(shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeomet
 
 
 def _height(tags: Tags, usual: float, most: float) -> tuple[float, bool]:
-    """Return a height in metres, and whether it is assumed."""
+    """Return a height from tags, metres, and whether it is assumed instead."""
     own = metres(tags.get("height", tags.get("est_height")), most)
     return (usual, True) if own is None else (own, False)
 
@@ -125,8 +127,8 @@ def _lamps(nodes: list[tuple[Node, Float]]) -> Iterator[Poles]:
 
 def _signals(nodes: list[tuple[Node, Float]], carriageway: BaseGeometry) -> Iterator[Poles]:
     for node, place in nodes:
-        beside = node.tags.get("highway") == "traffic_signals" or node.tags.get("traffic_signals") == "signal"
-        if beside and not carriageway.intersects(shapely.Point(place)):
+        is_signal = node.tags.get("highway") == "traffic_signals" or node.tags.get("traffic_signals") == "signal"
+        if is_signal and not carriageway.intersects(shapely.Point(place)):
             height, assumed = _height(node.tags, SIGNAL_HEIGHT, MAX_POST)
             yield Poles(place[None], height, SIGNAL_ARM, None, FROM_EXTRACT, assumed)
 
@@ -170,7 +172,7 @@ def _thick_barriers(shapes: PlanShapes, area: BaseGeometry) -> Iterator[Slab]:
 def _shelters(
     shapes: PlanShapes, nodes: list[tuple[Node, Float]], area: BaseGeometry, carriageway: BaseGeometry
 ) -> Iterator[Slab]:
-    """Yield roof and back wall of shelters: over their outline where it is known, else of a usual size."""
+    """Yield roof and back wall of shelters, on their outline if it is mapped, otherwise of a usual size."""
     outlines = [
         (part, way.tags)
         for way in shapes.extract.ways.values()
@@ -183,6 +185,7 @@ def _shelters(
     for node, place in nodes:
         stop = node.tags.get("highway") == "bus_stop" and node.tags.get("shelter") == "yes"
         if node.tags.get("amenity") == "shelter" or stop:
+            # A stop and its shelter are often mapped as two elements: a node near a known outline adds none.
             if any(outline.distance(shapely.Point(place)) < 2 * SHELTER_SIZE[0] for outline, _ in outlines):
                 continue
             outlines.append((_shelter_outline(place, carriageway), node.tags))
@@ -194,11 +197,12 @@ def _shelters(
 
 
 def _shelter_outline(place: Float, carriageway: BaseGeometry) -> shapely.Polygon:
-    """Return the outline of a shelter of a usual size whose front is at the edge of the road's clearance."""
+    """Return the outline of a shelter of usual size, facing the road at least 1 m from the carriageway."""
     nearest = shapely.get_coordinates(shapely.shortest_line(shapely.Point(place), carriageway.boundary))[1]
     away = place - nearest
     distance = float(np.hypot(*away))
     away = away / distance if distance > 0.01 else np.array([1.0, 0.0])
+    # Stops are also mapped on the carriageway: the way out then points from the node to the edge.
     if carriageway.intersects(shapely.Point(place)):
         away = -away
     along = np.array([-away[1], away[0]])
@@ -209,7 +213,7 @@ def _shelter_outline(place: Float, carriageway: BaseGeometry) -> shapely.Polygon
 
 
 def _back_wall(outline: shapely.Polygon, carriageway: BaseGeometry) -> shapely.Polygon:
-    """Return a thin wall along the side of an outline that is farthest from the road."""
+    """Return a thin wall along the long side of an outline that is farthest from the road."""
     corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(outline))
     sides = [shapely.LineString(corners[i : i + 2]) for i in range(4)]
     longest = max(side.length for side in sides)

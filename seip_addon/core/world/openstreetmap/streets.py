@@ -1,4 +1,4 @@
-"""Streets of an extract, chosen and made explicit for SUMO's netconvert: what counts as a street, lanes, pavements."""
+"""Streets of an extract for SUMO's netconvert: selection of ways, with explicit lanes, widths and pavements."""
 
 import itertools
 import math
@@ -23,11 +23,11 @@ CLASSES = (
     *("motorway_link", "trunk_link", "primary_link", "secondary_link", "tertiary_link"),
     *("unclassified", "residential", "living_street", "road", "busway"),
 )
-"""Values of ``highway`` that are streets; ``service`` (driveways, aisles, alleys) is one where it is asked for."""
+"""Values of ``highway`` that are streets; ``service`` (driveways, aisles, alleys) is one on request."""
 TRACKS = {"tram", "light_rail"}
 """Values of ``railway`` whose tracks may lie in a street."""
 PAVED_CLASSES = {"primary", "secondary", "tertiary", "unclassified", "residential", "living_street", "road"}
-"""Streets that have a pavement on both sides where the map says nothing of pavements."""
+"""Classes of streets that have a pavement on both sides unless the map has tags for pavements."""
 WIDE_CLASSES = {"motorway", "trunk"}
 """Streets whose one-way carriageways usually have two lanes."""
 ONE_WAY = {"yes", "true", "1", "-1", "reverse"}
@@ -38,7 +38,7 @@ COPIED = (
 """Tags of a street that netconvert reads as they are."""
 MAX_LANES, MAX_STREET_WIDTH = 12, 60.0
 LANE_WIDTHS = (2.25, 6.0)
-"""Widths (metres) of a lane that a width of the street may mean."""
+"""Narrowest and widest lane (metres); lane widths from tags are clamped to this range."""
 CYCLE_LANES = {"lane", "track", "opposite_lane", "opposite_track", "shared_busway"}
 CYCLE_LANE_WIDTH, SIDEWALK_WIDTH = 1.5, 2.5  # metres
 _SIDES = {(True, True): "both", (True, False): "left", (False, True): "right", (False, False): "none"}
@@ -50,28 +50,28 @@ MIN_ELEVATED = 0.8  # share of a street network's nodes that must have an elevat
 
 @dataclass(frozen=True)
 class StreetFile:
-    """What was written for netconvert.
+    """Streets as written for netconvert.
 
     Parameters
     ----------
     streets : int
-        Number of ways that are streets.
+        Number of streets written.
     elevated : bool
-        Whether its nodes have elevations.
+        Whether the nodes have elevations.
     left_hand : bool
         Whether traffic keeps to the left.
     roundabouts : tuple of frozenset of int
-        Nodes of each roundabout: where streets meet it is a junction of its own.
+        Nodes of each roundabout; each node where a street meets it is a separate junction.
     slip_ends : tuple of int
-        Nodes where a slip lane leaves or joins a street, apart from other nodes where streets meet.
+        Nodes where a slip lane leaves or joins a street, more than `JOIN_DISTANCE` from any other junction node.
     ways : mapping of int to Way
-        The streets, by the ids that they are written with.
+        Streets by the id under which they are written.
     structures : Structures
         Streets on bridges and in underpasses.
     lone_signals : tuple of int
-        Nodes of traffic signals that no junction follows.
+        Nodes of traffic signals without a junction within reach.
     notes : tuple of str
-        What was assumed.
+        Assumptions made, as messages.
     """
 
     streets: int
@@ -96,7 +96,7 @@ def is_street(tags: Tags, *, service: bool = False) -> bool:
 
 
 def is_tunnel(tags: Tags) -> bool:
-    """Return whether a way is a street in a tunnel, which is left out."""
+    """Return whether a way is a street in a tunnel; scenes leave tunnels out."""
     return tags.get("highway") in CLASSES and _is_underground(tags)
 
 
@@ -112,16 +112,20 @@ def write_streets(
     service: bool = False,
     left_hand: bool | None = None,
 ) -> StreetFile:
-    """Write the streets within a window as an extract of their own.
+    """Write the streets within a window as a separate extract for netconvert.
 
     Parameters
     ----------
+    extract : Extract
+        Extract to take the streets from.
+    path : Path
+        File to write (.osm).
     window : (4,) float, degrees
         South, west, north, east.
     service : bool
         Whether driveways, aisles and alleys (``highway=service``) are streets.
     left_hand : bool, optional
-        Whether traffic keeps to the left; by default what the extract and its place say.
+        Whether traffic keeps to the left; by default derived from the extract and its location.
     """
     pieces = list(_pieces(extract, window, service=service))
     used = list(dict.fromkeys(number for _, way in pieces for number in way.nodes))
@@ -129,8 +133,11 @@ def write_streets(
     if left_hand is None:
         left_hand, reason = drives_on_the_left(extract)
         notes.append(f"traffic keeps to the {'left' if left_hand else 'right'}: {reason}")
+    # Elevations are used only if nearly all nodes have one: a few tagged nodes among untagged ones would make steps.
     heights = [elevation(extract.nodes[number]) for number in used]
     elevated = bool(used) and sum(height is not None for height in heights) >= MIN_ELEVATED * len(used)
+    # netconvert guesses lanes, widths, pavements and signals by its own defaults. The streets are therefore written
+    # with these made explicit, and with signals moved to the junctions that they control.
     medians = _Medians(extract, [way for _, way in pieces])
     places = dict(zip(extract.nodes, _in_metres(extract, list(extract.nodes.values())), strict=True))
     signals = matched_signals(extract, [way for _, way in pieces], places)
@@ -150,25 +157,30 @@ def write_streets(
 
 
 def _slip_ends(extract: Extract, ways: Sequence[Way]) -> Iterator[int]:
-    """Yield the ends of one-way links that lie farther than `JOIN_DISTANCE` from any other node where streets meet."""
-    beside: dict[int, set[int]] = {}
+    """Yield the ends of one-way links more than `JOIN_DISTANCE` from any other node where streets meet."""
+    # Adjacency of nodes over all streets: more than two neighbours make a node a junction, two only a bend or a joint
+    # between two ways.
+    neighbours: dict[int, set[int]] = {}
     for way in ways:
         for one, other in itertools.pairwise(way.nodes):
-            beside.setdefault(one, set()).add(other)
-            beside.setdefault(other, set()).add(one)
-    meeting = [number for number, others in beside.items() if len(others) > 2]
+            neighbours.setdefault(one, set()).add(other)
+            neighbours.setdefault(other, set()).add(one)
+    meeting = [number for number, others in neighbours.items() if len(others) > 2]
     places = _in_metres(extract, [extract.nodes[number] for number in meeting])
     links = {
         end for way in ways if _is_link(way.tags) and is_one_way(way.tags) for end in (way.nodes[0], way.nodes[-1])
     }
     for number, place in zip(meeting, places, strict=True):
+        # The smallest distance is that of the node to itself, 0; the second smallest is to the nearest other junction.
         if number in links and np.sort(np.hypot(*(places - place).T))[1:2].min(initial=math.inf) > JOIN_DISTANCE:
             yield number
 
 
 def _in_metres(extract: Extract, nodes: Sequence[Node]) -> Float:
-    """Return where nodes are (n, 2), metres about the extract's first node."""
+    """Return the positions of nodes (n, 2), metres east and north of the extract's first node."""
     first = next(iter(extract.nodes.values()))
+    # Equirectangular approximation with the length of a degree at the equator. It serves comparisons of distances,
+    # sides and crossings among neighbours only; netconvert projects the coordinates of the map itself.
     east = 111_320.0 * math.cos(math.radians(first.latitude))
     return np.array(
         [((node.longitude - first.longitude) * east, (node.latitude - first.latitude) * 110_574.0) for node in nodes]
@@ -176,16 +188,17 @@ def _in_metres(extract: Extract, nodes: Sequence[Node]) -> Float:
 
 
 def _joined(ways: Iterable[tuple[int, ...]]) -> tuple[frozenset[int], ...]:
-    """Return the nodes of ways, of those together that share one."""
+    """Return the node sets of connected groups of ways; ways that share a node belong to one group."""
     found: list[frozenset[int]] = []
     for nodes in ways:
+        # A way may connect several groups that were separate so far: all of them are merged with it.
         met = [one for one in found if not one.isdisjoint(nodes)]
         found = [*(one for one in found if one not in met), frozenset(nodes).union(*met)]
     return tuple(found)
 
 
 def elevation(node: Node) -> float | None:
-    """Return the elevation that a node has, metres."""
+    """Return the elevation of a node from its tags, metres; None without a plausible one."""
     try:
         value = float(node.tags.get("ele", ""))
     except ValueError:
@@ -194,8 +207,10 @@ def elevation(node: Node) -> float | None:
 
 
 def _pieces(extract: Extract, window: tuple[float, float, float, float], *, service: bool) -> Iterator[tuple[int, Way]]:
-    """Yield the streets within a window; one that leaves it in between comes in pieces, with ids of their own."""
+    """Yield the streets within a window; a street that leaves it and returns is split into pieces with new ids."""
     south, west, north, east = window
+    # New ids start above all ids of the extract. The first piece keeps the id of its way, so that turn restrictions,
+    # which refer to ways by id, still apply to it.
     fresh = max(extract.ways, default=0)
     for number, way in extract.ways.items():
         if not is_street(way.tags, service=service):
@@ -208,6 +223,8 @@ def _pieces(extract: Extract, window: tuple[float, float, float, float], *, serv
         ]
         for place, (first, last) in enumerate(_runs(inside)):
             nodes = way.nodes[max(first - 1, 0) : last + 1]  # one node beyond, where the extract has it
+            # Every piece shares the tags object of its way: `bridges` and `heights` find the pieces of one way by its
+            # identity.
             held = tuple(one for one in nodes if one in extract.nodes)
             if len(held) < 2:
                 continue
@@ -216,7 +233,7 @@ def _pieces(extract: Extract, window: tuple[float, float, float, float], *, serv
 
 
 def _runs(inside: list[bool]) -> Iterator[tuple[int, int]]:
-    """Yield first index and index after the last of each run of nodes inside."""
+    """Yield the first index and the index after the last of each run of True values."""
     start = None
     for place, held in enumerate([*inside, False]):
         if held and start is None:
@@ -227,9 +244,12 @@ def _runs(inside: list[bool]) -> Iterator[tuple[int, int]]:
 
 
 def _node(number: int, node: Node, height: float | None, signals: Signals) -> list[str]:
+    # The reader counts longitudes from the middle of the window, so that they may leave ±180 degrees near the date
+    # line.
     longitude = math.remainder(node.longitude, 360.0)
     place = f'<node id="{number}" lat="{node.latitude:.9f}" lon="{longitude:.9f}"'
     tags = {key: node.tags[key] for key in ("highway", "crossing", "railway") if key in node.tags}
+    # Signals in front of a junction are written at the junction instead: netconvert drops them where they are mapped.
     if number in signals.moved:
         tags = {key: value for key, value in tags.items() if key != "highway"}
     if number in signals.junctions:
@@ -250,6 +270,7 @@ def _tag_lines(tags: Mapping[str, str]) -> list[str]:
 def _restrictions(extract: Extract, streets: set[int]) -> Iterator[str]:
     for number, relation in extract.relations.items():
         ways = [ref for kind, ref, _ in relation.members if kind == "way"]
+        # A restriction that refers to a way outside the written streets cannot be resolved and is left out.
         if relation.tags.get("type") == "restriction" and ways and streets.issuperset(ways):
             yield f'<relation id="{number}">'
             for kind, ref, role in relation.members:
@@ -259,27 +280,29 @@ def _restrictions(extract: Extract, streets: set[int]) -> Iterator[str]:
 
 
 def _tags(way: Way, medians: "_Medians", *, left_hand: bool) -> dict[str, str]:
-    """Return the tags of a street that netconvert is to read: lanes, widths, pavements and cycle lanes explicit."""
+    """Return the tags of a street for netconvert, with explicit lanes, widths, pavements and cycle lanes."""
     given = way.tags
     tags = {key: given[key] for key in COPIED if key in given} | shown_name(given)
     if given.get("railway") in TRACKS and "highway" not in given:
         return tags
     tags |= _lane_tags(given)
+    # In the written tags ``right`` always is the side where traffic keeps, as in a right-hand network: for left-hand
+    # traffic both sides are exchanged.
     near, far = ("left", "right") if left_hand else ("right", "left")
     cycle = {"right": _cycle_lane(given, near), "left": _cycle_lane(given, far)}
     walked = dict(zip(("left", "right"), _sidewalks(way, medians, left_hand=left_hand), strict=True))
     paved = {"right": walked[near], "left": walked[far]}
     tags |= {f"cycleway:{side}": kind for side, kind in cycle.items() if kind is not None}
     tags["sidewalk"] = _SIDES[paved["left"], paved["right"]]
-    beside = {
+    outer = {
         side: [CYCLE_LANE_WIDTH] * (cycle[side] is not None) + [SIDEWALK_WIDTH] * paved[side]
         for side in ("right", "left")
     }
-    return tags | _widths(given, beside)
+    return tags | _widths(given, outer)
 
 
 def _lane_tags(tags: Tags) -> dict[str, str]:
-    """Return the number of lanes in the tags that netconvert reads: its own defaults by class of street differ."""
+    """Return the tags for the number of lanes; without them netconvert uses other defaults by class of street."""
     lanes = lane_counts(tags)
     own = {} if is_one_way(tags) else {f"lanes:{way}": str(number) for way, number in lanes.items()}
     return {"lanes": str(sum(lanes.values()))} | own
@@ -292,23 +315,24 @@ def _cycle_lane(tags: Tags, side: str) -> str | None:
     return "track" if "track" in kind else "lane"
 
 
-def _widths(tags: Tags, beside: Mapping[str, list[float]]) -> dict[str, str]:
-    """Return the widths of all lanes, left to right as one drives, nothing where the map gives no width.
+def _widths(tags: Tags, outer: Mapping[str, list[float]]) -> dict[str, str]:
+    """Return the tags for the widths of all lanes, left to right in driving direction; none if the map has no width.
 
     Parameters
     ----------
-    beside : dict
-        Widths (metres) of cycle lane and pavement on the ``right`` and ``left``, where they are; the right is where
-        traffic keeps.
+    outer : dict
+        Widths (metres) of existing cycle lanes and pavements on the ``right`` and ``left``; traffic keeps to the right.
     """
     lanes = lane_counts(tags)
     widths = {way: _lane_widths(tags, way, number) for way, number in lanes.items()}
     if not any(widths.values()):
         return {}
+    # A list has one entry for each lane that netconvert makes: driving lanes first, then cycle lane and pavement, which
+    # lie to the right of the lanes of their direction. Seen along the way, those of the backward direction are left.
     named = {"forward": "" if is_one_way(tags) else ":forward", "backward": ":backward"}
     side = {"forward": "right", "backward": "left"}
     return {
-        f"width:lanes{named[way]}": "|".join(f"{one:.2f}" for one in [*each, *beside[side[way]]])
+        f"width:lanes{named[way]}": "|".join(f"{one:.2f}" for one in [*each, *outer[side[way]]])
         for way, each in widths.items()
         if each
     }
@@ -317,8 +341,8 @@ def _widths(tags: Tags, beside: Mapping[str, list[float]]) -> dict[str, str]:
 def lane_counts(tags: Tags) -> dict[str, int]:
     """Return the number of lanes of a street in each direction: ``forward`` and, for two-way streets, ``backward``.
 
-    Without a number a direction has `usual_lanes`. One lane of a two-way street serves both directions: the street is
-    laid out with one lane each.
+    A direction without a number has `usual_lanes`. A two-way street with a single lane for both directions is laid out
+    with one lane for each.
     """
     whole = int(count(tags.get("lanes"), MAX_LANES) or 0)
     if is_one_way(tags):
@@ -327,13 +351,15 @@ def lane_counts(tags: Tags) -> dict[str, int]:
         way: int(count(tags.get(f"lanes:{way}"), MAX_LANES) or 0) or _listed_lanes(tags, f":{way}")
         for way in ("forward", "backward")
     }
+    # ``lanes`` counts both directions. Where it contradicts the numbers by direction, or leaves a direction without a
+    # lane, the larger total holds. An odd lane, and any lanes that no direction has, go to the forward direction.
     total = max(whole, sum(number or 1 for number in own.values()))
     backward = own["backward"] or (total - own["forward"] if own["forward"] else total // 2)
     return {"forward": total - backward, "backward": backward}
 
 
 def usual_lanes(tags: Tags) -> int:
-    """Return the number of lanes that each direction of a street has where the map does not say it."""
+    """Return the assumed number of lanes in each direction of a street without a number of lanes in the map."""
     return 2 if is_one_way(tags) and tags.get("highway") in WIDE_CLASSES else 1
 
 
@@ -347,7 +373,7 @@ def has_lane_count(tags: Tags) -> bool:
 
 
 def implausible_lanes(tags: Tags) -> dict[str, str]:
-    """Return the tags that give a street's number of lanes and cannot be right."""
+    """Return the tags for a street's number of lanes whose values are not plausible."""
     keys = ("lanes", "lanes:forward", "lanes:backward")
     return {key: tags[key] for key in keys if key in tags and (count(tags[key], MAX_LANES) or 0.0) <= 0.0}
 
@@ -358,16 +384,18 @@ def has_widths(tags: Tags) -> bool:
 
 
 def _listed_lanes(tags: Tags, way: str) -> int:
-    """Return the number of lanes that ``turn:lanes`` of a direction lists, 0 where there is no list."""
+    """Return the number of lanes in the ``turn:lanes`` list of a direction, 0 without a list."""
     listed = tags.get(f"turn:lanes{way}", "")
     number = listed.count("|") + 1
     return number if listed and number <= MAX_LANES else 0
 
 
 def _lane_widths(tags: Tags, way: str, lanes: int) -> list[float]:
-    """Return the widths of the driving lanes of one direction, metres, none where the map does not say."""
+    """Return the widths of the driving lanes of one direction, metres; an empty list if the map has none."""
     low, high = LANE_WIDTHS
     key = "width:lanes" if is_one_way(tags) else f"width:lanes:{way}"
+    # A list for each lane counts only if it fits the number of lanes. Otherwise the width of the whole carriageway is
+    # shared equally between the lanes of both directions, less the cycle lanes marked on it.
     given = [metres(one, MAX_STREET_WIDTH) for one in tags.get(key, "").split("|")]
     if len(given) == lanes and all(given):
         return [min(max(one, low), high) for one in given if one]
@@ -380,9 +408,9 @@ def _lane_widths(tags: Tags, way: str, lanes: int) -> list[float]:
 
 
 def shown_name(tags: Tags) -> dict[str, str]:
-    """Return the name of a street that pictures can show, where it is not as given.
+    """Return a tag with the displayed name of a street if it differs from ``name``; otherwise an empty dict.
 
-    It is in English where its own has no letters for the pictures, and the number of a road that has none.
+    Names in scripts that the font of the pictures lacks are replaced by ``name:en``; roads without a name use ``ref``.
     """
     name = tags.get("name", "")
     english = tags.get("name:en")
@@ -402,24 +430,28 @@ def _sidewalks(way: Way, medians: "_Medians", *, left_hand: bool) -> tuple[bool,
     left, right = (_sidewalk_tag(way.tags, side) for side in ("left", "right"))
     if left is None or right is None:
         kind = way.tags.get("highway", "")
+        # Assumptions for the sides without a tag. Roundabouts have a pavement on the outside only: their island is on
+        # the left in right-hand traffic. Slip roads have one at the kerb side; the island between them and the street
+        # has none. One-way carriageways of a dual street have none on the side of the other carriageway.
         usual_left = usual_right = kind in PAVED_CLASSES
         if is_roundabout(way.tags):
             usual_left, usual_right = (True, False) if left_hand else (False, True)
         elif kind.endswith("_link") and kind not in ("motorway_link", "trunk_link"):
             usual_left, usual_right = left_hand, not left_hand
         elif usual_left and is_one_way(way.tags):
-            beside_left, beside_right = medians.beside(way)
-            usual_left, usual_right = not beside_left, not beside_right
+            median_left, median_right = medians.beside(way)
+            usual_left, usual_right = not median_left, not median_right
         left = usual_left if left is None else left
         right = usual_right if right is None else right
     return left, right
 
 
 def _sidewalk_tag(tags: Tags, side: str) -> bool | None:
-    """Return what tags say of the pavement on one side, None where they say nothing."""
+    """Return whether tags give a pavement on one side, None without such tags."""
     own = tags.get(f"sidewalk:{side}", tags.get("sidewalk:both"))
     if own is not None:
         return own not in ("no", "none")
+    # ``separate`` is a pavement mapped as a way of its own: it exists, and netconvert lays it next to the street.
     whole = tags.get("sidewalk")
     if whole is None:
         return None
@@ -427,10 +459,11 @@ def _sidewalk_tag(tags: Tags, side: str) -> bool | None:
 
 
 class _Medians:
-    """The one-way streets of an extract, to tell on which side of one its other carriageway lies."""
+    """One-way streets of an extract, indexed to find the side on which the opposite carriageway of one lies."""
 
     def __init__(self, extract: Extract, ways: Iterable[Way]) -> None:
         self._extract = extract
+        # Roundabouts and slip roads lie next to streets too, but are not the other carriageway of one.
         starts, stops, names = [], [], []
         for way in ways:
             if is_one_way(way.tags) and way.tags.get("junction") is None and not _is_link(way.tags):
@@ -445,11 +478,13 @@ class _Medians:
         self._tree = shapely.STRtree(list(lines))
 
     def beside(self, way: Way) -> tuple[bool, bool]:
-        """Return whether the other carriageway of a one-way street lies to its left, and to its right."""
+        """Return whether the opposite carriageway of a one-way street lies on its left, and on its right."""
         line = self._line(way)
         steps = np.diff(line, axis=0)
         if not len(steps):
             return False, False
+        # Cast a ray to each side from the middle of the longest segment, away from junctions at the ends. It starts at
+        # 2 m, so as not to meet the street itself.
         longest = int(np.argmax(np.hypot(*steps.T)))
         middle, along = (line[longest] + line[longest + 1]) / 2, steps[longest] / (np.hypot(*steps[longest]) or 1.0)
         aside = np.array([-along[1], along[0]])
@@ -457,19 +492,21 @@ class _Medians:
         for side, sign in enumerate((1.0, -1.0)):
             ray = shapely.linestrings(np.stack([middle + 2.0 * sign * aside, middle + MAX_MEDIAN * sign * aside]))
             for index in self._tree.query(ray, predicate="intersects"):
+                # The other carriageway has the same name and leads the opposite way, within 37 degrees (cosine below
+                # -0.8). A parallel one-way street of the same direction does not make the space between them a median.
                 ahead = self._stop[index] - self._start[index]
                 opposite = float(ahead @ along) < -0.8 * float(np.hypot(*ahead))
                 found[side] |= opposite and self._names[index] == way.tags.get("name", "")
         return found[0], found[1]
 
     def _line(self, way: Way) -> Float:
-        """Return a way (n, 2) in metres about the extract's first node, in the direction of its traffic."""
+        """Return the line of a way (n, 2), metres from the extract's first node, in driving direction."""
         line = _in_metres(self._extract, self._extract.line(way))
         return line[::-1] if way.tags.get("oneway") in ("-1", "reverse") else line
 
 
 def is_roundabout(tags: Tags) -> bool:
-    """Return whether a way is a piece of a roundabout."""
+    """Return whether a way is part of a roundabout."""
     return tags.get("junction") in ("roundabout", "circular")
 
 

@@ -1,4 +1,4 @@
-"""The approaches of a junction: its streets, as far as a distance along the road."""
+"""Approaches of a junction: its streets up to a distance along the roads."""
 
 import heapq
 import math
@@ -13,9 +13,9 @@ from ...arrays import Float
 from ..opendrive.lanes import LaneSurface
 from .road_surface import by_road, cut_along, in_groups
 
-JOINT_GAP, MIN_JOINT = 0.3, 0.5  # ends of roads within so many metres, along so many of their width, are joined
-MIN_HEIGHT_STEP = 1.0  # metres of height between ends that do not
-MAX_STRAIGHT_TURN = math.radians(35.0)  # an approach goes on through other junctions on lanes that turn by less
+JOINT_GAP, MIN_JOINT = 0.3, 0.5  # metres: gap between ends of roads that are joined, and width along which they meet
+MIN_HEIGHT_STEP = 1.0  # metres of height between ends that are not joined
+MAX_STRAIGHT_TURN = math.radians(35.0)  # an approach continues through other junctions on lanes that turn by less
 Key = tuple[str, int]  # a road and one of its ends: 0 where it starts, 1 where it stops
 
 
@@ -30,7 +30,7 @@ class _End:
 
 @dataclass(frozen=True, eq=False)
 class _ApproachRoad:
-    """A road by its driving lanes: range of s, ends, turn between them (radians), whether an approach goes along it."""
+    """Driving lanes of a road: range of s, ends, turn between them (radians), whether an approach can follow it."""
 
     start: float
     stop: float
@@ -45,26 +45,26 @@ def approach_lanes(
     distance: float,
     names: Mapping[str, str] | None = None,
 ) -> tuple[LaneSurface, ...]:
-    """Return the driving lanes of junctions that are one place, and of their approaches up to a distance.
+    """Return the driving lanes of junctions that form one place, and of their approaches up to a distance.
 
-    An approach goes on over the roads that join on to it, and straight on through other junctions: into each road there
-    that turns little, or with names only into the one that the street goes on in.
+    An approach continues over the roads joined to it, and straight through other junctions. There it enters every road
+    that turns little; if names are given, only the road in which the street continues.
 
     Parameters
     ----------
     surfaces : sequence of LaneSurface
         All lanes of a map.
     junctions : collection of str
-        Their ids.
+        Ids of the junctions.
     distance : float, metres
-        Along the roads, from where the junction ends.
+        Length of the approaches along the roads, from the end of the junction.
     names : mapping of str to str, optional
-        Of the streets, by the ids of their roads.
+        Names of the streets by the ids of their roads.
 
     Returns
     -------
     tuple of LaneSurface
-        Cut at the distance.
+        Lanes, cut at the distance.
     """
     driving = in_groups(surfaces, ["driving"])
     roads = by_road(driving)
@@ -102,12 +102,13 @@ def _end(rows: Sequence[tuple[LaneSurface, int]]) -> _End:
 
 
 def _joints(streets: Mapping[str, _ApproachRoad]) -> dict[Key, list[Key]]:
-    """Return for each end those that it leads into."""
+    """Return the ends that each end of a road leads into."""
     keys = [(road, which) for road in streets for which in (0, 1)]
     ends = [streets[road].ends[which] for road, which in keys]
     lines = [end.across for end in ends]
     joints: dict[Key, list[Key]] = {key: [] for key in keys}
     for a, b in shapely.STRtree(lines).query(lines, predicate="dwithin", distance=JOINT_GAP).T.tolist():
+        # Ends that only touch at a corner are neighbouring lanes, and ends at different heights cross on a bridge.
         level = abs(ends[a].height - ends[b].height) < MIN_HEIGHT_STEP
         if a != b and level and lines[a].buffer(JOINT_GAP, cap_style="flat").intersection(lines[b]).length > MIN_JOINT:
             joints[keys[a]].append(keys[b])
@@ -120,9 +121,9 @@ def _side_ways(
     joints: Mapping[Key, Sequence[Key]],
     names: Mapping[str, str],
 ) -> frozenset[Key]:
-    """Return the ends of roads in junctions at which a street does not go on: another road there does.
+    """Return the ends of roads in junctions where a street does not continue, because it continues in another road.
 
-    It goes on in the road of its own name, and of several in the one that turns least.
+    A street continues in the road of the same name; among several, in the one that turns least.
     """
     ways: dict[Key, list[tuple[tuple[bool, float], frozenset[str], Key]]] = {}
     for road, street in streets.items():
@@ -134,6 +135,7 @@ def _side_ways(
                         own = names.get(key[0], "")
                         other_name = not own or all(names.get(other) != own for other in leads_to)
                         ways.setdefault(key, []).append(((other_name, street.turn), leads_to, (road, which)))
+    # Lanes that lead into the same road as the best one stay open: they are parallel lanes of the same connection.
     closed: set[Key] = set()
     for found in ways.values():
         _, best, _ = min(found, key=lambda way: way[0])
@@ -152,7 +154,7 @@ def _distances(
     closed: Collection[Key],
     most: float,
 ) -> dict[Key, float]:
-    """Return how far each end of a road is from a junction, metres along the roads; infinity beyond ``most``."""
+    """Return the distance of each road end from a junction along the roads, metres; infinity beyond ``most``."""
     away = {(road, which): math.inf for road in streets for which in (0, 1)}
     waiting = [(0.0, (road, which)) for road in inside for which in (0, 1)]
     away.update({key: 0.0 for _, key in waiting})
@@ -161,6 +163,8 @@ def _distances(
         road, which = key
         if travelled > away[key]:
             continue
+        # Dijkstra's algorithm over road ends: joints cost nothing, the way along a road costs its length. Roads within
+        # the starting junctions are at distance zero at both ends, and roads that turn are not followed.
         steps = [(travelled, other) for other in joints[key] if other not in closed]
         if road not in inside and streets[road].leads_on:
             steps.append((travelled + streets[road].stop - streets[road].start, (road, 1 - which)))
@@ -172,8 +176,9 @@ def _distances(
 
 
 def _pieces(lane: LaneSurface, street: _ApproachRoad, away: Sequence[float], distance: float) -> Iterator[LaneSurface]:
-    """Yield what of a lane lies within the distance of the junction, from either end of its road."""
+    """Yield the parts of a lane within the distance of the junction, measured from both ends of its road."""
     from_start, from_stop = street.start + distance - away[0], street.stop - distance + away[1]
+    # A road may be reached from both ends. The reached parts overlap, and the whole lane remains, or leave a gap.
     ranges = [(-math.inf, math.inf)] if from_start >= from_stop else [(-math.inf, from_start), (from_stop, math.inf)]
     for low, high in ranges:
         piece = cut_along(lane, max(low, lane.s[0]), min(high, lane.s[-1]))

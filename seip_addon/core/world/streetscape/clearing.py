@@ -1,4 +1,4 @@
-"""What an extract puts on the carriageway, as that is laid out: moved or cut, for there it would hide the road."""
+"""Removal of objects of an extract from the carriageway, where they would block the view of the road."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -13,16 +13,16 @@ from ...geometry.plan import without
 from ...site.scene_geometry import DESCRIBED
 from .description import Building, Poles, SiteDescription, Slab, Trees, Wall
 
-CLEARANCE = 4.5  # metres above the road from which on something may hang over it
+CLEARANCE = 4.5  # metres above the road from which on objects may extend over it
 NEAR_EDGE = 3.0  # metres inside the carriageway up to which trees and posts are moved to its edge
 SETBACK = 0.2  # metres that they then stand from it
 MAX_IN_LANE = 0.5  # metres inside the carriageway up to which a post is taken to stand at its edge
-MIN_OVERLAP, MIN_REST = 0.1, 2.0  # square metres on the carriageway that do not count, and of what is left that does
+MIN_OVERLAP, MIN_REST = 0.1, 2.0  # m²: smaller overlaps with the carriageway are ignored, smaller rests left out
 
-_CLIPPED = "buildings cut off at the edge of the carriageway, on to which they reached"
-_MOVED = f"trees and posts moved to the edge of the carriageway, up to {NEAR_EDGE:g} m inside which they stood"
-_IN_LANE = f"posts that carry no sensor, since the map has them in a lane, more than {MAX_IN_LANE:g} m from its edge"
-_DROPPED = "trees and posts left out, since they stood in the middle of the carriageway"
+_CLIPPED = "buildings cut off at the edge of the carriageway, which they overlapped"
+_MOVED = f"trees and posts moved to the edge of the carriageway, from up to {NEAR_EDGE:g} m inside it"
+_IN_LANE = f"posts that carry no sensor, because the map has them in a lane, more than {MAX_IN_LANE:g} m from its edge"
+_DROPPED = "trees and posts left out, because they stood in the middle of the carriageway"
 _CUT = "walls, fences and shelters cut off at the edge of the carriageway, which they crossed"
 
 Row = TypeVar("Row", Trees, Poles)
@@ -32,15 +32,20 @@ Solid = TypeVar("Solid", Building, Slab)
 def clear(
     description: SiteDescription, carriageway: BaseGeometry, mouths: BaseGeometry
 ) -> tuple[SiteDescription, tuple[str, ...]]:
-    """Return a description of which nothing stands on the carriageway but what a site file puts there, and notes.
+    """Return a description without objects on the carriageway, except those from a site file, and notes.
 
     Parameters
     ----------
-    carriageway, mouths : shapely geometry
-        On the level that is studied, and lines across it where the road goes on; map coordinates.
+    description : SiteDescription
+        Description to clear.
+    carriageway : shapely geometry
+        Carriageway on the studied level, map coordinates.
+    mouths : shapely geometry
+        Lines across it where the road continues, map coordinates.
     """
     shapely.prepare(carriageway)
     lanes = carriageway.buffer(-MAX_IN_LANE)
+    # Objects move to the sides of the road only, never to the end of the modelled carriageway.
     edge = without(shapely.boundary(carriageway), mouths.buffer(SETBACK))
     counted = Counter[str]()
 
@@ -66,7 +71,7 @@ def clear(
 
 
 def _split_at_lanes(rows: Sequence[Poles], lanes: BaseGeometry, counted: Counter[str]) -> Iterator[Poles]:
-    """Yield posts; those in a lane come as rows that carry no sensors, since where they stand is not known."""
+    """Yield posts; those in a lane become rows that carry no sensors, because their real position is unknown."""
     for row in rows:
         inside = shapely.intersects_xy(lanes, row.positions)
         if row.source == DESCRIBED or not inside.any():
@@ -78,7 +83,7 @@ def _split_at_lanes(rows: Sequence[Poles], lanes: BaseGeometry, counted: Counter
 
 
 def _beside(row: Row, carriageway: BaseGeometry, edge: BaseGeometry, counted: Counter[str]) -> Row:
-    """Return a row of trees or posts with those on the carriageway at its edge, or left out."""
+    """Return a row of trees or posts with those on the carriageway moved to its edge, or left out."""
     inside = shapely.intersects_xy(carriageway, row.positions)
     if row.source == DESCRIBED or not inside.any():
         return row
@@ -87,6 +92,8 @@ def _beside(row: Row, carriageway: BaseGeometry, edge: BaseGeometry, counted: Co
     ways = shapely.get_coordinates(found).reshape(-1, 2, 2)
     outwards = ways[:, 1] - ways[:, 0]
     depth = np.hypot(*outwards.T)
+    # The vector to the edge, made longer by the setback. Very near to the edge the vector only doubles: its direction
+    # is that of rounding, and the division stays finite.
     places[inside] += outwards * (1.0 + SETBACK / np.maximum(depth, SETBACK))[:, None]
     lost = inside.copy()
     lost[inside] = depth > NEAR_EDGE

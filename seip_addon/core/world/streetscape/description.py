@@ -1,7 +1,7 @@
-"""The site description: what a map does not say about a place, read from a small TOML file.
+"""Site descriptions: data about a place that the map lacks, read from a small TOML file.
 
-The keys are explained in docs/site-description.md. Coordinates are map
-coordinates in metres; headings are degrees in the file and radians here.
+The keys are explained in docs/site-description.md. Coordinates are map coordinates in metres; headings are degrees in
+the file and radians here.
 """
 
 import math
@@ -32,7 +32,7 @@ DESCRIPTION_SUFFIX = ".toml"
 
 MAX_SIZE, MAX_HEIGHT, MAX_RADIUS = limits.SIZE.most, limits.HEIGHT.most, limits.SITE_RADIUS.most  # metres
 MIN_AREA = 1e-4  # square metres below which an outline encloses nothing
-MAX_COVERED = 0.5  # share of a building's outline from which on another source's building stands for it
+MAX_COVERED = 0.5  # share of a building's outline covered by another source, above which that one replaces it
 MAX_ROW_LENGTH = 10_000  # limit on the trees or lights of a row
 
 
@@ -46,7 +46,7 @@ class Area:
 
 @dataclass(frozen=True, eq=False)
 class WeightedRegion:
-    """A region whose targets count ``weight`` times: a polygon, or the central box of a junction."""
+    """A region whose targets have a weight: a polygon, or the central box of a junction."""
 
     name: str
     weight: float
@@ -61,13 +61,15 @@ class Building:
     Parameters
     ----------
     outline : Polygon
-        In plan; courtyards are its holes.
+        Outline in plan; courtyards are its holes.
+    height, base : float, metres
+        Height from the base to the ridge, and height of the base above the ground.
     roof : Roof
-        Part of the height.
+        Roof; its height is part of the building's.
     source : str
-        Who says that it stands there, as in `scene_geometry.Pole`.
+        Source of the building, as in `scene_geometry.Pole`.
     height_assumed : bool
-        Whether that source does not give its height.
+        Whether the source lacks its height.
     """
 
     outline: Polygon
@@ -80,7 +82,7 @@ class Building:
 
 @dataclass(frozen=True, eq=False)
 class Trees:
-    """Trees of one size at ``positions`` (n, 2); ``source`` and ``height_assumed`` as of a `Building`."""
+    """Trees of one size at ``positions`` (n, 2); for ``source`` and ``height_assumed`` see `Building`."""
 
     positions: Float
     height: float
@@ -91,7 +93,7 @@ class Trees:
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """A wall along ``line`` (n, 2), of a material and with a name; the rest as of a `Building`."""
+    """A wall along ``line`` (n, 2), with a material and a name; for the rest see `Building`."""
 
     line: Float
     height: float
@@ -112,15 +114,15 @@ class Poles:
     positions : (n, 2) float64, metres
         Feet of the posts, map coordinates.
     height, arm : float, metres
-        Of the post, and of the arm it carries.
+        Height of the post, and length of its arm.
     heading : float or None, radians
-        Where the arm points, counter-clockwise from map x (east). None: to the nearest carriageway.
+        Direction of the arm, counter-clockwise from map x (east); None points it to the nearest carriageway.
     source, height_assumed
-        As of a `Building`.
+        See `Building`.
     name : str
-        Kind of the posts, for those that are neither street lights nor signals.
+        Kind of the posts, if these are neither street lights nor signals.
     keep_off : str or None
-        Rule that keeps sensors off the posts, unless it is allowed.
+        Rule that excludes sensors from the posts, unless it is allowed.
     carries : bool
         Whether the posts may carry sensors at all.
     """
@@ -138,7 +140,7 @@ class Poles:
 
 @dataclass(frozen=True, eq=False)
 class Slab:
-    """A plate over ``outline`` from ``base`` to ``top`` metres above the ground: a canopy, a shelter, a hedge."""
+    """A plate over ``outline`` from ``base`` to ``top`` metres above the ground, such as a canopy, shelter or hedge."""
 
     outline: Polygon
     base: float
@@ -151,22 +153,22 @@ class Slab:
 
 @dataclass(frozen=True, eq=False)
 class PlacedSolid:
-    """A solid out of a file of its own.
+    """A solid from a separate file, such as a city model or a survey.
 
     Parameters
     ----------
     name : str
-        What it is, such as ``Building``.
+        Kind of the solid, such as ``Building``.
     solid : Solid
-        In plan map coordinates; its heights count from the ground under it, or are the map's.
+        Shape with map coordinates in plan; its heights count from the ground under it, or are those of the map.
     outline : shapely geometry
-        In plan, map coordinates.
+        Outline in plan, map coordinates.
     source : str
-        As of a `Building`.
+        See `Building`.
     on_ground : bool
         Whether its heights count from the lowest ground under its outline.
     is_building : bool
-        Whether the map's buildings, and an extract's, give way to it.
+        Whether it replaces buildings of the map and of an extract.
     """
 
     name: str
@@ -179,17 +181,18 @@ class PlacedSolid:
 
 @dataclass(frozen=True, eq=False)
 class SideWay:
-    """A footway, cycle track or driveway that is no part of the road.
+    """A footway, cycle track or driveway that is not part of the road.
 
     Parameters
     ----------
     area : shapely geometry
-        In plan, map coordinates.
+        Area in plan, map coordinates.
     material, name : str
+        Material and name of its surface.
     keep_off : str or None
-        Rule that keeps new posts off it.
+        Rule that excludes new posts from it.
     line : (n, 2) float64, metres, or None
-        Middle line of a footway, which may run beside a pavement of the street and stand for the same; None for others.
+        Centre line of a footway, which may duplicate a pavement of the street; None for other ways.
     width : float, metres
         Width of the footway along that line.
     """
@@ -204,48 +207,51 @@ class SideWay:
 
 @dataclass(frozen=True, eq=False)
 class SiteDescription:
-    """A place to study and what stands there.
+    """A place to study and the objects there.
 
     Parameters
     ----------
     name : str
-        Title of the place; empty: the map's name.
+        Title of the place; the map's name if empty.
+    map : Path or None
+        File of the map.
     near : (x, y) or None
-        Middle of the place, map coordinates.
+        Centre of the place, map coordinates.
     junction : str or None
-        Id or name of the junction that is the middle of the place.
+        Id or name of the junction at the centre of the place.
     radius : float or None, metres
-        The region of interest is the driving surface this near to the middle.
+        Radius of the region of interest, which is the driving surface within it.
     approaches : float or None, metres
-        Instead of the radius: the driving surface of the junction, and of its approaches this far along the roads.
-        Without either a junction has approaches of `DEFAULT_RADIUS`, and another place that radius.
+        Length of the approaches, instead of the radius: the region is the driving surface of the junction and of its
+        approaches this far along the roads. Without either, a junction has approaches of `DEFAULT_RADIUS`, and any
+        other place that radius.
     region : shapely geometry or None
-        Instead of both: the driving surface within this area.
+        Area of the region, instead of both: the driving surface within it.
     level : tuple of str
         Names of streets, or ids of roads, on the level to study, where roads lie above each other.
     weighted_regions, buildings, trees, walls, street_lights, signal_poles, forbidden_areas, mandatory_areas : tuple
-        What the file lists.
+        Objects and areas listed in the file.
     slabs, posts, ways : tuple
-        What an extract adds: plates, plain posts, and ways beside the road.
+        Plates, plain posts, and ways next to the road, from an extract.
     solids : tuple of PlacedSolid
-        What a city model or a survey adds; where these are buildings the map's own give way to them.
+        Solids from a city model or a survey; buildings among them replace those of the map.
     keep_off_areas : tuple of KeepOffArea
-        Where rules keep new posts off, map coordinates.
+        Areas from which rules exclude new posts, map coordinates.
     relief : Relief or None
-        Ground that the map, which is flat, is laid on.
+        Ground under the map, which is flat.
     flat_land : FlatLand or None
-        Level land beside the map's ramps and underpasses; None where the map does not tell the height of the land.
+        Level land next to ramps and underpasses; None if the map does not give the height of the land.
     from_centre_lines : bool
-        Whether the map was made of the middle lines of streets: then junctions within `JUNCTION_REACH` metres of each
-        other are one, and holes between their lanes no islands.
+        Whether the map was made from centre lines of streets: then junctions within `JUNCTION_REACH` metres of each
+        other are one, and small holes between their lanes are not islands.
     roundabouts : tuple of frozenset of str
-        Ids of junctions that are one roundabout each, in a map made of middle lines.
+        Junction ids of each roundabout, in a map made from centre lines.
     map_source : str
-        Who says where the roads are.
+        Source of the roads.
     widths_assumed : frozenset of str
-        Groups of lanes (`road_surface.GROUPS`) of which the map has some whose width nobody gives.
+        Groups of lanes (`road_surface.GROUPS`) in which some widths are assumed.
     attribution : tuple of str
-        Credits that the sources of the site demand.
+        Credits required by the sources of the site.
     """
 
     name: str = ""
@@ -279,12 +285,12 @@ class SiteDescription:
 
     @property
     def has_objects(self) -> bool:
-        """Whether anything stands there."""
+        """Whether the description has any objects."""
         standing = (self.buildings, self.trees, self.walls, self.street_lights, self.signal_poles)
         return any((*standing, self.slabs, self.posts, self.solids))
 
     def with_objects_of(self, other: "SiteDescription") -> "SiteDescription":
-        """Return this description with what stands there, and what ways lie there, by another one too."""
+        """Return this description with the objects, ways, areas and credits of another one added."""
         return replace(
             self,
             buildings=(*self.buildings, *other.buildings),
@@ -306,7 +312,7 @@ class SiteDescription:
 
     @property
     def along(self) -> float | None:
-        """Length of the approaches in the region, metres; None where the region is a circle or an area."""
+        """Length of the approaches in the region, metres; None if the region is a circle or an area."""
         if self.junction is None or self.region is not None or self.radius is not None:
             return None
         return DEFAULT_RADIUS if self.approaches is None else self.approaches
@@ -315,7 +321,7 @@ class SiteDescription:
 def without_covered_buildings(
     description: SiteDescription, solids: Sequence[PlacedSolid]
 ) -> tuple[SiteDescription, int]:
-    """Return a description without the buildings of an extract that others cover, and how many these are."""
+    """Return a description without buildings of an extract that `solids` cover, and the number of these."""
     tree = shapely.STRtree([one.outline for one in solids if one.is_building])
     kept = tuple(
         one
@@ -331,18 +337,18 @@ def read_site_description(path: Path) -> SiteDescription:
     Parameters
     ----------
     path : Path
-        The TOML file. A map that it names is looked for beside it.
+        TOML file. The path of its map is relative to its folder.
 
     Raises
     ------
     SeipError
-        No such file, broken TOML, an unknown key (close ones are offered), a
-        value of the wrong kind, or a shape that is none.
+        The file does not exist, is not valid TOML, or has an unknown key (close ones are suggested), a value of the
+        wrong type or an invalid shape.
     """
     try:
         written = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is no UTF-8 text"
+        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
         raise SeipError(f"cannot read the site description {path}: {reason}") from error
     keys = _PLACE | {name: Key(_tables(name), ()) for name in _LISTED}
     values = read_table(parse_toml(written, str(path)), str(path), keys)
@@ -368,21 +374,21 @@ def describe_place(
     radius: float | None = None,
     approaches: float | None = None,
 ) -> tuple[Path, SiteDescription]:
-    """Return a place's map and description, what is given here in place of what a file says.
+    """Return the map and description of a place; arguments given here replace those of the file.
 
     Parameters
     ----------
     source : Path
-        The map, or a site description that names it.
+        Map, or a site description that names it.
     site : Path, optional
-        Site description to go with a map.
+        Site description to use with a map.
     near, junction, radius, approaches
-        As in `SiteDescription`.
+        See `SiteDescription`.
 
     Raises
     ------
     SeipError
-        As for `read_site_description`; no map is named, or a number makes no sense.
+        See `read_site_description`; or no map is named, or a number is invalid.
     """
     described = _described(source, site)
     map_path = described.map
@@ -404,10 +410,10 @@ def describe_place(
 
 
 def _described(source: Path, site: Path | None) -> SiteDescription:
-    """Return what files say of a place."""
+    """Return the description of a place from its files."""
     if source.suffix.lower() == DESCRIPTION_SUFFIX:
         if site is not None:
-            raise SeipError(f"{source} is a site description already; leave the other one, {site}, out")
+            raise SeipError(f"{source} is a site description already; leave out the other one, {site}")
         return read_site_description(source)
     return replace(SiteDescription() if site is None else read_site_description(site), map=source)
 
@@ -490,7 +496,7 @@ def _poles(height: float, arm: float, heading: float | None, **row: Any) -> Pole
 
 
 def _positions(row: Mapping[str, Any]) -> Float:
-    """Return (n, 2) positions: one, or a row from one point to another at a spacing."""
+    """Return positions (n, 2): a single one, or a row from one point to another at a spacing."""
     given = {key for key, value in row.items() if value is not None}
     if given == {"position"}:
         return np.array([row["position"]])
@@ -548,4 +554,4 @@ _LISTED: Mapping[str, tuple[Callable[..., Any], Mapping[str, Key]]] = {
     "forbidden_area": (Area, _AREA),
     "mandatory_area": (Area, _AREA),
 }
-"""What is made of each kind of table in the file, and the keys of such a table; ``buildings`` holds all of them."""
+"""Constructor and keys of each kind of table in the file; the field ``buildings`` holds all tables ``building``."""

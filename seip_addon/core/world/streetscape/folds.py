@@ -1,4 +1,4 @@
-"""Edges of lanes without folds: on the inside of a sharp bend the edge of a wide road crosses itself."""
+"""Removal of folds in lane edges: on the inside of a sharp bend the edge of a wide road crosses itself."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -13,18 +13,20 @@ MAX_FOLD_LENGTH = 25.0  # metres of an edge in one fold: a longer loop is the sh
 
 
 def without_folds(surfaces: Iterable[LaneSurface]) -> tuple[LaneSurface, ...]:
-    """Return lanes whose edges do not cross themselves: each fold shrinks to the point where its edge crosses."""
+    """Return the lanes with each fold of an edge collapsed to the point where the edge crosses itself."""
     return tuple(replace(lane, left=_unfolded(lane.left), right=_unfolded(lane.right)) for lane in surfaces)
 
 
 def _unfolded(edge: Float) -> Float:
-    """Return an edge (n, 3) whose folds are single points; lanes that share the edge get the same one."""
+    """Return an edge (n, 3) with folds collapsed to points; lanes with a common edge keep it."""
     if len(edge) < 4 or shapely.LineString(edge[:, :2]).is_simple:
         return edge
     edge = edge.copy()
     steps = np.hypot(*np.diff(edge[:, :2], axis=0).T)
     travelled = np.concatenate([[0.0], np.cumsum(steps)])
     pieces = shapely.linestrings(np.stack([edge[:-1, :2], edge[1:, :2]], axis=1))
+    # Scan segments in order. A fold begins at the first segment that a later one crosses; the last such segment within
+    # `MAX_FOLD_LENGTH` ends it. All points between take the crossing point, so that the number of rows stays the same.
     first = 0
     while first < len(pieces) - 2:
         last = int(np.searchsorted(travelled, travelled[first + 1] + MAX_FOLD_LENGTH))

@@ -1,4 +1,4 @@
-"""Footways of an extract that run beside a pavement of the street: one pavement, mapped twice."""
+"""Removal of footways of an extract that run along a pavement of the street: one pavement, mapped twice."""
 
 from collections.abc import Sequence
 
@@ -14,23 +14,26 @@ STEP, MIN_LENGTH = 2.0, 8.0  # metres: sampling along footways, and least length
 
 
 def without_doubles(line: Float, width: float, pavement: BaseGeometry) -> tuple[BaseGeometry, float]:
-    """Area of a footway without what runs beside a pavement, and the length of that.
+    """Return the area of a footway without the stretches along a pavement, and the length of these.
 
-    Where the rest ends beside the pavement, it is led on to it; short pieces at the pavement, such as between two
-    mapped pavements or at a crossing, are left out as well.
+    Ends of the rest near the pavement are connected to it. Short pieces at the pavement, such as between two mapped
+    pavements or at a crossing, are left out as well.
 
     Parameters
     ----------
     line : (n, 2) float64, metres
-        Middle line.
+        Centre line of the footway.
+    width : float, metres
+        Width of the footway.
     pavement : shapely geometry
-        Prepared.
+        Pavements of the street, prepared.
 
     Returns
     -------
     area : shapely geometry
+        Area of the rest.
     length : float, metres
-        Of what is left out.
+        Length of the stretches that are left out.
     """
     points = shapely.get_coordinates(shapely.segmentize(shapely.LineString(line), STEP))
     steps = np.diff(points, axis=0)
@@ -43,18 +46,20 @@ def without_doubles(line: Float, width: float, pavement: BaseGeometry) -> tuple[
 
 
 def _beside(points: Float, steps: Float, pavement: BaseGeometry) -> Boolean:
-    """Whether each step (n - 1,) between points (n, 2) runs along a pavement that is near."""
+    """Return whether each step (n - 1,) between points (n, 2) runs along a pavement nearby."""
     middles = shapely.points((points[:-1] + points[1:]) / 2)
     across = shapely.get_coordinates(shapely.shortest_line(middles, pavement)).reshape(-1, 2, 2)
     across = across[:, 1] - across[:, 0]
     distance = np.hypot(*across.T)
+    # The shortest line to the pavement is square to a parallel pavement, so the cosine of its angle with the step is
+    # the sine of the angle between step and pavement. On the pavement itself there is no such line, and no test.
     turn = np.abs((across * steps).sum(axis=1)) / np.maximum(distance * np.hypot(*steps.T), 1e-9)
     near: Boolean = (distance <= MAX_BESIDE) & ((turn <= MAX_TURN) | (distance < 1e-6))
     return near
 
 
 def _long_runs(beside: Boolean, lengths: Float) -> Boolean:
-    """Whether each step belongs to a run along the pavement that is long enough to be one."""
+    """Return whether each step belongs to a run along the pavement of at least `MIN_LENGTH`."""
     run = np.cumsum(np.concatenate([[0], np.diff(beside.astype(np.int64)) != 0]))
     total = np.bincount(run, lengths)
     long: Boolean = beside & (total[run] >= MIN_LENGTH)
@@ -62,13 +67,13 @@ def _long_runs(beside: Boolean, lengths: Float) -> Boolean:
 
 
 def _is_stub(line: BaseGeometry, pavement: BaseGeometry) -> bool:
-    """Return whether a line is short and wholly beside the pavement."""
+    """Return whether a line is short and near the pavement throughout."""
     ends = shapely.points(shapely.get_coordinates(line))
     return bool(line.length < MIN_LENGTH and shapely.distance(ends, pavement).max() <= MAX_BESIDE)
 
 
 def _links(line: BaseGeometry, pavement: BaseGeometry) -> Sequence[BaseGeometry]:
-    """Return straight ways from the ends of a line to a pavement that is near, unless the line reaches it."""
+    """Return straight links from the ends of a line to a pavement nearby; none if the line reaches it already."""
     if line.intersects(pavement):
         return []
     ends = shapely.points(shapely.get_coordinates(line)[[0, -1]])

@@ -1,4 +1,4 @@
-"""Intersections of maps that were made of the middle lines of streets, where one comes as several junctions.
+"""Intersections of maps made from centre lines of streets, in which one intersection has several junctions.
 
 SUMO's netconvert makes a junction wherever two ways meet or a lane begins, and several where the carriageways of two
 wide streets cross.
@@ -20,20 +20,20 @@ from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import Road
 
 FOOTPATHS = {"sidewalk", "walking", "none"}
-MIN_ARMS = 3  # arms of a junction; where fewer meet, a street goes on
+MIN_ARMS = 3  # arms of a junction; where fewer meet, a street continues
 ARM_GAP = 2.0  # metres between two ends of roads of one arm at most
 SAME_DIRECTION = math.radians(40.0)  # roads whose ends differ by less lead the same way
 TOUCH = 0.5  # metres between a junction and the end of a road that meets it at most
 JUNCTION_REACH = 20.0  # metres between two junctions of one intersection at most
-PARALLEL = math.radians(15.0)  # by which the other carriageway of a street turns from it at most
+PARALLEL = math.radians(15.0)  # largest angle between the carriageways of a street
 MAX_MEDIAN = 22.0  # metres between the middles of lanes of two carriageways of one street at most
 MAX_INTERSECTION = 45.0  # metres from the junction in the middle to the farthest of an intersection at most
 
 
 def without_plain_joints(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, ...]:
-    """Return lanes of which those are in no junction that lie where no more than two arms meet.
+    """Return the lanes with `junction_id` removed from those in junctions where no more than two arms meet.
 
-    A pavement that is a road of its own, as netconvert makes of one on the left of a one-way street, is no arm.
+    Pavements that are separate roads are not arms; netconvert makes one on the left of a one-way street.
     """
     areas = _areas(surfaces)
     streets = {lane.road_id for lane in surfaces if lane.lane_type not in FOOTPATHS}
@@ -49,6 +49,9 @@ def without_plain_joints(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, 
     for number, area in areas.items():
         touching = tree.query(area, predicate="dwithin", distance=TOUCH)
         arms = shapely.union_all([ends[index].buffer(ARM_GAP / 2) for index in touching])
+        # Each of three counts may miss an arm: ends of different arms may lie close together, arms may lead in similar
+        # directions, and ends in a row may belong to several streets. A junction is a plain joint only if all three
+        # find fewer than three arms.
         meeting = (
             len(shapely.get_parts(arms)),
             _directions([outwards[index] for index in touching]),
@@ -60,13 +63,14 @@ def without_plain_joints(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, 
 
 
 def _two_way_streets(ends: Iterable[tuple[str | None, int]]) -> int:
-    """Return how many two-way streets at most have ends of their roads, which are of one way each, in one place."""
+    """Return the largest number of two-way streets whose one-way carriageways end at one point."""
+    # A two-way street has one road that starts here (row 0) and one that ends here (row -1).
     rows = [row for road, row in ends if road is not None]
     return min(rows.count(0), rows.count(-1))
 
 
 def _directions(vectors: Sequence[Float]) -> int:
-    """Return in how many directions vectors (2,) point that differ by more than `SAME_DIRECTION`."""
+    """Return the number of directions of vectors (2,) that differ by more than `SAME_DIRECTION` from each other."""
     found: list[float] = []
     for x, y in vectors:
         heading = math.atan2(y, x)
@@ -78,20 +82,28 @@ def _directions(vectors: Sequence[Float]) -> int:
 def intersection(
     surfaces: Sequence[LaneSurface], junction_id: str, roundabouts: Iterable[frozenset[str]] = ()
 ) -> frozenset[str]:
-    """Return the ids of the junctions that are one intersection with a junction.
+    """Return the ids of the junctions that form one intersection with a given junction.
 
     Parameters
     ----------
+    surfaces : sequence of LaneSurface
+        Lanes of the map.
+    junction_id : str
+        Id of the junction in the middle.
     roundabouts : iterable of frozenset of str
-        Ids of junctions that are one roundabout each.
+        Junction ids of each roundabout.
     """
     areas = _areas(surfaces)
     if junction_id not in areas:
         return frozenset({junction_id})
+    # A junction of a roundabout stands for the whole roundabout, however large. The limit on the size of the
+    # intersection then counts from its middle and includes it.
     found = {junction_id}.union(*(one & areas.keys() for one in roundabouts if junction_id in one))
     middle = shapely.union_all([areas[number] for number in found]).centroid
     away = max(areas[number].centroid.distance(middle) for number in found)
     most = max(MAX_INTERSECTION, away + JUNCTION_REACH)
+    # Flood fill over junctions that are near each other. Without the limit on the distance from the middle, a row of
+    # close junctions along a street would grow into one intersection.
     waiting = sorted(found)
     while waiting:
         area = areas[waiting.pop()]
@@ -110,18 +122,21 @@ def intersection(
 def ring_roads(
     roads: Iterable[Road], junctions: frozenset[str], roundabouts: Iterable[frozenset[str]]
 ) -> frozenset[str]:
-    """Return the ids of the roads that lead around the roundabouts of an intersection, between their arms.
+    """Return the ids of the roads that form the rings of the roundabouts of an intersection.
 
     Parameters
     ----------
+    roads : iterable of Road
+        Roads of the map.
     junctions : frozenset of str
         Ids of the junctions of the intersection.
     roundabouts : iterable of frozenset of str
-        Ids of the junctions that are one roundabout each.
+        Junction ids of each roundabout.
     """
     rings = [one for one in roundabouts if one & junctions]
 
     def in_ring(road: Road, ring: frozenset[str]) -> bool:
+        # Part of the ring: within one of its junctions, or between two of them.
         ends = (road.predecessor, road.successor)
         return road.junction_id in ring or all(end is not None and end.id in ring for end in ends)
 
@@ -131,10 +146,10 @@ def ring_roads(
 def with_other_carriageways(
     lanes: Sequence[LaneSurface], surfaces: Sequence[LaneSurface], names: Mapping[str, str]
 ) -> BaseGeometry:
-    """Return the area of lanes, and of what lies beside them of the same streets: the other carriageway of each.
+    """Return the area of lanes together with the opposite carriageways of their streets next to them.
 
-    A street with both directions beside each other is no carriageway of another one, and a street with a name of its
-    own that runs along them is no link between them.
+    A street whose directions lie next to each other is not an opposite carriageway of another street, and a street with
+    a different name that runs parallel is not a link between two carriageways.
 
     Parameters
     ----------
@@ -143,9 +158,11 @@ def with_other_carriageways(
     surfaces : sequence of LaneSurface
         All driving lanes.
     names : mapping of str to str
-        Of the streets, by the ids of their roads.
+        Names of the streets by the ids of their roads.
     """
     area = united(lane.polygon for lane in lanes)
+    # Bands on both sides of the given lanes, as wide as a median may be, for each street name: the opposite carriageway
+    # lies within them. Closing fills the gaps between bands at junctions, where lanes have no band.
     bands: dict[str, list[tuple[BaseGeometry, float]]] = {}
     for lane in lanes:
         middle = (lane.left[:, :2] + lane.right[:, :2]) / 2
@@ -154,6 +171,8 @@ def with_other_carriageways(
             bands.setdefault(names[lane.road_id], []).append((band, _heading(lane)))
     two_way = _two_way_roads(surfaces)
     sides = {name: closed(united(band for band, _ in own), JUNCTION_REACH) for name, own in bands.items()}
+    # Opposite carriageways: one-way roads of the same name, parallel to a lane whose band they meet. They are clipped
+    # to the bands, so that they end where the given lanes end.
     others = [
         shapely.make_valid(lane.polygon).intersection(sides[names[lane.road_id]])
         for lane in surfaces
@@ -165,6 +184,7 @@ def with_other_carriageways(
     ]
     streets = united([area, *others])
     headings = [heading for own in bands.values() for _, heading in own]
+    # Links across the median: lanes that begin and end at these carriageways, such as turns within a junction.
     links = [
         lane.polygon
         for lane in surfaces
@@ -176,7 +196,9 @@ def with_other_carriageways(
 
 
 def _two_way_roads(surfaces: Sequence[LaneSurface]) -> frozenset[str]:
-    """Return the ids of roads, each of one direction, whose inner edge is that of a road of the other direction."""
+    """Return the ids of one-way roads whose inner edge is that of a road in the opposite direction."""
+    # The inner edge of the innermost lane is the centre line of a street whose directions are not divided: there both
+    # roads touch. Comparing the middles of edges keeps out roads that only meet end to end.
     innermost: dict[str, LaneSurface] = {}
     for lane in surfaces:
         found = innermost.get(lane.road_id)
@@ -195,20 +217,22 @@ def _two_way_roads(surfaces: Sequence[LaneSurface]) -> frozenset[str]:
 
 
 def _runs_along(lane: LaneSurface, headings: Iterable[float]) -> bool:
-    """Return whether a lane is longer than the way across a median, and as good as parallel to some heading."""
+    """Return whether a lane is longer than a median is wide, and nearly parallel to one of the headings."""
     length = float(np.hypot(*(lane.left[-1] - lane.left[0])[:2]))
     own = _heading(lane)
-    alike = any(abs(math.remainder(own - heading, math.pi)) < SAME_DIRECTION for heading in headings)
-    return length > MAX_MEDIAN and alike
+    is_parallel = any(abs(math.remainder(own - heading, math.pi)) < SAME_DIRECTION for heading in headings)
+    return length > MAX_MEDIAN and is_parallel
 
 
 def box_along(area: BaseGeometry, lanes: Iterable[LaneSurface]) -> BaseGeometry:
-    """Return the smallest rectangle around a junction's area that lies along one of the roads that meet there."""
+    """Return the smallest rectangle around a junction's area that is aligned with one of its roads."""
     meeting = [
         lane
         for lane in lanes
         if lane.junction_id is None and lane.polygon.distance(area) < TOUCH and not _leads_between(lane, area)
     ]
+    # Turn the area so that a road lies along x, take its bounding box and turn that back. The rectangle of least area
+    # overall would lie askew to all roads where the area is irregular.
     boxes = [
         rotate(shapely.envelope(rotate(area, -heading, (0, 0), use_radians=True)), heading, (0, 0), use_radians=True)
         for heading in map(_heading, meeting)
@@ -229,7 +253,7 @@ def _heading(lane: LaneSurface) -> float:
 
 
 def filled(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
-    """Return the area of a junction's lanes with the holes between them, and narrow gaps at its edge, filled."""
+    """Return the area of a junction's lanes, with holes between them and narrow gaps at the edge filled."""
     area = closed(united(lane.polygon for lane in surfaces), 0.5)
     return united(shapely.Polygon(part.exterior) for part in _polygons(area))
 

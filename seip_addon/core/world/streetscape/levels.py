@@ -17,29 +17,31 @@ from ..opendrive.lanes import LaneSurface
 from .road_surface import MAX_SEAM, by_road, group, is_near
 from .terrain import Terrain
 
-MAX_JOINT_STEP = 1.0  # roads that meet within so many metres of height lead into each other
-MIN_LEVEL_HEIGHT = 2.0  # a road that lies more than this (metres) above another one crosses it on a level of its own
-MIN_LEAD = 10.0  # metres along the roads by which one of two roads as many joints away is the nearer one
+MAX_JOINT_STEP = 1.0  # metres of height within which roads that meet lead into each other
+MIN_LEVEL_HEIGHT = 2.0  # metres: a road more than this above another one crosses it on a different level
+MIN_LEAD = 10.0  # metres along the roads by which one of two roads equally many joints away is the nearer one
 UNNAMED_ROAD = "a street without a name"
 MIN_OVERLAP = 1.0  # square metres in plan: roads that overlap less do not cross
 
 
 class UnclearLevelError(SeipError):
-    """Roads cross in the middle of a place, and nothing tells which is studied."""
+    """Error: roads cross in the middle of a place, and it is unclear which one to study."""
 
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """A road above another one, and where, in map coordinates.
+    """A road above another one, in map coordinates.
 
     Parameters
     ----------
     above, below : str
         Ids of the roads.
     height : float, metres
+        Difference of their heights.
     place : (x, y), metres
+        Middle of their overlap.
     streets : (str, str)
-        Names of the streets above and below, where they have names.
+        Names of the streets above and below, or "".
     """
 
     above: str
@@ -50,12 +52,12 @@ class Crossing:
 
     @property
     def levels(self) -> tuple[str, str]:
-        """What names the upper and the lower level."""
+        """Names of the upper and the lower level: streets if these differ, otherwise roads."""
         upper, lower = (name or road for name, road in zip(self.streets, (self.above, self.below), strict=True))
         return (self.above, self.below) if upper.casefold() == lower.casefold() else (upper, lower)
 
     def called(self, road: str) -> str:
-        """Return what a message calls one of the two roads: by the name of its street, where the map has names."""
+        """Return the name of one of the two roads in messages: that of its street if the map has names."""
         name, other = self.streets if road == self.above else self.streets[::-1]
         if not name:
             return UNNAMED_ROAD if other else f"road {road}"
@@ -68,14 +70,14 @@ class Crossing:
 
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """The lanes of a place on the level that is studied, and on others.
+    """Lanes of a place on the studied level and on other levels.
 
     Parameters
     ----------
     studied, others : tuple of LaneSurface
-        In map coordinates.
+        Lanes in map coordinates.
     crossings : tuple of Crossing
-        Why there are others.
+        Crossings that separate the levels.
     """
 
     studied: tuple[LaneSurface, ...]
@@ -96,21 +98,21 @@ def split_levels(
 ) -> Levels:
     """Divide lanes into those on the level of a place and those that cross above or below.
 
-    Of two crossing roads the one that is fewer joints away from the anchors in the graph of roads is on the studied
-    level; of as many, the nearer one along the roads. Each other road takes the level of the crossing road that is
-    fewer joints away; ties are decided by height. A road that shares its surface with a studied one is studied too, as
-    where a street that leads to the other level branches off.
+    Of two crossing roads, the one that is fewer joints away from the anchors in the graph of roads is on the studied
+    level; if both are equally many joints away, the one that is nearer along the roads. Each remaining road takes the
+    level of the crossing road that is fewer joints away; ties are decided by height. A road that shares its surface
+    with a studied one is studied too, as where a street that leads to the other level branches off.
 
     Parameters
     ----------
     surfaces : sequence of LaneSurface
         All lanes of the map, map coordinates.
     around : shapely geometry
-        The place, map coordinates. What lies beyond it counts as studied.
+        Area of the place, map coordinates. Lanes beyond it count as studied.
     anchors : iterable of str
         Ids of the roads in the middle of the place.
     level : sequence of str
-        Streets that are on the level, in place of the anchors: their names, or ids of roads.
+        Streets on the studied level, instead of the anchors: their names, or ids of roads.
     names : mapping of str to str, optional
         Names of the streets by the ids of their roads.
 
@@ -119,7 +121,7 @@ def split_levels(
     UnclearLevelError
         Roads cross and neither is nearer to the place (both are named).
     SeipError
-        A road of ``level`` is not here.
+        A road of ``level`` is not at the place.
     """
     shapely.prepare(around)
     near = [lane for lane in surfaces if group(lane) and is_near(lane, around)]
@@ -129,19 +131,26 @@ def split_levels(
     crossings = _crossings(roads, names) if roads else ()
     if not crossings:
         return Levels(tuple(surfaces), (), ())
+    # The graph of roads that lead into each other. Only one road of each crossing can be on the studied level; the
+    # other one seeds the other levels, and the rest of the graph follows the nearer seed.
     joined = _joined(roads)
     start = (on_level or set(anchors)) & roads.keys()
     others = _roads_farther_off(crossings, joined, roads, start)
     winners = {road for crossing in crossings for road in (crossing.above, crossing.below)} | start
     to_level, to_others = _hops(joined, winners - others), _hops(joined, others)
+    # A ramp half-way between both levels is equally near to both: its height decides.
     even = {road for road in roads if to_others[road] == to_level[road] < math.inf}
     others |= {road for road in roads if to_others[road] < to_level[road]}
     others |= {road for road in even - start if _lies_with_others(roads[road], roads, crossings, others)}
+    # Roads that no joint connects with a crossing within this area take the level of the nearest road of their height.
     apart = {road for road in roads if to_others[road] == to_level[road] == math.inf}
     others |= {road for road in sorted(apart) if _next_to(road, roads, roads.keys() - apart) in others}
     for crossing in crossings:
+        # Both roads of a crossing would be studied, as where a loop connects them: one level cannot hold both.
         if not {crossing.above, crossing.below} & others:
             raise _ambiguous(crossing)
+    # Where a ramp branches off, its first metres are the surface of the studied street. Leaving them out would cut a
+    # hole into that street.
     others -= _on_studied_surface(roads, others - winners, roads.keys() - others)
     away = {id(lane) for lane in near if lane.road_id in others}
     return Levels(
@@ -152,22 +161,22 @@ def split_levels(
 
 
 def _on_level(level: Sequence[str], roads: Mapping[str, object], names: Mapping[str, str]) -> set[str]:
-    """Return the roads here that ids and names of streets stand for."""
+    """Return the ids of the roads here that have given ids or street names."""
     found = set()
-    for asked in level:
-        named = {road for road in roads if names.get(road, "").casefold() == asked.strip().casefold()}
-        if asked not in roads and not named:
+    for given in level:
+        named = {road for road in roads if names.get(road, "").casefold() == given.strip().casefold()}
+        if given not in roads and not named:
             known = ", ".join(sorted({names[road] for road in roads if names.get(road)}))
             raise SeipError(
-                f"no road {asked!r} at this place: name a street that lies on the level{known and ': '}{known}"
+                f"no road {given!r} at this place: name a street that lies on the level{known and ': '}{known}"
             )
-        found |= {asked} if asked in roads else named
+        found |= {given} if given in roads else named
     return found
 
 
 @dataclass(frozen=True, eq=False)
 class _RoadArea:
-    """A road within the place: its outline in plan and its heights, (low, high) and everywhere."""
+    """Outline in plan of a road within the place, its lowest and highest height, and its surface."""
 
     outline: BaseGeometry
     heights: tuple[float, float]
@@ -175,7 +184,7 @@ class _RoadArea:
 
     @property
     def middle(self) -> float:
-        """Half-way between the lowest and the highest place, metres."""
+        """Height half-way between the lowest and the highest point, metres."""
         return sum(self.heights) / 2
 
 
@@ -191,7 +200,7 @@ def _roads(lanes: Sequence[LaneSurface], around: BaseGeometry) -> dict[str, _Roa
 
 
 def _pairs(roads: Mapping[str, _RoadArea], distance: float) -> list[tuple[str, str]]:
-    """Return the pairs of roads that come so near to each other in plan, metres."""
+    """Return the pairs of roads within `distance` metres of each other in plan."""
     names = list(roads)
     outlines = [roads[name].outline for name in names]
     first, second = shapely.STRtree(outlines).query(outlines, predicate="dwithin", distance=distance)
@@ -199,16 +208,19 @@ def _pairs(roads: Mapping[str, _RoadArea], distance: float) -> list[tuple[str, s
 
 
 def _crossings(roads: Mapping[str, _RoadArea], names: Mapping[str, str]) -> tuple[Crossing, ...]:
-    """Return where roads lie above each other, the greatest overlap of each two."""
+    """Return all places where one road lies above another one."""
     found = []
     for one, other in _pairs(roads, 0.0):
         first, second = roads[one], roads[other]
+        # Heights that cannot differ enough anywhere need no intersection of outlines.
         if max(first.heights[1] - second.heights[0], second.heights[1] - first.heights[0]) < MIN_LEVEL_HEIGHT:
             continue
         for part in shapely.get_parts(first.outline.intersection(second.outline)):
             if part.area < MIN_OVERLAP:
                 continue
             points = _points_in(part)
+            # One road must be above the other over the whole overlap. Where a ramp leaves a street, the overlap begins
+            # at no difference in height, and the two do not cross.
             rise = first.terrain.height(points) - second.terrain.height(points)
             if np.abs(rise).min() > MIN_LEVEL_HEIGHT:
                 above, below = (one, other) if rise[0] > 0 else (other, one)
@@ -219,12 +231,13 @@ def _crossings(roads: Mapping[str, _RoadArea], names: Mapping[str, str]) -> tupl
 
 
 def _joined(roads: Mapping[str, _RoadArea]) -> dict[str, set[str]]:
-    """Return for each road those that meet it in plan and in height."""
+    """Return the neighbours of each road: those that touch it in plan at the same height."""
     joined: dict[str, set[str]] = {road: set() for road in roads}
     for one, other in _pairs(roads, MAX_SEAM):
         first, second = roads[one], roads[other]
         common = first.outline.buffer(MAX_SEAM).intersection(second.outline.buffer(MAX_SEAM))
         points = np.concatenate([np.empty((0, 2)), *map(_points_in, shapely.get_parts(common))])
+        # One point of equal height is enough: a ramp has it only where it begins.
         rise = np.abs(first.terrain.height(points) - second.terrain.height(points))
         if rise.min(initial=math.inf) < MAX_JOINT_STEP:
             joined[one].add(other)
@@ -238,8 +251,9 @@ def _points_in(part: BaseGeometry) -> Float:
 
 
 def _hops(joined: Mapping[str, set[str]], start: Iterable[str]) -> dict[str, float]:
-    """Return over how many joints each road is reached; infinity where it is not."""
+    """Return the number of joints between each road and the nearest start; infinity if it cannot be reached."""
     hops = dict.fromkeys(joined, math.inf)
+    # Breadth-first search; neighbours in sorted order keep the result independent of the order of sets.
     waiting = deque(start)
     hops.update(dict.fromkeys(waiting, 0.0))
     while waiting:
@@ -261,7 +275,7 @@ def _lies_with_others(
 
 
 def _on_studied_surface(roads: Mapping[str, _RoadArea], others: set[str], studied: Iterable[str]) -> set[str]:
-    """Return the other roads that share the surface of a studied one, where neither of the two climbs to a level."""
+    """Return the other roads that share the surface of a studied one, if neither climbs to a different level."""
     level = {road for road, own in roads.items() if own.heights[1] - own.heights[0] < MIN_LEVEL_HEIGHT}
     others, known = others & level, level.intersection(studied)
     pairs = _pairs({road: own for road, own in roads.items() if road in others | known}, 0.0)
@@ -274,7 +288,7 @@ def _on_studied_surface(roads: Mapping[str, _RoadArea], others: set[str], studie
 
 
 def _share_surface(one: _RoadArea, other: _RoadArea) -> bool:
-    """Return whether roads overlap, nowhere farther apart in height than roads that lead into each other."""
+    """Return whether roads overlap, with a height difference below `MAX_JOINT_STEP` everywhere."""
     parts = shapely.get_parts(one.outline.intersection(other.outline))
     points = [_points_in(part) for part in parts if part.area >= MIN_OVERLAP]
     return bool(points) and all(
@@ -283,7 +297,7 @@ def _share_surface(one: _RoadArea, other: _RoadArea) -> bool:
 
 
 def _next_to(road: str, roads: Mapping[str, _RoadArea], reached: Iterable[str]) -> str:
-    """Return the nearest road at about the height of one that is joined to none here; empty where there is none."""
+    """Return the nearest reached road at about the height of a road without joints; "" if there is none."""
     own = roads[road]
     for other in sorted(reached, key=lambda name: (float(own.outline.distance(roads[name].outline)), name)):
         ends = shapely.get_coordinates(shapely.shortest_line(own.outline, roads[other].outline))
@@ -296,9 +310,9 @@ def _next_to(road: str, roads: Mapping[str, _RoadArea], reached: Iterable[str]) 
 def _roads_farther_off(
     crossings: Iterable[Crossing], joined: Mapping[str, set[str]], roads: Mapping[str, _RoadArea], start: set[str]
 ) -> set[str]:
-    """Return of each two roads that cross the one that more joints part from the place; of as many, the farther one.
+    """For each crossing, return the road with more joints between it and the place; if equal, the farther one.
 
-    Where no joint leads to either, both are on other levels, or next to a road that tells their level.
+    Crossings without a joint to either road are skipped: their level follows from the roads next to them.
     """
     hops = _hops(joined, start)
     metres = _metres_away(joined, roads, start)
@@ -317,7 +331,7 @@ def _roads_farther_off(
 def _metres_away(
     joined: Mapping[str, set[str]], roads: Mapping[str, _RoadArea], start: Iterable[str]
 ) -> dict[str, float]:
-    """Return the length of the shortest way to each road, metres along the roads between; infinity where none leads."""
+    """Return the distance of each road from the start along the roads between, metres; infinity without a path."""
     away = dict.fromkeys(joined, math.inf)
     waiting = [(0.0, road) for road in sorted(start)]
     away.update({road: 0.0 for _, road in waiting})
@@ -325,6 +339,7 @@ def _metres_away(
         travelled, road = heapq.heappop(waiting)
         if travelled > away[road]:
             continue
+        # Dijkstra's algorithm. Half the perimeter of a long, narrow outline is about the length of the road.
         onwards = travelled + float(roads[road].outline.length) / 2
         for following in sorted(joined[road]):
             if onwards < away[following]:

@@ -17,16 +17,16 @@ from . import street_furniture
 from .object_kinds import MAX_POST_THICKNESS, SIGN_WORDS, VAGUE_TYPES, Kind, Post, height_of, kind_of, post_of, size_of
 from .parts import Part
 
-MIN_HEIGHT = 0.2  # outlines lower than this (metres) hide nothing that matters
+MIN_HEIGHT = 0.2  # metres: lower outlines hide nothing that matters
 POLE_HEIGHT, POLE_THICKNESS = 3.0, 0.08
-"""Posts from this height and thickness up (metres) can carry a sensor: a traffic sign's of 5 to 6 cm cannot."""
+"""Least height and thickness (metres) of posts that can carry a sensor: posts of traffic signs, 5 to 6 cm, cannot."""
 
 LANDING_DEPTH = 2.0  # metres from the kerb that the ground in front of a crossing is deep
 TREE_HEIGHT, CROWN_SHARE = 8.0, 0.6
-MIN_CROWN_SHARE = 0.15  # a tree that is more slender than this is given by its trunk: its crown follows from its height
+MIN_CROWN_SHARE = 0.15  # width to height: more slender trees are given by their trunk, and get a crown by their height
 LIGHT_HEIGHT, LIGHT_ARM = 8.0, 1.5
 POST_RADIUS, FENCE_WIDTH = 0.06, 0.1
-"""Sizes (metres) of what a map gives no size; the crown's diameter as a share of the tree's height."""
+"""Sizes (metres) assumed for objects without sizes; the diameter of a crown is a share of the tree's height."""
 
 MAX_FACADE_AREA = 200_000.0  # square metres of walls beyond which a building has no windows: there would be too many
 FACADES = ("facade brick", "facade plaster", "facade sand", "facade grey")
@@ -40,16 +40,17 @@ def arm_heading(xy: Float, carriageway: BaseGeometry) -> float:
 
 
 def tree_part(name: str, foot: Float, height: float, crown_diameter: float, number: int) -> Part:
-    """Return a tree; neighbours in number differ in shape and turn."""
+    """Return a tree; consecutive numbers differ in shape and rotation."""
+    # Multiples of the golden angle never come close to each other: few trees look the same, however many there are.
     golden_turn = math.pi * (3 - math.sqrt(5))
     shape = street_furniture.tree(height, crown_diameter, number % 3)
     return Part(name, shape, (Role.OCCLUDERS,), _xyz(foot), number * golden_turn % math.tau)
 
 
 def building_parts(name: str, base: Float, height: Float, number: int, shape: Solid | None = None) -> tuple[Part, ...]:
-    """Return a block (k, 3) raised by (k,) metres, and its windows where it is a house with level eaves.
+    """Return a building: a block on `base` (k, 3) of `height` (k,) metres, with windows if its eaves are level.
 
-    A ``shape`` stands in place of the block, whose windows it gets.
+    A ``shape`` replaces the block and gets the same windows.
     """
     walls = shape or block(base, height, side=facade(number), cap="roof")
     building = Part(name, walls, (Role.OCCLUDERS,))
@@ -62,19 +63,19 @@ def building_parts(name: str, base: Float, height: Float, number: int, shape: So
 
 
 def facade(number: int) -> str:
-    """Return the material of the walls of a building, by its number."""
+    """Return the material of the walls of a building from its number."""
     return FACADES[number % len(FACADES)]
 
 
 def object_parts(objects: Iterable[PlacedObject], carriageway: BaseGeometry) -> tuple[Part, ...]:
-    """Return the parts for a map's objects; flat ones (crossings, parking spaces) have none.
+    """Return the parts for the objects of a map; flat ones (crossings, parking spaces) have none.
 
     Parameters
     ----------
     objects : iterable of PlacedObject
-        In local axes.
+        Objects in local axes.
     carriageway : shapely geometry
-        For the arms of street lights.
+        Carriageway that arms of street lights point to.
     """
     return tuple(part for number, placed in enumerate(objects) for part in _object(placed, number, carriageway))
 
@@ -82,7 +83,8 @@ def object_parts(objects: Iterable[PlacedObject], carriageway: BaseGeometry) -> 
 def landings(objects: Iterable[PlacedObject]) -> Iterator[BaseGeometry]:
     """Yield the crossings of a map with the ground at their ends, in local axes.
 
-    Each is its rectangle, extended along both axes: what lies at its sides is carriageway.
+    Each rectangle is extended along both of its axes, because it is unknown which of them leads across the road; the
+    extension along the road lies on the carriageway.
     """
     for placed in objects:
         if placed.kind == "crosswalk":
@@ -94,7 +96,7 @@ def landings(objects: Iterable[PlacedObject]) -> Iterator[BaseGeometry]:
 
 
 def _extended(corners: Float, side: Float) -> BaseGeometry:
-    """Return a rectangle (4, 2) that goes on by the depth of a landing at both ends of its side (2, 2)."""
+    """Return a rectangle (4, 2) extended by the depth of a landing at both ends of its side (2, 2)."""
     along = side[1] - side[0]
     by = LANDING_DEPTH * along / (np.hypot(*along) or 1.0)
     return shapely.MultiPoint(np.concatenate([corners + by, corners - by])).convex_hull
@@ -112,13 +114,13 @@ def is_trunk(placed: PlacedObject) -> bool:
 
 
 def can_carry(post: Post) -> bool:
-    """Return whether a post is high and thick enough for a sensor, as far as the map says."""
+    """Return whether a post is high and thick enough for a sensor; unknown sizes count as sufficient."""
     thick_enough = post.thickness == 0 or post.thickness >= POLE_THICKNESS
     return thick_enough and not post.words & SIGN_WORDS and (post.height or LIGHT_HEIGHT) >= POLE_HEIGHT
 
 
 def pole_part(name: str, shape: Solid, foot: Float, heading: float, source: str) -> Part:
-    """Return a post that can carry a sensor, its arm turned to a heading; ``source`` is as in `Part`."""
+    """Return a post that can carry a sensor, with its arm at a heading; for ``source`` see `Part`."""
     return Part(name, shape, (Role.POLES,), _xyz(foot), heading, source=source)
 
 
@@ -128,7 +130,7 @@ def _local(placed: PlacedObject, origin: Float) -> PlacedObject:
 
 
 def _object(placed: PlacedObject, number: int, carriageway: BaseGeometry) -> tuple[Part, ...]:
-    """Return the parts of one object in local axes; ``number`` varies the looks of equal ones."""
+    """Return the parts of one object in local axes; ``number`` varies the appearance of equal objects."""
     kind, name = kind_of(placed), placed.name or f"{placed.kind} {placed.id}"
     height, size = height_of(placed), size_of(placed)
     if kind is Kind.FLAT:
@@ -149,7 +151,7 @@ def _object(placed: PlacedObject, number: int, carriageway: BaseGeometry) -> tup
 
 
 def _is_single_tree(kind: Kind, height: float, size: float) -> bool:
-    """Return whether an object is one tree, and no row or wood of which the map gives the whole extent."""
+    """Return whether an object is a single tree, not a row or a wood given by its whole extent."""
     if kind is Kind.TREE:
         return size <= (height or TREE_HEIGHT)
     return kind is Kind.PLANTS and size <= max(height, 1.0)
@@ -173,7 +175,7 @@ def _block(placed: PlacedObject, name: str, number: int, base: Float, height: Fl
 
 def _post(name: str, placed: PlacedObject, post: Post, carriageway: BaseGeometry) -> tuple[Part, ...]:
     if post.height == 0 and not post.is_lamp and placed.kind in VAGUE_TYPES:
-        return ()  # nothing but a name
+        return ()  # the map gives only its name
     height = round(post.height or LIGHT_HEIGHT, 2)
     lit = post.is_lamp or "light" in name.lower()
     if lit and height >= POLE_HEIGHT:
@@ -186,12 +188,12 @@ def _post(name: str, placed: PlacedObject, post: Post, carriageway: BaseGeometry
 
 
 def _middle(placed: PlacedObject) -> Float:
-    """Return the foot (3,) of what stands in the middle of an object."""
+    """Return the foot (3,) of a shape at the centre of an object."""
     return placed.outlines[0].base.mean(axis=0) if placed.outlines else placed.position
 
 
 def footprint(placed: PlacedObject) -> Float:
-    """Return the corners (k, 3) of an object's box or cylinder about its position."""
+    """Return the corners (k, 3) of an object's box or cylinder, relative to its position."""
     if placed.radius > 0:
         angle = np.arange(8) * (math.tau / 8)
         return np.column_stack([placed.radius * np.cos(angle), placed.radius * np.sin(angle), np.zeros(8)])

@@ -1,4 +1,4 @@
-"""Where a mesh out of a file of its own stands in a modelled site."""
+"""Position of an imported mesh in a modelled site."""
 
 import math
 from collections.abc import Sequence
@@ -16,32 +16,34 @@ from .geographic_position import looks_like_degrees
 from .model import SiteModel
 from .parts import Part
 
-REACH = 2000.0  # metres from the middle of a site within which a mesh is one of its own
+REACH = 2000.0  # metres from the region of a site within which a mesh can be placed
 
 
 @dataclass(frozen=True)
 class MeshPlace:
-    """Where the zero of a mesh stands, local axes in metres, and where its x points, radians counter-clockwise."""
+    """Position of a mesh's origin, local axes in metres, and heading of its x axis, radians counter-clockwise."""
 
     position: tuple[float, float, float]
     heading: float
 
 
 def mesh_place(model: SiteModel, given: Sequence[float], name: str) -> MeshPlace:
-    """Return where a mesh stands whose zero is given.
+    """Return the position of a mesh from the given position of its origin.
 
     Parameters
     ----------
+    model : SiteModel
+        Site to place the mesh in.
     given : sequence of two or three float
-        Latitude and longitude in degrees, or map coordinates in metres, and a heading in degrees counter-clockwise
-        from east. Numbers that can be both are degrees where the place that they are so is at the site.
+        Latitude and longitude in degrees, or map coordinates in metres, optionally followed by a heading in degrees
+        counter-clockwise from east. Numbers that can be both are degrees if that place is at the site.
     name : str
-        Of its file, for messages.
+        Name of the mesh file, for messages.
 
     Raises
     ------
     SeipError
-        These are no such numbers, or no place of the site.
+        The numbers are not finite, there are too few or too many, or the place is not at the site.
     """
     if len(given) not in (2, 3) or not all(map(math.isfinite, given)):
         raise SeipError(f"the place of {name} must be --mesh-origin LAT LON [HEADING], or X Y [HEADING] of the map")
@@ -49,15 +51,15 @@ def mesh_place(model: SiteModel, given: Sequence[float], name: str) -> MeshPlace
     if place is None:
         x, y = model.origin[:2]
         raise SeipError(
-            f"{given[0]:g}, {given[1]:g} is no place within {REACH:,.0f} m of the site, in degrees or in metres of the "
-            f"map, whose middle is at map ({x:.0f}, {y:.0f}): give where the zero of {name} stands by --mesh-origin"
+            f"{given[0]:g}, {given[1]:g} is not within {REACH:,.0f} m of the site, in degrees or in metres of the map; "
+            f"the site's centre is at map ({x:.0f}, {y:.0f}): give the position of the zero of {name} by --mesh-origin"
         )
     heading = math.radians(given[2]) if len(given) == 3 else 0.0
     return MeshPlace((float(place[0]), float(place[1]), ground_height(model.parts, place)), heading)
 
 
 def ground_height(parts: Sequence[Part], place: Float) -> float:
-    """Return the height of roads and ground at a place (2,), beside them that of their nearest corner, metres."""
+    """Return the height of roads and ground at a place (2,), or outside them that of the nearest corner, metres."""
     lying = [part.solid for part in parts if {Role.ROADS, Role.GROUND} & set(part.roles)]
     fans = [
         solid.vertices[[(face[0], face[i], face[i + 1]) for face in solid.faces for i in range(1, len(face) - 1)]]
@@ -71,7 +73,7 @@ def ground_height(parts: Sequence[Part], place: Float) -> float:
 
 
 def _local(model: SiteModel, given: Sequence[float]) -> Float | None:
-    """Return two numbers as a place of the site (2,), local axes; None where they are none."""
+    """Return the place (2,) that two numbers give, local axes; None if it is not at the site."""
     places = []
     x, y, z, heading = model.header_offset.tolist()
     mercator = GeoReference(model.geo_reference or "", (x, y, z, heading)).mercator

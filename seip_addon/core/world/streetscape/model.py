@@ -345,7 +345,7 @@ def _without_covered(
     tree = shapely.STRtree(modelled)
     kept = tuple(one for one in placed if kind_of(one) is not Kind.BUILDING or not _is_covered(one, tree))
     count = len(placed) - len(kept)
-    note = f"{counted(count, 'building')} of the map gave way to the city model's or the survey's"
+    note = f"{counted(count, 'building')} of the map replaced by those of the city model or the survey"
     return kept, (note,) if count else ()
 
 

@@ -1,4 +1,4 @@
-"""Streets and crossings of a map by their names, for results that say what is seen where."""
+"""Named streets and crossings of a map, for results by place."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from .road_surface import CARRIAGEWAY, in_groups, lane_outline, without_crumbs
 
 CROSSING = "crosswalk"
 ASSUMED_CROSSING = "Assumed crossing"
-"""Name of a crossing that the map of an extract has though the extract does not."""
+"""Name of a crossing in the map of an extract that the extract itself does not contain."""
 MAX_MEDIAN = 6.0  # metres between the crossings of two carriageways that are one
 ROUNDABOUT = "Roundabout"
 DIRECTIONS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
 _MIDDLE = shapely.Point(0.0, 0.0)  # of the place, local axes
-GRID = 1e-3  # metres to which outlines are rounded, so that no odd one fails
+GRID = 1e-3  # metres to which outlines are rounded, so that intersections do not fail
 LEAST_AREA = 1.0
-"""Square metres within the region of interest, below which a place is left out."""
+"""Least area of a place within the region of interest (square metres)."""
 
 
 def named_places(
@@ -38,21 +38,21 @@ def named_places(
     unnamed: str = "",
     rings: Collection[str] = (),
 ) -> tuple[NamedArea, ...]:
-    """Return the streets outside junctions, then the painted crossings, each as far as it lies in a region.
+    """Return the streets outside junctions, then the painted crossings, each cut to a region.
 
     Parameters
     ----------
     lanes : sequence of LaneSurface
-        In local axes.
+        Lanes in local axes.
     names : mapping of str to str
-        Names of roads by their ids; a road without one is called after its id, a crossing after the nearest street:
-        of several crossings of one street each has the direction in which it lies from the origin.
+        Names of roads by their ids. A road without one is named by its id, a crossing after the nearest street; if a
+        street has several crossings, their names include the direction from the origin.
     objects : iterable of PlacedObject
-        In local axes.
+        Objects of the map in local axes.
     region : shapely geometry
-        In plan, local.
+        Region in plan, local axes.
     unnamed : str
-        What streets without a name are called, with the direction of each arm, where ids say nothing to anybody.
+        Name for streets without one, used with the direction of each arm if ids of roads mean nothing to a reader.
     rings : collection of str
         Ids of the roads of roundabouts.
     """
@@ -76,7 +76,7 @@ def named_places(
 def _crossings(
     objects: Iterable[PlacedObject], streets: Mapping[str, BaseGeometry], region: BaseGeometry
 ) -> Iterator[NamedArea]:
-    """Yield the crossings in a region, each once: of several of one street each has the direction that it lies in."""
+    """Yield the crossings in a region, each once; several of one street are named with their direction."""
     crossings: dict[tuple[str, bool], list[tuple[BaseGeometry, str]]] = {}
     taken: BaseGeometry = shapely.Polygon()
     for one in objects:
@@ -92,6 +92,7 @@ def _crossings(
     for (name, is_assumed), own_areas in crossings.items():
         called = Counter[str]()
         found = _whole(own_areas)
+        # Mapped and assumed crossings of one street are counted together, so that their names stay different.
         several = len(found) > 1 or numbers[name] > 1
         for area, own in sorted(found, key=lambda one: float(one[0].distance(_MIDDLE))):
             arm = f"{name}, {_direction(area)} arm" if several and own != name else name
@@ -101,7 +102,7 @@ def _crossings(
 
 
 def _whole(crossings: Sequence[tuple[BaseGeometry, str]]) -> list[tuple[BaseGeometry, str]]:
-    """Return crossings, those of the carriageways on both sides of a median as one."""
+    """Return crossings, with those of the two carriageways at a median merged into one."""
     found: list[tuple[BaseGeometry, str]] = []
     for area, own in crossings:
         near = [one for one in found if one[0].distance(area) < MAX_MEDIAN]
@@ -110,7 +111,7 @@ def _whole(crossings: Sequence[tuple[BaseGeometry, str]]) -> list[tuple[BaseGeom
 
 
 def _by_arm(name: str, area: BaseGeometry, region: BaseGeometry) -> Iterator[tuple[str, BaseGeometry]]:
-    """Yield the parts of an area that lie in different directions from the middle of the place, each with its own."""
+    """Yield the parts of an area by direction from the centre of the place, with the direction in the name."""
     arms: dict[str, list[BaseGeometry]] = {}
     for part in shapely.get_parts(shapely.intersection(area, region, grid_size=GRID)):
         if part.area >= LEAST_AREA:
@@ -120,15 +121,15 @@ def _by_arm(name: str, area: BaseGeometry, region: BaseGeometry) -> Iterator[tup
 
 
 def _direction(area: BaseGeometry) -> str:
-    """Return the compass direction from the middle of the place to an area."""
+    """Return the compass direction from the centre of the place to an area."""
     middle = area.centroid
     return DIRECTIONS[round(math.atan2(middle.y, middle.x) / (math.tau / len(DIRECTIONS))) % len(DIRECTIONS)]
 
 
 def street_names(road_map: RoadMap) -> dict[str, str]:
-    """Return the name of the street that each road is part of, by its id, as far as it has one.
+    """Return the street name of each road by its id; roads without one are left out.
 
-    A road in a junction that has none is part of the street that it leads on.
+    A road in a junction without a name has the name of the road before it, or of the road after it.
     """
     names = {road.id: road.name for road in road_map.roads if road.name}
     joints = {}
@@ -140,7 +141,7 @@ def street_names(road_map: RoadMap) -> dict[str, str]:
 
 
 def _crossed(streets: Mapping[str, BaseGeometry], area: BaseGeometry) -> str:
-    """Return what a crossing is called after the street of a name that is nearest to it; nothing where none has one."""
+    """Return the name of a crossing from the nearest named street, "" if there is none."""
     nearest = min(streets, key=lambda name: streets[name].distance(area.centroid), default="")
     return f"Crossing of {nearest}" if nearest else ""
 

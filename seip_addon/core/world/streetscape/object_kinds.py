@@ -1,4 +1,4 @@
-"""Classification of a map's objects: by type where there is one, else by name and shape."""
+"""Classification of a map's objects: by type if they have one, otherwise by name and shape."""
 
 import re
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ class Kind(Enum):
     """Kinds of objects that are modelled."""
 
     FLAT = "flat"
-    """Paint and surfaces: nothing stands there."""
+    """Paint and surfaces without height."""
     TREE = "tree"
     PLANTS = "plants"
     """Hedges, bushes, woods."""
@@ -33,8 +33,8 @@ KIND_OF_TYPE = {
     "streetlamp": Kind.LAMP,
     "building": Kind.BUILDING,
 }
-UNTYPED = {"-1", "none", ""}  # types that say nothing: name and shape decide
-VAGUE_TYPES = UNTYPED | {"obstacle"}  # types of which name and shape say more
+UNTYPED = {"-1", "none", ""}  # types without meaning: name and shape decide
+VAGUE_TYPES = UNTYPED | {"obstacle"}  # types for which name and shape are more specific
 
 WORDS_OF_KIND = {
     Kind.LAMP: {"lamp", "lamps", "streetlamp", "streetlight", "lantern", "luminaire", "laterne", "leuchte"},
@@ -51,10 +51,10 @@ SIGNAL_WORDS = {"signal", "signals", "traffic", "trafficlight", "light", "ampel"
 SIGN_WORDS = {"sign", "signs", "schild", "verkehrszeichen", "speed"}
 
 MIN_HEIGHT = 0.01
-"""Metres below which a height is none that the map states."""
+"""Metres: lower heights count as not given in the map."""
 
 MIN_POST_HEIGHT, MAX_POST_THICKNESS, MIN_POST_SLENDERNESS = 2.0, 0.6, 6.0
-"""A post is at least so high, at most so thick (metres), and at least so many times as high as thick."""
+"""Least height and greatest thickness of a post (metres), and least ratio of the two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,11 +64,11 @@ class Post:
     Parameters
     ----------
     xy : (2,) float64, metres
-        Its foot in plan.
+        Foot in plan.
     height, thickness : float, metres
-        Zero where the map does not say.
+        Height and thickness, zero if the map does not give them.
     words : frozenset of str
-        Of its name and type.
+        Words of its name and type.
     is_lamp : bool
         Whether it carries a street light.
     """
@@ -87,7 +87,7 @@ def words_of(name: str) -> frozenset[str]:
 
 
 def kind_of(placed: PlacedObject) -> Kind:
-    """Return what an object is."""
+    """Return the kind of an object."""
     if placed.kind in FLAT_KINDS:
         return Kind.FLAT
     words = words_of(placed.name)
@@ -101,7 +101,7 @@ def kind_of(placed: PlacedObject) -> Kind:
 
 
 def _kind_by_looks(placed: PlacedObject, words: frozenset[str]) -> Kind:
-    """Return what an object is by the words of its name and its shape."""
+    """Return the kind of an object from the words of its name and its shape."""
     named = next((kind for kind, of_kind in WORDS_OF_KIND.items() if words & of_kind), None)
     if named is Kind.POST and size_of(placed) > MAX_POST_THICKNESS:
         return Kind.OTHER
@@ -109,7 +109,7 @@ def _kind_by_looks(placed: PlacedObject, words: frozenset[str]) -> Kind:
 
 
 def post_of(placed: PlacedObject) -> Post | None:
-    """Return the post that an object is, None where it is something else."""
+    """Return an object as a post, None if it is something else."""
     kind = kind_of(placed)
     if kind not in (Kind.POST, Kind.LAMP):
         return None
@@ -119,19 +119,19 @@ def post_of(placed: PlacedObject) -> Post | None:
 
 
 def height_of(placed: PlacedObject) -> float:
-    """Return the height of an object, metres, its outlines counted; zero where the map does not say."""
+    """Return the height of an object including its outlines, metres; zero if the map does not give it."""
     height = max([placed.height, *(float(outline.height.max()) for outline in placed.outlines)])
     return height if height >= MIN_HEIGHT else 0.0
 
 
 def size_of(placed: PlacedObject) -> float:
-    """Return the greatest side of an object in plan, metres; zero where the map does not say."""
+    """Return the longest side of an object in plan, metres; zero if the map does not give it."""
     sides = [float(np.ptp(outline.base[:, :2], axis=0).max()) for outline in placed.outlines]
     return max(sides) if sides else max(placed.length, placed.width, 2 * placed.radius)
 
 
 def _thickness(placed: PlacedObject) -> float:
-    """Return the least side of an object in plan, metres; zero where the map does not say."""
+    """Return the shortest side of an object in plan, metres; zero if the map does not give it."""
     if placed.outlines:
         return size_of(placed)
     return min((side for side in (placed.length, placed.width, 2 * placed.radius) if side > 0), default=0.0)

@@ -1,4 +1,4 @@
-"""The parts that a modelled site is made of."""
+"""Parts of a modelled site."""
 
 from dataclasses import dataclass
 
@@ -14,23 +14,23 @@ class Part:
     Parameters
     ----------
     solid : Solid
-        Its shape; parts may share one.
+        Shape; parts may share one.
     foot : (3,) float64, metres
-        Where the shape's origin stands, local axes.
+        Position of the shape's origin, local axes.
     yaw : float, radians
-        How the shape is turned about the vertical, counter-clockwise.
+        Rotation of the shape about the vertical, counter-clockwise.
     weight : float or None
-        Of a weighted region.
+        Weight of a weighted region.
     source : str
-        Who says that it stands there, as in `scene_geometry.Pole`; empty for what only means an area.
+        Source of the part, as in `scene_geometry.Pole`; empty for parts that only mark an area.
     height_assumed : bool
-        Whether that source does not give its height.
+        Whether the source lacks its height.
     width_assumed : bool
-        Whether that source does not give its width, as of lanes.
+        Whether the source lacks its width, as for lanes.
     keep_off : str or None
-        Rule that keeps new posts off the part, or sensors off the pole, unless it is allowed.
+        Rule that excludes new posts from the part, or sensors from the pole, unless it is allowed.
     of : str
-        Name of the part, an earlier one, that takes this along where it is moved or deleted; empty where none does.
+        Name of an earlier part that this one follows if it is moved or deleted; "" if there is none.
     """
 
     name: str

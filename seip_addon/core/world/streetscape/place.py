@@ -1,4 +1,4 @@
-"""The place of a map that is studied: its middle, its region of interest and its level, in map coordinates."""
+"""The studied place of a map: its centre, its region of interest and its level, in map coordinates."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,19 +23,23 @@ from .intersections import JUNCTION_REACH, box_along, filled, intersection, ring
 from .levels import Levels, split_levels
 from .named_places import street_names
 
-MIN_SHARE_OF_JUNCTION = 0.5  # of a junction's area that a region holds from which on it holds all of it
+MIN_SHARE_OF_JUNCTION = 0.5  # share of a junction's area in a region from which on the region includes all of it
 SCENE_MARGIN = 40.0  # metres that the scene extends beyond the region of interest, for occluders at its edge
-MAX_ROAD_DISTANCE = 10.0  # roads this near to the middle of the place (metres) may each be the one that is meant
+MAX_ROAD_DISTANCE = 10.0  # metres from the centre of the place within which any road may be the requested one
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A place of a map as a site description names it.
+    """A place of a map, chosen by a site description.
 
     Parameters
     ----------
-    surfaces : tuple of LaneSurface
-        The lanes of the map that count, map coordinates.
+    road_map : RoadMap
+        Map that the place is on.
+    surfaces : sequence of LaneSurface
+        Lanes of the map to consider, map coordinates.
+    description : SiteDescription
+        Choice of the place and its region.
     """
 
     road_map: RoadMap
@@ -44,7 +48,7 @@ class Place:
 
     @cached_property
     def centre(self) -> Float:
-        """Middle of the place, (2,) metres."""
+        """Centre of the place, (2,) metres."""
         description = self.description
         if description.near is not None:
             return np.array(description.near, dtype=np.float64)
@@ -60,7 +64,7 @@ class Place:
 
     @cached_property
     def within(self) -> BaseGeometry:
-        """Area in which the region of interest lies."""
+        """Area that limits the region of interest."""
         if self.description.region is not None:
             return self.description.region
         if self.description.along is None:
@@ -72,7 +76,7 @@ class Place:
         return shapely.union_all([shapely.make_valid(lane.polygon) for lane in lanes]).convex_hull
 
     def levels(self) -> Levels:
-        """Return the lanes on the level of the place, and those that cross above or below."""
+        """Return the lanes on the level of the place, and those on other levels."""
         around = self.within.convex_hull.buffer(SCENE_MARGIN, quad_segs=16)
         if self.description.near is None and self.description.junction is not None:
             anchors = {lane.road_id for lane in self.surfaces if lane.junction_id in self._junctions}
@@ -100,7 +104,7 @@ class Place:
         raise self._no_driving_lane()
 
     def _whole_streets(self, lanes: Sequence[LaneSurface], shift: Float) -> BaseGeometry:
-        """Return the area of lanes, local axes, and their streets' other carriageways no holes in junctions."""
+        """Return the area of lanes (local axes) with the opposite carriageways of their streets and whole junctions."""
         around = self.within.convex_hull.buffer(SCENE_MARGIN)
         driving = road_surface.in_groups(self.surfaces, ["driving"])
         nearby = road_surface.local_strips(driving, shift, shifted(around, -shift))
@@ -114,7 +118,7 @@ class Place:
     def weighted_areas(self) -> list[tuple[str, BaseGeometry, float]]:
         """Return name, area and weight of the weighted regions.
 
-        Where none is described it is the box of the junction nearest to the middle.
+        Without a description there is one: the box of the junction nearest to the centre.
         """
         described, (x, y) = self.description.weighted_regions, self.centre.tolist()
         if not described:
@@ -126,14 +130,14 @@ class Place:
         ]
 
     def _title(self, junction: Junction) -> str:
-        """Return what a junction is called: by its streets where the map was made of them, else by its id."""
+        """Return the title of a junction: its streets in a map made from centre lines, otherwise its id."""
         name = self.description.name if self.description.from_centre_lines else ""
         return name if name.startswith("Junction ") else f"Junction {name or junction.id}"
 
     def _lanes_of_region(self) -> Sequence[LaneSurface]:
         """Return the lanes that the region of interest may lie on.
 
-        In a map made of middle lines a circle about a junction holds no street that only passes by.
+        In a map made from centre lines, a circle around a junction excludes streets that only pass by.
         """
         description = self.description
         if description.along is not None:
@@ -151,7 +155,7 @@ class Place:
 
     @cached_property
     def _junctions(self) -> frozenset[str]:
-        """Ids of the junctions in the middle of the place: one, or those of an intersection."""
+        """Ids of the junctions at the centre of the place: one, or those of an intersection."""
         return self._one_place(self._junction)
 
     def _one_place(self, junction: Junction) -> frozenset[str]:
@@ -168,7 +172,7 @@ class Place:
 
     @cached_property
     def _names(self) -> dict[str, str]:
-        """Names of the streets, by the ids of their roads."""
+        """Names of the streets by the ids of their roads."""
         return {road.id: road.name for road in self.road_map.roads}
 
     def _driving_area(self, junction: Junction) -> BaseGeometry:
@@ -178,7 +182,7 @@ class Place:
         return junction_area(self.surfaces, junction.id) if area.is_empty else area
 
     def _central_box(self, junction: Junction) -> BaseGeometry:
-        """Return the smallest rectangle around a junction's driving lanes; it lies along the roads' axes."""
+        """Return the smallest rectangle around a junction's driving lanes, aligned with its roads if possible."""
         if self.description.from_centre_lines:
             driving = road_surface.in_groups(self.surfaces, ["driving"])
             ring = ring_roads(self.road_map.roads, self._one_place(junction), self.description.roundabouts)
@@ -198,7 +202,7 @@ class Place:
         return SeipError(f"there is no driving lane {where}{hint}{self._nearest()}")
 
     def _nearest(self) -> str:
-        """Return the junctions next to the place, as the end of a sentence."""
+        """Return the junctions nearest to the place, as the end of a sentence."""
         names, (x, y) = [], self.centre.tolist()
         for junction, _ in nearest_junctions(self.road_map, self.surfaces, x, y, 3):
             middle = junction_area(self.surfaces, junction.id).centroid
@@ -210,5 +214,5 @@ class Place:
 
 
 def shifted(area: BaseGeometry, by: Float) -> BaseGeometry:
-    """Return an area moved in plan by metres, (2,) or (3,)."""
+    """Return an area moved in plan by a vector (2,) or (3,), metres."""
     return shapely.transform(area, lambda xy: xy + by[:2])

@@ -1,4 +1,4 @@
-"""Checks of the carriageways of a site: grades that no street has, and steps between connected lanes."""
+"""Checks of the carriageways of a site: implausible grades, and steps between connected lanes."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -10,23 +10,23 @@ from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import RoadLink, RoadMap
 from .road_surface import CARRIAGEWAY, by_road, in_groups
 
-MAX_GRADE = 0.12  # of a carriageway, above which a scene is distrusted
+MAX_GRADE = 0.12  # grade of a carriageway above which a warning is given
 GRADE_LENGTH = 2.0  # metres along a lane over which its grade is measured
-MIN_RISE = 0.02  # metres by which a lane rises more than at `MAX_GRADE`, below which it is rounding
+MIN_RISE = 0.02  # metres: a rise above that of `MAX_GRADE` by less than this is rounding
 MAX_GAP = 0.1  # metres of height between the ends of two connected lanes
 SAME_END = 0.3  # metres in plan between the ends of two connected lanes at most
-MAX_NAMED = 3  # places that a message names
+MAX_NAMED = 3  # places in a message at most
 
 
 def road_warnings(
     road_map: RoadMap, lanes: Sequence[LaneSurface], names: Mapping[str, str], origin: Float
 ) -> tuple[str, ...]:
-    """Return warnings of steep carriageways and of steps between connected lanes, a sentence each.
+    """Return warnings of steep carriageways and of steps between connected lanes, one sentence each.
 
     Parameters
     ----------
     lanes : sequence of LaneSurface
-        Of a scene, local axes; those of all its levels.
+        Lanes of a scene on all levels, local axes.
     names : mapping of str to str
         Names of the streets by the ids of their roads.
     origin : (3,) float64, metres
@@ -43,14 +43,14 @@ def road_warnings(
         )
     if gaps:
         messages.append(
-            f"lanes that lead into each other differ in height: by {gaps}; check the heights of the map there before "
+            f"lanes that lead into each other differ in height by {gaps}; check the heights of the map there before "
             "sensors are placed"
         )
     return tuple(messages)
 
 
 def steep_places(lanes: Sequence[LaneSurface]) -> Iterator[tuple[float, str, Float]]:
-    """Yield the grade, road and place (2,) of the steepest part of each lane that is steeper than `MAX_GRADE`."""
+    """Yield grade, road and place (2,) of the steepest part of each lane with a grade above `MAX_GRADE`."""
     for lane in lanes:
         middle = (lane.left + lane.right) / 2
         away = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(middle[:, :2], axis=0).T))])
@@ -65,7 +65,7 @@ def steep_places(lanes: Sequence[LaneSurface]) -> Iterator[tuple[float, str, Flo
 
 
 def height_gaps(road_map: RoadMap, lanes: Sequence[LaneSurface]) -> Iterator[tuple[float, str, Float]]:
-    """Yield the height, road and place (2,) of each step between lanes of roads that lead into each other."""
+    """Yield height, road and place (2,) of each step between lanes of roads that lead into each other."""
     own = by_road(lanes)
     length = {road.id: road.length for road in road_map.roads}
     for road in road_map.roads:
@@ -79,19 +79,20 @@ def height_gaps(road_map: RoadMap, lanes: Sequence[LaneSurface]) -> Iterator[tup
 
 
 def _ends(lanes: Sequence[LaneSurface], at: RoadLink, length: Mapping[str, float]) -> Float:
-    """Return the left and right corner of each lane, (n, 2, 3), that reaches the start or end of its road."""
+    """Return the left and right corners (n, 2, 3) of the lanes that reach the start or end of their road."""
     s, row = (length[at.id], -1) if at.contact == "end" else (0.0, 0)
     reaching = [lane for lane in lanes if abs(float(lane.s[row]) - s) < SAME_END]
     return np.array([(lane.left[row], lane.right[row]) for lane in reaching]).reshape(-1, 2, 3)
 
 
 def _steps(ends: Float, others: Float) -> Iterator[tuple[float, Float]]:
-    """Yield height and place of the step at each end (n, 2, 3) of a lane that meets one of others (m, 2, 3)."""
+    """Yield height and place of the step at each lane end (n, 2, 3) that meets one of others (m, 2, 3)."""
     middles = shapely.points(others[:, :, :2].mean(axis=1))
     tree = shapely.STRtree(middles)
     for end in ends:
         middle = shapely.Point(end[:, :2].mean(axis=0))
         for other in others[tree.query(middle, predicate="dwithin", distance=SAME_END)]:
+            # Roads may meet with opposite directions: left and right are paired as they lie nearer.
             swapped = np.hypot(*(end - other[::-1])[:, :2].T).sum() < np.hypot(*(end - other)[:, :2].T).sum()
             gap = float(np.abs(end[:, 2] - (other[::-1] if swapped else other)[:, 2]).max())
             if gap > MAX_GAP:
@@ -99,7 +100,7 @@ def _steps(ends: Float, others: Float) -> Iterator[tuple[float, Float]]:
 
 
 def _worst(places: Iterator[tuple[float, str, Float]], names: Mapping[str, str], origin: Float, figure: str) -> str:
-    """Return the worst place of each street, the worst streets first, as a list of words."""
+    """Return the worst place of each street as a text, worst streets first."""
     found: dict[str, tuple[float, Float]] = {}
     for size, road, place in places:
         name = names.get(road) or f"road {road}"

@@ -1,4 +1,4 @@
-"""Lanes of a map as the surfaces of a street: carriageways, pavements, kerbs and lane markings."""
+"""Surfaces of a street from the lanes of a map: carriageways, pavements, kerbs and lane markings."""
 
 import dataclasses
 from collections.abc import Iterable, Sequence
@@ -38,43 +38,43 @@ MAX_CORNER, MAX_ENDS = 40.0, 20.0
 """A corner is no longer than this along the carriageway, and along the pavements at its two ends (metres)."""
 SMALL_NOTCH, MIN_NOTCH = 1.25, 0.01
 """Notches in the edge of a pavement up to twice this (metres) are closed, from this area up (square metres)."""
-MIN_PAVEMENT_WIDTH = 0.6  # metres: narrower strips between lanes are rounding of a map made of middle lines
+MIN_PAVEMENT_WIDTH = 0.6  # metres: narrower strips between lanes are rounding of a map made from centre lines
 JUNCTION_SPACING = 4.0
 KERB_HEIGHT = 0.12
 KERB_DEPTH = 0.35
 MARKING_WIDTH = 0.12
 MARKING_ABOVE = 0.012
 DASH_LENGTH, DASH_GAP = 3.0, 6.0
-MIN_PAINT, MAX_PAINTED_TWICE = 1e-9, 0.1  # square metres of paint that count, and share of it that may be painted twice
+MIN_PAINT, MAX_PAINTED_TWICE = 1e-9, 0.1  # least area of paint (m²), and share of it that may be painted twice
 STOP_LINE_WIDTH = 0.4
 STOP_LINE_SETBACK = 1.0
 SNAP_GRID = 1e-4  # grid (metres) that plans snap to when they are joined
-MIN_MARKED_WIDTH = 1.0  # lanes that are narrower than this (metres) somewhere are tapers; nothing is painted along them
+MIN_MARKED_WIDTH = 1.0  # metres: lanes narrower than this somewhere are tapers, and have no markings
 MIN_LOOSE_AREA = 400.0  # m²: pieces of streets, with pavements, that reach less into a scene are left out
 MAX_SEAM = 0.05  # gaps up to twice this (metres) between the lanes of two roads are closed in outlines
 MAX_OVERLAP = 0.002  # overlaps up to twice this wide (metres) are rounding of edges that meet
 MAX_FOLD = 0.1  # square metres of a road's lanes that may lie on each other, as rounding
-MIN_ISLAND_AREA = 15.0  # m²: smaller holes of a carriageway that was made of middle lines are no islands
-MAX_HOLE = 4.0  # m²: smaller holes between the lanes of other maps are none either
+MIN_ISLAND_AREA = 15.0  # m²: smaller holes of a carriageway made from centre lines are not islands
+MAX_HOLE = 4.0  # m²: the same for holes between the lanes of other maps
 MAX_ISLAND_AREA = 400.0  # holes of the carriageway smaller than this (m²) are islands, on which no post is assumed
 MAX_MEDIAN_WIDTH = 12.0  # holes narrower than this (metres) are medians: likewise
 MAX_OPEN_MEDIAN_WIDTH = 6.0  # narrower gaps (metres) between carriageways are medians though no junction closes them
-MAX_PAVEMENT_DISTANCE = 6.0  # a pavement within this (metres) of the carriageway lies beside it, whatever is between
+MAX_PAVEMENT_DISTANCE = 6.0  # metres: pavements this near belong to the carriageway, whatever is between
 SIDE_STEP, MIN_SIDE_LENGTH = 2.0, 10.0  # metres: sampling step along sides of roads, and least side without pavement
 
 
 @dataclass(frozen=True, eq=False)
 class Roadside:
-    """The carriageway and where it ends at its sides, in local axes.
+    """The carriageway and its sides, in local axes.
 
     Parameters
     ----------
     carriageway : shapely geometry
+        Area of the lanes for vehicles.
     filled : shapely geometry
-        The carriageway with its islands and medians: holes between the lanes of
-        a junction, small ones and narrow ones, and narrow gaps.
+        The carriageway with its islands and medians: holes within junctions, small or narrow holes, and narrow gaps.
     mouths : shapely geometry
-        Lines across the carriageway where lanes end and the road goes on.
+        Lines across the carriageway where lanes end and the road continues.
     """
 
     carriageway: BaseGeometry
@@ -94,8 +94,11 @@ def roadside(surfaces: Sequence[LaneSurface]) -> Roadside:
     junctions = sorted({lane.junction_id for lane in paved if lane.junction_id is not None})
     inside = [lane_outline([lane for lane in paved if lane.junction_id == junction]) for junction in junctions]
     whole = shapely.union_all([carriageway, *map(_without_holes, inside)])
+    # Morphological closing fills gaps between carriageways that are open at an end, and are no holes.
     medians = without(closed(whole, MAX_OPEN_MEDIAN_WIDTH / 2), whole)
     filled = _without_holes(closed(whole.union(medians), MAX_SEAM), least=MAX_ISLAND_AREA, narrow=MAX_MEDIAN_WIDTH)
+    # A lane that ends at the edge of the filled area leads out of the model: there the edge is not a side of the road.
+    # Ends of lanes where another lane follows lie inside, and only touch the edge with a corner.
     ends = [lane.left[[row], :2].tolist() + lane.right[[row], :2].tolist() for lane in paved for row in (0, -1)]
     across = shapely.linestrings(np.array(ends).reshape(-1, 2, 2))
     at_edge = shapely.length(shapely.intersection(across, shapely.boundary(filled).buffer(2 * MAX_SEAM)))
@@ -104,33 +107,36 @@ def roadside(surfaces: Sequence[LaneSurface]) -> Roadside:
 
 
 def bare_sides(roadside: Roadside, pavement: BaseGeometry) -> BaseGeometry:
-    """Return the sides of the carriageway, as lines, along which no pavement lies."""
+    """Return the sides of the carriageway without a pavement, as lines."""
     sides = roadside.sides()
     if pavement.is_empty or sides.is_empty:
         return sides
+    # For each short piece of a side take the rectangle next to it, away from the carriageway. The side is bare where no
+    # pavement meets it. A test point just left of the piece tells which way is out.
     lines = [shapely.get_coordinates(line) for line in shapely.get_parts(shapely.segmentize(sides, SIDE_STEP))]
     start, stop = (np.concatenate([line[cut] for line in lines]) for cut in (slice(-1), slice(1, None)))
     along = (stop - start) / np.linalg.norm(stop - start, axis=1, keepdims=True)
     aside = np.column_stack([-along[:, 1], along[:, 0]])
     inner = shapely.contains_xy(roadside.filled, (start + stop) / 2 + 2 * MAX_SEAM * aside)
     outwards = MAX_PAVEMENT_DISTANCE * np.where(inner[:, None], -aside, aside)
-    beside = shapely.polygons(np.stack([start, stop, stop + outwards, start + outwards], axis=1))
+    strips = shapely.polygons(np.stack([start, stop, stop + outwards, start + outwards], axis=1))
     shapely.prepare(pavement)
-    is_bare = ~shapely.intersects(pavement, beside)
+    is_bare = ~shapely.intersects(pavement, strips)
     bare = shapely.line_merge(shapely.multilinestrings(np.stack([start, stop], axis=1)[is_bare]))
     return shapely.union_all([line for line in shapely.get_parts(bare) if line.length >= MIN_SIDE_LENGTH])
 
 
 def without_small_holes(area: BaseGeometry) -> BaseGeometry:
-    """Return an area of a map's lanes without the holes that these leave between them in junctions."""
+    """Return an area of lanes without the small holes that these leave between them in junctions."""
     return _without_holes(area, least=MAX_HOLE)
 
 
 def without_gaps(roadside: Roadside, surfaces: Sequence[LaneSurface], *, fill: bool) -> BaseGeometry:
-    """Return the carriageway without the holes and seams that are too small for islands.
+    """Return the area of the carriageway with holes and seams that are too small for islands.
 
-    In a map that was made of middle lines (``fill``) they are where the number of lanes changes, and between lanes; in
-    others only holes count, where lanes that turn in a junction leave a gap that no lane of another kind covers.
+    With ``fill``, for maps made from centre lines, these lie where the number of lanes changes, and between lanes. For
+    other maps only the holes themselves are returned: gaps between turning lanes in a junction that no lane of a
+    different kind covers.
     """
     if fill:
         return _without_holes(roadside.carriageway, least=MIN_ISLAND_AREA)
@@ -139,16 +145,17 @@ def without_gaps(roadside: Roadside, surfaces: Sequence[LaneSurface], *, fill: b
 
 
 def _is_corner(notch: BaseGeometry, kerb: BaseGeometry, walked: BaseGeometry) -> bool:
-    """Return whether a notch lies round a corner between the ends of pavements, and along neither for long."""
+    """Return whether a notch lies at a corner between the ends of pavements, and only briefly along each."""
     along = notch.buffer(2 * MAX_SEAM)
     return bool(kerb.intersection(along).length <= MAX_CORNER and walked.intersection(along).length <= MAX_ENDS)
 
 
 def _without_holes(area: BaseGeometry, *, least: float = np.inf, narrow: float = 0.0) -> BaseGeometry:
-    """Return the area without its holes: all, or those smaller than ``least`` m² or narrower than ``narrow`` metres."""
+    """Return the area without holes smaller than ``least`` m² (all by default) or narrower than ``narrow`` metres."""
 
     def kept(hole: shapely.LinearRing) -> bool:
         inside = shapely.Polygon(hole)
+        # Shrinking by half a width erases a hole exactly if it is nowhere wider than that.
         return bool(inside.area >= least and not inside.buffer(-narrow / 2).is_empty)
 
     parts = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
@@ -158,18 +165,18 @@ def _without_holes(area: BaseGeometry, *, least: float = np.inf, narrow: float =
 def local_strips(
     surfaces: Iterable[LaneSurface], origin: Float, area: BaseGeometry, *, kerbs: bool = True
 ) -> tuple[LaneSurface, ...]:
-    """Return the lanes near an area, in local axes, with a row of points at least each ten metres.
+    """Return the lanes near an area, in local axes, with rows of points at most `MAX_STEP` apart.
 
     Parameters
     ----------
     surfaces : iterable of LaneSurface
-        In map coordinates.
+        Lanes in map coordinates.
     origin : (3,) float64, metres
         Map coordinates of the local origin.
     area : shapely geometry
-        In local axes. Whole rows are kept: the lanes end a little beyond.
+        Area in local axes. Rows are kept whole, so that lanes end a little beyond it.
     kerbs : bool
-        Whether pavements that the map leaves flush are raised.
+        Whether pavements are raised that are level with the road in the map.
     """
     shapely.prepare(area)
     moved = (_moved(surface, origin) for surface in surfaces if surface.lane_type in GROUPS)
@@ -179,7 +186,7 @@ def local_strips(
 
 
 def cut_along(surface: LaneSurface, low: float, high: float) -> LaneSurface | None:
-    """Return the part of a lane between two places along the road, metres; None where there is none."""
+    """Return the part of a lane between two stations along the road, metres; None if it is empty."""
     if high <= low:
         return None
     known = np.arange(len(surface.s))
@@ -191,8 +198,10 @@ def cut_along(surface: LaneSurface, low: float, high: float) -> LaneSurface | No
 def without_loose_ends(
     surfaces: Sequence[LaneSurface], region: BaseGeometry, extent: BaseGeometry
 ) -> tuple[LaneSurface, ...]:
-    """Return lanes without small pieces of roads that lead to none of a region within an extent."""
+    """Return the lanes without small, disconnected pieces of roads outside the region."""
     plan = [shapely.make_valid(surface.polygon) for surface in surfaces]
+    # Connected parts of all lanes, pavements included. A part that does not reach the region and has little area within
+    # the extent is the cut end of a street that passes by.
     parts = shapely.get_parts(closed(shapely.union_all(plan, grid_size=SNAP_GRID), MAX_SEAM))
     loose = [part for part in parts if not part.intersects(region) and part.intersection(extent).area < MIN_LOOSE_AREA]
     away = shapely.union_all(loose)
@@ -202,24 +211,24 @@ def without_loose_ends(
 
 
 def with_rows_at(surface: LaneSurface, places: Float) -> LaneSurface:
-    """Return a lane with rows of points at more places (n,) along the road, metres, as far as it reaches there."""
+    """Return a lane with additional rows of points at stations (n,) along the road, metres, within its range."""
     known = np.arange(len(surface.s))
     inside = places[(places > surface.s[0]) & (places < surface.s[-1])]
     return _at_rows(surface, np.unique(np.concatenate([known, np.interp(inside, surface.s, known)])))
 
 
 def group(surface: LaneSurface) -> str | None:
-    """Return the group of a lane's type, None for one without a surface."""
+    """Return the group of a lane's type, None for types without a surface."""
     return GROUPS.get(surface.lane_type)
 
 
 def in_groups(surfaces: Iterable[LaneSurface], groups: Sequence[str]) -> tuple[LaneSurface, ...]:
-    """Return the lanes of some groups."""
+    """Return the lanes that belong to the given groups."""
     return tuple(surface for surface in surfaces if group(surface) in groups)
 
 
 def by_road(surfaces: Iterable[LaneSurface]) -> dict[str, list[LaneSurface]]:
-    """Return the lanes of each road, by its id."""
+    """Return the lanes by road id."""
     roads: dict[str, list[LaneSurface]] = {}
     for surface in surfaces:
         roads.setdefault(surface.road_id, []).append(surface)
@@ -233,7 +242,7 @@ def is_near(surface: LaneSurface, area: BaseGeometry) -> bool:
 
 
 def lane_outline(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
-    """Return the area in plan that lanes cover, with seams and crumbs closed."""
+    """Return the area in plan that lanes cover, with seams closed and crumbs removed."""
     return without_crumbs(closed(_plan(surfaces), MAX_SEAM).simplify(0.01))
 
 
@@ -244,17 +253,17 @@ def without_crumbs(area: BaseGeometry, least: float = 0.5) -> BaseGeometry:
 
 
 class SurfaceLayers:
-    """Surfaces of lanes that are laid one after the other, each without what lies under an earlier one.
+    """Surfaces of lanes laid one after another, each without the area that earlier ones cover.
 
-    Lanes of a map overlap: in junctions, where roads merge, and where a map was made of middle lines. Two faces in one
-    place are drawn as black slivers, and both count in areas.
+    Lanes of a map overlap in junctions, where roads merge, and in maps made from centre lines. Two faces in one place
+    are drawn as black slivers, and both count in areas.
 
     Parameters
     ----------
     surfaces : sequence of LaneSurface
         All lanes, in local axes.
     extent : shapely geometry
-        The surfaces end there.
+        Area to which the surfaces are cut.
     fill : bool
         Whether holes between the driving lanes of a junction are filled.
     """
@@ -266,14 +275,16 @@ class SurfaceLayers:
 
     @property
     def area(self) -> BaseGeometry:
-        """Area in plan that is covered."""
+        """Area in plan covered so far."""
         return united(self._laid)
 
     def lay(self, triangles: Float, plan: BaseGeometry) -> Float:
-        """Lay triangles (n, 3, 3) whose outline in plan is known, and return what is not covered yet (m, 3, 3)."""
+        """Lay triangles (n, 3, 3) with a known outline in plan, and return the part not covered before (m, 3, 3)."""
         near = [area for area in self._laid if area.intersects(plan)]
         if near:
             covered = united(near)
+            # Edges that meet overlap by rounding: cutting these would make slivers. Only an overlap of some width is
+            # cut.
             if not shapely.intersection(covered, plan, grid_size=SNAP_GRID).buffer(-MAX_OVERLAP).is_empty:
                 triangles, plan = cut(triangles, covered), without(plan, covered)
         if not plan.is_empty:
@@ -283,9 +294,9 @@ class SurfaceLayers:
     def lay_group(self, name: str) -> Float:
         """Lay the lanes of one group and return their surface within the extent, (n, 3, 3).
 
-        Lanes that cross each other in a junction differ in height by some centimetres: there the group is laid anew as
-        one layer at their mean height, and groups other than driving lanes give way to these. Elsewhere lanes meet edge
-        to edge and stay as they are, unless they fold on to themselves in a narrow bend.
+        Lanes that cross each other in a junction differ in height by some centimetres: there the group is replaced by
+        one layer at their mean height, and groups other than driving lanes are cut by these. Elsewhere lanes meet edge
+        to edge and stay as they are, unless they overlap themselves in a narrow bend.
         """
         lanes = in_groups(self._surfaces, [name])
         junctions = sorted({lane.junction_id for lane in lanes if lane.junction_id is not None})
@@ -297,6 +308,8 @@ class SurfaceLayers:
     def _lay_road(self, lanes: Sequence[LaneSurface]) -> Float:
         triangles = np.concatenate([lane.triangles for lane in lanes])
         plan = outline(triangles, SNAP_GRID)
+        # Triangles that cover more area than their outline lie on each other: replace them by one layer over the
+        # outline.
         if np.abs(signed_area(triangles)).sum() > plan.area + MAX_FOLD:
             triangles = Terrain(triangles).drape(plan, spacing=JUNCTION_SPACING)
         return self.lay(triangles, plan)
@@ -307,6 +320,7 @@ class SurfaceLayers:
             area = filled(lanes) if self._fill else area
         else:
             number = lanes[0].junction_id
+            # Islands that `filled` adds to the driving lanes belong to these, and must not be laid as pavement as well.
             driving = [lane for lane in in_groups(self._surfaces, ["driving"]) if lane.junction_id == number]
             area = without_crumbs(without(area, filled(driving) if self._fill and driving else _plan(driving)))
         terrain = Terrain(np.concatenate([lane.triangles for lane in lanes]))
@@ -314,26 +328,28 @@ class SurfaceLayers:
 
 
 def kerb_faces(pavement: Float, step: float | None = None) -> Float:
-    """Return (n, 3, 3) upright triangles below the edge of a pavement's triangles (m, 3, 3).
+    """Return (n, 3, 3) vertical triangles below the edge of a pavement's triangles (m, 3, 3).
 
-    With a ``step`` the edge follows their height at least each so many metres, without one at its corners in plan.
+    The edge follows the height of the pavement at its corners in plan and, with a ``step``, also at points at most
+    that many metres apart.
     """
     if len(pavement) == 0:
         return pavement
     plan = without_crumbs(closed(outline(pavement, SNAP_GRID), MAX_SEAM).simplify(0.01))
     plan = plan if step is None else shapely.segmentize(plan, step)
     terrain = Terrain(pavement)
+    # Counter-clockwise outer rings and clockwise holes have the pavement at their left, so that kerbs face outwards.
     parts = map(orient, shapely.get_parts(plan))
     rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
     return np.concatenate([_skirt(ring, terrain) for ring in rings])
 
 
 def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface], carriageway: BaseGeometry) -> Float:
-    """Return (n, 3, 3) triangles that close pavements (m, 3, 3) round the corners of junctions.
+    """Return (n, 3, 3) triangles that close pavements (m, 3, 3) at the corners of junctions.
 
-    Many maps end the pavements where the junction begins. A notch between the ends of two pavements and the carriageway
-    is filled at the pavements' height, unless the map has a pavement of its own there: within the junction, or beside
-    the carriageway, beyond a verge. A median is no corner either.
+    In many maps pavements end where the junction begins. A notch between the ends of two pavements and the carriageway
+    is filled at the height of the pavements, unless the map has another pavement there: within the junction, or next to
+    the carriageway beyond a verge. Medians are not corners.
     """
     inside = _plan([lane for lane in in_groups(surfaces, CARRIAGEWAY) if lane.junction_id is not None])
     if inside.is_empty or len(pavement) == 0:
@@ -341,6 +357,9 @@ def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface], carriagew
     walked = outline(pavement, SNAP_GRID)
     own = _plan([lane for lane in in_groups(surfaces, ["sidewalk"]) if lane.junction_id is not None])
     kerb = shapely.boundary(carriageway)
+    # Morphological closing of the whole street fills the concave corners between lanes; what it adds are the notches.
+    # Corners touch a junction and a pavement, are away from pavements within the junction, and are short along the
+    # kerb.
     street = closed(_plan(surfaces).union(walked, grid_size=SNAP_GRID), MAX_SEAM)
     notches = without(closed(street, CORNER_NOTCH), street)
     corners = [
@@ -358,7 +377,7 @@ def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface], carriagew
 def notch_pavements(pavement: Float, carriageway: BaseGeometry) -> Float:
     """Return (n, 3, 3) triangles that close small notches in the edge of pavements (m, 3, 3).
 
-    On the inside of a tight corner the outer edge of the pavement folds; what is left of it is a notch.
+    On the inside of a tight corner the outer edge of the pavement folds, which leaves a notch.
     """
     if len(pavement) == 0:
         return pavement
@@ -372,6 +391,8 @@ def notch_pavements(pavement: Float, carriageway: BaseGeometry) -> Float:
 def slivers(pavement: Float) -> BaseGeometry:
     """Return the parts of pavements (n, 3, 3) in plan that are narrower than `MIN_PAVEMENT_WIDTH`."""
     walked = outline(pavement, SNAP_GRID)
+    # Morphological opening: parts that vanish when the area shrinks and grows again are narrower than the width. It
+    # grows by a seam more, so that rounding at the edge does not count.
     wide = walked.buffer(-MIN_PAVEMENT_WIDTH / 2, join_style="mitre").buffer(
         MIN_PAVEMENT_WIDTH / 2 + MAX_SEAM, join_style="mitre"
     )
@@ -379,12 +400,14 @@ def slivers(pavement: Float) -> BaseGeometry:
 
 
 def markings(surfaces: Sequence[LaneSurface], extent: BaseGeometry) -> Float:
-    """Return (n, 4, 3) quads of lines between and beside the driving lanes, up to the stop lines of junctions.
+    """Return (n, 4, 3) quads of the lines along driving lanes, up to the stop lines of junctions.
 
     Parameters
     ----------
+    surfaces : sequence of LaneSurface
+        Lanes in local axes.
     extent : shapely geometry
-        The lines end there, as the surfaces do.
+        Area to which the lines are cut, as the surfaces are.
     """
     lanes = {(lane.road_id, lane.section, lane.lane_id): lane for lane in surfaces if lane.junction_id is None}
     painted = without(extent, _junctions(surfaces).buffer(STOP_LINE_SETBACK + STOP_LINE_WIDTH))
@@ -393,6 +416,8 @@ def markings(surfaces: Sequence[LaneSurface], extent: BaseGeometry) -> Float:
     for (road, section, number), lane in lanes.items():
         if group(lane) != "driving" or _is_taper(lane):
             continue
+        # Lane ids count outwards from the reference line, left lanes positive and right lanes negative, without 0: the
+        # inner neighbour of lane 1 is lane -1.
         away = 1 if number > 0 else -1
         inner = lanes.get((road, section, number - away if number != away else -away))
         outer = lanes.get((road, section, number + away))
@@ -405,12 +430,13 @@ def markings(surfaces: Sequence[LaneSurface], extent: BaseGeometry) -> Float:
 
 
 def _painted_once(quads: Float) -> Float:
-    """Return quads (n, 4, 3) without those that lie on an earlier one.
+    """Return the quads (n, 4, 3) that do not lie on an earlier one.
 
-    The two directions of a street may be roads of their own whose edge is the same line.
+    The two directions of a street may be separate roads with the same line as an edge.
     """
     plan = shapely.polygons(quads[:, :, :2])
     plan = np.where(shapely.is_valid(plan), plan, shapely.convex_hull(plan))
+    # Each quad is compared with the earlier ones only, so that of two equal quads the first one remains.
     later, earlier = shapely.STRtree(plan).query(plan, predicate="intersects")
     later, earlier = later[earlier < later], earlier[earlier < later]
     shared = shapely.area(shapely.intersection(plan[later], plan[earlier]))
@@ -420,11 +446,13 @@ def _painted_once(quads: Float) -> Float:
 
 
 def stop_lines(surfaces: Sequence[LaneSurface]) -> Float:
-    """Return (n, 4, 3) quads where driving lanes enter a junction."""
+    """Return (n, 4, 3) quads of stop lines where driving lanes enter a junction."""
     inside = _junctions(surfaces).buffer(0.3)
     shapely.prepare(inside)
     quads = [np.empty((0, 4, 3))]
     for lane in in_groups(surfaces, ["driving"]):
+        # Right lanes lead along the reference line and left lanes against it; with left-hand traffic the other way
+        # round.
         forward = (lane.lane_id < 0) != lane.keeps_left
         left, right = (lane.left, lane.right) if forward else (lane.right[::-1], lane.left[::-1])
         end = shapely.Point((left[-1, :2] + right[-1, :2]) / 2)
@@ -434,20 +462,20 @@ def stop_lines(surfaces: Sequence[LaneSurface]) -> Float:
 
 
 def inner_edge(lane: LaneSurface) -> Float:
-    """Return the edge (n, 3) on the side of the reference line."""
+    """Return the edge (n, 3) of a lane nearer to the reference line."""
     return lane.right if lane.lane_id > 0 else lane.left
 
 
 def outer_edge(lane: LaneSurface) -> Float:
-    """Return the edge (n, 3) away from the reference line."""
+    """Return the edge (n, 3) of a lane farther from the reference line."""
     return lane.left if lane.lane_id > 0 else lane.right
 
 
 def _with_kerbs(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, ...]:
-    """Return the lanes with pavements raised to kerb height, where the map leaves all pavements flush.
+    """Return the lanes with pavements raised to kerb height, if all pavements of the map are level with the road.
 
-    Maps without lane heights (the towns of CARLA are some) mean pavements
-    that are raised in the street; 0.12 m is the usual upstand of a kerb.
+    Maps without lane heights, such as the towns of CARLA, mean pavements that are raised in the street; 0.12 m is the
+    usual height of a kerb.
     """
     inner_neighbour = {
         (lane.road_id, lane.section, lane.lane_id + (1 if lane.lane_id > 0 else -1)): lane for lane in surfaces
@@ -457,6 +485,7 @@ def _with_kerbs(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, ...]:
         neighbour = inner_neighbour.get((lane.road_id, lane.section, lane.lane_id))
         if neighbour is not None and len(neighbour.left) == len(lane.left):
             steps.append(float(np.median(inner_edge(lane)[:, 2] - outer_edge(neighbour)[:, 2])))
+    # One pavement that is raised shows that the map has lane heights: then all are left as they are.
     if max(steps) > KERB_HEIGHT / 4:
         return tuple(surfaces)
     up = np.array([0.0, 0.0, KERB_HEIGHT])
@@ -487,7 +516,7 @@ def _at_rows(surface: LaneSurface, rows: Float) -> LaneSurface:
 
 
 def _interpolated(at: Float, known: Float | Integer, points: Float) -> Float:
-    """Return points (k, 3) between points (n, 3) that lie at ascending places (n,), at others (k,)."""
+    """Return points (k, 3) at stations (k,), interpolated between points (n, 3) at ascending stations (n,)."""
     return np.column_stack([np.interp(at, known, points[:, axis]) for axis in range(3)])
 
 
@@ -500,7 +529,7 @@ def _trimmed(surface: LaneSurface, area: BaseGeometry) -> LaneSurface:
 
 
 def _skirt(ring: shapely.LinearRing, terrain: Terrain) -> Float:
-    """Return upright faces below a ring that has the area at its left; they face right."""
+    """Return vertical faces below a ring with the area at its left; they face right."""
     plan = np.asarray(ring.coords)[:, :2]
     height = terrain.height(plan)
     high, low = np.column_stack([plan, height]), np.column_stack([plan, height - KERB_DEPTH])
@@ -544,7 +573,7 @@ def _ribbon(path: Float) -> Float:
 
 
 def _bar(left: Float, right: Float) -> Float:
-    """Return the stop line (1, 4, 3) before the end of a lane between two edges (n, 3)."""
+    """Return the stop line (1, 4, 3) near the end of a lane between two edges (n, 3)."""
     near, far = STOP_LINE_SETBACK, STOP_LINE_SETBACK + STOP_LINE_WIDTH
     corners = np.concatenate([_before_end(right, [far, near]), _before_end(left, [near, far])])
     bar: Float = corners[None] + np.array([0.0, 0.0, MARKING_ABOVE])
@@ -552,6 +581,6 @@ def _bar(left: Float, right: Float) -> Float:
 
 
 def _before_end(path: Float, distances: Sequence[float]) -> Float:
-    """Return points (k, 3) some metres before the end of a path (n, 3)."""
+    """Return points (k, 3) at distances (metres) before the end of a path (n, 3)."""
     left_over = np.cumsum(np.linalg.norm(np.diff(path[::-1], axis=0), axis=1))
     return _interpolated(np.array(distances), np.array([0.0, *left_over]), path[::-1])

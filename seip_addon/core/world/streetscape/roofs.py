@@ -1,4 +1,4 @@
-"""Buildings as closed solids: walls round an outline with courtyards, and a flat, sloped or ridged roof."""
+"""Buildings as closed solids: walls around an outline with courtyards, and a flat, sloped or ridged roof."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _GRID = 1e-6  # metres that corners snap to
 
 @dataclass(frozen=True)
 class Roof:
-    """A roof.
+    """Shape and size of a roof.
 
     Parameters
     ----------
@@ -27,9 +27,9 @@ class Roof:
         A value of ``roof:shape``. Shapes of a family share one solid: a ridge between two slopes, four slopes, a
         point, one slope.
     height : float, metres
-        From the eaves to the ridge.
+        Height from the eaves to the ridge.
     heading : float or None, radians
-        Direction in which it falls, counter-clockwise from east; None: across the longer side.
+        Downward direction, counter-clockwise from east; None for square to the longer side.
     across : bool
         Whether the ridge lies across the longer side instead of along it.
     """
@@ -49,7 +49,7 @@ def house(outline: shapely.Polygon, base: float, eaves: float, *, side: str, roo
     Parameters
     ----------
     outline : Polygon
-        In plan, local axes; courtyards are its holes.
+        Outline in plan, local axes; courtyards are its holes.
     base, eaves : float, metres
         Height of the floor and of the top of the walls.
     side : str
@@ -63,6 +63,8 @@ def house(outline: shapely.Polygon, base: float, eaves: float, *, side: str, roo
     count = len(corners)
     top = np.column_stack([corners, eaves + rise.height(corners)])
     floor = np.column_stack([corners, np.full(count, base)])
+    # Edges between two triangles occur once in each direction. Those without the opposite one are the outline and its
+    # courtyards, where walls stand; all triangles are counter-clockwise, so that walls face outwards.
     edges = Counter((int(a), int(b)) for face in index for a, b in zip(face, np.roll(face, -1), strict=True))
     around = [(a, b) for a, b in edges if (b, a) not in edges]
     walls = [(count + a, count + b, b, a) for a, b in around]
@@ -74,7 +76,7 @@ def house(outline: shapely.Polygon, base: float, eaves: float, *, side: str, roo
 
 
 def _triangles(piece: shapely.Polygon) -> Float:
-    """Return a polygon in triangles (n, 3, 2) that turn counter-clockwise and use its corners alone."""
+    """Return a polygon as counter-clockwise triangles (n, 3, 2) that use only its corners."""
     parts = shapely.get_parts(shapely.constrained_delaunay_triangles(piece))
     corners = shapely.get_coordinates([part.exterior for part in parts]).reshape(-1, 4, 2)[:, :3]
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
@@ -84,7 +86,7 @@ def _triangles(piece: shapely.Polygon) -> Float:
 
 
 class _Rise:
-    """How high a roof rises over the eaves, and the pieces of the outline over which it is a plane."""
+    """Height of a roof above the eaves, and the pieces of the outline over which it is plane."""
 
     def __init__(self, outline: shapely.Polygon, roof: Roof) -> None:
         self._roof, self._most = roof.shape, roof.height if roof.shape in RIDGED | SLOPED else 0.0
@@ -107,24 +109,26 @@ class _Rise:
         self.pieces = self._cut(outline)
 
     def height(self, xy: Float) -> Float:
-        """Return how far the roof is above the eaves at points (n, 2), metres."""
+        """Return the height of the roof above the eaves at points (n, 2), metres."""
         if self._most <= 0.0:
             return np.zeros(len(xy))
         u, v = xy @ self._along - self._u, xy @ self._aside - self._v
-        beside = 1.0 - np.abs(v) / self._half_v
+        # u runs along the ridge and v across it, from the middle of the outline. Every slope is linear in one of them,
+        # and the roof is the lowest of its slopes. At the ends hipped roofs are as steep as at the sides.
+        slopes = 1.0 - np.abs(v) / self._half_v
         if self._roof in POINTED:
-            share = np.minimum(beside, 1.0 - np.abs(u) / self._half_u)
+            share = np.minimum(slopes, 1.0 - np.abs(u) / self._half_u)
         elif self._roof in HIPPED:
-            share = np.minimum(beside, (self._half_u - np.abs(u)) / min(self._half_u, self._half_v))
+            share = np.minimum(slopes, (self._half_u - np.abs(u)) / min(self._half_u, self._half_v))
         elif self._roof in RIDGED:
-            share = beside
+            share = slopes
         else:
             share = (1.0 - v / self._half_v) / 2
         rise: Float = self._most * np.clip(share, 0.0, 1.0)
         return rise
 
     def _cut(self, outline: shapely.Polygon) -> list[shapely.Polygon]:
-        """Return the outline cut along the roof's edges."""
+        """Return the outline cut along the ridge and the hips of the roof."""
         half_u, half_v = self._half_u, self._half_v
         if self._roof in POINTED:
             lines = [((-half_u, -half_v), (half_u, half_v)), ((-half_u, half_v), (half_u, -half_v))]
@@ -140,6 +144,8 @@ class _Rise:
         else:
             return [outline]
         origin = self._u * self._along + self._v * self._aside
+        # Slightly longer than the outline, so that the lines cross it in spite of rounding. If the cells do not add up
+        # to the outline, the cut has failed: keep the outline whole.
         edges = [
             shapely.LineString([origin + 1.001 * x * self._along + 1.001 * y * self._aside for x, y in line])
             for line in lines

@@ -1,4 +1,4 @@
-"""The posts of a map's traffic lights: the map's own where it has them, else assumed ones beside the carriageway."""
+"""Posts of a map's traffic lights: those of the map, or assumed ones next to the carriageway."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -19,18 +19,18 @@ from .parts import Part
 from .road_surface import Roadside
 from .terrain import Terrain
 
-DEFAULT_HEIGHT = 6.0  # of a post (metres) whose height the map does not give
+DEFAULT_HEIGHT = 6.0  # metres: assumed height of a post
 MAST_ARM, MAX_ARM = 4.5, 12.0
-MIN_HEIGHT_FOR_ARM = 4.5  # a lower post (metres) has no arm over traffic
+MIN_HEIGHT_FOR_ARM = 4.5  # metres: lower posts have no arm over traffic
 KERB_CLEARANCE = 0.6
 SAME_POLE_DISTANCE = 3.0
-"""Signals whose poles would stand nearer than this (metres) share one; a post of any kind so near carries a signal."""
-MAST_REACH = 12.0  # a post whose name tells of signals carries one up to so far away (metres)
+"""Metres: signals with poles nearer to each other share one, and a post of any kind within this carries a signal."""
+MAST_REACH = 12.0  # metres within which a post named after signals carries one
 
 
 @dataclass(frozen=True, eq=False)
 class _SignalPost:
-    """A post with its arm (radians, metres): `Part` says what the source is."""
+    """A post with the heading (radians) and length (metres) of its arm; for the source see `Part`."""
 
     foot: Float
     heading: float
@@ -48,14 +48,19 @@ def split_posts(
 
     Parameters
     ----------
+    objects : sequence of PlacedObject
+        Objects in local axes.
     signals : iterable of PlacedSignal
-        In local axes, as the objects are.
+        Signals in local axes.
+    roadside : Roadside
+        Carriageway and its sides.
 
     Returns
     -------
     others : list of PlacedObject
+        Objects that carry no signal.
     lights : list of (PlacedSignal, Post or None)
-        Each dynamic signal with its post.
+        Dynamic signals, each with its post.
     """
     posts = [(number, post) for number, placed in enumerate(objects) if (post := post_of(placed)) is not None]
     used: set[int] = set()
@@ -73,14 +78,18 @@ def signal_parts(
 ) -> tuple[Part, ...]:
     """Return the posts of traffic lights, with their heads and arms.
 
-    A post of the map stands where the map has it. Without one a signal beside the carriageway is its post, and one over
-    it hangs on a mast arm from the nearest place beside. Heights of signals in the map are not used, as maps give posts
-    below the road and lamps above it.
+    Posts of the map keep their position. Without one, a signal next to the carriageway stands on a post at its place,
+    and a signal above it is mounted on an arm from the nearest place next to it. Heights of signals in the map are not
+    used, because maps have posts below the road and lamps above it.
 
     Parameters
     ----------
     lights : iterable of (PlacedSignal, Post or None)
-        In local axes: see `split_posts`.
+        Signals in local axes with their posts: see `split_posts`.
+    roadside : Roadside
+        Carriageway and its sides.
+    terrain : Terrain
+        Heights of the ground at the posts.
     """
     poles: list[_SignalPost] = []
     for signal, own in lights:
@@ -99,13 +108,13 @@ def signal_parts(
 
 
 def _own_post(signal: PlacedSignal, posts: Sequence[tuple[int, Post]], roadside: Roadside) -> tuple[int, Post | None]:
-    """Return the nearest post of the map that can be the signal's, and its number among the objects."""
+    """Return the index and the nearest post of the map that can carry the signal; (-1, None) without one."""
     xy = signal.position[:2]
-    hangs = roadside.filled.contains(shapely.Point(xy))
+    overhead = roadside.filled.contains(shapely.Point(xy))
 
     def reach(post: Post) -> float:
-        tells = post.words & SIGNAL_WORDS and not post.is_lamp
-        return MAST_REACH if tells or (hangs and not post.is_lamp and can_carry(post)) else SAME_POLE_DISTANCE
+        named = post.words & SIGNAL_WORDS and not post.is_lamp
+        return MAST_REACH if named or (overhead and not post.is_lamp and can_carry(post)) else SAME_POLE_DISTANCE
 
     near = [(float(np.hypot(*(post.xy - xy))), number, post) for number, post in posts]
     eligible = [entry for entry in near if entry[0] <= reach(entry[2])]
@@ -117,23 +126,23 @@ def _own_post(signal: PlacedSignal, posts: Sequence[tuple[int, Post]], roadside:
 
 def _post_for(signal: PlacedSignal, own: Post | None, roadside: Roadside) -> _SignalPost:
     xy = signal.position[:2]
-    hangs = bool(roadside.filled.contains(shapely.Point(xy)))
+    overhead = bool(roadside.filled.contains(shapely.Point(xy)))
     height, carries = DEFAULT_HEIGHT, True
     if own is not None:
         foot, source = own.xy, FROM_MAP
         height, carries = own.height or DEFAULT_HEIGHT, can_carry(own)
-    elif hangs:
+    elif overhead:
         foot, source = _beside(xy, roadside), ASSUMED
     else:
         named = words_of(signal.name) & WORDS_OF_KIND[Kind.POST]
         foot, source = xy, FROM_MAP if named else ASSUMED
-    heading, arm = _arm(foot, xy, signal.yaw, roadside, hangs=hangs)
-    faces_left = math.sin(signal.yaw + math.pi - heading) >= 0  # the lamps look against the traffic
+    heading, arm = _arm(foot, xy, signal.yaw, roadside, overhead=overhead)
+    faces_left = math.sin(signal.yaw + math.pi - heading) >= 0  # lamps face oncoming traffic
     return _SignalPost(foot, heading, arm if height >= MIN_HEIGHT_FOR_ARM else 0.0, height, faces_left, source, carries)
 
 
 def _beside(xy: Float, roadside: Roadside) -> Float:
-    """Return the place nearest to a point (2,) that is beside the carriageway, and not across its end."""
+    """Return the nearest place to a point (2,) at the side of the carriageway, not across its end."""
     kerb = shapely.boundary(roadside.filled.buffer(KERB_CLEARANCE, join_style="mitre"))
     sides = kerb.difference(roadside.mouths.buffer(1.02 * KERB_CLEARANCE, cap_style="square"))
     line = shapely.shortest_line(shapely.Point(xy), kerb if sides.is_empty else sides)
@@ -141,13 +150,13 @@ def _beside(xy: Float, roadside: Roadside) -> Float:
     return place
 
 
-def _arm(foot: Float, xy: Float, travel: float, roadside: Roadside, *, hangs: bool) -> tuple[float, float]:
-    """Return heading (radians) and length (metres) of the arm of a post; none where it would reach over no lane."""
+def _arm(foot: Float, xy: Float, travel: float, roadside: Roadside, *, overhead: bool) -> tuple[float, float]:
+    """Return heading (radians) and length (metres) of the arm of a post; zero length if it would not reach a lane."""
     towards = arm_heading(foot, roadside.carriageway)
     across = travel + math.pi / 2  # the arm is square to the traffic
     square = across if math.cos(across - towards) >= 0 else across + math.pi
     way = xy - foot
-    if hangs and np.hypot(*way) > 0:
+    if overhead and np.hypot(*way) > 0:
         heading, length = math.atan2(way[1], way[0]), round(max(float(np.hypot(*way)), 1.0), 1)
     else:
         heading, length = square, MAST_ARM

@@ -1,6 +1,6 @@
-"""Procedural street furniture as plain arrays: few faces, true outlines.
+"""Procedural street furniture as plain arrays, with few faces and true outlines.
 
-Every solid stands with its foot in the origin and z up; what has an arm reaches along +x. Sizes are in metres.
+Every solid has its foot at the origin and z up; arms reach along +x. Sizes are in metres.
 """
 
 import numpy as np
@@ -10,11 +10,11 @@ from ...geometry.solids import Solid, join, prism, signed_area, tube
 
 STOREY_HEIGHT = 3.2
 WINDOW_SPACING = 3.4
-WINDOW_OFFSET = 0.03  # how far window panes stand before the wall, so that they are drawn before it
+WINDOW_OFFSET = 0.03  # metres between panes and wall, so that panes are drawn in front of it
 
 
 def windows(outline: Float, base: float, height: float) -> Solid:
-    """Return the panes of a block: one in each bay of each storey, wide ones on the ground floor."""
+    """Return the window panes of a block: one in each bay of each storey, wide ones on the ground floor."""
     ring = outline[::-1] if signed_area(outline) < 0 else outline
     storeys = int(height / STOREY_HEIGHT + 0.1)  # a low top storey has windows too
     panes = [
@@ -42,10 +42,10 @@ def signal_pole(height: float, arm: float, *, faces_left: bool = True) -> Solid:
     Parameters
     ----------
     height, arm : float, metres
-        Without an arm the post carries the low head alone.
+        Height of the post and length of the arm; a post without an arm has only the low head.
     faces_left : bool
-        Whether the lamps face +y, the left of the arm: the near side of the
-        junction where traffic keeps to the right. Else they face -y.
+        Whether the lamps face +y, left of the arm, which is the near side of the junction in right-hand traffic;
+        otherwise they face -y.
     """
     shaft = tube(np.array([0, 0, 0]), np.array([0, 0, height]), (0.11, 0.08), "steel")
     low = _signal_head([0, 0.26, min(2.6, height - 0.5)])
@@ -80,13 +80,13 @@ def tree(height: float, crown_diameter: float, variant: int) -> Solid:
     half = np.array([crown_diameter, crown_diameter, crown_height]) / 2
     shape = directions * bumps[:, None]
     low, high = shape.min(axis=0), shape.max(axis=0)
-    shape = 2 * (shape - low) / (high - low) - 1  # the crown is as wide and as high as asked for
+    shape = 2 * (shape - low) / (high - low) - 1  # bumps must not change the width and height of the crown
     crown = Solid(shape * half + [0, 0, middle], faces, ("leaves",) * len(faces))
     return join(trunk, crown)
 
 
 def _panes(start: Float, stop: Float, floor: float, *, shop: bool) -> Float:
-    """Return (n, 4, 3) panes of one storey of one side, seen from outside counter-clockwise."""
+    """Return (n, 4, 3) panes of one storey of one side, counter-clockwise seen from outside."""
     along = stop - start
     length = float(np.hypot(*along))
     bays = int(length / WINDOW_SPACING)
@@ -129,7 +129,7 @@ def _mirrored(solid: Solid) -> Solid:
 
 
 def _icosphere() -> tuple[Float, tuple[tuple[int, ...], ...]]:
-    """Return the unit icosahedron with each face cut in four: 42 vertices, 80 faces."""
+    """Return the unit icosahedron with each face divided into four: 42 vertices, 80 faces."""
     golden = (1 + 5**0.5) / 2
     corners = [
         [-1, golden, 0], [1, golden, 0], [-1, -golden, 0], [1, -golden, 0],

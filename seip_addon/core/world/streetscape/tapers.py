@@ -1,7 +1,7 @@
-"""Tapers where the number of lanes changes: the edge of a road widens along the road, not in one step.
+"""Tapers where the number of lanes changes: the edge of a road widens gradually, not in one step.
 
-SUMO's netconvert adds a lane over a few metres of a joint between two roads. The narrower road is widened towards the
-joint here, with what lies beside its outermost lane.
+SUMO's netconvert adds a lane over a few metres of a joint between two roads. Here the narrower road is widened towards
+the joint, together with pavements and other strips next to its outermost lane.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -18,18 +18,18 @@ from .road_surface import CARRIAGEWAY, by_road, group, inner_edge, outer_edge, w
 
 RATE = 10.0  # metres along the road for each metre that it widens
 MIN_JUMP = 0.5  # metres: smaller jumps need no taper
-MAX_JUMP = 8.0  # metres: larger ones are no added lanes
-MAX_SHARE = 0.9  # of a road's length that its taper takes at most
+MAX_JUMP = 8.0  # metres: larger jumps are not added lanes
+MAX_SHARE = 0.9  # largest share of a road's length that its taper takes
 TOUCH = 0.5  # metres between ends of roads that meet
-MIN_MEDIAN = 4.0  # metres that are left to the next carriageway: otherwise a median would be closed
+MIN_MEDIAN = 4.0  # metres that remain to the next carriageway: otherwise a median would be closed
 STEP = 5.0  # metres between the rows of a taper
 Side = tuple[str, int, bool]
-"""A road, the sign of the ids of its lanes on one side, and whether the outer edge of that side is meant."""
+"""Id of a road, sign of the lane ids on one side, and whether it is the outer edge of that side."""
 
 
 @dataclass(frozen=True, eq=False)
 class _End:
-    """An end of one edge of a carriageway: where it is, and the direction away from the carriageway."""
+    """End of one edge of a carriageway: its position, and the direction away from the carriageway."""
 
     side: Side
     s: float
@@ -40,7 +40,7 @@ class _End:
 
 @dataclass(frozen=True)
 class _Taper:
-    """Widening at one edge of a road: by ``jump`` metres at ``s``, and by nothing ``length`` metres from there."""
+    """Widening at one edge of a road: ``jump`` metres at ``s``, linear to zero ``length`` metres away."""
 
     s: float
     jump: float
@@ -53,14 +53,14 @@ class _Taper:
 
 
 def with_tapers(surfaces: Sequence[LaneSurface], joints: Mapping[str, str]) -> tuple[LaneSurface, ...]:
-    """Return lanes whose edges widen gradually towards the joints at which lanes are added or end.
+    """Return the lanes with edges that widen gradually towards joints where lanes are added or end.
 
     Parameters
     ----------
     surfaces : sequence of LaneSurface
-        All lanes of a map that was made of middle lines.
+        All lanes of a map made from centre lines.
     joints : mapping of str to str
-        Joint of each road that lies in one: a junction at which a street only goes on.
+        Joint of each road that lies in one. A joint is a junction where a street only continues.
     """
     tapers, links = _tapers(surfaces, joints)
     dense = [_with_rows(lane, tapers) for lane in surfaces]
@@ -80,7 +80,7 @@ def with_tapers(surfaces: Sequence[LaneSurface], joints: Mapping[str, str]) -> t
 def _tapers(
     surfaces: Sequence[LaneSurface], joints: Mapping[str, str]
 ) -> tuple[dict[Side, list[_Taper]], dict[Side, Float]]:
-    """Return the tapers of roads, and for roads in joints the straight line (2, 2) that an edge is to follow there."""
+    """Return the tapers of roads, and for roads within joints the straight line (2, 2) that an edge follows."""
     tapers: dict[Side, list[_Taper]] = {}
     roads = by_road([lane for lane in surfaces if group(lane) in CARRIAGEWAY])
     outside = [end for road, lanes in roads.items() if road not in joints for end in _ends(lanes)]
@@ -88,6 +88,9 @@ def _tapers(
     carriageways = {road: united(lane.polygon for lane in lanes) for road, lanes in roads.items() if road not in joints}
     moved: dict[tuple[Side, int], Float] = {}
     joined = []
+    # For each edge of a road within a joint find the ends of the edges outside that it connects, and how far sideways
+    # the second lies from the first. The one farther inside belongs to the narrower road, which is widened by that
+    # much, unless another carriageway is so near that the median would close.
     for road in sorted(joints.keys() & roads.keys()):
         for inside in _through(roads[road]):
             before, after = (_nearest(outside, tree, one, roads) for one in inside)
@@ -103,6 +106,9 @@ def _tapers(
                     whole = max(lane.s[-1] for lane in lanes) - min(lane.s[0] for lane in lanes)
                     taper = _Taper(narrow.s, abs(jump), min(RATE * abs(jump), MAX_SHARE * whole))
                     tapers.setdefault(narrow.side, []).append(taper)
+    # Widened edges meet at the joint, but the roads within it still have their old edges: let these follow the straight
+    # line between the ends outside. Several roads may run through a joint between the same two edges; the one with a
+    # pavement, or nearest to the line, is the outermost and moves.
     walked = {_side(lane, outer=True) for lane in surfaces if group(lane) == "sidewalk"}
     nearest: dict[tuple[Side, ...], tuple[tuple[bool, float], Side, Float]] = {}
     for inside, outer in joined:
@@ -141,7 +147,7 @@ def _ends(lanes: Sequence[LaneSurface]) -> Iterator[_End]:
 def _nearest(
     ends: Sequence[_End], tree: shapely.STRtree, inside: _End, roads: Mapping[str, Sequence[LaneSurface]]
 ) -> _End | None:
-    """Return the end of a road at which a road within a joint begins or ends."""
+    """Return the end of a road outside that an end of a road within a joint meets, None without one."""
     for index in tree.query(shapely.Point(inside.edge).buffer(MAX_JUMP)):
         end: _End = ends[int(index)]
         across = [
@@ -149,16 +155,16 @@ def _nearest(
             for lane in roads[end.side[0]]
             if _sign(lane) == end.side[1] and lane.s[end.row] == end.s
         ]
-        alike = end.side[2] == inside.side[2] and float(end.aside @ inside.aside) > 0.9
-        if alike and shapely.union_all(across).distance(shapely.Point(inside.edge)) < TOUCH:
+        same_edge = end.side[2] == inside.side[2] and float(end.aside @ inside.aside) > 0.9
+        if same_edge and shapely.union_all(across).distance(shapely.Point(inside.edge)) < TOUCH:
             return end
     return None
 
 
 def _meets(end: _End, distance: float, carriageways: Mapping[str, BaseGeometry], own: Collection[str]) -> bool:
-    """Return whether another carriageway lies beside an end of a road."""
-    beside = shapely.LineString([end.edge + TOUCH * end.aside, end.edge + distance * end.aside])
-    return any(road not in own and area.intersects(beside) for road, area in carriageways.items())
+    """Return whether another carriageway lies within a distance of an edge's end."""
+    outwards = shapely.LineString([end.edge + TOUCH * end.aside, end.edge + distance * end.aside])
+    return any(road not in own and area.intersects(outwards) for road, area in carriageways.items())
 
 
 def _last_lanes(surfaces: Sequence[LaneSurface]) -> dict[tuple[Side, int], LaneSurface]:
@@ -173,30 +179,31 @@ def _last_lanes(surfaces: Sequence[LaneSurface]) -> dict[tuple[Side, int], LaneS
 
 
 def _is_beyond(lane: LaneSurface, other: LaneSurface, *, outer: bool) -> bool:
-    """Return whether a lane is nearer to an edge of the road than another one."""
+    """Return whether a lane is nearer to an edge of the road than another lane."""
     return abs(lane.lane_id) > abs(other.lane_id) if outer else abs(lane.lane_id) < abs(other.lane_id)
 
 
 def _widened(lane: LaneSurface, shift: Float, last: LaneSurface, *, outer: bool) -> LaneSurface:
-    """Return a lane moved (n, 3): as a whole beside the carriageway, at its edge if it is the last of it."""
-    beside = _is_beyond(lane, last, outer=outer)
-    if not beside and lane.lane_id != last.lane_id:
+    """Return a lane moved by `shift` (n, 3): the last lane at its outer edge only, lanes beyond it as a whole."""
+    is_beyond = _is_beyond(lane, last, outer=outer)
+    if not is_beyond and lane.lane_id != last.lane_id:
         return lane
-    inner = inner_edge(lane) + shift * (beside or not outer)
-    return _with_edges(lane, inner, outer_edge(lane) + shift * (beside or outer))
+    inner = inner_edge(lane) + shift * (is_beyond or not outer)
+    return _with_edges(lane, inner, outer_edge(lane) + shift * (is_beyond or outer))
 
 
 def _with_rows(lane: LaneSurface, tapers: Mapping[Side, Sequence[_Taper]]) -> LaneSurface:
     own = [taper for outer in (True, False) for taper in tapers.get(_side(lane, outer=outer), ())]
     if not own:
         return lane
+    # A taper bends within a lane: without extra rows the edge would stay straight between the lane's own rows.
     places = [np.arange(one.s - one.length, one.s + one.length, STEP) for one in own]
     ends = [place for one in own for place in (one.s - one.length, one.s + one.length)]
     return with_rows_at(lane, np.concatenate([*places, ends]))
 
 
 def _shift(lane: LaneSurface, tapers: Sequence[_Taper], line: Float | None, *, outer: bool) -> Float:
-    """Return by how far (n, 3) the edge of the last lane of a carriageway is moved."""
+    """Return the displacement (n, 3) of the edge of the last lane of a carriageway, metres."""
     edge, inside = (outer_edge(lane), inner_edge(lane)) if outer else (inner_edge(lane), outer_edge(lane))
     if line is not None:
         along = (lane.s - lane.s[0]) / (lane.s[-1] - lane.s[0])

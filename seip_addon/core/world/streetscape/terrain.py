@@ -1,4 +1,4 @@
-"""The height of the ground: looked up on triangles, and areas in plan laid on them."""
+"""Heights of the ground from triangles, areas draped over them, and embankments next to roads."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,10 +12,10 @@ from ...arrays import Float
 from ...geometry.height_raster import HeightRaster
 from ...geometry.plan import plane_height, signed_area
 
-MIN_AREA = 1e-6  # triangles smaller than this in plan (m²) carry nothing and are left out
+MIN_AREA = 1e-6  # m² in plan: smaller triangles are left out
 SNAP_GRID = 1e-6  # grid (metres) that cut outlines snap to; without one slivers arise that cannot be triangulated
 ROADSIDE, MAX_ROADSIDE = 5.0, 15.0
-"""Width (metres) of the strip beside a road in which the ground changes from its height to that of the land."""
+"""Width (metres) of the strip next to a road where the ground changes from its height to that of the land."""
 EMBANKMENT_RUN = 2.2  # metres of that width for each metre of height between the two
 MIN_EMBANKMENT = 0.25  # metres of height from which the strip needs a finer grid than flat ground
 STEEP_SPACING = 2.0  # metres, about, between places where the ground is steep
@@ -24,16 +24,16 @@ _TOUCHING = 1e-3  # metres from a road within which the ground has its height
 
 @dataclass(frozen=True, eq=False)
 class Relief:
-    """Heights of the ground that a flat map is laid on.
+    """Heights of the ground under a flat map.
 
     Parameters
     ----------
     raster : HeightRaster
-        Map coordinates.
+        Heights in map coordinates.
     level : float, metres
-        Height that the map gives the ground.
+        Height of the ground in the map.
     bridges : frozenset of str
-        Ids of the roads that lead straight from end to end, whatever the ground is between.
+        Ids of the roads that are straight in height from end to end, independent of the ground between.
     """
 
     raster: HeightRaster
@@ -41,7 +41,7 @@ class Relief:
     bridges: frozenset[str] = frozenset()
 
     def rise(self, xy: Float) -> Float:
-        """Return how far the ground lies above the map's own (n,) at places (n, 2), metres."""
+        """Return the height of the ground above that of the map (n,) at places (n, 2), metres."""
         return self.raster.at(xy) - self.level
 
     def at(self, xy: Float) -> Float:
@@ -51,7 +51,7 @@ class Relief:
 
 @dataclass(frozen=True)
 class FlatLand:
-    """Level land that the streets of a map rise above on ramps and bridges, or lie below in underpasses.
+    """Level land around streets that rise above it on ramps and bridges, or lie below it in underpasses.
 
     Parameters
     ----------
@@ -70,16 +70,16 @@ class FlatLand:
 
 
 class Terrain:
-    """Heights on a set of triangles that overlap at most slightly in plan.
+    """Heights on a set of triangles that overlap only slightly in plan.
 
     Parameters
     ----------
     triangles : (n, 3, 3) float64, metres
-        None of them upright.
+        Triangles; none may be vertical.
     beside : callable, optional
-        Heights (n,) of the ground at places (n, 2) on none of the triangles.
+        Function for the heights (n,) of the ground at places (n, 2) outside all triangles.
     steep : shapely geometry, optional
-        Area in plan in which `drape` divides each cell of its grid further.
+        Area in plan in which `drape` uses a finer grid.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class Terrain:
         self._tree = shapely.STRtree(self._plan)
 
     def height(self, xy: Float) -> Float:
-        """Return the height below or above points in plan.
+        """Return the heights at points in plan.
 
         Parameters
         ----------
@@ -100,10 +100,11 @@ class Terrain:
         Returns
         -------
         (n,) float64, metres
-            The mean of the triangles there; next to them that of the ground, or of the nearest point of a triangle.
+            Mean height of the triangles there; outside them the height of the ground, or of the nearest triangle point.
         """
         points = shapely.points(xy)
         point, triangle = self._tree.query(points, predicate="intersects")
+        # Points on a common edge, or where triangles overlap slightly, meet several triangles: take the mean.
         found = np.bincount(point, minlength=len(xy))
         total = np.bincount(point, plane_height(self._triangles[triangle], xy[point]), minlength=len(xy))
         height: Float = total / np.maximum(found, 1)
@@ -118,20 +119,21 @@ class Terrain:
         return plane_height(self._triangles[nearest], on_triangle)
 
     def drape(self, area: BaseGeometry, *, spacing: float, above: float = 0.0) -> Float:
-        """Return an area in plan as triangles that lie on the terrain at their corners, without cracks.
+        """Drape an area in plan over the terrain, as triangles with their corners on it and without cracks.
 
         Parameters
         ----------
         area : shapely geometry
+            Area in plan.
         spacing : float, metres
-            Side of the square grid along which the area is divided; a fraction of it where the ground is steep.
+            Side of the square grid that divides the area; a fraction of it is used where the ground is steep.
         above : float, metres
-            Height over the terrain.
+            Height above the terrain.
 
         Returns
         -------
         (n, 3, 3) float64, metres
-            Normals up.
+            Triangles with normals up.
         """
         plan = triangulate(_cells(area, spacing, self._steep))
         corners = plan.reshape(-1, 2)
@@ -141,23 +143,23 @@ class Terrain:
 
 
 class Embankments:
-    r"""Heights of the ground next to roads: slopes lead from these to the land.
+    r"""Heights of the ground next to roads, with slopes between the roads and the land.
 
-    Next to a road the ground is as high as the road; from a width :math:`b` on it is as high as the land. A road at the
-    height :math:`h` above the land raises it at a distance :math:`d < b` by
+    At a road the ground is as high as the road; at a distance :math:`b` and beyond it is as high as the land. A road at
+    height :math:`h` above the land raises the ground at a distance :math:`d < b` by
 
     .. math:: (1 - s) h, \qquad s = \frac{d^2}{d^2 + (b - d)^2}.
 
-    Several roads are near where one climbs next to another one. The ground is raised by the mean over their triangles
-    within the greatest width :math:`B`, weighted by :math:`((B - d) / (B d))^4` (after Franke and Little): at the
-    edge of each road it has that road's height, and no steps in between.
+    Several roads may be near, as where one climbs next to another one. The ground is raised by the mean over their
+    triangles within the greatest width :math:`B`, weighted by :math:`((B - d) / (B d))^4` (after Franke and Little): it
+    has the height of each road at its edge, and no steps in between.
 
     Parameters
     ----------
     triangles : (n, 3, 3) float64, metres
-        Roads that lie on the ground; no bridges.
+        Surfaces of roads on the ground, without bridges.
     land : callable
-        Heights (n,) of the land at places (n, 2).
+        Function for the heights (n,) of the land at places (n, 2).
     """
 
     def __init__(self, triangles: Float, land: Callable[[Float], Float]) -> None:
@@ -169,6 +171,7 @@ class Embankments:
         above = np.abs(corners[:, 2] - land(corners[:, :2])).reshape(-1, 3).max(axis=1)
         width = embankment_width(above)
         high = above > MIN_EMBANKMENT
+        # Only slopes need a fine grid: flat ground next to a road at its own height does not.
         self.steep = shapely.union_all(shapely.buffer(self._plan[high], width[high]))
         self._reach = float(width.max(initial=ROADSIDE))
 
@@ -179,6 +182,8 @@ class Embankments:
         point, triangle = self._tree.query(points, predicate="dwithin", distance=self._reach)
         nearest = shapely.get_coordinates(shapely.shortest_line(self._plan[triangle], points[point]))[::2]
         away = np.hypot(*(xy[point] - nearest).T)
+        # The weight falls to zero at the reach, so that a triangle enters the mean without a step, and grows without
+        # bound towards the road, so that its height wins there; `_TOUCHING` keeps it finite.
         weight = (np.maximum(self._reach - away, 0.0) / (self._reach * np.maximum(away, _TOUCHING))) ** 4
         above = plane_height(self._triangles[triangle], nearest) - land[point]
         width = embankment_width(np.abs(above))
@@ -191,15 +196,15 @@ class Embankments:
 
 
 def embankment_width(height: Float) -> Float:
-    """Return the width (n,) of the strip beside roads at heights (n,) above or below the land, metres."""
+    """Return the width (n,) of the strip next to roads at heights (n,) above or below the land, metres."""
     width: Float = np.clip(EMBANKMENT_RUN * height, ROADSIDE, MAX_ROADSIDE)
     return width
 
 
 def _cells(area: BaseGeometry, spacing: float, steep: BaseGeometry | None = None) -> NDArray[np.object_]:
-    """Return the polygons that a square grid through the origin divides an area into.
+    """Divide an area into polygons by a square grid through the origin.
 
-    Cells that meet a steep area are divided into squares of about `STEEP_SPACING`.
+    Cells that meet a steep area are divided further into squares of about `STEEP_SPACING`.
     """
     if area.is_empty:
         return np.array([], dtype=object)
@@ -219,10 +224,10 @@ def _cells(area: BaseGeometry, spacing: float, steep: BaseGeometry | None = None
         offsets = side * np.stack(np.meshgrid(*[np.arange(divisions)] * 2), axis=-1).reshape(-1, 2)
         x, y = (low[:, None] + offsets).reshape(-1, 2).T
         whole = met[~divided]
-        # Cells next to them get the same corners along the common side, so that no cracks open between both.
+        # Cells next to divided ones get the same corners along the common side, so that no cracks open between them.
         border = shapely.segmentize(shapely.boundary(shapely.union_all(met[divided])), side)
-        beside = shapely.intersects(whole, border)
-        whole[beside] = shapely.snap(whole[beside], shapely.extract_unique_points(border), SNAP_GRID)
+        at_border = shapely.intersects(whole, border)
+        whole[at_border] = shapely.snap(whole[at_border], shapely.extract_unique_points(border), SNAP_GRID)
         met = np.concatenate([whole, shapely.box(x, y, x + side, y + side)])
     parts = shapely.get_parts(shapely.intersection(met, area, grid_size=SNAP_GRID))
     kept: NDArray[np.object_] = parts[shapely.area(parts) > MIN_AREA]
@@ -230,7 +235,7 @@ def _cells(area: BaseGeometry, spacing: float, steep: BaseGeometry | None = None
 
 
 def triangulate(area: BaseGeometry | NDArray[np.object_]) -> Float:
-    """Return (n, 3, 2) counter-clockwise triangles that fill areas in plan, with no corners of their own."""
+    """Return (n, 3, 2) counter-clockwise triangles that fill areas in plan, without additional corners."""
     pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(area))
     corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
     area = signed_area(corners)
@@ -240,12 +245,14 @@ def triangulate(area: BaseGeometry | NDArray[np.object_]) -> Float:
 
 
 def cut(triangles: Float, away: BaseGeometry) -> Float:
-    """Return (n, 3, 3) triangles without what lies in an area in plan."""
+    """Return (n, 3, 3) triangles without the part within an area in plan."""
     if len(triangles) == 0:
         return triangles
     plan = shapely.polygons(triangles[:, :, :2])
     shapely.prepare(away)
     touched = shapely.intersects(away, plan)
+    # Only triangles that touch the area are cut. The pieces lie in the plane of their triangle, so that the surface
+    # stays the same.
     rests = shapely.difference(plan[touched], away, grid_size=SNAP_GRID)
     pieces = [triangles[~touched]]
     for triangle, rest in zip(triangles[touched], rests, strict=True):
@@ -258,5 +265,5 @@ def cut(triangles: Float, away: BaseGeometry) -> Float:
 
 
 def _raised(corners: Float, height: Float) -> Float:
-    """Return (n, 3, 3) triangles of their corners in plan (3 n, 2) and heights (3 n,)."""
+    """Return (n, 3, 3) triangles from their corners in plan (3 n, 2) and heights (3 n,)."""
     return np.column_stack([corners, height]).reshape(-1, 3, 3)

@@ -240,7 +240,7 @@ def test_poses_are_positions_by_heights_by_tilts_by_types_and_tilted_ones_face_t
         ((0.0, math.radians(90)), "less than 90°, not 90°"),
         ((math.radians(-90),), "more than -90° .* not -90°"),
         ((math.inf,), "not inf°"),
-        ((0.1, 0.0, 0.1), "the tilt of 5.72958° is given twice: name each tilt once"),
+        ((0.1, 0.0, 0.1), "the tilt of 5.72958° is given twice"),
         ((0.0, -0.0), "the tilt of -0° is given twice"),
     ],
 )

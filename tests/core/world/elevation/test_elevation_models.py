@@ -115,7 +115,7 @@ def test_smoothing_keeps_planes_and_stays_between_the_extremes(slope_x, slope_y,
 def test_a_map_with_heights_keeps_them(tmp_path):
     path = write_dem(tmp_path / "dem.tif", sampled(plane, X - 150, Y + 150, 300), X - 150, Y + 150)
     hill = np.column_stack([np.zeros((50, 2)), np.linspace(0, 5, 50)])
-    with pytest.raises(SeipError, match=r"heights of its own there \(0\.0 to 5\.0 m\)"):
+    with pytest.raises(SeipError, match=r"own heights there \(0\.0 to 5\.0 m\).*--terrain"):
         relief(path, lanes=hill)
     bridge = np.column_stack([np.zeros((100, 2)), np.repeat([34.0, 40.0], [80, 20])])
     assert relief(path, lanes=bridge).level == 34
@@ -130,7 +130,7 @@ def test_a_model_of_another_place_is_refused_with_both_places(tmp_path):
 ONES = np.ones((4, 4), np.float32)
 BROKEN = {
     "not there": (lambda path: None, "no such file"),
-    "text": (lambda path: path.write_text("ncols 4", encoding="utf-8"), "is no TIFF"),
+    "text": (lambda path: path.write_text("ncols 4", encoding="utf-8"), "is not a TIFF file"),
     "cut": (lambda path: path.write_bytes(write_dem(path, np.ones((99, 99)), 0, 0).read_bytes()[:900]), "no TIFF|read"),
     "a picture": (lambda path: Image.new("RGB", (8, 8)).save(path), "one band of heights"),
     "no georeference": (lambda path: Image.fromarray(ONES).save(path), "has no georeference"),
@@ -152,8 +152,8 @@ BROKEN = {
         "a georeference that lies nowhere on Earth",
     ),
     "vast steps": (lambda path: write_dem(path, ONES, 0, 0, step=1e7), "a georeference that lies nowhere on Earth"),
-    "feet": (lambda path: write_dem(path, ONES, 0, 0, keys=[3076, 0, 1, 9002]), "does not count in metres"),
-    "nothing": (lambda path: write_dem(path, ONES * np.nan, 0, 0), "holds no height between"),
+    "feet": (lambda path: write_dem(path, ONES, 0, 0, keys=[3076, 0, 1, 9002]), "is not in metres"),
+    "nothing": (lambda path: write_dem(path, ONES * np.nan, 0, 0), "no height between"),
     "no data that is none": (lambda path: write_dem(path, ONES, 0, 0, no_data="none"), "damaged tags"),
 }
 
@@ -200,5 +200,5 @@ def test_a_small_file_that_claims_many_pixels_is_refused(tmp_path):
     entry = content.index(bytes([1, 1, 4, 0, 1, 0, 0, 0]))  # ImageLength, one LONG
     content[entry + 8 : entry + 12] = (2_000_000).to_bytes(4, "little")
     path.write_bytes(content)
-    with pytest.raises(SeipError, match=r"dem\.tif holds far fewer bytes than its size in pixels needs"):
+    with pytest.raises(SeipError, match=r"dem\.tif has far fewer bytes"):
         read_geotiff(path)

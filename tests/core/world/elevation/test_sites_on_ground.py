@@ -90,7 +90,7 @@ def test_a_map_of_its_own_heights_is_refused(tmp_path):
     path = street(tmp_path)
     sloping = path.read_text(encoding="utf-8").replace('b="0"', 'b="0.05"', 1)
     path.write_text(sloping, encoding="utf-8")
-    with pytest.raises(SeipError, match="heights of its own"):
+    with pytest.raises(SeipError, match="own heights"):
         finish(build_site(path, AskedSite(near=(0.0, 0.0), radius=60.0, terrain=AskedTerrain(ground(tmp_path, plane)))))
 
 

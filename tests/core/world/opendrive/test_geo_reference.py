@@ -119,7 +119,7 @@ CITY = b'{"type": "CityJSON", "version": "1.1", "CityObjects": {}}'
         (b"\xef\xbb\xbf\n " + CITY, "is CityJSON"),
         (b'{"type": "FeatureCollection"}', "town.xodr is JSON, not OpenDRIVE"),
         (b"PK\x03\x04....", "is a zip archive"),
-        (b"BLENDER-v405", "is a .blend, no map"),
+        (b"BLENDER-v405", "is a .blend file, not a map"),
         (b"<osm version='0.6'/>", "begins with <osm> as extracts of OpenStreetMap do"),
         (b"<net version='1.9'/>", "begins with <net> as networks of SUMO do"),
     ],

@@ -193,5 +193,5 @@ def test_a_signal_stands_where_its_post_is_said_to_be(tmp_path):
 
 def test_a_signal_on_a_road_that_is_not_there_is_named(tmp_path):
     text = '<signal id="5" s="50" t="0"><positionRoad roadId="33" s="0" t="0"/></signal>'
-    with pytest.raises(SeipError, match="road 1: signal 5 stands on road 33, which is not there"):
+    with pytest.raises(SeipError, match="road 1: signal 5 is on road 33"):
         placed_signals(read_text(tmp_path, document(road(signals=text))))

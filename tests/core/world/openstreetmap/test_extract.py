@@ -55,13 +55,13 @@ def test_nodes_outside_a_window_are_passed_over(tmp_path):
         ("<osm><node id='1' lat='0' lon='0'>", "broken or unfinished XML"),
         (osm("")[:-6] + "<node", "broken or unfinished XML"),
         (osm(""), "has no node"),
-        ("<OpenDRIVE/>", "no extract of OpenStreetMap: its first element is <OpenDRIVE>"),
+        ("<OpenDRIVE/>", "not an extract of OpenStreetMap: its first element is <OpenDRIVE>"),
         ('<!DOCTYPE osm [<!ENTITY a "aaaa">]><osm>&a;</osm>', "declares a document type or entities"),
-        (osm('<node id="x" lat="0" lon="0"/>'), "is no whole number"),
-        (osm('<node lat="0" lon="0"/>'), "is no whole number"),
-        (osm(f'<node id="{10**20}" lat="0" lon="0"/>'), "is no whole number below"),
+        (osm('<node id="x" lat="0" lon="0"/>'), "not a whole number"),
+        (osm('<node lat="0" lon="0"/>'), "not a whole number"),
+        (osm(f'<node id="{10**20}" lat="0" lon="0"/>'), "not a whole number below"),
         ("<html/>", "first element is <html>; download the place"),
-        (osm('<node id="1" lat="0" lon="0"/><way id="2"><nd ref=""/></way>'), "is no whole number"),
+        (osm('<node id="1" lat="0" lon="0"/><way id="2"><nd ref=""/></way>'), "not a whole number"),
     ],
 )
 def test_a_broken_extract_is_refused_in_a_sentence(tmp_path, text, complaint):
@@ -101,8 +101,8 @@ def test_places_that_are_none_and_repeats_are_counted(tmp_path):
     found = read(written(tmp_path, osm("".join(nodes))))
     assert sorted(found.nodes) == [1, 5, 6]
     assert found.nodes[1].latitude == 11
-    assert "gives 1 element twice" in found.notes[0]
-    assert "gives 4 nodes no place on Earth" in found.notes[1]
+    assert "1 element twice" in found.notes[0]
+    assert "4 nodes" in found.notes[1]
 
 
 def test_an_extract_that_is_too_large_is_refused(tmp_path, monkeypatch):

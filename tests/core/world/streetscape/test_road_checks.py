@@ -45,7 +45,7 @@ def test_a_step_between_roads_that_lead_into_each_other_is_named(tmp_path, step,
     found = warnings(tmp_path, two_roads(0.0, step, turned=turned))
     assert bool(found) == warned
     if warned:
-        assert f"differ in height: by {abs(step):.2f} m on road 1 at (0, 2)" in found[0]
+        assert f"differ in height by {abs(step):.2f} m on road 1 at (0, 2)" in found[0]
 
 
 def test_roads_above_each_other_make_no_step(tmp_path):

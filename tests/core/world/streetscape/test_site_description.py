@@ -135,7 +135,7 @@ def test_a_missing_or_binary_file_is_named(tmp_path):
     with pytest.raises(SeipError, match=r"nowhere\.toml"):
         read_site_description(tmp_path / "nowhere.toml")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(SeipError, match="no UTF-8 text"):
+    with pytest.raises(SeipError, match="not UTF-8 text"):
         read_site_description(tmp_path / "binary.toml")
 
 
