@@ -112,7 +112,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "source",
         type=Path,
-        help="map (.xodr), extract (.osm, .osm.gz) or site description (.toml) with the name of a map",
+        help="map (.xodr), extract (.osm, .osm.gz, .osm.pbf) or site description (.toml) with the name of a map",
     )
     place = parser.add_mutually_exclusive_group()
     place.add_argument(

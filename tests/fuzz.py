@@ -772,6 +772,23 @@ def _extracts(_: Path) -> list[bytes]:
     return [(ROOT / "scenes" / "harbour.osm").read_bytes()]
 
 
+def _pbf_extracts(folder: Path) -> list[bytes]:
+    import osmium  # noqa: PLC0415
+
+    contents = []
+    for options in ("pbf", "pbf,pbf_compression=none"):
+        path = folder / "sample.osm.pbf"
+        with osmium.SimpleWriter(osmium.io.File(str(path), options), overwrite=True) as writer:
+            for element in osmium.FileProcessor(str(ROOT / "scenes" / "harbour.osm")):
+                writer.add(element)
+        contents.append(path.read_bytes())
+    return contents
+
+
+def _mutate_pbf(random: Random, content: bytes) -> Case:
+    return Case(mutated_bytes(random, content))
+
+
 def _mutate_extract(random: Random, content: bytes) -> Case:
     if random.random() < 0.5:
         pattern = r'(?:k="(?:height|width|lanes|building:levels|min_height|maxspeed|layer)" v|lat|lon)="([^"]*)"'
@@ -966,6 +983,7 @@ FORMATS = {
     "network": Format((".xml",), _networks, _mutate_network, _read_network),
     "flows": Format((".xml",), _flows, _mutate_flow, _read_flow),
     "osm": Format((".osm",), _extracts, _mutate_extract, _read_extract),
+    "osm.pbf": Format((".osm.pbf",), _pbf_extracts, _mutate_pbf, _read_extract),
     "city": Format((".json",), _cities, _mutate_text, _read_city),
     "dem": Format((".tif",), _elevations, _mutate_elevation, _read_elevation),
     **{

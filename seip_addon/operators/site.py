@@ -39,7 +39,7 @@ AREA_ITEMS = tuple(item for item in ROLE_ITEMS if Role[item[0]] in roles.AREAS)
 
 
 class SEIP_OT_choose_map(LongWork[SitePlaces], bpy.types.Operator):
-    """Choose an OpenDRIVE map (.xodr), an extract of OpenStreetMap (.osm, .osm.gz) or a site description (.toml), and choose among its junctions"""  # noqa: E501  # a tooltip is one line
+    """Choose an OpenDRIVE map (.xodr), an extract of OpenStreetMap (.osm, .osm.gz, .osm.pbf) or a site description (.toml), and choose among its junctions"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.choose_map"
     bl_label = "Choose Map"
@@ -48,7 +48,7 @@ class SEIP_OT_choose_map(LongWork[SitePlaces], bpy.types.Operator):
         name="File", description="The map, extract or site description", subtype="FILE_PATH", options={"SKIP_SAVE"}
     )
     filter_glob: bpy.props.StringProperty(
-        default=f"*.xodr;*{DESCRIPTION_SUFFIX};*.osm;*.osm.gz", options={"HIDDEN", "SKIP_SAVE"}
+        default=f"*.xodr;*{DESCRIPTION_SUFFIX};*.osm;*.osm.gz;*.osm.pbf", options={"HIDDEN", "SKIP_SAVE"}
     )
     _by_hand = False
 

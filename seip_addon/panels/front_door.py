@@ -23,7 +23,7 @@ from ..operators.view import SEIP_OT_colour_coverage, SEIP_OT_save_picture
 from ..operators.visibility import SEIP_OT_compute_visibility
 from .site import draw_place
 
-OPENDRIVE, OPENSTREETMAP = "*.xodr", "*.osm;*.osm.gz"
+OPENDRIVE, OPENSTREETMAP = "*.xodr", "*.osm;*.osm.gz;*.osm.pbf"
 DIALOG_WIDTH = 420
 
 

@@ -1,12 +1,13 @@
-"""Extracts of OpenStreetMap: nodes, ways and relations with their tags, read from XML."""
+"""Extracts of OpenStreetMap: nodes, ways and relations with their tags, read from XML or PBF."""
 
 import itertools
 import math
 import re
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from ...counts import counted
 from ...errors import SeipError
@@ -18,7 +19,6 @@ MAX_ELEMENTS = 3_000_000  # nodes, ways and relations that are kept at most: abo
 EARTH_RADIUS = 6_350_000.0  # metres: below the smallest real radius, so that windows are no smaller than requested
 MAX_LATITUDE = 85.0  # degrees: projections of streets do not hold nearer to a pole
 _OTHER_FORMATS = {
-    b"\x00\x00\x00": "is in the PBF format; convert it (osmium cat place.osm.pbf -o place.osm)",
     b"BZh": "is compressed with bzip2; unpack it (bunzip2)",
     b"PK\x03\x04": "is a zip archive; unpack it",
     b"\xfd7zXZ": "is compressed with xz; unpack it (unxz)",
@@ -26,6 +26,10 @@ _OTHER_FORMATS = {
     b"{": "is JSON; download the place as OpenStreetMap XML (.osm)",
 }
 """First bytes of other formats that are given in place of an extract, and what to do with such a file."""
+PBF_START = b"\x00\x00\x00"
+"""First bytes of the PBF format: the length of its first header, in network order."""
+PBF_STEP = 100_000  # elements of a PBF file between two reports of progress
+_KINDS = {"n": "node", "w": "way", "r": "relation"}
 MAX_TAG = 255  # characters of a tag's value, as in the database of OpenStreetMap
 MAX_ID = 2**62
 OPENSTREETMAP = "© OpenStreetMap contributors (ODbL)"
@@ -97,20 +101,21 @@ class Extract:
         return [self.nodes[number] for number in way.nodes if number in self.nodes]
 
 
-@dataclass
-class _Collected:
-    """Elements read so far, with counts for notes and the credit of the data."""
+class _Collector:
+    """Elements of a file within a window, with counts for notes and the credit of the data.
 
-    nodes: dict[int, Node] = field(default_factory=dict)
-    ways: dict[int, Way] = field(default_factory=dict)
-    relations: dict[int, Relation] = field(default_factory=dict)
-    repeated: int = 0
-    near: int = 0
-    misplaced: int = 0
-    root: str = ""
-    holder: str = ""
-    date: str = ""
-    newest: str = ""
+    Both formats, XML and PBF, fill one of these.
+    """
+
+    def __init__(self, name: str, within: Window | None) -> None:
+        self.nodes: dict[int, Node] = {}
+        self.ways: dict[int, Way] = {}
+        self.relations: dict[int, Relation] = {}
+        self.repeated = self.near = self.misplaced = 0
+        self.holder = self.date = self.newest = ""
+        self._name, self._within = name, within
+        self._middle = None if within is None else (within[1] + within[3]) / 2
+        """Longitude around which others are unwrapped, so that places on both sides of the date line are neighbours."""
 
     @property
     def attribution(self) -> str:
@@ -121,9 +126,57 @@ class _Collected:
             return f"{credit}, data of {self.date}"
         return f"{credit}, changes up to {self.newest}" if self.newest else credit
 
+    def add_node(self, number: int, latitude: float, longitude: float, tags: Tags) -> None:
+        """Add a node unless it is far from the window; NaN coordinates count as misplaced."""
+        if not (abs(latitude) <= MAX_LATITUDE and abs(longitude) <= 180.0):
+            self.misplaced += 1
+            return
+        if self._middle is None:
+            self._middle = longitude
+        longitude = self._middle + math.remainder(longitude - self._middle, 360.0)
+        # Ways refer to nodes before it is known which nodes they need, so nodes are kept in a wider band: the next
+        # node of a street that leaves the window may lie far beyond its edge. `cropped` removes the rest.
+        if self._is_within(latitude, longitude, NEXT_NODE):
+            self.repeated += number in self.nodes
+            self.near += self._is_within(latitude, longitude)
+            self.nodes[number] = Node(latitude, longitude, tags)
+            self._check_size()
+
+    def add_way(self, number: int, nodes: tuple[int, ...], tags: Tags) -> None:
+        """Add a way."""
+        self.repeated += number in self.ways
+        self.ways[number] = Way(nodes, tags)
+        self._check_size()
+
+    def add_relation(self, number: int, members: tuple[tuple[str, int, str], ...], tags: Tags) -> None:
+        """Add a relation."""
+        self.repeated += number in self.relations
+        self.relations[number] = Relation(members, tags)
+        self._check_size()
+
+    def changed(self, time: str) -> None:
+        """Note the time stamp (ISO 8601) of an element."""
+        self.newest = max(self.newest, _day(time))
+
+    def _check_size(self) -> None:
+        if len(self.nodes) + len(self.ways) + len(self.relations) > MAX_ELEMENTS:
+            raise SeipError(
+                f"{self._name} holds more than {MAX_ELEMENTS:,} elements; cut the place out of it "
+                "(osmium extract --bbox west,south,east,north)"
+            )
+
+    def _is_within(self, latitude: float, longitude: float, beyond: float = 0.0) -> bool:
+        """Return whether a place lies within the window widened by `beyond` metres."""
+        if self._within is None:
+            return True
+        south, west, north, east = self._within
+        more = math.degrees(beyond / EARTH_RADIUS)
+        east_more = more / math.cos(math.radians(latitude))
+        return south - more <= latitude <= north + more and west - east_more <= longitude <= east + east_more
+
 
 def read_extract(path: Path, within: Window | None = None) -> Generator[Progress, None, Extract]:
-    """Read an extract in OpenStreetMap's XML, plain or packed with gzip.
+    """Read an extract: OpenStreetMap's XML, plain or packed with gzip, or PBF.
 
     Parameters
     ----------
@@ -138,18 +191,15 @@ def read_extract(path: Path, within: Window | None = None) -> Generator[Progress
     Raises
     ------
     SeipError
-        The file cannot be read, has a different format, is not well-formed XML, declares entities, has ids that are not
-        whole numbers, or has more than `MAX_ELEMENTS` elements.
+        The file cannot be read, has a different format, is damaged, declares entities, has ids that are not whole
+        numbers, or has more than `MAX_ELEMENTS` elements.
     """
-    _refuse_other_formats(path)
-    collected = _Collected()
-    reader = _Reader(path.name, within, collected)
-    yield from read_tags(path, reader.start, reader.end, cure="download the extract again")
-    if collected.root not in ("osm", "osmChange"):
-        raise SeipError(
-            f"{path.name} is not an extract of OpenStreetMap: its first element is <{collected.root[:40]}>; "
-            "download the place as OpenStreetMap XML (.osm)"
-        )
+    start = _first_bytes(path)
+    collected = _Collector(path.name, within)
+    if start[:3] == PBF_START:
+        yield from _read_pbf(path, collected, everything=within is None)
+    else:
+        yield from _read_xml(path, collected)
     if not collected.nodes or collected.near == 0:
         if within is None:
             raise SeipError(f"{path.name} has no node: take an extract that holds the place")
@@ -191,31 +241,39 @@ def cropped(extract: Extract, within: Window) -> Extract:
     return replace(extract, nodes=nodes, ways=ways)
 
 
-class _Reader:
+def _read_xml(path: Path, into: _Collector) -> Generator[Progress, None, None]:
+    reader = _XmlReader(path.name, into)
+    yield from read_tags(path, reader.start, reader.end, cure="download the extract again")
+    if reader.root not in ("osm", "osmChange"):
+        raise SeipError(
+            f"{path.name} is not an extract of OpenStreetMap: its first element is <{reader.root[:40]}>; "
+            "download the place as OpenStreetMap XML (.osm)"
+        )
+
+
+class _XmlReader:
     """Handlers for a stream of XML tags that collect elements."""
 
-    def __init__(self, name: str, within: Window | None, into: _Collected) -> None:
-        self._name, self._within, self._into = name, within, into
+    def __init__(self, name: str, into: _Collector) -> None:
+        self.root = ""
+        self._name, self._into = name, into
         self._attributes: Attributes = {}
         self._tags: dict[str, str] = {}
         self._refs: list[int] = []
         self._members: list[tuple[str, int, str]] = []
         self._deleted = False
-        self._middle = None if within is None else (within[1] + within[3]) / 2
-        """Longitude around which others are unwrapped, so that places on both sides of the date line are neighbours."""
 
     def start(self, tag: str, attributes: Attributes) -> None:
         """Process the start tag of an element."""
-        if not self._into.root:
-            self._into.root = tag
+        if not self.root:
+            self.root = tag
             self._into.holder = one_line(attributes.get("copyright", "")[:MAX_TAG])
             self._into.date = _day(attributes.get("timestamp", ""))
         elif tag == "meta":
             self._into.date = _day(attributes.get("osm_base", "")) or self._into.date
         if tag in ("node", "way", "relation"):
             self._attributes, self._tags, self._refs, self._members = attributes, {}, [], []
-            if "timestamp" in attributes:
-                self._into.newest = max(self._into.newest, _day(attributes["timestamp"]))
+            self._into.changed(attributes.get("timestamp", ""))
             self._deleted = attributes.get("visible") == "false" or attributes.get("action") == "delete"
         elif tag == "tag":
             self._tags[attributes.get("k", "")] = one_line(attributes.get("v", "")[:MAX_TAG])
@@ -228,28 +286,13 @@ class _Reader:
         """Process the end tag of an element."""
         if tag not in ("node", "way", "relation") or self._deleted:
             return
-        into, tags = self._into, self._tags or _NO_TAGS
-        number = self._id(self._attributes, "id")
+        number, tags = self._id(self._attributes, "id"), self._tags or _NO_TAGS
         if tag == "node":
-            # Ways refer to nodes before it is known which nodes they need, so nodes are kept in a wider band: the next
-            # node of a street that leaves the window may lie far beyond its edge. `cropped` removes the rest.
-            place = self._place()
-            if place is None or not self._is_within(*place, NEXT_NODE):
-                return
-            into.repeated += number in into.nodes
-            into.near += self._is_within(*place)
-            into.nodes[number] = Node(*place, tags)
+            self._into.add_node(number, self._degrees("lat"), self._degrees("lon"), tags)
         elif tag == "way":
-            into.repeated += number in into.ways
-            into.ways[number] = Way(tuple(self._refs), tags)
+            self._into.add_way(number, tuple(self._refs), tags)
         else:
-            into.repeated += number in into.relations
-            into.relations[number] = Relation(tuple(self._members), tags)
-        if len(into.nodes) + len(into.ways) + len(into.relations) > MAX_ELEMENTS:
-            raise SeipError(
-                f"{self._name} holds more than {MAX_ELEMENTS:,} elements; cut the place out of it "
-                "(osmium extract --bbox west,south,east,north)"
-            )
+            self._into.add_relation(number, tuple(self._members), tags)
 
     def _id(self, attributes: Attributes, name: str) -> int:
         text = attributes.get(name, "")
@@ -264,28 +307,49 @@ class _Reader:
             "download the extract again"
         )
 
-    def _place(self) -> tuple[float, float] | None:
-        """Return latitude and longitude, degrees; None if they are missing, invalid, or too near to a pole."""
+    def _degrees(self, name: str) -> float:
+        """Return a coordinate of the element, NaN if it is missing or invalid."""
         try:
-            latitude, longitude = float(self._attributes["lat"]), float(self._attributes["lon"])
+            return float(self._attributes[name])
         except (KeyError, ValueError):
-            self._into.misplaced += 1
-            return None
-        if abs(latitude) <= MAX_LATITUDE and abs(longitude) <= 180.0:
-            if self._middle is None:
-                self._middle = longitude
-            return latitude, self._middle + math.remainder(longitude - self._middle, 360.0)
-        self._into.misplaced += 1
-        return None
+            return math.nan
 
-    def _is_within(self, latitude: float, longitude: float, beyond: float = 0.0) -> bool:
-        """Return whether a place lies within the window widened by `beyond` metres."""
-        if self._within is None:
-            return True
-        south, west, north, east = self._within
-        more = math.degrees(beyond / EARTH_RADIUS)
-        east_more = more / math.cos(math.radians(latitude))
-        return south - more <= latitude <= north + more and west - east_more <= longitude <= east + east_more
+
+def _read_pbf(path: Path, into: _Collector, *, everything: bool) -> Generator[Progress, None, None]:
+    """Read the PBF format with pyosmium; without ``everything`` only ways and relations with a node near the window."""
+    import osmium  # noqa: PLC0415  # its library takes a moment to load, and most extracts are XML
+
+    try:
+        elements = osmium.FileProcessor(osmium.io.File(str(path), "pbf"))
+        into.date = _day(elements.header.get("osmosis_replication_timestamp"))
+        element: Any  # without a type that nodes, ways and relations share
+        for number, element in enumerate(elements):
+            if number % PBF_STEP == 0:
+                yield Progress(0, 0, f"reading {path.name}", counted=False)
+            if element.visible:
+                _add_pbf_element(element, into, everything=everything)
+    except (RuntimeError, ValueError, OverflowError) as error:
+        raise SeipError(f"{path.name} is damaged ({one_line(str(error))[:80]}); download the extract again") from error
+
+
+def _add_pbf_element(element: Any, into: _Collector, *, everything: bool) -> None:  # noqa: ANN401 -- as above
+    if element.timestamp.year > 1970:  # 1970 stands for no time stamp
+        into.changed(element.timestamp.isoformat())
+    tags = {tag.k: one_line(tag.v[:MAX_TAG]) for tag in element.tags} or _NO_TAGS
+    if element.is_node():
+        if into.ways:  # ways are dropped by the nodes before them
+            raise ValueError("nodes after ways: sort it with osmium sort")
+        place = element.location
+        valid = place.valid()
+        into.add_node(element.id, place.lat if valid else math.nan, place.lon if valid else math.nan, tags)
+    elif element.is_way():
+        nodes = tuple(node.ref for node in element.nodes)
+        if everything or not into.nodes.keys().isdisjoint(nodes):
+            into.add_way(element.id, nodes, tags)
+    elif element.is_relation():
+        members = tuple((_KINDS[member.type], member.ref, member.role) for member in element.members)
+        if everything or any(kind == "way" and number in into.ways for kind, number, _ in members):
+            into.add_relation(element.id, members, tags)
 
 
 def _day(time: str) -> str:
@@ -342,12 +406,14 @@ def rings(ways: Sequence[Way]) -> tuple[list[list[int]], int]:
     return found, left
 
 
-def _refuse_other_formats(path: Path) -> None:
+def _first_bytes(path: Path) -> bytes:
+    """Return the first bytes of a file, after a check that they are not those of another format."""
     try:
         with path.open("rb") as file:
             start = file.read(16)
     except OSError:
-        return  # the reader reports the error
+        return b""  # the reader names the fault
     for mark, cure in _OTHER_FORMATS.items():
         if start.lstrip(b"\xef\xbb\xbf \t\r\n" if mark == b"{" else b"").startswith(mark):
             raise SeipError(f"{path.name} {cure}")
+    return start

@@ -51,7 +51,7 @@ from .streets import (
     write_streets,
 )
 
-EXTRACT_SUFFIXES = (".osm", ".osm.gz", ".osm.xml")
+EXTRACT_SUFFIXES = (".osm", ".osm.gz", ".osm.pbf", ".osm.xml")
 STREET_REACH = 450.0  # metres beyond the region within which streets are laid out: traffic comes from there
 MAX_JUNCTION_DISTANCE = 60.0  # metres from a requested place to its junction at most
 NAMES = ("name", "name:en", "alt_name", "ref")

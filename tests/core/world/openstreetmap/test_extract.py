@@ -72,7 +72,7 @@ def test_a_broken_extract_is_refused_in_a_sentence(tmp_path, text, complaint):
 @pytest.mark.parametrize(
     ("content", "cure"),
     [
-        (b"\x00\x00\x00\x0d\x0a\x09OSMHeader", "osmium cat"),
+        (b"\x00\x00\x00\x0d\x0a\x09OSMHeader", "is damaged"),
         (b"PK\x03\x04rest", "unpack"),
         (b"BZh91", "bunzip2"),
         (b' {"a": 1}', "JSON"),
@@ -183,3 +183,48 @@ def test_tags_are_one_line_of_at_most_255_characters(tmp_path):
 def test_the_credit_of_an_extract_names_its_holder_and_its_date(tmp_path, head, credit):
     path = written(tmp_path, f'{head}<node id="1" lat="1" lon="1"/></osm>')
     assert read(path).attribution == credit
+
+
+def as_pbf(path, **header):
+    """Write an extract of XML as PBF beside it."""
+    osmium = pytest.importorskip("osmium")
+    target = path.with_suffix(".osm.pbf")
+    about = osmium.io.Header()
+    for name, value in header.items():
+        about.set(name, value)
+    with osmium.SimpleWriter(str(target), header=about, overwrite=True) as writer:
+        for element in osmium.FileProcessor(str(path)):
+            writer.add(element)
+    return target
+
+
+@pytest.mark.parametrize("within", [None, window(52.5, 13.4, 60.0)], ids=["whole", "window"])
+def test_pbf_is_read_as_xml_is(tmp_path, within):
+    plain = crossing().write(tmp_path / "place.osm")
+    one, other = read(plain, within), read(as_pbf(plain), within)
+    assert one.nodes.keys() == other.nodes.keys()
+    for number, node in one.nodes.items():
+        assert other.nodes[number].latitude == pytest.approx(node.latitude, abs=1e-7)
+        assert other.nodes[number].longitude == pytest.approx(node.longitude, abs=1e-7)
+        assert dict(other.nodes[number].tags) == dict(node.tags)
+    assert {number: (way.nodes, dict(way.tags)) for number, way in one.ways.items()} == {
+        number: (way.nodes, dict(way.tags)) for number, way in other.ways.items()
+    }
+    assert {number: one.members for number, one in one.relations.items()} == {
+        number: one.members for number, one in other.relations.items()
+    }
+    assert one.attribution == other.attribution
+
+
+def test_pbf_states_the_date_of_its_data(tmp_path):
+    plain = crossing().write(tmp_path / "place.osm")
+    dated = read(as_pbf(plain, osmosis_replication_timestamp="2024-03-22T00:00:00Z"))
+    assert dated.attribution.endswith("data of 2024-03-22")
+
+
+@pytest.mark.parametrize("keep", [20, 200, -1])
+def test_a_damaged_pbf_is_named(tmp_path, keep):
+    path = as_pbf(crossing().write(tmp_path / "place.osm"))
+    path.write_bytes(path.read_bytes()[:keep])
+    with pytest.raises(SeipError, match=r"place\.osm\.pbf is damaged"):
+        read(path)
