@@ -43,7 +43,7 @@ def test_a_report_is_written_and_named(folder, capsys):
     assert capsys.readouterr().out.split() == [str(folder / "report.html"), str(folder / "report.pdf")]
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "Mill Lane" in page
-    assert "Prices are of installed sensors" in page
+    assert "Prices include installation" in page
     price = load_placement_record(folder / "placement.json").price_usd
     headline = f"2 sensors see [^.]*\\.[^.]*\\.?[^.]*, for \\${price:,.0f} installed\\."
     assert re.search(headline, page)

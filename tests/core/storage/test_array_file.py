@@ -150,7 +150,7 @@ def test_a_claim_of_64_gib_costs_no_memory(stored):
     script = (
         "import resource, sys\n"
         "from seip_addon.core.errors import SeipError\n"
-        "from seip_addon.core.sensing.traffic import Trajectories\n"
+        "from seip_addon.core.sensing.traffic.trajectories import Trajectories\n"
         "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
         "try:\n    Trajectories.load(sys.argv[1])\n"
         "except SeipError as error:\n    print(error)\n"
@@ -225,7 +225,7 @@ THREADS = """
 import gc, sys, time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from seip_addon.core.sensing.traffic import Trajectories
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
 gc.set_threshold(50)
 gc.callbacks.append(lambda *_: time.sleep(1e-5))  # threads change amid a collection, wherever that begins
 with ThreadPoolExecutor(4) as pool:

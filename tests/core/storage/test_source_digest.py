@@ -37,7 +37,7 @@ def copy(tmp_path):
     return tmp_path
 
 
-def key(folder, entry="visibility.grid", package="seip_addon", path=""):
+def key(folder, entry="sensing.visibility.grid", package="seip_addon", path=""):
     return output(DIGEST.format(package), entry, cwd=folder, path=path)
 
 
@@ -48,7 +48,7 @@ def test_all_that_is_loaded_is_in_the_digest(entry):
 
 
 def test_imports_within_functions_are_followed():
-    assert f"{CORE}.pictures.scan_view" in _sources(f"{CORE}.workflows.recording")
+    assert f"{CORE}.output.pictures.scan_view" in _sources(f"{CORE}.workflows.recording")
 
 
 def test_imports_of_commands_are_followed_and_nothing_is_run():
@@ -67,14 +67,14 @@ print(*_sources(sys.argv[1]))
 @pytest.mark.parametrize(
     ("changed", "other"),
     [
-        ("visibility/near_surfaces.py", True),
-        ("visibility/occlusion.py", True),
-        ("lidar/beams.py", True),
-        ("lidar/__init__.py", True),
+        ("sensing/visibility/near_surfaces.py", True),
+        ("sensing/visibility/occlusion.py", True),
+        ("sensing/lidar/beams.py", True),
+        ("sensing/lidar/__init__.py", True),
         ("geometry/orientation.py", True),
-        ("pictures/palette.py", False),
-        ("scans/scanner.py", False),
-        ("placement/greedy.py", False),
+        ("output/pictures/palette.py", False),
+        ("sensing/scans/scanner.py", False),
+        ("choosing/placement/greedy.py", False),
     ],
 )
 def test_a_grid_has_another_key_where_its_code_has_changed(copy, changed, other):
@@ -85,10 +85,10 @@ def test_a_grid_has_another_key_where_its_code_has_changed(copy, changed, other)
 
 
 def test_scans_have_another_key_where_their_code_has_changed(copy):
-    before = key(copy, "scans.run_folder")
-    path = copy / "seip_addon" / "core" / "lidar" / "noisy_returns.py"
+    before = key(copy, "sensing.scans.run_folder")
+    path = copy / "seip_addon" / "core" / "sensing" / "lidar" / "noisy_returns.py"
     path.write_text(path.read_text(encoding="utf-8") + "\nCHANGED = True\n", encoding="utf-8")
-    assert key(copy, "scans.run_folder") != before
+    assert key(copy, "sensing.scans.run_folder") != before
 
 
 @pytest.mark.slow
