@@ -355,9 +355,7 @@ def _free_poles(geometry: SceneGeometry, settings: CandidateSettings, dropped: d
     free = [p for p in geometry.poles if not p.forbidden and not forbidden.intersects(shapely.Point(p.base[:2]))]
     for pole in geometry.poles:
         if pole.mandatory and pole not in free:
-            raise SeipError(
-                f"mandatory pole {pole.name!r} stands in a forbidden area: move the area or unmark it"
-            )
+            raise SeipError(f"mandatory pole {pole.name!r} stands in a forbidden area: move the area or unmark it")
     dropped["on a forbidden pole"] = len(geometry.poles) - len(free)
     usable = [pole for pole in free if settings.assumed_poles or pole.mandatory or pole.source != ASSUMED]
     dropped[ASSUMED_POLES] = len(free) - len(usable)
