@@ -62,7 +62,7 @@ STAGES = 6  # stages of work after the lanes of the map are known
 ROADS_PER_STEP = 20
 MIN_HOLE = 0.01  # square metres: smaller holes of a carriageway are rounding
 CANDIDATE_MARGIN = 15.0  # how far outside the region of interest (metres) a new post may stand
-VERGE_STRIP = (0.8, 2.3)  # where new posts may stand beside a road without pavements: metres from the carriageway
+VERGE_STRIP = (0.8, 2.3)  # strip for new posts along roads without pavements: metres from the carriageway
 VERGE_BELOW = 0.03
 GROUND_MARGIN = 5.0  # margin of ground around objects outside the extent (metres)
 MAX_GROUND_DISTANCE = 300.0  # largest distance of ground from the extent (metres): a wall may run along the whole map
@@ -71,7 +71,7 @@ KERB_STEP, RELIEF_SPACING = 2.5, 6.0  # metres: fine enough for errors of some c
 OVERLAY_SPACING = 4.0  # metres, as for junctions: coarser overlays would cut through the coverage on curved roads
 MIN_BRIDGE_HEIGHT = 1.0  # metres above the land from which a road on a bridge is in the air
 MIN_RAMP_HEIGHT = 1.0  # metres above the nearest studied road from which a ramp of another level is in the way
-MIN_WALL = 0.02  # metres of height, of both ends together, from which a gap beside a road below has a wall
+MIN_WALL = 0.02  # metres: sum of the heights at both ends above which a gap next to a lower road gets a wall
 UNNAMED_STREET = "Unnamed street"
 OVERLAY_STEP = 0.001  # metres of height between areas of one role that may overlap
 
@@ -793,9 +793,9 @@ def _verge_part(
     others = without(laid, covered).buffer(-road_surface.MAX_SEAM)
     lanes = lanes if others.is_empty else lanes.union(others)
     lanes = without(lanes, street.crossing.decks.buffer(road_surface.MAX_SEAM, join_style="mitre"))
-    beside = road_surface.without_crumbs(without(ground, lanes))
+    open_ground = road_surface.without_crumbs(without(ground, lanes))
     spacing = VERGE_SPACING if street.relief is None else RELIEF_SPACING
-    triangles = street.ground.drape(beside, spacing=spacing, above=-VERGE_BELOW)
+    triangles = street.ground.drape(open_ground, spacing=spacing, above=-VERGE_BELOW)
     return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
 
 
