@@ -103,7 +103,7 @@ def test_the_command_line_goes_before_the_site_file(site, road, tmp_path):
         (["{road}", "--near", "nan", "2000", "-o", "{out}.blend"], "--near must be a finite number"),
         (["{road}", "--near", "1100", "2000", "-o", "{out}.obj"], r"let it end in \.blend"),
         (["{out}.xodr", "--near", "0", "0", "-o", "{out}.blend"], r"out\.xodr"),
-        (["{site}", "--site", "{site}", "-o", "{out}.blend"], "leave the other one"),
+        (["{site}", "--site", "{site}", "-o", "{out}.blend"], "leave out the other one"),
         (["{road}", "--near", "1100", "2000", "-o", "{road}/out.blend"], "cannot write"),
     ],
 )

@@ -1,1 +1,1 @@
-"""OpenStreetMap: an extract's streets as an OpenDRIVE map, and what stands beside them."""
+"""OpenStreetMap: streets of an extract as an OpenDRIVE map, and the objects next to them."""

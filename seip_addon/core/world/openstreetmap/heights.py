@@ -413,7 +413,7 @@ def _crossing_places(network: _Network, shapes: PlanShapes) -> list[_Place]:
             continue  # heights of the extract are those of its bridges, too
         own, other = shapes.line(crossing.way), shapes.line(crossing.other)
         for street_area, other_area in corridors(crossing, own, other):
-            # The clearance must hold wherever the street covers the crossed way, including lanes beside its centre
+            # The clearance must hold wherever the street covers the crossed way, including lanes next to its centre
             # line: take all places whose lanes overlap the crossed area, on the street and on what continues it
             # straight.
             common = street_area.intersection(other_area)

@@ -45,27 +45,31 @@ def matched_signals(extract: Extract, streets: Sequence[Way], lines: Mapping[int
     lines : mapping of int to (2,) float64, metres
         Positions of the nodes by id.
     """
-    beside: dict[int, list[int]] = {}
+    neighbours: dict[int, list[int]] = {}
     found: dict[int, list[tuple[Way, int]]] = {}
     for way in streets:
         for place, node in enumerate(way.nodes):
-            beside.setdefault(node, [])
-            beside[node] += way.nodes[max(place - 1, 0) : place] + way.nodes[place + 1 : place + 2]
+            neighbours.setdefault(node, [])
+            neighbours[node] += way.nodes[max(place - 1, 0) : place] + way.nodes[place + 1 : place + 2]
             if extract.nodes[node].tags.get("highway") == "traffic_signals":
                 found.setdefault(node, []).append((way, place))
     junctions, moved, unmatched = set(), set(), []
     for node, places in found.items():
-        if _is_junction(beside[node]):
+        if _is_junction(neighbours[node]):
             continue
         tags = extract.nodes[node].tags
         reach = SIGNAL_REACH
         if tags.get("crossing", "no") != "no" and _direction(tags) is None:
             reach = CROSSING_REACH
         ahead = {following for way, place in places for following in _ahead(way, place, tags)}
-        ends = [end for following in sorted(ahead) for end in _first_junction(node, following, beside, lines, reach)]
+        ends = [
+            end for following in sorted(ahead) for end in _first_junction(node, following, neighbours, lines, reach)
+        ]
         if not ends:  # mapped at the post itself, which may stand behind the junction
-            behind = set(beside[node]) - ahead
-            ends = [end for one in sorted(behind) for end in _first_junction(node, one, beside, lines, BEHIND_REACH)]
+            behind = set(neighbours[node]) - ahead
+            ends = [
+                end for one in sorted(behind) for end in _first_junction(node, one, neighbours, lines, BEHIND_REACH)
+            ]
         if ends:
             junctions.add(min(ends)[1])
             moved.add(node)
@@ -96,7 +100,7 @@ def _ahead(way: Way, place: int, tags: Tags) -> Iterator[int]:
 
 
 def _first_junction(
-    node: int, following: int, beside: Mapping[int, Sequence[int]], lines: Mapping[int, Float], reach: float
+    node: int, following: int, neighbours: Mapping[int, Sequence[int]], lines: Mapping[int, Float], reach: float
 ) -> Iterator[tuple[float, int]]:
     """Yield distance (metres) and node of the first junction along a street, if it is within reach."""
     away = 0.0
@@ -104,11 +108,11 @@ def _first_junction(
         away += math.dist(lines[node], lines[following])
         if away > reach:
             return
-        if _is_junction(beside[following]):
+        if _is_junction(neighbours[following]):
             yield away, following
             return
         # Not a junction, so at most one neighbour is left besides the node that the walk came from.
-        onward = sorted(set(beside[following]) - {node})
+        onward = sorted(set(neighbours[following]) - {node})
         if not onward:
             return
         node, following = following, onward[0]

@@ -49,16 +49,16 @@ def clear(
     edge = without(shapely.boundary(carriageway), mouths.buffer(SETBACK))
     counted = Counter[str]()
 
-    def beside(rows: Sequence[Row]) -> tuple[Row, ...]:
+    def at_edge(rows: Sequence[Row]) -> tuple[Row, ...]:
         return tuple(_beside(row, carriageway, edge, counted) for row in rows)
 
     def posts(rows: Sequence[Poles]) -> tuple[Poles, ...]:
-        return beside(tuple(_split_at_lanes(rows, lanes, counted)))
+        return at_edge(tuple(_split_at_lanes(rows, lanes, counted)))
 
     cleared = replace(
         description,
         buildings=tuple(_clipped(description.buildings, carriageway, counted, _CLIPPED)),
-        trees=beside(description.trees),
+        trees=at_edge(description.trees),
         walls=tuple(_cut(description.walls, carriageway, counted)),
         street_lights=posts(description.street_lights),
         signal_poles=posts(description.signal_poles),

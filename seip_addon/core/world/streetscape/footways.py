@@ -10,7 +10,7 @@ from ...arrays import Boolean, Float
 
 MAX_BESIDE = 6.0  # metres from a pavement to the middle of a footway that is the same one
 MAX_TURN = 0.5  # sine of the angle between the two at most
-STEP, MIN_LENGTH = 2.0, 8.0  # metres: sampling along footways, and least length beside a pavement that counts
+STEP, MIN_LENGTH = 2.0, 8.0  # metres: sampling along footways, and least length along a pavement that counts
 
 
 def without_doubles(line: Float, width: float, pavement: BaseGeometry) -> tuple[BaseGeometry, float]:
@@ -58,11 +58,11 @@ def _beside(points: Float, steps: Float, pavement: BaseGeometry) -> Boolean:
     return near
 
 
-def _long_runs(beside: Boolean, lengths: Float) -> Boolean:
+def _long_runs(along: Boolean, lengths: Float) -> Boolean:
     """Return whether each step belongs to a run along the pavement of at least `MIN_LENGTH`."""
-    run = np.cumsum(np.concatenate([[0], np.diff(beside.astype(np.int64)) != 0]))
+    run = np.cumsum(np.concatenate([[0], np.diff(along.astype(np.int64)) != 0]))
     total = np.bincount(run, lengths)
-    long: Boolean = beside & (total[run] >= MIN_LENGTH)
+    long: Boolean = along & (total[run] >= MIN_LENGTH)
     return long
 
 

@@ -36,6 +36,8 @@ def without_plain_joints(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, 
     Pavements that are separate roads are not arms; netconvert makes one on the left of a one-way street.
     """
     areas = _areas(surfaces)
+    # The ends of all lanes of streets outside junctions, as lines across the lane, with the direction along the road
+    # from that end. Only driving lanes count as ends of two-way streets.
     streets = {lane.road_id for lane in surfaces if lane.lane_type not in FOOTPATHS}
     ends, outwards, roads = [], [], []
     for lane in surfaces:
@@ -47,6 +49,7 @@ def without_plain_joints(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, 
     tree = shapely.STRtree(ends)
     joints = set()
     for number, area in areas.items():
+        # Ends within `ARM_GAP` of each other merge into one part of the union: these are lanes of one arm.
         touching = tree.query(area, predicate="dwithin", distance=TOUCH)
         arms = shapely.union_all([ends[index].buffer(ARM_GAP / 2) for index in touching])
         # Each of three counts may miss an arm: ends of different arms may lie close together, arms may lead in similar
@@ -59,6 +62,7 @@ def without_plain_joints(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, 
         )
         if max(meeting) < MIN_ARMS:
             joints.add(number)
+    # Lanes of a plain joint become part of the street: they only lose the id of the junction.
     return tuple(replace(lane, junction_id=None) if lane.junction_id in joints else lane for lane in surfaces)
 
 
@@ -71,6 +75,8 @@ def _two_way_streets(ends: Iterable[tuple[str | None, int]]) -> int:
 
 def _directions(vectors: Sequence[Float]) -> int:
     """Return the number of directions of vectors (2,) that differ by more than `SAME_DIRECTION` from each other."""
+    # A heading opens a new direction if it differs from all found so far. It is compared modulo a full turn, because
+    # both ends of a street that passes through are separate arms.
     found: list[float] = []
     for x, y in vectors:
         heading = math.atan2(y, x)
@@ -167,13 +173,16 @@ def with_other_carriageways(
     for lane in lanes:
         middle = (lane.left[:, :2] + lane.right[:, :2]) / 2
         if names.get(lane.road_id) and lane.junction_id is None and np.ptp(middle, axis=0).max() > 0:
+            # Flat caps end the band with its lane, so that it does not reach into other arms of the junction.
             band = shapely.LineString(middle).buffer(MAX_MEDIAN, cap_style="flat")
             bands.setdefault(names[lane.road_id], []).append((band, _heading(lane)))
+    # A road with its opposite direction right next to it is a whole street, not one carriageway of a divided one.
     two_way = _two_way_roads(surfaces)
     sides = {name: closed(united(band for band, _ in own), JUNCTION_REACH) for name, own in bands.items()}
     # Opposite carriageways: one-way roads of the same name, parallel to a lane whose band they meet. They are clipped
     # to the bands, so that they end where the given lanes end.
     others = [
+        # Headings are compared modulo 180 degrees below, because the opposite carriageway leads the other way.
         shapely.make_valid(lane.polygon).intersection(sides[names[lane.road_id]])
         for lane in surfaces
         if lane.road_id not in two_way

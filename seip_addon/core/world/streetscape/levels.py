@@ -204,6 +204,7 @@ def _pairs(roads: Mapping[str, _RoadArea], distance: float) -> list[tuple[str, s
     names = list(roads)
     outlines = [roads[name].outline for name in names]
     first, second = shapely.STRtree(outlines).query(outlines, predicate="dwithin", distance=distance)
+    # The query returns every pair in both orders, and each road with itself.
     return [(names[a], names[b]) for a, b in zip(first.tolist(), second.tolist(), strict=True) if a < b]
 
 
@@ -324,6 +325,7 @@ def _roads_farther_off(
         lead = metres[crossing.above] - metres[crossing.below] if above == below else above - below
         if above == below and abs(lead) < MIN_LEAD:
             raise _ambiguous(crossing)
+        # A positive lead is the distance by which the upper road is farther from the place than the lower one.
         losers.add(crossing.above if lead > 0 else crossing.below)
     return losers
 

@@ -1,8 +1,8 @@
-"""Headers of mesh files, checked before Blender's importers take them at their word.
+"""Checks of the headers of mesh files, because Blender's importers trust them.
 
-An importer reserves memory for what a header announces and opens the files that a model names. Here the announced
-counts are compared with the size of the file, and named files must lie in the model's folder. Formats: PLY (Turk 1994),
-STL, glTF 2.0 (Khronos, sections 3.6 and 4.4) and OBJ.
+An importer allocates memory for the counts in a header and opens the files that a model names. Here these counts are
+compared with the size of the file, and named files must lie in the folder of the model. Formats: PLY (Turk 1994), STL,
+glTF 2.0 (Khronos, sections 3.6 and 4.4) and OBJ.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ _MATERIAL_FILE = re.compile(rb"^[ \t]*mtllib[ \t]+([^\r\n]+)", re.MULTILINE)
 
 
 class _HeaderError(ValueError):
-    """What is wrong with a file, as part of a sentence."""
+    """Fault of a file, as part of a sentence."""
 
 
 def check_mesh_header(path: Path) -> None:
-    """Check what the header of a mesh file announces, and which files it names.
+    """Check the counts in the header of a mesh file, and the files that it names.
 
     Parameters
     ----------
     path : Path
-        Files of other formats than PLY, STL, glTF and OBJ pass.
+        Mesh file; formats other than PLY, STL, glTF and OBJ are not checked.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def check_mesh_header(path: Path) -> None:
 
 @dataclass(frozen=True)
 class _PlyElement:
-    """An element of a PLY: how many rows it has, and its properties as (letter of the count or "", letter)."""
+    """An element of a PLY file: its name, number of rows, and properties as (letter of the count or "", letter)."""
 
     name: str
     count: int
@@ -124,16 +124,18 @@ def _ply_elements(lines: Sequence[str]) -> tuple[str, list[_PlyElement]]:
             case _:
                 raise _HeaderError(f"has a line in its header that is not PLY: {line.strip()[:40]!r}")
     if order is None:
-        raise _HeaderError("does not say whether it is text or binary")
+        raise _HeaderError("has no format line for text or binary")
     return order, elements
 
 
 def _check_ply_lists(path: Path, at: int, order: str, elements: Sequence[_PlyElement]) -> None:
-    """Walk through the rows of a binary PLY: each of its lists must end within the file."""
+    """Check that all lists of a binary PLY file end within the file."""
     if not path.stat().st_size > at:
         return
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         for element in elements:
+            # Rows without lists have a fixed size and are skipped at once. Rows with lists must be read one by one,
+            # because each list begins with its own length.
             if not any(counted for counted, _ in element.properties):
                 at += element.count * struct.calcsize(f"<{''.join(kind for _, kind in element.properties)}")
                 continue
@@ -165,6 +167,7 @@ def _check_stl(path: Path) -> None:
             raise _HeaderError("is too short for an STL file")
         return
     (count,) = struct.unpack_from("<I", begin, 80)
+    # Binary files may begin with "solid", too: the size tells both kinds apart.
     binary = size == _STL_HEADER + count * _STL_TRIANGLE
     if not binary and not begin.lstrip().startswith(b"solid"):
         raise _HeaderError(f"announces {count:,} triangles and has {size - _STL_HEADER:,} bytes for them")
@@ -260,7 +263,7 @@ def _refuse(length: int, there: int) -> NoReturn:
 
 
 def _uri_bytes(path: Path, uri: object) -> int:
-    """Return how many bytes a URI stands for, once it is data or a file in the model's folder."""
+    """Return the number of bytes of a URI after checking that it is data or a file in the model's folder."""
     if not isinstance(uri, str):
         raise _HeaderError(f"has {str(uri)[:40]!r} in place of a URI")
     if uri.startswith("data:"):
@@ -274,9 +277,9 @@ def _uri_bytes(path: Path, uri: object) -> int:
 
 
 def _require_inside(path: Path, uri: str) -> Path:
-    """Return the file that a model names, once it lies in the model's folder.
+    """Return the path of a file that a model names after checking that it lies in the model's folder.
 
-    Blender decodes per cent signs; so both spellings must lie there.
+    Blender decodes percent-encoded names, so that both spellings must lie there.
     """
     folder = path.resolve().parent
     try:

@@ -1,4 +1,4 @@
-"""From a map and a site description to the parts of a scene, in local axes."""
+"""Model of a site: the parts of a scene from a map and a site description, in local axes."""
 
 from collections import Counter
 from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
@@ -23,10 +23,10 @@ from ...site.sources import SourceCount, count_sources
 from ..opendrive.lanes import LaneSurface, lane_surfaces
 from ..opendrive.objects import PlacedObject, placed_objects
 from ..opendrive.road_map import Road, RoadMap
-from ..opendrive.signals import placed_signals
+from ..opendrive.signals import PlacedSignal, placed_signals
 from . import road_surface, street_furniture
 from .clearing import MAX_IN_LANE, clear
-from .description import MAX_COVERED, Building, PlacedSolid, Poles, SiteDescription, Slab, Trees, Wall
+from .description import MAX_COVERED, Building, PlacedSolid, Poles, SideWay, SiteDescription, Slab, Trees, Wall
 from .folds import without_folds
 from .footways import without_doubles
 from .geographic_position import in_metres
@@ -58,20 +58,20 @@ from .signal_posts import signal_parts, split_posts
 from .tapers import with_tapers
 from .terrain import Embankments, FlatLand, Relief, Terrain, cut, embankment_width
 
-STAGES = 6  # pieces of work that a model is made in once the map's lanes are known
+STAGES = 6  # stages of work after the lanes of the map are known
 ROADS_PER_STEP = 20
 MIN_HOLE = 0.01  # square metres: smaller holes of a carriageway are rounding
 CANDIDATE_MARGIN = 15.0  # how far outside the region of interest (metres) a new post may stand
-VERGE_STRIP = (0.8, 2.3)  # where new posts may stand beside a road without pavements: metres from the carriageway
+VERGE_STRIP = (0.8, 2.3)  # strip for new posts along roads without pavements: metres from the carriageway
 VERGE_BELOW = 0.03
-GROUND_MARGIN = 5.0  # how far the ground goes on around what stands outside the extent (metres)
-MAX_GROUND_DISTANCE = 300.0  # how far from the extent (metres) it goes on at most: a wall may run along the whole map
+GROUND_MARGIN = 5.0  # margin of ground around objects outside the extent (metres)
+MAX_GROUND_DISTANCE = 300.0  # largest distance of ground from the extent (metres): a wall may run along the whole map
 VERGE_SPACING = 12.0
-KERB_STEP, RELIEF_SPACING = 2.5, 6.0  # metres: as ground on which nothing is farther off than some centimetres needs
-OVERLAY_SPACING = 4.0  # as the surface of junctions: coarser veils would rise through the coverage on curved roads
+KERB_STEP, RELIEF_SPACING = 2.5, 6.0  # metres: fine enough for errors of some centimetres on uneven ground
+OVERLAY_SPACING = 4.0  # metres, as for junctions: coarser overlays would cut through the coverage on curved roads
 MIN_BRIDGE_HEIGHT = 1.0  # metres above the land from which a road on a bridge is in the air
 MIN_RAMP_HEIGHT = 1.0  # metres above the nearest studied road from which a ramp of another level is in the way
-MIN_WALL = 0.02  # metres of height, of both ends together, from which a gap beside a road below has a wall
+MIN_WALL = 0.02  # metres: sum of the heights at both ends above which a gap next to a lower road gets a wall
 UNNAMED_STREET = "Unnamed street"
 OVERLAY_STEP = 0.001  # metres of height between areas of one role that may overlap
 
@@ -84,11 +84,11 @@ SURFACES = {
     "border": ("Borders", "verge", Role.GROUND),
     "median": ("Medians", "median", Role.GROUND),
 }
-"""Name, material and role of the surface of each group of lanes but the pavements."""
+"""Name, material and role of the surface of each group of lanes, except pavements."""
 PART_NAMES = {group: (name,) for group, (name, _, _) in SURFACES.items()} | {
     "sidewalk": ("Pavements", "Pavements beyond", "Kerbs")
 }
-"""Names of the parts that are as wide as the lanes of a group."""
+"""Names of the parts whose widths are those of a group of lanes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,17 +102,19 @@ class SiteModel:
     geo_reference : str or None
         Projection of the map, as the map gives it.
     header_offset : (4,) float64
-        Of the map: x, y, z in metres and heading in radians.
+        Header offset of the map: x, y, z in metres and heading in radians.
+    parts : tuple of Part
+        Objects of the scene.
     region : shapely geometry
         Region of interest in plan, local axes.
     notes : tuple of str
-        What was assumed because the map does not say it, a sentence each.
+        Assumptions made where the map lacks data, one sentence each.
     warnings : tuple of str
         Reasons to distrust results of the scene, one sentence each.
     places : tuple of NamedArea
         Streets and crossings of the map in the region, local axes.
     attribution : tuple of str
-        Credits that the sources of the site demand.
+        Credits required by the sources of the site.
     """
 
     name: str
@@ -127,7 +129,7 @@ class SiteModel:
     attribution: tuple[str, ...] = ()
 
     def sources(self) -> tuple[SourceCount, ...]:
-        """Count what is there by kind and source; what is there to be looked at alone does not count."""
+        """Count the parts by kind and source, except those that are only seen."""
         return count_sources(
             (part.name, part.source, part.height_assumed or part.width_assumed or part.source == ASSUMED)
             for part in self.parts
@@ -137,18 +139,18 @@ class SiteModel:
 
 @dataclass(frozen=True, eq=False)
 class _OtherLevels:
-    """Roads on other levels, and what carries roads that cross each other, in local axes.
+    """Roads on other levels, and bridges of the studied level, in local axes.
 
     Parameters
     ----------
     lanes : tuple of LaneSurface
-        Of the roads on other levels.
+        Lanes of the roads on other levels.
     above, below : (n, 3, 3) float64, metres
-        Surfaces of these roads, all, that are in the way of the studied level, and of the others.
+        Surfaces of these roads that occlude the studied level, and the remaining ones.
     on_ground : (n, 3, 3) float64, metres
-        Those of them that lie on the ground.
+        Surfaces of these roads that lie on the ground.
     decks : shapely geometry
-        Where roads of the studied level are in the air: the ground goes on below them.
+        Area in plan where roads of the studied level are above the ground.
     """
 
     lanes: tuple[LaneSurface, ...]
@@ -159,25 +161,25 @@ class _OtherLevels:
 
     @cached_property
     def area(self) -> BaseGeometry:
-        """Area in plan of the roads on the ground."""
+        """Area in plan of the roads of other levels on the ground."""
         return outline(self.on_ground, road_surface.SNAP_GRID)
 
     @cached_property
     def off_posts(self) -> BaseGeometry:
-        """Area in plan next to which no post stands on the verge."""
+        """Area in plan next to which the verge is not used for posts."""
         return self.area.union(self.decks)
 
 
 @dataclass(frozen=True, eq=False)
 class _Surroundings:
-    """Ground, roadside and region that the parts of a site are placed by, in local axes.
+    """Ground, roadside and region of a site, from which its parts are placed, in local axes.
 
     Parameters
     ----------
     terrain : Terrain
-        Height of the studied roads, and of the ground next to them.
+        Heights of the studied roads, and of the ground next to them.
     ground : Terrain
-        Height of the ground, below bridges too.
+        Heights of the ground, also below bridges.
     """
 
     origin: Float
@@ -193,7 +195,7 @@ class _Surroundings:
 
     @cached_property
     def lane_interiors(self) -> BaseGeometry:
-        """Driving lanes without a strip along their edges, in which a post is taken to stand beside the road."""
+        """Driving lanes without a strip along their edges, where posts count as standing next to the road."""
         driving = road_surface.lane_outline(road_surface.in_groups(self.lanes, ["driving"]))
         return driving.buffer(-MAX_IN_LANE)
 
@@ -203,33 +205,29 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
 
     Parameters
     ----------
+    road_map : RoadMap
+        Map of the place.
     description : SiteDescription
-        Which place, and what stands there besides what the map has.
+        Choice of the place, and objects there that the map lacks.
 
     Yields
     ------
     Progress
-        Roads of the map laid out, then stages of the model, of all.
+        Number of roads converted to lanes, then of completed stages.
 
     Raises
     ------
     SeipError
-        No such junction, no road at the place, or an empty region of interest.
+        The junction does not exist, or there is no road at the place or in the region of interest.
     """
     surfaces = yield from _all_lanes(road_map)
     if not surfaces:
-        raise SeipError(f"map {road_map.name!r} has no lane with an area; give its lanes widths, or take another map")
+        raise SeipError(f"map {road_map.name!r} has no lane with an area: give its lanes widths, or use another map")
     description, place_notes = in_metres(description, road_map, surfaces)
-    if description.from_centre_lines:
-        jointless = without_plain_joints(surfaces)
-        joints = {
-            lane.road_id: lane.junction_id
-            for lane, kept in zip(surfaces, jointless, strict=True)
-            if lane.junction_id is not None and kept.junction_id is None
-        }
-        surfaces = without_folds(with_tapers(jointless, joints))
+    surfaces = _mended_lanes(surfaces, description)
     stages = (Progress(done, STAGES, "streets", counted=False) for done in range(STAGES + 1))
     yield next(stages)
+    # In map coordinates: the place, its level, and its region.
     place = Place(road_map, surfaces, description)
     levels = place.levels()
     place = replace(place, surfaces=levels.studied)
@@ -238,49 +236,30 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     yield next(stages)
     street = _surroundings(levels, place.surfaces, origin, shifted(region, -origin), description)
     yield next(stages)
-    on_map = (shifted(area, origin) for area in (street.roadside.carriageway, street.roadside.mouths))
-    description, clear_notes = clear(description, *on_map)
-    around = shifted(street.extent, origin)
-    placed = tuple(_risen(one, description.relief) for one in placed_objects(road_map, area=around))
-    placed = local_objects(placed, origin)
-    away = levels.other_roads()
-    local_signals = [
-        replace(one, position=_risen_place(one.position, description.relief) - origin)
-        for one in placed_signals(road_map, area=around)
-        if one.road_id not in away
-    ]
-    placed, covered_notes = _without_covered(placed, description, origin)
-    others, lights = split_posts(placed, local_signals, street.roadside)
-    signals = [_checked_pole(part, street) for part in signal_parts(lights, street.roadside, street.terrain)]
-    objects = [_checked_pole(part, street) for part in object_parts(others, street.roadside.carriageway)]
+    # From here on in local axes: objects of the description and of the map.
+    described, clear_notes = _local_description(description, street)
+    objects, covered_notes = _without_covered(_map_objects(road_map, street), described)
+    furniture = _furniture(objects, _map_signals(road_map, street, levels), described, street)
     other_levels = _other_level_parts(street)
-    furniture = [*objects, *signals, *_described_parts(description, street)]
     yield next(stages)
     layers = SurfaceLayers(street.lanes, street.extent, fill=description.from_centre_lines)
     carriageway = _surface_parts(street, layers, fill=description.from_centre_lines)
     yield next(stages)
-    pavement, notes = _pavement_parts(street, layers, off_lanes=description.from_centre_lines)
-    beside, side_notes = _side_way_parts(description, street, layers)
+    pavement, pavement_notes = _pavement_parts(street, layers, off_lanes=description.from_centre_lines)
+    ways, way_notes = _side_way_parts(described, street, layers)
     yield next(stages)
-    weighted = place.weighted_areas()
+    laid = [*carriageway, *pavement, *ways]
     parts = [
-        *carriageway,
-        *pavement,
-        *beside,
-        _verge_part(
-            street, furniture, [*carriageway, *pavement, *beside], from_centre_lines=description.from_centre_lines
-        ),
+        *laid,
+        _verge_part(street, furniture.parts, laid, from_centre_lines=description.from_centre_lines),
         *other_levels,
-        _marking_part(street, stop_lines=bool(signals or description.signal_poles)),
-        *furniture,
-        _area_part("Region of interest", street.region, Role.REGION, street),
-        *_weighted_parts(weighted, street, described=bool(description.weighted_regions)),
-        *_area_parts(description, street),
-        *_keep_off_parts(description, placed, street),
+        _marking_part(street, stop_lines=bool(furniture.signals or described.signal_poles)),
+        *furniture.parts,
+        *_overlay_parts(place, described, objects, street),
     ]
-    occluders = [part for part in (*furniture, *other_levels) if Role.OCCLUDERS in part.roles]
     names = street_names(road_map)
-    seen = _sight_area(region, origin, parts)
+    seen = _sight_area(street.region, parts)
+    occluders = [part for part in (*furniture.parts, *other_levels) if Role.OCCLUDERS in part.roles]
     bare = () if any(_hides(part, seen) for part in occluders) else (NO_OBSTACLES_MESSAGE,)
     warnings = road_warnings(road_map, (*street.lanes, *street.crossing.lanes), names, origin)
     yield next(stages)
@@ -296,15 +275,15 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
             *covered_notes,
             *_level_notes(levels),
             *clear_notes,
-            *notes,
-            *side_notes,
-            *_furniture_notes(placed, signals),
+            *pavement_notes,
+            *way_notes,
+            *_furniture_notes(objects, furniture.signals),
         ),
         warnings=(*bare, *warnings),
         places=named_places(
             street.lanes,
             names,
-            placed,
+            objects,
             street.region,
             unnamed=UNNAMED_STREET if description.from_centre_lines else "",
             rings=_ring_roads(road_map, description.roundabouts),
@@ -313,8 +292,110 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     )
 
 
+def _mended_lanes(surfaces: tuple[LaneSurface, ...], description: SiteDescription) -> tuple[LaneSurface, ...]:
+    """Return the lanes of a map made from centre lines without plain joints, steps and folds; of others unchanged."""
+    if not description.from_centre_lines:
+        return surfaces
+    jointless = without_plain_joints(surfaces)
+    joints = {
+        lane.road_id: lane.junction_id
+        for lane, kept in zip(surfaces, jointless, strict=True)
+        if lane.junction_id is not None and kept.junction_id is None
+    }
+    return without_folds(with_tapers(jointless, joints))
+
+
+def _local_description(description: SiteDescription, street: _Surroundings) -> tuple[SiteDescription, tuple[str, ...]]:
+    """Return a description with the carriageway cleared and its objects and areas in local axes, and notes.
+
+    The choice of the place (``near``, ``region``, weighted regions) and the ground remain in map coordinates: `Place`
+    and `_Surroundings` have used them before.
+    """
+    on_map = (shifted(area, street.origin) for area in (street.roadside.carriageway, street.roadside.mouths))
+    cleared, notes = clear(description, *on_map)
+    plan = street.origin[:2]
+    local = replace(
+        cleared,
+        buildings=tuple(replace(one, outline=shifted(one.outline, -plan)) for one in cleared.buildings),
+        trees=tuple(replace(one, positions=one.positions - plan) for one in cleared.trees),
+        walls=tuple(replace(one, line=one.line - plan) for one in cleared.walls),
+        street_lights=tuple(replace(one, positions=one.positions - plan) for one in cleared.street_lights),
+        signal_poles=tuple(replace(one, positions=one.positions - plan) for one in cleared.signal_poles),
+        posts=tuple(replace(one, positions=one.positions - plan) for one in cleared.posts),
+        slabs=tuple(replace(one, outline=shifted(one.outline, -plan)) for one in cleared.slabs),
+        ways=tuple(_local_way(one, plan) for one in cleared.ways),
+        solids=tuple(_local_solid(one, street.origin) for one in cleared.solids),
+        forbidden_areas=tuple(replace(one, polygon=shifted(one.polygon, -plan)) for one in cleared.forbidden_areas),
+        mandatory_areas=tuple(replace(one, polygon=shifted(one.polygon, -plan)) for one in cleared.mandatory_areas),
+        keep_off_areas=tuple(replace(one, polygon=shifted(one.polygon, -plan)) for one in cleared.keep_off_areas),
+    )
+    return local, notes
+
+
+def _local_way(way: SideWay, plan: Float) -> SideWay:
+    line = None if way.line is None else way.line - plan
+    return replace(way, area=shifted(way.area, -plan), line=line)
+
+
+def _local_solid(placed: PlacedSolid, origin: Float) -> PlacedSolid:
+    """Return a solid in local axes; heights that count from the ground stay as they are."""
+    shift = origin * [1, 1, 0] if placed.on_ground else origin
+    solid = replace(placed.solid, vertices=placed.solid.vertices - shift)
+    return replace(placed, outline=shifted(placed.outline, -origin), solid=solid)
+
+
+def _map_objects(road_map: RoadMap, street: _Surroundings) -> tuple[PlacedObject, ...]:
+    """Return the objects of the map within the extent, on the ground, in local axes."""
+    on_map = placed_objects(road_map, area=shifted(street.extent, street.origin))
+    return local_objects((_risen(one, street.relief) for one in on_map), street.origin)
+
+
+def _map_signals(road_map: RoadMap, street: _Surroundings, levels: Levels) -> list[PlacedSignal]:
+    """Return the signals of the map within the extent and on the studied level, on the ground, in local axes."""
+    away = levels.other_roads()
+    return [
+        replace(one, position=_risen_place(one.position, street.relief) - street.origin)
+        for one in placed_signals(road_map, area=shifted(street.extent, street.origin))
+        if one.road_id not in away
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Furniture:
+    """Parts that stand on the ground; those of traffic lights of the map, which are among them, also separately."""
+
+    parts: tuple[Part, ...]
+    signals: tuple[Part, ...]
+
+
+def _furniture(
+    objects: Sequence[PlacedObject],
+    map_signals: Sequence[PlacedSignal],
+    described: SiteDescription,
+    street: _Surroundings,
+) -> _Furniture:
+    """Return the parts of the map's objects and signals, and of the description, all in local axes."""
+    others, lights = split_posts(objects, map_signals, street.roadside)
+    signals = tuple(_checked_pole(part, street) for part in signal_parts(lights, street.roadside, street.terrain))
+    own = (_checked_pole(part, street) for part in object_parts(others, street.roadside.carriageway))
+    return _Furniture((*own, *signals, *_described_parts(described, street)), signals)
+
+
+def _overlay_parts(
+    place: Place, described: SiteDescription, objects: Sequence[PlacedObject], street: _Surroundings
+) -> list[Part]:
+    """Return the overlays on the ground: region of interest, weighted regions, and areas for sensors."""
+    weighted = [(name, shifted(area, -street.origin), weight) for name, area, weight in place.weighted_areas()]
+    return [
+        _area_part("Region of interest", street.region, Role.REGION, street),
+        *_weighted_parts(weighted, street, described=bool(described.weighted_regions)),
+        *_area_parts(described, street),
+        *_keep_off_parts(described, objects, street),
+    ]
+
+
 def _ring_roads(road_map: RoadMap, roundabouts: Sequence[frozenset[str]]) -> frozenset[str]:
-    """Return the ids of the roads that lead from one junction of a roundabout to another one of it."""
+    """Return the ids of the roads between two junctions of one roundabout."""
 
     def is_ring(road: Road) -> bool:
         ends = {link.id for link in (road.predecessor, road.successor) if link is not None and link.kind == "junction"}
@@ -323,28 +404,28 @@ def _ring_roads(road_map: RoadMap, roundabouts: Sequence[frozenset[str]]) -> fro
     return frozenset(road.id for road in road_map.roads if road.junction_id is None and is_ring(road))
 
 
-def _sight_area(region: BaseGeometry, origin: Float, parts: Sequence[Part]) -> BaseGeometry:
-    """Return the area in plan, local axes, that lies between places for sensors and the region of interest."""
+def _sight_area(region: BaseGeometry, parts: Sequence[Part]) -> BaseGeometry:
+    """Return the area in plan that lies between positions of sensors and the region of interest, local axes."""
     posts = [part.foot[:2] for part in parts if Role.POLES in part.roles]
-    return shapely.union_all([shifted(region, -origin).buffer(CANDIDATE_MARGIN), shapely.MultiPoint(posts)]).convex_hull
+    return shapely.union_all([region.buffer(CANDIDATE_MARGIN), shapely.MultiPoint(posts)]).convex_hull
 
 
 def _hides(part: Part, area: BaseGeometry) -> bool:
-    """Return whether a part is large enough to hide something in an area, and reaches into it."""
+    """Return whether a part reaches into an area and is large enough to hide targets there."""
     plan = shapely.MultiPoint(part.solid.vertices[:, :2] + part.foot[:2]).convex_hull
     return can_hide(part.solid.vertices) and bool(area.intersects(plan))
 
 
 def _without_covered(
-    placed: tuple[PlacedObject, ...], description: SiteDescription, origin: Float
+    objects: tuple[PlacedObject, ...], described: SiteDescription
 ) -> tuple[tuple[PlacedObject, ...], tuple[str, ...]]:
-    """Return the objects of a map without the buildings that a city model or a survey has, and a note on them."""
-    modelled = [shifted(one.outline, -origin) for one in description.solids if one.is_building]
+    """Return the objects of a map without buildings that a city model or a survey contains, and a note on these."""
+    modelled = [one.outline for one in described.solids if one.is_building]
     if not modelled:
-        return placed, ()
+        return objects, ()
     tree = shapely.STRtree(modelled)
-    kept = tuple(one for one in placed if kind_of(one) is not Kind.BUILDING or not _is_covered(one, tree))
-    count = len(placed) - len(kept)
+    kept = tuple(one for one in objects if kind_of(one) is not Kind.BUILDING or not _is_covered(one, tree))
+    count = len(objects) - len(kept)
     note = f"{counted(count, 'building')} of the map replaced by those of the city model or the survey"
     return kept, (note,) if count else ()
 
@@ -357,7 +438,7 @@ def _is_covered(placed: PlacedObject, modelled: shapely.STRtree) -> bool:
 
 
 def _with_source(part: Part, description: SiteDescription) -> Part:
-    """Return a part of which somebody says that it is there; what only means an area needs nobody."""
+    """Return a part with the source of the map if it has none; overlays that only mark areas need none."""
     if part.source or AREA_OVERLAYS.keys() >= set(part.roles):
         return part
     assumed = any(part.name in PART_NAMES.get(group, ()) for group in description.widths_assumed)
@@ -365,15 +446,15 @@ def _with_source(part: Part, description: SiteDescription) -> Part:
 
 
 def _furniture_notes(placed: Sequence[PlacedObject], signals: Sequence[Part]) -> Iterator[str]:
-    """Return notes on posts and tree crowns that are assumed, since the map does not give them."""
+    """Yield notes on assumed posts of traffic lights and assumed crowns of trees."""
     assumed = sum(part.source == ASSUMED for part in signals)
     if assumed:
         posts = counted(assumed, "post of traffic lights is", "posts of traffic lights are")
-        yield f"{posts} assumed, since the map has none there: no sensor hangs there unless assumed poles are asked for"
+        yield f"{posts} assumed, because the map has none there: they carry sensors only with assumed poles allowed"
     trunks = sum(map(is_trunk, placed))
     if trunks:
         trees = counted(trunks, "tree")
-        yield f"the map gives {trees} the width of a trunk: the crown is taken as {CROWN_SHARE:g} times the height"
+        yield f"the map gives {trees} the width of a trunk: the crowns are taken as {CROWN_SHARE:g} times the height"
 
 
 def _all_lanes(road_map: RoadMap) -> Generator[Progress, None, tuple[LaneSurface, ...]]:
@@ -388,17 +469,17 @@ def _all_lanes(road_map: RoadMap) -> Generator[Progress, None, tuple[LaneSurface
 
 def _level_notes(levels: Levels) -> Iterator[str]:
     roads = levels.other_roads()
-    told = set()  # the carriageways of one street cross another one each, which is one crossing to a person
+    noted = set()  # each carriageway of a street crosses the other street, which is one crossing for the user
     for crossing in levels.crossings:
         streets = (crossing.called(crossing.above), crossing.called(crossing.below), crossing.above in roads)
-        if streets not in told:
-            told.add(streets)
+        if streets not in noted:
+            noted.add(streets)
             away = "upper" if crossing.above in roads else "lower"
-            yield f"{crossing}: the {away} one is on another level, in the way but not studied"
+            yield f"{crossing}: the {away} one is on another level; it is modelled but not studied"
 
 
 def _other_level_parts(street: _Surroundings) -> list[Part]:
-    """Return the roads of other levels, above and below."""
+    """Return the parts for roads of other levels, above and below."""
     above, below = street.crossing.above, street.crossing.below
     return [
         Part("Roads above", _solid(above, "asphalt"), (Role.OCCLUDERS,)),
@@ -408,7 +489,7 @@ def _other_level_parts(street: _Surroundings) -> list[Part]:
 
 
 def _retaining_walls(street: _Surroundings) -> Float:
-    """Return (n, 3, 3) upright triangles that close the gap between roads on other levels and higher ground."""
+    """Return (n, 3, 3) vertical triangles that close the gap between roads on other levels and higher ground."""
     sides = shapely.boundary(street.crossing.area)
     quads = [np.empty((0, 4, 3))]
     on_ground = street.crossing.on_ground
@@ -424,7 +505,7 @@ def _retaining_walls(street: _Surroundings) -> Float:
 
 
 def _checked_pole(part: Part, street: _Surroundings) -> Part:
-    """Return a part of the map; a pole on another level, or in a lane, carries no sensor."""
+    """Return a part of the map, as an occluder only if it is a pole on a different level or in a lane."""
     if Role.POLES not in part.roles:
         return part
     x, y, z = part.foot
@@ -434,14 +515,14 @@ def _checked_pole(part: Part, street: _Surroundings) -> Part:
 
 
 def _origin(place: Place, relief: Relief | None) -> Float:
-    """Return the local origin: the middle and the road's height nearest to it, in whole metres."""
+    """Return the local origin (3,), whole metres: the centre, at the height of the nearest point of a road."""
     points = np.concatenate([np.concatenate([lane.left, lane.right]) for lane in place.surfaces])
     nearest = points[np.argmin(np.hypot(*(points[:, :2] - place.centre).T))]
     return np.round([*place.centre, _risen_place(nearest, relief)[2]])
 
 
 def _risen_place(points: Float, relief: Relief | None) -> Float:
-    """Return places (3,) or (n, 3) of a map on the ground that it is laid on."""
+    """Return points (3,) or (n, 3) of a map, raised by the ground under it."""
     if relief is None:
         return points
     risen = np.atleast_2d(points) + 0.0
@@ -450,7 +531,7 @@ def _risen_place(points: Float, relief: Relief | None) -> Float:
 
 
 def _risen(placed: PlacedObject, relief: Relief | None) -> PlacedObject:
-    """Return an object on the ground that the map is laid on, raised as a whole."""
+    """Return an object of a map, raised as a whole by the ground under its position."""
     if relief is None:
         return placed
     position = _risen_place(placed.position, relief)
@@ -462,10 +543,12 @@ def _risen(placed: PlacedObject, relief: Relief | None) -> PlacedObject:
 def _strips(
     surfaces: Sequence[LaneSurface], origin: Float, area: BaseGeometry, relief: Relief | None, *, kerbs: bool = True
 ) -> tuple[LaneSurface, ...]:
-    """Return the lanes near an area in local axes, on the ground that the map is laid on."""
+    """Return the lanes near an area in local axes, raised by the ground under the map."""
     if relief is None:
         return road_surface.local_strips(surfaces, origin, area, kerbs=kerbs)
     surfaces = [_bridged(lane, relief) if lane.road_id in relief.bridges else lane for lane in surfaces]
+    # Lanes follow the ground only at their rows of points, so they get more rows first, still at the heights of the
+    # map. The height of the origin is subtracted last, because it refers to the raised map.
     lanes = road_surface.local_strips(surfaces, origin * [1, 1, 0], area, kerbs=kerbs)
     shift, height = origin * [1, 1, 0], origin * [0, 0, 1]
 
@@ -482,7 +565,7 @@ def _strips(
 
 
 def _bridged(lane: LaneSurface, relief: Relief) -> LaneSurface:
-    """Return a lane of a bridge, map coordinates, on the ground at its ends and straight in between."""
+    """Return a lane of a bridge (map coordinates), raised by the ground at its ends and linearly in between."""
 
     def risen(edge: Float) -> Float:
         ends = relief.rise(edge[[0, -1], :2])
@@ -522,10 +605,10 @@ def _ground(
     origin: Float,
     land: Relief | FlatLand | None,
 ) -> tuple[Terrain, Terrain, _OtherLevels]:
-    """Return the terrain of the studied roads, the ground beside and below them, and the roads of other levels.
+    """Return the terrain of the studied roads, the ground next to and below them, and the roads of other levels.
 
-    Where the height of the land is not known it is that of the nearest studied road: one that lies lower is in a
-    cutting between walls. Otherwise roads lie on embankments and in cuttings with slopes.
+    If the height of the land is unknown, the ground has the height of the nearest studied road, and lower roads lie in
+    cuttings between walls. Otherwise roads lie on embankments and in cuttings with slopes.
     """
     studied, away = _triangles(lanes), _triangles(others)
     if land is None:
@@ -537,6 +620,7 @@ def _ground(
         local: Float = land.at(xy + origin[:2]) - origin[2]
         return local
 
+    # A bridge over level land has its ends on the ground; only roads that rise above it somewhere are in the air.
     bridges = frozenset(
         lane.road_id
         for lane in (*lanes, *others)
@@ -547,6 +631,8 @@ def _ground(
     others_on_ground, others_in_air = _lifted(others, bridges, spans)
     embankments = Embankments(np.concatenate([on_ground, others_on_ground]), height)
     ground = Terrain(np.concatenate([on_ground, others_on_ground]), embankments.height, embankments.steep)
+    # The ground continues below decks. Ramps of other levels that are higher than the studied road occlude it, and the
+    # lower ones are ground.
     decks = without(outline(in_air, road_surface.SNAP_GRID), outline(on_ground, road_surface.SNAP_GRID))
     high = _rise(others_on_ground, Terrain(studied)) > MIN_RAMP_HEIGHT
     in_way = np.concatenate([others_in_air, others_on_ground[high]])
@@ -558,7 +644,7 @@ def _ground(
 
 
 def _rise(triangles: Float, terrain: Terrain) -> Float:
-    """Return how far triangles (n, 3, 3) lie above a terrain, (n,) metres at their middles."""
+    """Return the heights (n,) of the centres of triangles (n, 3, 3) above a terrain, metres."""
     middles: Float = triangles.mean(axis=1)
     rise: Float = middles[:, 2] - terrain.height(middles[:, :2])
     return rise
@@ -569,7 +655,7 @@ def _triangles(lanes: Sequence[LaneSurface]) -> Float:
 
 
 def _spans(levels: Levels, lanes: Sequence[LaneSurface], origin: Float) -> Iterator[tuple[BaseGeometry, float]]:
-    """Yield where roads cross others, with room for slopes below, and the height above which they are in the air."""
+    """Yield the area of each crossing, with room for slopes, and the height above which roads are in the air there."""
     roads = road_surface.by_road(lanes)
     for crossing in levels.crossings:
         above, below = (_triangles(roads.get(road, [])) for road in (crossing.above, crossing.below))
@@ -584,7 +670,7 @@ def _spans(levels: Levels, lanes: Sequence[LaneSurface], origin: Float) -> Itera
 def _lifted(
     lanes: Sequence[LaneSurface], bridges: Collection[str], spans: Iterable[tuple[BaseGeometry, float]]
 ) -> tuple[Float, Float]:
-    """Return the surfaces of lanes (n, 3, 3) that lie on the ground, and those in the air, on bridges."""
+    """Return the surfaces of lanes (n, 3, 3) on the ground, and those in the air on bridges."""
     on_ground = _triangles([lane for lane in lanes if lane.road_id not in bridges])
     in_air = [_triangles([lane for lane in lanes if lane.road_id in bridges])]
     for area, low in spans:
@@ -597,7 +683,7 @@ def _lifted(
 
 
 def _surface_parts(street: _Surroundings, layers: SurfaceLayers, *, fill: bool) -> list[Part]:
-    """Return the surfaces of lanes by group; the driving lanes have no small holes."""
+    """Return a part for each group of lanes; small holes of the driving lanes are filled."""
     groups = {road_surface.group(lane) for lane in street.lanes}
     laid = {group: layers.lay_group(group) for group in SURFACES if group in groups}
     if "driving" in laid:
@@ -621,9 +707,9 @@ def _surface_parts(street: _Surroundings, layers: SurfaceLayers, *, fill: bool) 
 def _pavement_parts(
     street: _Surroundings, layers: SurfaceLayers, *, off_lanes: bool
 ) -> tuple[list[Part], tuple[str, ...]]:
-    """Return pavements near the region (where posts may stand), those beyond, their kerbs, verges, and notes.
+    """Return pavements near the region (for posts), those beyond it, kerbs and verges, and notes.
 
-    With ``off_lanes`` they give way to the carriageway where both lie on each other.
+    With ``off_lanes`` pavements are cut where they overlap the carriageway.
     """
     own = layers.lay_group("sidewalk")
     if off_lanes:
@@ -651,7 +737,7 @@ def _pavement_parts(
     if len(corners):
         added, had = (float(np.abs(signed_area(faces)).sum()) for faces in (corners, own))
         notes.append(
-            f"the pavements are closed round the corners of junctions, where the map leaves gaps: {added:,.0f} m² are "
+            f"the pavements are closed at the corners of junctions, where the map has gaps: {added:,.0f} m² are "
             f"added to its {had:,.0f} m²"
         )
     bare = road_surface.bare_sides(street.roadside, shapely.union_all(plan, grid_size=road_surface.SNAP_GRID))
@@ -665,10 +751,7 @@ def _pavement_parts(
 
 
 def _verge_strip(street: _Surroundings, sides: BaseGeometry) -> Part:
-    """Return the verge along sides of the carriageway.
-
-    There is none where the map ends and the road goes on, nor beside a bridge.
-    """
+    """Return a strip of verge along sides of the carriageway, except where the road continues and next to bridges."""
     inner, outer = VERGE_STRIP
     strip = without(sides.buffer(outer, cap_style="flat"), street.roadside.filled.buffer(inner))
     strip = without(strip, street.crossing.off_posts.buffer(outer))
@@ -683,12 +766,18 @@ def _verge_part(
     *,
     from_centre_lines: bool,
 ) -> Part:
-    """Return the ground beside all lanes and under all furniture, a little below the lanes and under their seams.
+    """Return the ground next to all lanes and under all furniture, slightly below the lanes and under their seams.
 
     Parameters
     ----------
+    street : _Surroundings
+        Ground and extent of the site.
+    furniture : sequence of Part
+        Parts that stand on the ground; it reaches around them.
     surfaces : sequence of Part
-        What else is laid on the ground.
+        Surfaces on the ground, which it does not cover.
+    from_centre_lines : bool
+        Whether the map was made from centre lines.
     """
     corners = [part.solid.vertices[:, :2] + part.foot[:2] for part in furniture]
     built_up = shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *corners])))
@@ -704,14 +793,14 @@ def _verge_part(
     others = without(laid, covered).buffer(-road_surface.MAX_SEAM)
     lanes = lanes if others.is_empty else lanes.union(others)
     lanes = without(lanes, street.crossing.decks.buffer(road_surface.MAX_SEAM, join_style="mitre"))
-    beside = road_surface.without_crumbs(without(ground, lanes))
+    open_ground = road_surface.without_crumbs(without(ground, lanes))
     spacing = VERGE_SPACING if street.relief is None else RELIEF_SPACING
-    triangles = street.ground.drape(beside, spacing=spacing, above=-VERGE_BELOW)
+    triangles = street.ground.drape(open_ground, spacing=spacing, above=-VERGE_BELOW)
     return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
 
 
 def _plan(part: Part) -> BaseGeometry:
-    """Return the area in plan of a part of triangles that stands at the origin."""
+    """Return the area in plan of a part made of triangles, with its foot at the origin."""
     return outline(
         part.solid.vertices[np.array(part.solid.faces, dtype=np.int64).reshape(-1, 3)], road_surface.SNAP_GRID
     )
@@ -730,9 +819,8 @@ def _weighted_parts(
     areas: Sequence[tuple[str, BaseGeometry, float]], street: _Surroundings, *, described: bool
 ) -> Iterator[Part]:
     for name, area, weight in areas:
-        local = shifted(area, -street.origin)
-        if local.intersects(street.region):
-            yield _area_part(name, local, Role.WEIGHTED_REGIONS, street, weight=weight)
+        if area.intersects(street.region):
+            yield _area_part(name, area, Role.WEIGHTED_REGIONS, street, weight=weight)
         elif described:
             raise SeipError(
                 f"the weighted region {name!r} lies outside the region of interest; move it or widen the region"
@@ -741,21 +829,17 @@ def _weighted_parts(
 
 def _area_parts(description: SiteDescription, street: _Surroundings) -> list[Part]:
     kinds = ((description.forbidden_areas, Role.FORBIDDEN_AREAS), (description.mandatory_areas, Role.MANDATORY_AREAS))
-    return [
-        _area_part(area.name, shifted(area.polygon, -street.origin), role, street)
-        for areas, role in kinds
-        for area in areas
-    ]
+    return [_area_part(area.name, area.polygon, role, street) for areas, role in kinds for area in areas]
 
 
 def _keep_off_parts(
     description: SiteDescription, placed: Sequence[PlacedObject], street: _Surroundings
 ) -> Iterator[Part]:
-    """Yield the areas that rules keep new posts off, as far as new posts might stand there.
+    """Yield the areas from which rules exclude new posts, cut to the surroundings of the region.
 
-    A map that was not made of middle lines has its crossings where they are; netconvert's are guessed.
+    Landings at the crossings of the map are added unless it was made from centre lines: netconvert guesses crossings.
     """
-    areas = [(one.rule, shifted(one.polygon, -street.origin)) for one in description.keep_off_areas]
+    areas = [(one.rule, one.polygon) for one in description.keep_off_areas]
     if not description.from_centre_lines:
         areas += [("landings", landing) for landing in landings(placed)]
     near = without(street.region.buffer(CANDIDATE_MARGIN), street.roadside.carriageway)
@@ -766,7 +850,7 @@ def _keep_off_parts(
 
 
 def _described_parts(description: SiteDescription, street: _Surroundings) -> list[Part]:
-    """Return what the site description adds, standing on the ground."""
+    """Return the parts of a description in local axes, standing on the ground."""
     parts: list[Part] = []
     for number, building in enumerate(description.buildings, start=1):
         parts += _building_parts(building, number, street)
@@ -776,16 +860,15 @@ def _described_parts(description: SiteDescription, street: _Surroundings) -> lis
         names[wall.name] += 1
         foot = _on_ground(wall.line, street) + np.array([0.0, 0.0, wall.base])
         panels = fence(foot, np.full(len(foot), wall.height), wall.thickness, side=wall.material)
-        parts.append(_told(Part(f"{wall.name} {names[wall.name]}", panels, (Role.OCCLUDERS,)), wall))
+        parts.append(_with_item_source(Part(f"{wall.name} {names[wall.name]}", panels, (Role.OCCLUDERS,)), wall))
     for slab in description.slabs:
         names[slab.name] += 1
-        outline = shifted(slab.outline, -street.origin)
-        ground = float(street.terrain.height(shapely.get_coordinates(outline)).min())
-        plate = house(outline, ground + slab.base, ground + slab.top, side=slab.material)
-        parts.append(_told(Part(f"{slab.name} {names[slab.name]}", plate, (Role.OCCLUDERS,)), slab))
+        ground = float(street.terrain.height(shapely.get_coordinates(slab.outline)).min())
+        plate = house(slab.outline, ground + slab.base, ground + slab.top, side=slab.material)
+        parts.append(_with_item_source(Part(f"{slab.name} {names[slab.name]}", plate, (Role.OCCLUDERS,)), slab))
     trees = [(foot, row) for row in description.trees for foot in _on_ground(row.positions, street)]
     parts += [
-        _told(tree_part(f"Tree {number}", foot, row.height, row.crown_diameter, number), row)
+        _with_item_source(tree_part(f"Tree {number}", foot, row.height, row.crown_diameter, number), row)
         for number, (foot, row) in enumerate(trees, start=1)
     ]
     parts += _pole_parts(description, street)
@@ -793,46 +876,44 @@ def _described_parts(description: SiteDescription, street: _Surroundings) -> lis
 
 
 def _building_parts(building: Building, number: int, street: _Surroundings) -> list[Part]:
-    outline = shifted(building.outline, -street.origin)
-    plan = shapely.get_coordinates(building.outline.exterior)[:-1] - street.origin[:2]
+    plan = shapely.get_coordinates(building.outline.exterior)[:-1]
     ground = float(street.terrain.height(plan).min()) + building.base
     walls = building.height - building.roof.height
     base = np.column_stack([plan, np.full(len(plan), ground)])
     shape = None
     if building.roof.height > 0.0 or building.outline.interiors:
-        shape = house(outline, ground, ground + walls, side=facade(number), roof=building.roof)
+        shape = house(building.outline, ground, ground + walls, side=facade(number), roof=building.roof)
     made = building_parts(f"Building {number}", base, np.full(len(plan), walls), number, shape)
-    return [_told(part, building) for part in made]
+    return [_with_item_source(part, building) for part in made]
 
 
 def _solid_parts(description: SiteDescription, street: _Surroundings, buildings: int) -> Iterator[Part]:
-    """Yield what files of their own give, numbered on from the buildings that the site has."""
+    """Yield the solids of separate files, with buildings numbered after those of the description."""
     numbers = Counter({"Building": buildings})
     for one in description.solids:
         numbers[one.name] += 1
-        moved = one.solid.vertices - street.origin
+        vertices = one.solid.vertices.copy()
         if one.on_ground:
-            ground = float(street.terrain.height(shapely.get_coordinates(shifted(one.outline, -street.origin))).min())
-            moved[:, 2] = one.solid.vertices[:, 2] + ground
-        solid = replace(one.solid, vertices=moved)
+            vertices[:, 2] += float(street.terrain.height(shapely.get_coordinates(one.outline)).min())
+        solid = replace(one.solid, vertices=vertices)
         yield Part(f"{one.name} {numbers[one.name]}", solid, (Role.OCCLUDERS,), source=one.source)
 
 
-def _told(part: Part, item: Building | Wall | Slab | Trees | Poles) -> Part:
-    """Return a part with its source, and a post with what it may carry."""
-    told = replace(part, source=item.source, height_assumed=item.height_assumed)
+def _with_item_source(part: Part, item: Building | Wall | Slab | Trees | Poles) -> Part:
+    """Return a part with the source of its item; posts also with their rule, and without sensors if they carry none."""
+    sourced = replace(part, source=item.source, height_assumed=item.height_assumed)
     if isinstance(item, Poles):
-        return replace(told, keep_off=item.keep_off, roles=told.roles if item.carries else (Role.OCCLUDERS,))
-    return told
+        return replace(sourced, keep_off=item.keep_off, roles=sourced.roles if item.carries else (Role.OCCLUDERS,))
+    return sourced
 
 
 def _side_way_parts(
     description: SiteDescription, street: _Surroundings, layers: SurfaceLayers
 ) -> tuple[list[Part], tuple[str, ...]]:
-    """Return ways beside the road, by kind, where no lane, building or other road lies, and notes."""
+    """Return ways next to the road by kind, without areas of lanes, buildings and other roads, and notes."""
     lanes = road_surface.lane_outline(street.lanes)
     standing: list[Building | PlacedSolid] = [*description.buildings, *description.solids]
-    houses = shapely.union_all([shifted(one.outline, -street.origin) for one in standing])
+    houses = shapely.union_all([one.outline for one in standing])
     covered = [lanes, street.roadside.filled, layers.area, houses, street.crossing.area]
     taken = shapely.union_all(covered).buffer(road_surface.MAX_SEAM)
     pavement = road_surface.lane_outline(road_surface.in_groups(street.lanes, ["sidewalk"]))
@@ -842,9 +923,9 @@ def _side_way_parts(
         areas = []
         for way in description.ways:
             if (way.name, way.material) == (name, material):
-                area = shifted(way.area, -street.origin)
+                area = way.area
                 if way.line is not None and not pavement.is_empty and area.intersects(street.extent):
-                    area, length = without_doubles(way.line - street.origin[:2], way.width, pavement)
+                    area, length = without_doubles(way.line, way.width, pavement)
                     doubled += length
                 areas.append(area)
         area = without(shapely.union_all(areas).intersection(street.extent), taken)
@@ -853,22 +934,22 @@ def _side_way_parts(
             road_surface.without_crumbs(area), spacing=VERGE_SPACING, above=-VERGE_BELOW / 2
         )
         parts.append(Part(name, _solid(triangles, material), (Role.GROUND,)))
-    note = f"{doubled:,.0f} m of footways beside a pavement of the street are left out: they are the same pavement"
+    note = f"{doubled:,.0f} m of footways along a pavement of the street are left out: they are the same pavement"
     return parts, (note,) if doubled else ()
 
 
 def _pole_parts(description: SiteDescription, street: _Surroundings) -> Iterator[Part]:
     for number, (foot, heading, row) in enumerate(_pole_places(description.street_lights, street), start=1):
         shape = street_furniture.street_light(row.height, row.arm)
-        yield _told(pole_part(f"Street light {number}", shape, foot, heading, row.source), row)
+        yield _with_item_source(pole_part(f"Street light {number}", shape, foot, heading, row.source), row)
     keeps_left = any(lane.keeps_left for lane in street.lanes)
     for number, (foot, heading, row) in enumerate(_pole_places(description.signal_poles, street), start=1):
         shape = street_furniture.signal_pole(row.height, row.arm, faces_left=not keeps_left)
         whose = "the site file" if row.source == DESCRIBED else f"the {row.source}"
-        yield _told(pole_part(f"Signal pole {number} of {whose}", shape, foot, heading, row.source), row)
+        yield _with_item_source(pole_part(f"Signal pole {number} of {whose}", shape, foot, heading, row.source), row)
     for number, (foot, heading, row) in enumerate(_pole_places(description.posts, street), start=1):
         shape = street_furniture.post(row.height, POST_RADIUS)
-        pole = _told(pole_part(f"{row.name} {number}", shape, foot, heading, row.source), row)
+        pole = _with_item_source(pole_part(f"{row.name} {number}", shape, foot, heading, row.source), row)
         yield pole if row.height >= POLE_HEIGHT else replace(pole, roles=(Role.OCCLUDERS,))
 
 
@@ -880,14 +961,13 @@ def _pole_places(rows: Sequence[Poles], street: _Surroundings) -> Iterator[tuple
 
 
 def _on_ground(plan: Float, street: _Surroundings) -> Float:
-    local = plan - street.origin[:2]
-    return np.column_stack([local, street.terrain.height(local)])
+    return np.column_stack([plan, street.terrain.height(plan)])
 
 
 def _area_part(
     name: str, area: BaseGeometry, role: Role, street: _Surroundings, *, weight: float | None = None, step: int = 0
 ) -> Part:
-    """Return an area in plan as an overlay on the ground; areas of one role that overlap have steps of their own."""
+    """Return an area in plan as an overlay on the ground; ``step`` raises it above other areas of the same role."""
     above, material = AREA_OVERLAYS[role]
     triangles = street.terrain.drape(area, spacing=OVERLAY_SPACING, above=above + step * OVERLAY_STEP)
     return Part(name, _solid(triangles, material), (role,), weight=weight)

@@ -78,6 +78,7 @@ class Place:
     def levels(self) -> Levels:
         """Return the lanes on the level of the place, and those on other levels."""
         around = self.within.convex_hull.buffer(SCENE_MARGIN, quad_segs=16)
+        # The studied level is that of the junction, or of all roads about as near to the centre as the nearest one.
         if self.description.near is None and self.description.junction is not None:
             anchors = {lane.road_id for lane in self.surfaces if lane.junction_id in self._junctions}
         else:

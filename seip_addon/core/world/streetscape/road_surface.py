@@ -94,7 +94,7 @@ def roadside(surfaces: Sequence[LaneSurface]) -> Roadside:
     junctions = sorted({lane.junction_id for lane in paved if lane.junction_id is not None})
     inside = [lane_outline([lane for lane in paved if lane.junction_id == junction]) for junction in junctions]
     whole = shapely.union_all([carriageway, *map(_without_holes, inside)])
-    # Morphological closing fills gaps between carriageways that are open at an end, and are no holes.
+    # Morphological closing fills gaps between carriageways that are open at an end, and therefore not holes.
     medians = without(closed(whole, MAX_OPEN_MEDIAN_WIDTH / 2), whole)
     filled = _without_holes(closed(whole.union(medians), MAX_SEAM), least=MAX_ISLAND_AREA, narrow=MAX_MEDIAN_WIDTH)
     # A lane that ends at the edge of the filled area leads out of the model: there the edge is not a side of the road.

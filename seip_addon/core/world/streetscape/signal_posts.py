@@ -116,6 +116,8 @@ def _own_post(signal: PlacedSignal, posts: Sequence[tuple[int, Post]], roadside:
         named = post.words & SIGNAL_WORDS and not post.is_lamp
         return MAST_REACH if named or (overhead and not post.is_lamp and can_carry(post)) else SAME_POLE_DISTANCE
 
+    # The reach depends on the post: named after signals, or strong enough for an arm to a signal over the road, it may
+    # be far away; any other post must stand at the signal.
     near = [(float(np.hypot(*(post.xy - xy))), number, post) for number, post in posts]
     eligible = [entry for entry in near if entry[0] <= reach(entry[2])]
     if not eligible:
@@ -153,6 +155,7 @@ def _beside(xy: Float, roadside: Roadside) -> Float:
 def _arm(foot: Float, xy: Float, travel: float, roadside: Roadside, *, overhead: bool) -> tuple[float, float]:
     """Return heading (radians) and length (metres) of the arm of a post; zero length if it would not reach a lane."""
     towards = arm_heading(foot, roadside.carriageway)
+    # Of both directions square to the traffic, take the one that points towards the carriageway.
     across = travel + math.pi / 2  # the arm is square to the traffic
     square = across if math.cos(across - towards) >= 0 else across + math.pi
     way = xy - foot

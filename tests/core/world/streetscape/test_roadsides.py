@@ -115,10 +115,10 @@ def test_what_is_added_round_corners_is_told_and_nothing_is_where_the_map_has_pa
     rest = '<junction id="7" name="crossing"/>'
     closed = built(tmp_path, *crossing(paved=False), place=place, rest=rest)
     own = built(tmp_path, *crossing(paved=True), place=place, rest=rest)
-    (note,) = [note for note in closed.notes if "closed round the corners" in note]
+    (note,) = [note for note in closed.notes if "closed at the corners" in note]
     assert "9 m² are added to its" in note  # four squares of 1.5 m
     assert area(closed, "Pavements").area - area(own, "Pavements").area == pytest.approx(4 * (1.5**2 - 1), abs=0.05)
-    assert not any("closed round" in note for note in own.notes)
+    assert not any("closed at the corners" in note for note in own.notes)
 
 
 def test_a_verge_between_a_street_and_a_footway_of_its_own_is_no_corner(tmp_path):
@@ -135,7 +135,7 @@ def test_a_verge_between_a_street_and_a_footway_of_its_own_is_no_corner(tmp_path
     ]
     place = SiteDescription(near=(0.0, 0.0), radius=40.0)
     model = built(tmp_path, *arms, *footway, place=place, rest='<junction id="7" name="corner"/>')
-    assert not any("closed round" in note for note in model.notes)
+    assert not any("closed at the corners" in note for note in model.notes)
 
 
 @pytest.mark.parametrize(("gap", "has_verge"), [(4.0, False), (15.0, True)])

@@ -130,7 +130,7 @@ def test_a_mapped_footway_beside_the_street_makes_no_second_pavement(tmp_path):
     extract.way([(12, 11), (90, 11)], highway="footway", footway="sidewalk")
     site = finish(build_site(extract.write(tmp_path / "place.osm"), AskedSite(near_latlon=(52.5, 13.4))))
     assert not [part for part in site.model.parts if part.name == "Footways"]
-    assert any("footways beside a pavement" in note for note in site.model.notes)
+    assert any("m of footways along a pavement" in note for note in site.model.notes)
 
 
 def strip(low_x, low_y, high_x, high_y, lane_type="driving", road="1"):
