@@ -39,13 +39,12 @@ def named_crossings(extract: Extract) -> tuple[Crossing, ...]:
     streets = [way for way in extract.ways.values() if "highway" in way.tags and is_street(way.tags)]
     round_ways = [way for way in streets if is_roundabout(way.tags)]
     ring_of = {node: number for number, ring in enumerate(rings(round_ways)[0]) for node in ring}
-    names: defaultdict[int, set[str]] = defaultdict(set)
-    nodes: defaultdict[int, set[int]] = defaultdict(set)
+    names: defaultdict[tuple[str, int], set[str]] = defaultdict(set)
+    nodes: defaultdict[tuple[str, int], set[int]] = defaultdict(set)
     for way in streets:
         for node in way.nodes:
             if node in extract.nodes:
-                # All nodes of a roundabout share one key, negative unlike ids in the database of OpenStreetMap.
-                place = -1 - ring_of[node] if node in ring_of else node
+                place = ("ring", ring_of[node]) if node in ring_of else ("node", node)
                 nodes[place].add(node)
                 if "name" in way.tags:
                     names[place].add(way.tags["name"])

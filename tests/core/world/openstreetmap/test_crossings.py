@@ -8,6 +8,7 @@ import pytest
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.site_places import parsed_position, site_places
+from seip_addon.core.world.openstreetmap import extract as reading
 from seip_addon.core.world.openstreetmap.crossings import named_crossings
 from seip_addon.core.world.openstreetmap.extract import read_extract
 from tests.builders.osm_text import JUNCTIONS, Extract, crossing
@@ -96,3 +97,20 @@ def test_a_description_brings_its_own_radius():
     described = finish(site_places(SCENES / "junction.toml"))
     assert len(described.places) == 1
     assert described.radius > 0
+
+
+def test_a_node_with_a_negative_id_is_not_taken_for_a_roundabout():
+    """Editors give negative ids to nodes that are not saved yet."""
+    ring = {1: (52.0, 13.0), 2: (52.0001, 13.0001), 3: (52.0, 13.0002), 4: (51.9999, 13.0001)}
+    far = {-1: (52.01, 13.01), 10: (52.01, 13.011), 11: (52.011, 13.01), 12: (52.0, 12.999), 13: (52.0, 13.001)}
+    nodes = {number: reading.Node(*place, {}) for number, place in (ring | far).items()}
+    street = {"highway": "residential"}
+    ways = {
+        1: reading.Way((1, 2, 3, 4, 1), {**street, "junction": "roundabout"}),
+        2: reading.Way((12, 1), {**street, "name": "West Road"}),
+        3: reading.Way((3, 13), {**street, "name": "East Road"}),
+        4: reading.Way((10, -1), {**street, "name": "Elm Road"}),
+        5: reading.Way((-1, 11), {**street, "name": "Oak Road"}),
+    }
+    found = named_crossings(reading.Extract("place.osm", nodes, ways, {}))
+    assert [one.streets for one in found] == [("East Road", "West Road"), ("Elm Road", "Oak Road")]
