@@ -20,6 +20,7 @@ from seip_addon.core.errors import SeipError
 STUDIES = {
     "coverage": "coverage of sensor types × heights × numbers",
     "detection": "average precision of sensor types × numbers",
+    "criteria": "placement criteria compared by what a detector finds",
     "detector-settings": "precision against time of other settings of the detector",
     "ingredients": "gain of each ingredient of the detector's training",
     "random-sites": "random sites with traffic, to train detectors on",

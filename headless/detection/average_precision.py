@@ -111,7 +111,8 @@ class Evaluation:
         All-point interpolation of PASCAL VOC 2010, on all detections of all frames in one order. Equal scores make one
         point of the curve: no threshold can tell them apart.
         """
-        return float(_areas(self, np.ones((1, len(self.detections))), np.array([float(len(self.wanted))]))[0])
+        alike = np.zeros(len(self.detections), dtype=np.int64)
+        return float(_areas(self, np.ones((1, 1)), alike, np.array([float(len(self.wanted))]))[0])
 
 
 def evaluate(frames: Sequence[FrameResult], rule: Rule) -> Evaluation:
@@ -174,7 +175,7 @@ def average_precisions_of_runs(evaluation: Evaluation, times: Float | Integer) -
     """
     of_detection = evaluation.run[evaluation.detections.frame]
     wanted = np.bincount(evaluation.run[evaluation.wanted.frame], minlength=times.shape[1])
-    return _areas(evaluation, times[:, of_detection], times @ wanted)
+    return _areas(evaluation, times.astype(np.float64), of_detection, times @ wanted)
 
 
 def too_few_runs(count: int) -> str:
@@ -250,20 +251,27 @@ def _rows(table: Table, rows: Boolean | Integer) -> Table:
     return replace(table, **{column.name: getattr(table, column.name)[rows] for column in fields(table)})
 
 
-def _areas(evaluation: Evaluation, times: Float | Integer, wanted: Float | Integer) -> Float:
-    """Return average precisions where detections come several times or not at all.
+def _areas(evaluation: Evaluation, times: Float, group: Integer, wanted: Float | Integer) -> Float:
+    """Return average precisions where groups of detections come several times or not at all.
+
+    Precision falls from one hit to the next, so that only scores with a hit can hold the best precision at a recall or
+    beyond; the others, which are most, are left out.
 
     Parameters
     ----------
-    times : (b, d) array
-        How often each detection is there.
+    times : (b, g) float64
+        How often each group is there.
+    group : (d,) int64
+        Of each detection.
     wanted : (b,) array
         The number of road users that count.
     """
     detections = evaluation.detections
     last = _last_of_equals(detections.score)
-    hits = np.cumsum(times * detections.hit, axis=1)[:, last]
-    found = np.cumsum(times, axis=1)[:, last]
+    last = last[np.diff(np.cumsum(detections.hit)[last], prepend=0) > 0]
+    belongs = np.arange(times.shape[1])[:, None] == group
+    hits = times @ np.cumsum(belongs & detections.hit, axis=1)[:, last].astype(np.float64)
+    found = times @ np.cumsum(belongs, axis=1)[:, last].astype(np.float64)
     precision = np.divide(hits, found, out=np.zeros(hits.shape), where=found > 0)
     best_from_here = np.maximum.accumulate(precision[:, ::-1], axis=1)[:, ::-1]
     areas = (np.diff(hits, axis=1, prepend=0) * best_from_here).sum(axis=1)

@@ -18,6 +18,7 @@ from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.workflows.survey import Survey
 
 from .occupancy import vehicle_occupancy
+from .pose_criteria import PoseCriterion, entropy
 from .precision import ENOUGH_RETURNS, Precisions
 
 
@@ -55,7 +56,7 @@ def weights_of_targets(survey: Survey, traffic: Traffic) -> dict[str, Float]:
     """Return the weights of targets (t,) of the criteria that are weighted coverage, by name; see `criteria_of`."""
     targets = survey.site.targets
     often = vehicle_occupancy(targets, traffic.training)
-    weights = dict(zip(WEIGHTED, (targets.weight, often, _entropy(often)), strict=True))
+    weights = dict(zip(WEIGHTED, (targets.weight, often, entropy(often)), strict=True))
     return {name: weight for name, weight in weights.items() if weight is not targets.weight or targets.central.any()}
 
 
@@ -65,6 +66,7 @@ def criteria_of(
     placements: Sequence[SensorConfiguration],
     traffic: Traffic,
     precise: Precisions,
+    others: Sequence[PoseCriterion] = (),
 ) -> Generator[Progress, None, tuple[Criterion, ...]]:
     """Return coverage, and what could be optimised in its place; traffic is that of the runs to learn from alone.
 
@@ -72,6 +74,11 @@ def criteria_of(
     stands there. `occupancy entropy`: weighted by the entropy of whether one stands there, as S-MIG weights voxels (Hu
     et al. 2022). `returns`: share of targets where a car would have `ENOUGH_RETURNS` or more. `log returns`: the mean
     logarithm of a car's returns, as perception entropy takes it (Ma et al. 2021).
+
+    Parameters
+    ----------
+    others : sequence of PoseCriterion
+        More criteria of the survey's candidate poses.
     """
     targets = survey.site.targets
     seen = [one.deployment.seen_by > 0 for one in placements]
@@ -88,6 +95,14 @@ def criteria_of(
             (returns >= ENOUGH_RETURNS).mean(axis=1),
         ),
         Criterion("log_returns", "mean log of a car's returns", np.log1p(returns).mean(axis=1)),
+        *(
+            Criterion(
+                one.key,
+                one.name,
+                np.array([one.value(np.array([s.pose for s in placed.deployment.sensors])) for placed in placements]),
+            )
+            for one in others
+        ),
         Criterion(
             "test_vehicles_with_returns",
             f"test vehicles with {ENOUGH_RETURNS} returns (not beforehand)",
@@ -114,10 +129,3 @@ def _returns(
             row += known[key]
         rows.append(row)
     return np.array(rows)
-
-
-def _entropy(share: Float) -> Float:
-    """Return the entropy in bits of what is so likely, element by element."""
-    parts = [np.where(p > 0, p * np.log2(np.where(p > 0, p, 1.0)), 0.0) for p in (share, 1 - share)]
-    total: Float = -np.sum(parts, axis=0)
-    return total

@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 from headless.studies.coverage.cells import Cell, solve_cell
 from headless.studies.detection.sensor_configuration import SensorConfiguration
@@ -12,7 +13,7 @@ import numpy as np
 from seip_addon.core.arrays import Float, Integer
 from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
-from seip_addon.core.choosing.placement.problem import Placement, PlacementProblem
+from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, within
@@ -24,7 +25,7 @@ SWAPS_PER_PLACEMENT = 20  # draws from which those in between are taken
 
 NEAR = 0.05  # of the targets: how much less than the optimal placement one near it covers at most
 
-OPTIMAL, RANDOM, BETWEEN, OTHERWISE = "optimal", "random", "in between", "optimal by other weights"
+OPTIMAL, RANDOM, BETWEEN, OTHERWISE = "optimal", "random", "in between", "optimal by other criteria"
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class PlacementsStudySettings:
     learnt : int
         Placements whose clouds the detector learns from; none of them is evaluated.
     trainings : int
-        Each with a seed of its own.
+        Each with a seed of its own; with 0 the shipped detector is evaluated, and ``learnt`` is 0.
     steps : int
         Of each training.
     seed : int
@@ -66,7 +67,7 @@ class PlacementsStudySettings:
             raise SeipError(
                 f"{self.placements} placements say nothing of a correlation: ask for {MIN_PLACEMENTS} or more"
             )
-        if self.learnt < 1:
+        if self.learnt < 1 <= self.trainings:
             raise SeipError(f"the detector must learn from 1 placement or more, not {self.learnt}")
         if self.seed < 0:
             raise SeipError(f"the seed of the placements must be 0 or more, not {self.seed}")
@@ -83,7 +84,8 @@ class DrawnPlacements:
     evaluated : tuple of SensorConfiguration
         The optimal one first.
     kind : tuple of str
-        Of each: `OPTIMAL`, `RANDOM`, `BETWEEN`, or `OTHERWISE` for the optimal one of other weights of targets.
+        Of each: `OPTIMAL`, `RANDOM`, `BETWEEN`, or `OTHERWISE` for the best one by other weights of targets or by
+        another criterion.
     learnt : tuple of SensorConfiguration
         None of them is among the evaluated.
     """
@@ -94,11 +96,15 @@ class DrawnPlacements:
 
 
 def draw_placements(
-    survey: Survey, settings: PlacementsStudySettings, weights: Mapping[str, Float]
+    survey: Survey,
+    settings: PlacementsStudySettings,
+    weights: Mapping[str, Float],
+    best: Mapping[str, Integer] = MappingProxyType({}),
 ) -> Generator[Progress, None, DrawnPlacements]:
     """Draw placements of a survey's one type.
 
-    With the optimal placement go those of other weights: random placements alone do not show what weights are for.
+    The optimal placement is joined by those of other weights and by those that other criteria rate best: random
+    placements do not show what these are for.
     Half of the others are drawn uniformly from all feasible sets of poses. Most of these cover about the same; the rest
     are therefore the nearest to given steps of coverage, of many that differ in one sensor from the optimal or from the
     worst placement (greedily, each sensor adds least): half of the steps are even between the two, and half within
@@ -108,6 +114,8 @@ def draw_placements(
     ----------
     weights : mapping of str to (t,) float64
         Other weights of targets, by name.
+    best : mapping of str to (k,) int64
+        Poses that other criteria rate best, by name.
 
     Raises
     ------
@@ -119,18 +127,22 @@ def draw_placements(
     yield Progress(0, 2, f"place {count} × {sensor}", counted=False)
     case = yield from solve_cell(site, survey.models, visible, Cell(sensor, None, count, 1.0), survey.settings.limits)
     problem = placement_problem(site, visible, survey.models, Objective(count=count))
-    otherwise: dict[frozenset[int], tuple[str, Placement]] = {}
+    otherwise: dict[frozenset[int], _Found] = {}
     for name, weight in weights.items():
         progress = Progress(1, 2, f"place {count} × {sensor} for {name}", counted=False)
         yield progress
         placement = yield from within(progress, solve(replace(problem, weights=weight), survey.settings.limits))
         if set(placement.chosen.tolist()) != set(case.placement.chosen.tolist()):
-            otherwise.setdefault(frozenset(placement.chosen.tolist()), (name, placement))
+            found = _Found(name, placement.chosen, placement.status, placement.gap)
+            otherwise.setdefault(frozenset(placement.chosen.tolist()), found)
+    for name, poses in best.items():
+        if set(poses.tolist()) != set(case.placement.chosen.tolist()):
+            otherwise.setdefault(frozenset(poses.tolist()), _Found(name, poses))
     yield Progress(1, 2, "draw placements", counted=False)
     drawing = _Drawing(
         problem,
         count,
-        [case.placement.chosen, *(one.chosen for _, one in otherwise.values())],
+        [case.placement.chosen, *(one.chosen for one in otherwise.values())],
         np.random.default_rng(settings.seed),
     )
     random = drawing.random(settings.placements // 2)
@@ -149,14 +161,59 @@ def draw_placements(
     optimal = SensorConfiguration.of_case(case)
     others = [
         SensorConfiguration(
-            f"optimal for {name}", deploy(site, survey.models, visible, one.chosen), sensor, count, one.status, one.gap
+            f"optimal for {one.name}",
+            deploy(site, survey.models, visible, one.chosen),
+            sensor,
+            count,
+            one.status,
+            one.gap,
         )
-        for name, one in otherwise.values()
+        for one in otherwise.values()
     ]
     evaluated = (optimal, *configurations(RANDOM, random), *configurations(BETWEEN, between), *others)
     kind = (OPTIMAL, *[RANDOM] * len(random), *[BETWEEN] * len(between), *[OTHERWISE] * len(others))
     yield Progress(2, 2, "placements drawn", counted=False)
     return DrawnPlacements(evaluated, kind, configurations("learnt", learnt))
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """Poses that a criterion rates best, as in `Placement`."""
+
+    name: str
+    chosen: Integer
+    status: str = "feasible"
+    gap: float = np.inf
+
+
+def draw_from_pool(
+    problem: PlacementProblem, pool: Integer, best: Sequence[Integer], number: int, random: np.random.Generator
+) -> list[tuple[str, Integer]]:
+    """Draw placements of few poses, so that each pose is scanned once for many placements; return kind and poses.
+
+    Half are drawn uniformly from the sets of poses of a pool, the others spread as those of `draw_placements`, between
+    the greedily worst set of the pool and the first of the best ones.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Of a number of sensors where they cover most.
+    pool : (p,) int64
+        Candidates of which placements consist.
+    best : sequence of (k,) int64
+        Placements that are not drawn again, the one with the largest coverage first.
+
+    Raises
+    ------
+    SeipError
+        The pool has not so many.
+    """
+    assert problem.count is not None  # noqa: S101  # placements of one number of sensors are drawn
+    allowed = np.isin(np.arange(len(problem.positions)), np.concatenate([pool, *best]))
+    drawing = _Drawing(replace(problem, forbidden=~(problem.allowed & allowed)), problem.count, best, random)
+    uniform = drawing.random((number + 1) // 2)
+    between = drawing.between(number - len(uniform))
+    return [(RANDOM, poses) for poses in uniform] + [(BETWEEN, poses) for poses in between]
 
 
 class _Drawing:

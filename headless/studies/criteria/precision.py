@@ -1,7 +1,7 @@
 """Average precision of one detector with each of several placements, on the same test runs."""
 
-from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
@@ -14,8 +14,9 @@ from headless.detection.average_precision import (
     part,
 )
 from headless.detection.detector import Detector
+from headless.detection.frame_results import FrameResult
 from headless.detection.recordings import SampledRun, Simulator
-from headless.detection.rules import MAIN_RULE
+from headless.detection.rules import MAIN_RULE, RULES, precision_by
 from headless.detection.run_detection import AT_ONCE, detect_in_runs
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import deterministic
@@ -37,6 +38,8 @@ TRAFFIC_SEED, TRAINING_SEED, PLACEMENT_SEED = 0, 1, 2  # of resamples: draws of 
 RESAMPLES_AT_ONCE = 100  # as many as stay within a few hundred megabytes
 MAX_HALVES = 20  # ways to cut the test runs into halves that are tried
 FOLDER = "detections"  # of the folder of results: what was detected with each placement
+CLASSES = {"vehicles": "bev_0.7", "two-wheelers": "motorcycle_bicycle_0.5", "pedestrians": "pedestrian_0.5"}
+"""Rules of average precision for each class of road users; the first is the study's own."""
 ENOUGH_RETURNS = 10  # from a road user, to be counted as seen well
 
 
@@ -50,10 +53,13 @@ class Precisions:
         Name of the run of each frame.
     evaluations : tuple of tuple of Evaluation
         Of each placement, by each training.
+    of_classes : mapping of str to (n,) float64
+        Average precision of each placement by the rules of `CLASSES`, the mean over the trainings.
     """
 
     runs: Text
     evaluations: tuple[tuple[Evaluation, ...], ...]
+    of_classes: Mapping[str, Float] = field(default_factory=dict)
 
     @property
     def trainings(self) -> int:
@@ -177,9 +183,13 @@ def precisions(
     """
     works = [_evaluated(simulator, placement, detectors, traffic.test, folder / FOLDER) for placement in placements]
     with deterministic(1):  # all the time, as torch keeps one such setting for all threads
-        evaluations = yield from side_by_side(works, AT_ONCE)
+        results = yield from side_by_side(works, AT_ONCE)
     runs: Text = np.repeat([run.name for run in traffic.test], [len(run.times) for run in traffic.test])
-    return Precisions(runs, tuple(evaluations))
+    of_classes: dict[str, Float] = {
+        name: np.array([np.mean([precision_by(frames, RULES[rule]).value for frames in own]) for own in results])
+        for name, rule in CLASSES.items()
+    }
+    return Precisions(runs, tuple(tuple(evaluate(frames, MAIN_RULE) for frames in own) for own in results), of_classes)
 
 
 def _evaluated(
@@ -188,7 +198,7 @@ def _evaluated(
     detectors: Sequence[Detector],
     runs: Sequence[SampledRun],
     store: Path,
-) -> Generator[Progress, None, tuple[Evaluation, ...]]:
+) -> Generator[Progress, None, tuple[list[FrameResult], ...]]:
     scene = digest(source_digest(detect_in_runs.__module__), simulator.key(placement, runs))
     paths = [store / f"{digest(scene, detector.key)[:32]}.npz" for detector in detectors]
     missing = [number for number, path in enumerate(paths) if not path.exists()]
@@ -196,4 +206,4 @@ def _evaluated(
         found = yield from detect_in_runs(simulator, placement, runs, [detectors[number] for number in missing], 1)
         for number, frames in zip(missing, found, strict=True):
             save_frames(paths[number], frames)
-    return tuple(evaluate(load_frames(path), MAIN_RULE) for path in paths)
+    return tuple(load_frames(path) for path in paths)

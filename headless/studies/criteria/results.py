@@ -193,6 +193,9 @@ def _row(study: PlacementsStudy, number: int) -> dict[str, str]:
         "ap_low": low,
         "ap_high": high,
         **{f"ap_{seed}": f"{own[number]:.4f}" for seed, own in enumerate(study.precise.by_training, start=1)},
+        **{
+            f"ap_{name.replace('-', '_')}": f"{values[number]:.4f}" for name, values in study.precise.of_classes.items()
+        },
         **{one.key: f"{one.values[number]:.4f}" for one in study.criteria},
     }
 
@@ -222,6 +225,7 @@ def _record(
                 "average_precision": float(study.precise.values[number]),
                 "interval": study.precise.interval(number),
                 "by_training": study.precise.by_training[:, number].tolist(),
+                "of_classes": {name: _finite(values[number]) for name, values in study.precise.of_classes.items()},
                 "criteria": {one.key: float(one.values[number]) for one in study.criteria},
             }
             for number, placement in enumerate(study.drawn.evaluated)
@@ -257,10 +261,14 @@ def _record(
     }
 
 
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
 def _estimate(estimate: IntervalEstimate) -> dict[str, Any]:
     value, low, high = estimate.value, estimate.low, estimate.high
     return {
-        "value": value if math.isfinite(value) else None,
+        "value": _finite(value),
         "interval": [low, high] if math.isfinite(high - low) else None,
     }
 

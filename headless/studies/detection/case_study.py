@@ -36,6 +36,7 @@ from .kitti_precision import Kitti, kitti
 
 MIN_RUNS = 4  # one to learn from, one for validation, two for tests
 RUNS_PER_TEST, RUNS_PER_VALIDATION = 2, 8  # of all runs one half is for tests, and one eighth for validation
+RUNS_PER_CRITERIA = 4  # without training one quarter is for criteria that go by traffic, the others for tests
 
 SPLIT = "the last half for tests, an eighth before it (one at least) for validation, the others to learn from"
 """How runs are split, in words."""
@@ -97,6 +98,34 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
         There are too few, or one is too short.
     """
     return Traffic(*split_sampled(paths, origin, every))
+
+
+def read_untrained_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
+    """Read runs for a detector that has learnt from none of them: the first quarter for criteria, the rest for tests.
+
+    Criteria that go by traffic must not know that of tests. Parameters are those of `read_traffic`.
+
+    Raises
+    ------
+    SeipError
+        There are too few, or one is too short.
+    """
+    known, tests = split_untrained(sampled_runs(paths, origin, every))
+    return Traffic(known, (), tuple(replace(run, times=run.times[::TEST_STRIDE]) for run in tests))
+
+
+def split_untrained(runs: Sequence[SampledRun]) -> tuple[tuple[SampledRun, ...], tuple[SampledRun, ...]]:
+    """Return the first quarter of some runs (one at least), and the others.
+
+    Raises
+    ------
+    SeipError
+        There are too few.
+    """
+    if len(runs) < MIN_RUNS:
+        raise SeipError(f"{len(runs)} runs of traffic are too few: make {MIN_RUNS} or more with headless/traffic.py")
+    known = max(1, len(runs) // RUNS_PER_CRITERIA)
+    return tuple(runs[:known]), tuple(runs[known:])
 
 
 def split_sampled(paths: Sequence[Path], origin: Float, every: float) -> tuple[tuple[SampledRun, ...], ...]:

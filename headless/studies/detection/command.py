@@ -18,11 +18,12 @@ from headless.detection.settings import FINE_TUNING, NetworkSettings, TrainingSe
 from headless.options import add_rolling_shutter, new_parser, real_number, whole_number
 from headless.studies.claims import save_claims
 from headless.studies.coverage.cells import COUNTS
-from headless.studies.criteria.criteria import criteria_of, weights_of_targets
+from headless.studies.criteria.criteria import WEIGHTED, criteria_of, weights_of_targets
 from headless.studies.criteria.drawing import PlacementsStudySettings, draw_placements
 from headless.studies.criteria.occupancy import require_vehicles
 from headless.studies.criteria.precision import detectors_of, learnt_clouds, precisions
 from headless.studies.criteria.results import PlacementsStudy, save_study
+from headless.studies.criteria.site_criteria import best_of, problem_of, site_criteria
 from headless.studies.detection import case_study
 from headless.studies.detection import results as study_results
 from headless.studies.detection.claims import detection_claims
@@ -40,17 +41,17 @@ from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.source import require_own_traffic
 from seip_addon.core.workflows.survey import Survey
 
-STEPS, TRAININGS = Limits(1, 10_000_000), Limits(1, 1_000)
+STEPS, TRAININGS = Limits(1, 10_000_000), Limits(0, 1_000)
 
 
 def main(argv: list[str]) -> None:
     """Place, simulate, train, evaluate, and write charts and tables to a folder."""
     options = _parser().parse_args(argv)
-    if options.trainings < 1:
-        raise SeipError(f"ask for one training or more, not {options.trainings}")
     if options.placements is not None:
         _evaluate_placements(options)
         return
+    if options.trainings < 1:
+        raise SeipError(f"ask for one training or more, not {options.trainings}; only --placements needs none")
     study = prepare_study(options)
     watch, simulator, folder = study.stopwatch, study.simulator, options.output
     network = NetworkSettings()
@@ -102,25 +103,33 @@ def _evaluate_placements(options: argparse.Namespace) -> None:
     settings = PlacementsStudySettings(
         placements=options.placements,
         count=options.count,
-        learnt=options.learnt_placements,
+        learnt=options.learnt_placements if options.trainings else 0,
         trainings=options.trainings,
         steps=training.steps,
         seed=options.placement_seed,
     )
     settings.check(options.sensor)
-    site = prepare_site(options, settings.count)
+    site = prepare_site(options, settings.count, trained=options.trainings > 0)
     watch, folder = site.stopwatch, options.output
     require_vehicles(site.traffic, site.surveyed.site)
-    drawn = watch.run(
-        "placements", draw_placements(site.surveyed, settings, weights_of_targets(site.surveyed, site.traffic))
-    )
+    known = watch.run("criteria of poses", site_criteria(site.surveyed, site.traffic.training))
+    others = [one for one in known if one.key not in {"coverage", *WEIGHTED.values()}]
+    problem = problem_of(site.surveyed, settings.count)
+    best = {one.name: watch.run("placements", best_of(one, site.surveyed, problem)) for one in others}
+    weights = weights_of_targets(site.surveyed, site.traffic)
+    drawn = watch.run("placements", draw_placements(site.surveyed, settings, weights, best))
     simulator = site.simulator
-    models = detectors_of(drawn, settings, training, start)
-    training_set = watch.run("simulation", learnt_clouds(simulator, drawn, site.traffic))
-    trained = watch.run("training", case_study.train_all(models, training_set, folder, device=options.device))
-    detectors = [one.detector for one in trained]
+    if options.trainings:
+        models = detectors_of(drawn, settings, training, start)
+        training_set = watch.run("simulation", learnt_clouds(simulator, drawn, site.traffic))
+        trained = watch.run("training", case_study.train_all(models, training_set, folder, device=options.device))
+        detectors = [one.detector for one in trained]
+    else:
+        detectors = [Detector.load(SHIPPED_DETECTOR, options.device)]
     precise = watch.run("evaluation", precisions(simulator, drawn.evaluated, detectors, site.traffic, folder))
-    judged = watch.run("criteria", criteria_of(site.surveyed, simulator, drawn.evaluated, site.traffic, precise))
+    judged = watch.run(
+        "criteria", criteria_of(site.surveyed, simulator, drawn.evaluated, site.traffic, precise, others)
+    )
     study = PlacementsStudy(site.surveyed.site.name, settings, options.sensor[0], drawn, precise, judged)
     with runtime.incomplete_if_interrupted(folder):
         asked = site.surveyed.settings.as_record() | {"frames_every_s": options.every}
@@ -172,15 +181,22 @@ def prepare_study(options: argparse.Namespace) -> DetectionStudy:
     return DetectionStudy(**vars(site), configurations=configurations)
 
 
-def prepare_site(options: argparse.Namespace, count: int) -> DetectionSite:
-    """Survey a scene that can carry so many sensors, and read its traffic."""
+def prepare_site(options: argparse.Namespace, count: int, *, trained: bool = True) -> DetectionSite:
+    """Survey a scene that can carry so many sensors, and read its traffic.
+
+    Parameters
+    ----------
+    trained : bool
+        Whether detectors are to be trained on some of the traffic.
+    """
     check_device(options.device)
     check_every(options.every)
     surveyed, watch = survey.survey(
         options, lambda layout: check_objective(layout.site, layout.models, Objective(count=count))
     )
     paths = options.traffic or survey.runs_beside(options.scene)
-    traffic = case_study.read_traffic(paths, surveyed.geometry.origin, options.every)
+    read = case_study.read_traffic if trained else case_study.read_untrained_traffic
+    traffic = read(paths, surveyed.geometry.origin, options.every)
     runs = [run for runs in vars(traffic).values() for run in runs]
     check_runs([run.trajectories for run in runs], surveyed.site.region)
     for run in runs:
@@ -237,7 +253,11 @@ def _parser() -> argparse.ArgumentParser:
     parser = new_parser("study detection", what)
     add_options(parser)
     parser.add_argument(
-        "--trainings", type=whole_number(TRAININGS), default=3, metavar="N", help="each with a seed of its own"
+        "--trainings",
+        type=whole_number(TRAININGS),
+        default=3,
+        metavar="N",
+        help="each with a seed of its own; 0 with --placements: evaluate with the detector that ships",
     )
     parser.add_argument(
         "--from-scratch",

@@ -62,7 +62,7 @@ def test_tables_hold_every_placement(study):
     rows = list(csv.DictReader((study / "placements.csv").read_text(encoding="utf-8").splitlines()))
     kinds = [row["kind"] for row in rows]
     assert kinds[:5] == ["optimal", "random", "random", "in between", "in between"]
-    assert set(kinds[5:]) <= {"optimal by other weights"}
+    assert set(kinds[5:]) <= {"optimal by other criteria"}
     assert float(rows[0]["coverage"]) == max(float(row["coverage"]) for row in rows)
     record = json.loads((study / "placements.json").read_text(encoding="utf-8"))
     assert record["schema"] == "seip-placements-study/1"
@@ -73,6 +73,28 @@ def test_tables_hold_every_placement(study):
     assert not any(set(learnt) in evaluated for learnt in record["learnt_placements"])
     assert record["criteria"][0]["key"] == "coverage"
     assert record["sentences"][-1].startswith("nothing follows from this")
+
+
+def test_without_training_the_shipped_detector_is_evaluated(run, tmp_path):
+    """On all runs but the first quarter, with the placements that other criteria rate best next to the drawn ones."""
+    run(tmp_path, "--sensor", "type1", "--placements", "5", "--count", "2", "--trainings", "0", "--effort", "1")
+    record = json.loads((tmp_path / "placements.json").read_text(encoding="utf-8"))
+    assert not list(tmp_path.glob("detector-*"))
+    assert record["learnt_placements"] == []
+    known, tests = (len(record["traffic"][what]) for what in ("training", "test"))
+    assert known == (known + tests) // 4
+    placed = record["placements"]
+    values = {one["key"]: [own["criteria"][one["key"]] for own in placed] for one in record["criteria"]}
+    assert {"coverage", "occupancy_entropy", "returns", "egvs", "inspe", "pe_vgop"} <= set(values)
+    best = [number for number, own in enumerate(placed) if own["kind"].startswith("optimal")]
+    for key in ("coverage", "returns"):
+        assert max(values[key][number] for number in best) >= max(values[key]) - 1e-6, key
+    assert set(placed[0]["of_classes"]) == {"vehicles", "two-wheelers", "pedestrians"}
+
+
+def test_training_is_needed_without_drawn_placements(run, tmp_path):
+    with pytest.raises(SeipError, match="ask for one training or more, not 0"):
+        run(tmp_path, "--trainings", "0")
 
 
 def test_charts_are_drawn(study):

@@ -22,7 +22,9 @@ from headless.studies.criteria.drawing import (
 )
 from headless.studies.criteria.kept_frames import load_frames, save_frames
 from headless.studies.criteria.occupancy import require_vehicles, vehicle_occupancy
+from headless.studies.criteria.pose_criteria import SeenShare
 from headless.studies.criteria.precision import Precisions
+from headless.studies.criteria.site_criteria import best_of, problem_of
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 
 import numpy as np
@@ -104,6 +106,20 @@ def test_the_optimal_placements_of_other_weights_are_evaluated_as_well(survey):
         if positions[a] != positions[b]
     )
     assert (drawn.evaluated[-1].deployment.seen_by > 0) @ central == best
+
+
+@pytest.mark.parametrize("key", ["coverage", "occupancy_entropy"])
+def test_what_coverage_rates_best_is_proven_optimal(survey, key):
+    """Of all pairs: a greedy choice would be another, worse one."""
+    visible, weight = survey.grid.visible, np.ones(len(survey.site.targets))
+    criterion = SeenShare(key, key, visible, weight)
+    problem = problem_of(survey, 2)
+    found = finish(best_of(criterion, survey, problem))
+    position = survey.site.candidates.position_of
+    best = max(
+        (visible[a] | visible[b]).mean() for a in range(len(visible)) for b in range(a) if position[a] != position[b]
+    )
+    assert criterion.value(found) == pytest.approx(best)
 
 
 def test_a_seed_draws_the_same_and_another_others(survey):

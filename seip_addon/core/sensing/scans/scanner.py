@@ -7,6 +7,7 @@ its bounding box. A ray ends at the nearest of what it meets.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -194,6 +195,12 @@ class Scanner:
         self.delay = sensor.model.delay(np.arange(sensor.model.channels * sensor.model.azimuth_count))
         self._model = sensor.model
         self._cast_at_ground()
+
+    def for_other_traffic(self) -> Scanner:
+        """Return a scanner of the same sensor that shares what was cast at the static scene, not at road users."""
+        other = copy(self)
+        other._still_hits = {}  # noqa: SLF001  # its own kind
+        return other
 
     def aim(self, time: float) -> None:
         """Turn the rays to where they are in the frame that begins at a time in seconds; only a rosette's move."""

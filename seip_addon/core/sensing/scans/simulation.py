@@ -76,6 +76,15 @@ class Simulation:
         self._static, self._trajectories, self._shapes, self._settings = static, trajectories, shapes, settings
         self._revolution = max(1.0 / scanner.sensor.model.rotation_rate for scanner in scanners)
 
+    def part(self, sensors: Sequence[int]) -> Simulation:
+        """Return the simulation of some of the sensors, by their numbers, which shares their scanners.
+
+        Its `measure` makes the same frames of the sensors' scans as a simulation of these sensors alone: noise and
+        losses follow from the place of a sensor in the part.
+        """
+        scanners = [self.scanners[number] for number in sensors]
+        return Simulation(self._static, scanners, self._trajectories, self._shapes, self._settings)
+
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings about the scans."""
@@ -209,9 +218,7 @@ def prepare(
         raise SeipError("there is no sensor to scan with: place some first, with headless/place.py")
     if settings.seed < 0:
         raise SeipError(f"the seed must be a whole number from 0, not {settings.seed}")
-    distinct = {id(body.triangles): body.triangles for body in bodies}
-    trees = {key: make_ray_caster(triangles, settings.engine) for key, triangles in distinct.items()}
-    shapes = [BodySurface(trees[id(body.triangles)], body.reflectivity) for body in bodies]
+    shapes = body_surfaces(bodies, settings.engine)
     ground = ReflectiveSurface(make_ray_caster(static.triangles, settings.engine), static.reflectivity)
     scanners = []
     for number, sensor in enumerate(sensors):
@@ -219,6 +226,13 @@ def prepare(
         scanners.append(Scanner(sensor, ground, settings.seed))
     yield Progress(len(sensors), len(sensors), "what stands still")
     return Simulation(static, scanners, trajectories, shapes, settings)
+
+
+def body_surfaces(bodies: Sequence[Body], engine: Engine) -> list[BodySurface]:
+    """Return the surfaces of road users' bodies; those who share an array of triangles share its tree."""
+    distinct = {id(body.triangles): body.triangles for body in bodies}
+    trees = {key: make_ray_caster(triangles, engine) for key, triangles in distinct.items()}
+    return [BodySurface(trees[id(body.triangles)], body.reflectivity) for body in bodies]
 
 
 def frame_times(

@@ -1,0 +1,316 @@
+"""The table of criteria over sites, sensor types and counts: how well each predicts detection, and what it gains."""
+
+import math
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from headless.detection.average_precision import Evaluation, average_precisions_without_each_run, evaluate
+from headless.detection.detector import Detector
+from headless.detection.frame_results import FrameResult
+from headless.detection.recordings import SampledRun, Simulator
+from headless.detection.rules import RULES, precision_by
+from headless.studies.detection.sensor_configuration import SensorConfiguration
+
+import numpy as np
+
+from seip_addon.core.arrays import Integer, Text
+from seip_addon.core.choosing.placement.deployment import deploy
+from seip_addon.core.errors import SeipError
+from seip_addon.core.estimates import IntervalEstimate, jackknife_reach, share_interval
+from seip_addon.core.progress import Progress
+from seip_addon.core.workflows.survey import Survey
+
+from .agreement import correlate
+from .criteria import Criterion
+from .drawing import MIN_PLACEMENTS, draw_from_pool
+from .pose_criteria import PoseCriterion
+from .precision import CLASSES, Precisions
+from .shared_scans import SharedScans, detect_with_all
+from .site_criteria import CRITERIA, best_of, problem_of, site_criteria
+
+POOL = 18  # poses of which placements of several sensors are drawn, next to those that criteria like best
+BEST = "best by "  # kind of a placement, before the names of the criteria that like it best
+
+
+@dataclass(frozen=True)
+class CriteriaStudySettings:
+    """Settings of a table of criteria.
+
+    Parameters
+    ----------
+    counts : tuple of int
+        Numbers of sensors.
+    placements : int
+        Drawn ones per count, next to those that criteria rate best; with 0 only these are evaluated.
+    criteria : tuple of str
+        Keys of `CRITERIA`; coverage is always among them.
+    seed : int
+        Of what is drawn.
+    """
+
+    counts: tuple[int, ...]
+    placements: int
+    criteria: tuple[str, ...] = CRITERIA
+    seed: int = 0
+
+    def check(self) -> None:
+        """Raise SeipError where there are too few placements."""
+        if 0 < self.placements < MIN_PLACEMENTS:
+            raise SeipError(
+                f"{self.placements} placements say nothing of a correlation: ask for {MIN_PLACEMENTS} or more, or "
+                "for 0 to evaluate only those that criteria rate best"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class CountedPlacements:
+    """Placements of one number of sensors; n of them.
+
+    Parameters
+    ----------
+    count : int
+    kind : tuple of str
+        Of each.
+    poses : tuple of (k,) int64
+    configurations : tuple of SensorConfiguration
+    best : dict of str to int
+        Index of the placement that each criterion likes best of all candidates, by the criterion's key.
+    """
+
+    count: int
+    kind: tuple[str, ...]
+    poses: tuple[Integer, ...]
+    configurations: tuple[SensorConfiguration, ...]
+    best: dict[str, int]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A criterion in one cell of the table, for one class of road users.
+
+    Parameters
+    ----------
+    spearman : IntervalEstimate
+        Of the criterion and average precision over the placements; NaN for fewer than `MIN_PLACEMENTS`.
+    precision : IntervalEstimate
+        Average precision of the placement that the criterion likes best of all candidates.
+    gain : IntervalEstimate
+        That less the average precision of the optimal placement by coverage, on the same traffic.
+    """
+
+    site: str
+    sensor: str
+    count: int
+    criterion: str
+    road_users: str
+    placements: int
+    spearman: IntervalEstimate
+    precision: IntervalEstimate
+    gain: IntervalEstimate
+
+
+def choose_placements(
+    survey: Survey, criteria: Sequence[PoseCriterion], settings: CriteriaStudySettings
+) -> Generator[Progress, None, tuple[CountedPlacements, ...]]:
+    """Choose the placements of each count: what each criterion likes best of all candidates, and others at random.
+
+    Those of several sensors are drawn from `POOL` random poses and the best ones, so that poses are shared.
+    """
+    random = np.random.default_rng(settings.seed)
+    shuffled = random.permutation(np.flatnonzero(problem_of(survey, 1).allowed))
+    found = []
+    for count in settings.counts:
+        problem = problem_of(survey, count)
+        best: dict[str, frozenset[int]] = {}
+        for criterion in criteria:
+            poses = yield from best_of(criterion, survey, problem)
+            best[criterion.key] = frozenset(poses.tolist())
+        sets = list(dict.fromkeys(best.values()))
+        chosen = [np.array(sorted(one)) for one in sets]
+        names = [BEST + ", ".join(one.name for one in criteria if best[one.key] == some) for some in sets]
+        pool = shuffled[: POOL if count > 1 else settings.placements + len(sets)]
+        drawn = draw_from_pool(problem, pool, chosen, settings.placements, random) if settings.placements else []
+        kinds, poses_of = (*names, *(kind for kind, _ in drawn)), (*chosen, *(poses for _, poses in drawn))
+        configurations = tuple(
+            SensorConfiguration(
+                f"{kind} {number}",
+                deploy(survey.site, survey.models, survey.grid.visible, poses),
+                next(iter(survey.models)),
+                count,
+                kind,
+                math.inf,
+            )
+            for number, (kind, poses) in enumerate(zip(kinds, poses_of, strict=True), start=1)
+        )
+        found.append(
+            CountedPlacements(
+                count, kinds, poses_of, configurations, {key: sets.index(some) for key, some in best.items()}
+            )
+        )
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class StudiedType:
+    """What was found of one sensor type on one site.
+
+    Parameters
+    ----------
+    frames : tuple of tuple of list of FrameResult
+        Of each count, of each placement.
+    """
+
+    site: str
+    sensor: str
+    criteria: tuple[PoseCriterion, ...]
+    placed: tuple[CountedPlacements, ...]
+    frames: tuple[tuple[list[FrameResult], ...], ...]
+
+    @cached_property
+    def evaluations(self) -> tuple[dict[str, list[Evaluation]], ...]:
+        """Evaluations of all placements by class of road users, count by count, for classes that the traffic has."""
+        some = self.frames[0][0]
+        rules = {name: RULES[rule] for name, rule in CLASSES.items() if precision_by(some, RULES[rule]).road_users}
+        return tuple(
+            {name: [evaluate(own, rule) for own in frames] for name, rule in rules.items()} for frames in self.frames
+        )
+
+    def rows(self) -> Iterator[Row]:
+        """Yield the rows of the table, count by count."""
+        for placed, evaluated in zip(self.placed, self.evaluations, strict=True):
+            yield from self._rows_of(placed, evaluated)
+
+    def _rows_of(self, placed: CountedPlacements, evaluated: Mapping[str, list[Evaluation]]) -> Iterator[Row]:
+        runs: Text = np.array([frame.run for frame in self.frames[0][0]])
+        for road_users, evaluations in evaluated.items():
+            precise = Precisions(runs, tuple((one,) for one in evaluations))
+            reference = evaluations[placed.best[self.criteria[0].key]]
+            for criterion in self.criteria:
+                values = np.array([criterion.value(poses) for poses in placed.poses])
+                best = evaluations[placed.best[criterion.key]]
+                yield Row(
+                    self.site,
+                    self.sensor,
+                    placed.count,
+                    criterion.name,
+                    road_users,
+                    len(values),
+                    _spearman(Criterion(criterion.key, criterion.name, values), precise),
+                    precision_of(best),
+                    difference_of(best, reference),
+                )
+
+    def placements(self) -> Iterator[dict[str, Any]]:
+        """Yield the placements with their figures, for the record."""
+        for placed, evaluated in zip(self.placed, self.evaluations, strict=True):
+            for number, (kind, poses) in enumerate(zip(placed.kind, placed.poses, strict=True)):
+                yield {
+                    "count": placed.count,
+                    "kind": kind,
+                    "poses": poses.tolist(),
+                    "criteria": {one.key: one.value(poses) for one in self.criteria},
+                    "average_precision": {
+                        name: evaluations[number].average_precision for name, evaluations in evaluated.items()
+                    },
+                }
+
+
+def study_type(
+    survey: Survey,
+    simulator: Simulator,
+    runs: tuple[Sequence[SampledRun], Sequence[SampledRun]],
+    detector: Detector,
+    settings: CriteriaStudySettings,
+    folder: Path,
+) -> Generator[Progress, None, StudiedType]:
+    """Compute criteria, choose placements and detect with them, for the one sensor type of a survey.
+
+    Parameters
+    ----------
+    runs : two sequences of SampledRun
+        Those that criteria go by, and those of tests.
+    folder : path
+        What was detected is kept in it.
+    """
+    known, tests = runs
+    criteria = yield from site_criteria(survey, known, settings.criteria)
+    placed = yield from choose_placements(survey, criteria, settings)
+    everything = [one for some in placed for one in some.configurations]
+    shared = SharedScans(simulator, everything)
+    found = iter((yield from detect_with_all(shared, simulator, tests, detector, folder)))
+    frames = tuple(tuple(next(found) for _ in some.configurations) for some in placed)
+    return StudiedType(survey.site.name, next(iter(survey.models)), criteria, placed, frames)
+
+
+def _spearman(criterion: Criterion, precise: Precisions) -> IntervalEstimate:
+    """Return the rank correlation, NaN for fewer than `MIN_PLACEMENTS`: so few say nothing of it."""
+    few = len(criterion.values) < MIN_PLACEMENTS
+    return IntervalEstimate(math.nan, -math.inf, math.inf) if few else correlate(criterion, precise).spearman
+
+
+def precision_of(evaluation: Evaluation) -> IntervalEstimate:
+    """Return an average precision with its interval over traffic: a jackknife over runs, on the scale of log odds."""
+    value, left_out = evaluation.average_precision, average_precisions_without_each_run(evaluation)
+    if left_out is None:
+        return IntervalEstimate(value, -math.inf, math.inf)
+    return IntervalEstimate(value, *share_interval(value, left_out, len(evaluation.wanted)))
+
+
+def difference_of(one: Evaluation, other: Evaluation) -> IntervalEstimate:
+    """Return by how much an average precision exceeds another on the same traffic: a jackknife over the same runs."""
+    value = one.average_precision - other.average_precision
+    these, those = average_precisions_without_each_run(one), average_precisions_without_each_run(other)
+    if these is None or those is None:
+        return IntervalEstimate(value, -math.inf, math.inf)
+    reach = jackknife_reach(these - those)
+    return IntervalEstimate(value, value - reach, value + reach)
+
+
+def record_of(rows: Sequence[Mapping[str, Any]]) -> list[list[object]]:
+    """Return the cells of a CSV table of rows as `row_record` returns them."""
+    return [
+        [f"{value:.4f}" if isinstance(value, float) else "" if value is None else value for value in row.values()]
+        for row in rows
+    ]
+
+
+def row_record(row: Row) -> dict[str, Any]:
+    """Return a row as plain values, None for an open end of an interval."""
+    record: dict[str, Any] = {}
+    for name, value in vars(row).items():
+        if not isinstance(value, IntervalEstimate):
+            record[name] = value
+            continue
+        record |= {
+            name if part == "value" else f"{name}_{part}": number if math.isfinite(number) else None
+            for part, number in asdict(value).items()
+        }
+    return record
+
+
+def table_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield the lines of a compact table: one for each criterion in each cell, with all classes."""
+    heads = [f"{name}: Spearman, gain in points" for name in dict.fromkeys(row["road_users"] for row in rows)]
+    yield f"{'site, sensors, criterion':48} " + " ".join(f"{head:>42}" for head in heads)
+    cells = dict.fromkeys((row["site"], row["sensor"], row["count"], row["criterion"]) for row in rows)
+    for cell in cells:
+        own = [row for row in rows if (row["site"], row["sensor"], row["count"], row["criterion"]) == cell]
+        site, sensor, count, criterion = cell
+        name = f"{site[:20]}, {count} × {sensor}, {criterion}"
+        yield f"{name:48} " + " ".join(f"{_figures(row):>42}" for row in own)
+
+
+def _figures(row: Mapping[str, Any]) -> str:
+    gain = _interval(row, "gain", 100.0, "+.1f")
+    return f"{_interval(row, 'spearman', 1.0, '+.2f')}, {gain}"
+
+
+def _interval(row: Mapping[str, Any], name: str, scale: float, form: str) -> str:
+    value, low, high = (row[f"{name}{end}"] for end in ("", "_low", "_high"))
+    if value is None:
+        return "none"
+    between = "" if low is None or high is None else f" [{scale * low:{form}}, {scale * high:{form}}]"
+    return f"{scale * value:{form}}{between}"

@@ -1,0 +1,121 @@
+"""The command that compares criteria over sites, types and counts."""
+
+import csv
+import json
+
+import pytest
+
+pytest.importorskip("torch", reason="torch is not installed: make detection")
+
+from headless.detection.average_precision import evaluate
+from headless.detection.matching import Rule
+from headless.studies.criteria import command as criteria_study
+from headless.studies.criteria import shared_scans
+from headless.studies.criteria.criteria_table import difference_of, precision_of
+
+import numpy as np
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.estimates import student_quantile
+from tests.builders.labelled_frames import box, detected, frame, truth
+
+OPTIONS = ["--sensor", "type1", "--count", "1", "2", "--placements", "4", "--every", "30", "--effort", "1"]
+COARSE = ["--heights", "4", "5.4", "--grid", "8", "--spacing", "10"]
+CARS = [box(20.0 * number) for number in range(10)]
+
+
+@pytest.fixture(scope="module")
+def study(small_scene, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("criteria")
+    criteria_study.main([str(small_scene), "-o", str(folder), *COARSE, *OPTIONS])
+    return folder
+
+
+def test_table_holds_every_cell_criterion_and_class(study):
+    rows = list(csv.DictReader((study / "criteria.csv").read_text(encoding="utf-8").splitlines()))
+    criteria = ["coverage", "returns", "S-MIG", "EGVS", "InSPE", "PE-VGOP"]
+    classes = ["vehicles"]  # there are no other road users in this traffic
+    cells = [(row["count"], row["road_users"], row["criterion"]) for row in rows]
+    assert cells == [(count, name, one) for count in "12" for name in classes for one in criteria]
+    assert all(float(row["gain"]) == 0 for row in rows if row["criterion"] == "coverage")
+    record = json.loads((study / "criteria.json").read_text(encoding="utf-8"))
+    assert record["schema"] == "seip-criteria-study/1"
+    (studied,) = record["types"]
+    for count in (1, 2):
+        placed = [one for one in studied["placements"] if one["count"] == count]
+        sets = [frozenset(one["poses"]) for one in placed]
+        assert len(set(sets)) == len(sets)
+        best = [one for one in placed if one["kind"].startswith("best by")]
+        assert len(placed) == len(best) + 4
+        for key, name in (("coverage", "coverage"), ("returns", "returns"), ("occupancy_entropy", "S-MIG")):
+            (own,) = [one for one in best if name in one["kind"].removeprefix("best by ").split(", ")]
+            assert own["criteria"][key] == pytest.approx(max(one["criteria"][key] for one in placed), abs=1e-6)
+
+
+def test_a_finished_study_is_read_and_a_stopped_one_goes_on(study, small_scene, capsys, monkeypatch):
+    before = (study / "criteria.json").read_bytes()
+
+    def refuse(*_):
+        raise AssertionError("detected again")
+
+    monkeypatch.setattr(shared_scans, "_detected", refuse)
+    criteria_study.main([str(small_scene), "-o", str(study), *COARSE, *OPTIONS])
+    assert (study / "criteria.json").read_bytes() == before
+    (study / small_scene.stem / "type1" / "criteria.json").unlink()
+    criteria_study.main([str(small_scene), "-o", str(study), *COARSE, *OPTIONS])
+    then = json.loads((study / "criteria.json").read_text(encoding="utf-8"))["types"][0]
+    assert then["rows"] == json.loads(before)["types"][0]["rows"]
+    assert "2 × type1, PE-VGOP" in capsys.readouterr().out
+
+
+def test_best_placements_can_be_evaluated_alone(small_scene, tmp_path):
+    """Two criteria have two placements at most, which have no rank correlation."""
+    few = ["--placements", "0", "--criterion", "returns", "--count", "1"]
+    criteria_study.main([str(small_scene), "-o", str(tmp_path), *COARSE, *OPTIONS, *few])
+    (studied,) = json.loads((tmp_path / "criteria.json").read_text(encoding="utf-8"))["types"]
+    assert [row["criterion"] for row in studied["rows"]] == ["coverage", "returns"]
+    assert all(one["kind"].startswith("best by") for one in studied["placements"])
+    assert [row["spearman"] for row in studied["rows"]] == [None, None]
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--placements", "3"), "3 placements say nothing of a correlation"),
+        (("--count", "30"), "asked for 30 sensors, but there are"),
+    ],
+)
+def test_what_cannot_be_studied_gets_a_sentence(small_scene, tmp_path, options, sentence):
+    with pytest.raises(SeipError, match=sentence):
+        criteria_study.main([str(small_scene), "-o", str(tmp_path), *COARSE, *OPTIONS, *options])
+
+
+def test_scenes_of_one_name_are_refused(small_scene, tmp_path):
+    with pytest.raises(SeipError, match="two scenes have files of one name"):
+        criteria_study.main([str(small_scene), str(tmp_path / small_scene.name), "-o", str(tmp_path), *OPTIONS])
+
+
+def found(counts):
+    """Runs of a frame each with ten cars, of which so many are found."""
+    frames = [
+        frame(truth(CARS), detected(CARS[:count], [0.9] * count), run=f"run {number}")
+        for number, count in enumerate(counts)
+    ]
+    return evaluate(frames, Rule())
+
+
+def test_difference_is_the_jackknife_of_pairs():
+    """Without a run the difference is the mean of the others'; of pairs that all differ by one car it is certain."""
+    certain = difference_of(found([9, 8, 7, 6]), found([8, 7, 6, 5]))
+    assert (certain.value, certain.low, certain.high) == pytest.approx((0.1, 0.1, 0.1))
+    change = difference_of(found([9, 8, 7, 6]), found([9, 7, 7, 4]))
+    left_out = np.array([3, 2, 3, 1]) / 30
+    reach = student_quantile(3) * np.sqrt(3 / 4 * ((left_out - left_out.mean()) ** 2).sum())
+    assert change.value == pytest.approx(3 / 40)
+    assert (change.low, change.high) == pytest.approx((3 / 40 - reach, 3 / 40 + reach))
+
+
+def test_too_few_runs_leave_intervals_open():
+    assert precision_of(found([9, 8, 7])).high == np.inf
+    assert difference_of(found([9, 8, 7]), found([9, 8, 7])).low == -np.inf
+    assert precision_of(found([9, 8, 7, 9])).low < 33 / 40 < precision_of(found([9, 8, 7, 9])).high
