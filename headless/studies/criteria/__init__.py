@@ -1,4 +1,4 @@
-"""Which criteria of placements predict detection? Placements of one type and number, drawn over the range of coverage.
+"""Criteria of placements and how well they predict detection, for placements of one type and number.
 
 `drawing` draws them, `precision` evaluates detectors with each, `criteria` computes how good each is by coverage and by
 other criteria, `agreement` how well these agree with average precision, and `results` writes it down.

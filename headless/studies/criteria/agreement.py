@@ -160,14 +160,14 @@ def _ceiling(precise: Precisions, rows: Integer) -> tuple[Float, Float, Float, F
 
 
 def _spearman_brown(agreement: Float, times: int) -> Float:
-    """Return the reliability of so many times as much data as agrees so well with as much again."""
+    """Return the reliability of data that is `times` as large as two halves with this correlation (Spearman-Brown)."""
     positive = np.maximum(agreement, 0.0)
     reliability: Float = times * positive / (1 + (times - 1) * positive)
     return reliability
 
 
 def _drawn(number: int, resamples: int) -> Integer:
-    """Return resamples of so many placements, the same ones each time, (r, n) int64."""
+    """Return resamples of n placements, the same for each call, (r, n) int64."""
     return np.random.default_rng(PLACEMENT_SEED).integers(number, size=(resamples, number))
 
 

@@ -33,7 +33,7 @@ class Criterion:
     name : str
         In charts and sentences.
     values : (n,) float64
-        Of each placement.
+        Figure of each placement.
     beforehand : bool
         Whether it can be had without the traffic that the detector is tested on.
     """

@@ -48,7 +48,7 @@ class CriteriaStudySettings:
     criteria : tuple of str
         Keys of `CRITERIA`; coverage is always among them.
     seed : int
-        Of what is drawn.
+        Seed of the drawn placements.
     """
 
     counts: tuple[int, ...]
@@ -73,7 +73,7 @@ class CountedPlacements:
     ----------
     count : int
     kind : tuple of str
-        Of each.
+        Kind of each placement.
     poses : tuple of (k,) int64
     configurations : tuple of SensorConfiguration
     best : dict of str to int
@@ -155,12 +155,12 @@ def choose_placements(
 
 @dataclass(frozen=True, eq=False)
 class StudiedType:
-    """What was found of one sensor type on one site.
+    """Findings for one sensor type at one site.
 
     Parameters
     ----------
     frames : tuple of tuple of list of FrameResult
-        Of each count, of each placement.
+        Frames of each placement, by count.
     """
 
     site: str

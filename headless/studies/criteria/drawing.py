@@ -20,7 +20,7 @@ from seip_addon.core.progress import Progress, within
 from seip_addon.core.workflows.survey import Survey
 
 MIN_PLACEMENTS = 4
-MAX_TRIES = 20_000  # draws for one placement, before it is said that there are no more
+MAX_TRIES = 20_000  # draws for one placement before an error states that there are no more
 SWAPS_PER_PLACEMENT = 20  # draws from which those in between are taken
 
 NEAR = 0.05  # of the targets: how much less than the optimal placement one near it covers at most
@@ -30,7 +30,7 @@ OPTIMAL, RANDOM, BETWEEN, OTHERWISE = "optimal", "random", "in between", "optima
 
 @dataclass(frozen=True)
 class PlacementsStudySettings:
-    """What a study of placements is made of.
+    """Settings of a study of placements.
 
     Parameters
     ----------
@@ -41,11 +41,11 @@ class PlacementsStudySettings:
     learnt : int
         Placements whose clouds the detector learns from; none of them is evaluated.
     trainings : int
-        Each with a seed of its own; with 0 the shipped detector is evaluated, and ``learnt`` is 0.
+        Number of trainings, each with its own seed; with 0 the shipped detector is evaluated, and ``learnt`` is 0.
     steps : int
-        Of each training.
+        Steps of each training.
     seed : int
-        Of what is drawn.
+        Seed of the drawn placements.
     """
 
     placements: int
@@ -68,7 +68,7 @@ class PlacementsStudySettings:
                 f"{self.placements} placements say nothing of a correlation: ask for {MIN_PLACEMENTS} or more"
             )
         if self.learnt < 1 <= self.trainings:
-            raise SeipError(f"the detector must learn from 1 placement or more, not {self.learnt}")
+            raise SeipError(f"the detector must be trained on 1 placement or more, not {self.learnt}")
         if self.seed < 0:
             raise SeipError(f"the seed of the placements must be 0 or more, not {self.seed}")
         if len(sensors) != 1:
@@ -120,7 +120,7 @@ def draw_placements(
     Raises
     ------
     SeipError
-        There are not so many.
+        There are fewer placements.
     """
     (sensor,) = survey.models
     site, visible, count = survey.site, survey.grid.visible, settings.count
@@ -197,7 +197,7 @@ def draw_from_pool(
     Parameters
     ----------
     problem : PlacementProblem
-        Of a number of sensors where they cover most.
+        Problem of most coverage for a number of sensors.
     pool : (p,) int64
         Candidates of which placements consist.
     best : sequence of (k,) int64
@@ -206,7 +206,7 @@ def draw_from_pool(
     Raises
     ------
     SeipError
-        The pool has not so many.
+        The pool has fewer placements.
     """
     assert problem.count is not None  # noqa: S101  # placements of one number of sensors are drawn
     allowed = np.isin(np.arange(len(problem.positions)), np.concatenate([pool, *best]))
@@ -278,7 +278,7 @@ class _Drawing:
         )
 
     def _swapped(self, poses: Integer) -> Integer:
-        """Return poses with one of them replaced by a random one; as many as are asked for where there are fewer."""
+        """Return poses with one of them replaced by a random one, or with random ones added."""
         kept = self._random.permutation(poses)[: self._count - 1]
         return np.append(kept, self._random.choice(self._poses, self._count - len(kept), replace=False))
 

@@ -83,7 +83,7 @@ class LogReturns(PoseCriterion):
     returns : (c, m) float32
         R, expected returns of each pose from each road user, as `returns_grid` has them.
     weight : (m,) float64
-        Of each road user.
+        Weight of each road user.
     """
 
     returns: NDArray[np.float32]

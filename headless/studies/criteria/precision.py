@@ -35,7 +35,7 @@ from .drawing import DrawnPlacements, PlacementsStudySettings
 from .kept_frames import load_frames, save_frames
 
 TRAFFIC_SEED, TRAINING_SEED, PLACEMENT_SEED = 0, 1, 2  # of resamples: draws of one must not follow from another's
-RESAMPLES_AT_ONCE = 100  # as many as stay within a few hundred megabytes
+RESAMPLES_AT_ONCE = 100  # the number that needs a few hundred megabytes
 MAX_HALVES = 20  # ways to cut the test runs into halves that are tried
 FOLDER = "detections"  # of the folder of results: what was detected with each placement
 CLASSES = {"vehicles": "bev_0.7", "two-wheelers": "motorcycle_bicycle_0.5", "pedestrians": "pedestrian_0.5"}
@@ -52,7 +52,7 @@ class Precisions:
     runs : (f,) str
         Name of the run of each frame.
     evaluations : tuple of tuple of Evaluation
-        Of each placement, by each training.
+        Average precision of each placement by each training.
     of_classes : mapping of str to (n,) float64
         Average precision of each placement by the rules of `CLASSES`, the mean over the trainings.
     """

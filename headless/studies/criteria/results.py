@@ -1,4 +1,4 @@
-"""What a study of placements found: sentences, tables, record and charts."""
+"""Results of a study of placements: sentences, tables, record and charts."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -31,7 +31,7 @@ from .drawing import NEAR, OPTIMAL, RANDOM, DrawnPlacements, PlacementsStudySett
 from .precision import Precisions
 
 SCHEMA = "seip-placements-study/1"
-LEAST_PRECISION = 0.1  # below which a detector has not learnt enough for anything to follow
+LEAST_PRECISION = 0.1  # AP below which a detector supports no conclusion
 POINT = 0.01  # of average precision: what a criterion has to gain to be worth its trouble
 
 
@@ -96,7 +96,7 @@ class PlacementsStudy:
         )
         yield self._of_ceiling()
         for name, part in self.parts.items():
-            yield f"over {name} ({part.placements}): Spearman {_written(part.spearman)}; {_foretells(part)}"
+            yield f"over {name} ({part.placements}): Spearman {_written(part.spearman)}; {_predicts(part)}"
         for one in others:
             yield (
                 f"{one.criterion.name}: Spearman {_written(one.correlation.spearman)}, against coverage "
@@ -105,7 +105,7 @@ class PlacementsStudy:
             )
         if values.max() < LEAST_PRECISION:
             yield (
-                f"nothing follows from this: the detector has hardly learnt, with AP@0.7 below {LEAST_PRECISION:.0%} "
+                f"this supports no conclusion: the AP@0.7 of the detector is below {LEAST_PRECISION:.0%} "
                 "everywhere, so train it for more steps"
             )
             return
@@ -288,9 +288,9 @@ def _points(estimate: IntervalEstimate) -> str:
     return f"{value:+.1f} points{between}"
 
 
-def _foretells(part: Correlation) -> str:
+def _predicts(part: Correlation) -> str:
     if not math.isfinite(part.spearman.low):
-        return "too few to say whether coverage foretells detection there"
+        return "too few to test whether coverage predicts detection"
     if part.spearman.low > 0:
-        return "coverage foretells detection there, too"
-    return "there coverage is not told from chance"
+        return "coverage predicts detection here as well"
+    return "no significant correlation there"

@@ -51,7 +51,7 @@ def site_criteria(
     Parameters
     ----------
     survey : Survey
-        Of one sensor type.
+        Survey with one sensor type.
     runs : sequence of SampledRun
         Traffic that the criteria of the literature go by; not that of tests.
     keys : sequence of str

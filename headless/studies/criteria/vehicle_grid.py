@@ -62,7 +62,7 @@ class Vehicles:
 
 
 def vehicles_in(runs: Sequence[SampledRun], region: BaseGeometry, most: int, interval: float = 5.0) -> Vehicles:
-    """Return vehicles in the region at instants of runs, so many of them at most, spread evenly over all."""
+    """Return at most n vehicles in the region at instants of runs, spread evenly over all."""
     rows = []
     for run in runs:
         users = run.trajectories.users
@@ -90,7 +90,7 @@ def log_misses(
     Parameters
     ----------
     caster : RayCaster
-        Of the static scene.
+        Ray caster of the static scene.
     """
     vehicle, ray = BeamWindows(model).rays_towards((vehicles.corners - origin) @ orientation)
     directions = BeamPattern(model).directions(ray) @ orientation.T

@@ -87,7 +87,7 @@ class TrafficInstant:
     Parameters
     ----------
     caster : RayCaster or None
-        Of their triangles, 12 each; None without road users.
+        Triangles of the road users, 12 each; None without road users.
     occupant : (v,) int64
         As `Voxels.occupant` returns it.
     """

@@ -96,7 +96,7 @@ def _training(options: argparse.Namespace) -> tuple[TrainingSettings, Detector |
 
 
 def _evaluate_placements(options: argparse.Namespace) -> None:
-    """Evaluate placements of one type and number, and write how well coverage and others foretell detection."""
+    """Evaluate placements of one type and number, and write how well coverage and other criteria predict detection."""
     if options.placement:
         raise SeipError("name either --placements, to draw placements, or --placement, to evaluate some of your own")
     training, start = _training(options)
@@ -267,7 +267,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--separate", action="store_true", help="a detector for each placement, not one for all")
     parser.add_argument("--ablation", action="store_true", help="claim 9: also train with zero-padded pillars")
-    drawn = parser.add_argument_group("does coverage foretell detection? Placements of one type and number")
+    drawn = parser.add_argument_group("does coverage predict detection? Placements of one type and number")
     drawn.add_argument(
         "--placements", type=whole_number(COUNT), metavar="N", help="evaluate the optimal one and others that are drawn"
     )

@@ -125,7 +125,7 @@ def test_sentences_follow_from_the_figures():
     told = Told(np.sort(spread())[::-1], 0.02, 0.0)
     wrong = Criterion("wrong", "the wrong", -told.quality)
     said = list(study(told, wrong).sentences())
-    assert any("the upper half" in line and "foretells detection there, too" in line for line in said)
+    assert any("the upper half" in line and "predicts detection here as well" in line for line in said)
     assert said[-2].startswith("no criterion that can be had beforehand correlates better than coverage")
     assert said[-1].startswith("no criterion that can be had beforehand gains anything")
 
@@ -151,7 +151,7 @@ def test_a_criterion_that_gains_is_named():
 def test_a_detector_that_has_not_learnt_says_nothing():
     told = Told(np.linspace(0.0, 0.05, PLACEMENTS), 0.0, 0.0)
     said = list(study(told, Criterion("true", "the truth", told.quality)).sentences())
-    assert said[-1].startswith("nothing follows from this")
+    assert said[-1].startswith("this supports no conclusion")
 
 
 def test_noise_hides_what_coverage_foretells_near_the_optimum():
