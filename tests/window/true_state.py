@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import bpy
 from bl_ext.user_default.seip.seip_addon import preferences
-from bl_ext.user_default.seip.seip_addon.core.visibility import ray_casting
+from bl_ext.user_default.seip.seip_addon.core.sensing.visibility import ray_casting
 from bl_ext.user_default.seip.seip_addon.panels import detection, placement, results, site
 from bl_ext.user_default.seip.seip_addon.session import session
 from driver import Steps, Window, play
