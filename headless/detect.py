@@ -17,7 +17,7 @@ from pathlib import Path
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import runtime, survey
+from headless import runtime
 from headless.charts.detection import PrecisionRecallLine, save_parts_chart, save_precision_recall_chart
 from headless.charts.error_view import save_error_view
 from headless.detection.average_precision import precision_recall, too_few_runs
@@ -30,7 +30,7 @@ from headless.detection.recordings import MountedSensors, Simulator, sampled_run
 from headless.detection.rules import MAIN_RULE
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import deterministic
-from headless.options import add_rolling_shutter, add_settings, new_parser, read_settings, real_number
+from headless.options import add_optics, add_rolling_shutter, add_settings, new_parser, read_settings, real_number
 
 import bpy
 import numpy as np
@@ -39,7 +39,7 @@ from seip_addon.core.choosing.robustness.traffic_instants import check_runs
 from seip_addon.core.limits import TIME_STEP
 from seip_addon.core.output.datasets.detection_files import kitti_results, openpcdet_results
 from seip_addon.core.output.results.detection_record import FORMATS, SCHEMA
-from seip_addon.core.output.results.placement_record import versions
+from seip_addon.core.output.results.versions import versions
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings
@@ -167,7 +167,7 @@ def _parser() -> argparse.ArgumentParser:
     how = parser.add_argument_group("measurement")
     add_settings(how, ScanSettings, "seed")
     add_rolling_shutter(how)
-    survey.add_optics(how)
+    add_optics(how)
     add_settings(how, ScanSettings, "engine")
     return parser
 

@@ -8,13 +8,10 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from types import NoneType
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
-from seip_addon.core.choosing.placement.objective import Objective
-from seip_addon.core.choosing.placement.scenarios import PoseErrors, ScenarioKind, Scenarios
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import Limits
 from seip_addon.core.settings import Setting, settings_of
@@ -182,6 +179,20 @@ def add_rolling_shutter(group: argparse._ActionsContainer) -> None:
     )
 
 
+def add_optics(group: argparse._ActionsContainer) -> None:
+    """Add options of what surfaces reflect and of the weather."""
+    group.add_argument(
+        "--reflectivity",
+        nargs="+",
+        default=[],
+        metavar="M=SHARE",
+        help="reflectivity of materials M, 0 to 1 (default: from the scene)",
+    )
+    group.add_argument(
+        "--weather", nargs="+", default=[], metavar="WHAT", help="weather: rain=MM/H, visibility=M in fog, wet"
+    )
+
+
 def name_only(group: argparse._ArgumentGroup, reference: str) -> None:
     """Have help name the options of a group alone, and refer to where they are explained."""
     names = (action.option_strings[-1] for action in group._group_actions)  # noqa: SLF001 -- argparse has no other way
@@ -198,58 +209,6 @@ def read_settings(kind: type[Options], options: argparse.Namespace, **values: An
             value = getattr(options, dest)
             values[name] = tuple(value) if isinstance(value, list) else value
     return kind(**values)
-
-
-def add_objective(parser: argparse.ArgumentParser) -> None:
-    """Add the parts of an objective to a command: criterion, constraints, scenarios and risk measure."""
-    objective = parser.add_argument_group("objective")
-    add_settings(objective, Objective, "count", "budget", "coverage", "criterion", "shares", "seen_by", "failures")
-    objective.add_argument("--weighted", action="store_true", help="weight targets by their regions")
-    add_settings(objective, Objective, "central_weight", "min_distance", "forbidden", "mandatory")
-    scenarios = parser.add_argument_group("scenarios")
-    scenarios.add_argument(
-        "--pose-errors", action="store_true", help="optimise over random errors of the sensors' poses"
-    )
-    add_settings(scenarios, PoseErrors, "position", "height", "yaw", "tilt")
-    scenarios.set_defaults(position_error=None, height_error=None, yaw_error=None, tilt_error=None)
-    scenarios.add_argument(
-        "--traffic",
-        nargs="*",
-        type=Path,
-        metavar="NPZ",
-        help="optimise over instants of runs of traffic, and evaluate on the last third of the runs (default: those in "
-        "the folder SCENE_traffic beside the scene)",
-    )
-    add_settings(scenarios, Scenarios, "weights_from_traffic")
-    add_settings(scenarios, Objective, "risk")
-    add_settings(scenarios, Scenarios, "count", "held_out", "seed")
-
-
-def read_objective(options: argparse.Namespace) -> Objective:
-    """Return the objective that options of `add_objective` name."""
-    weight = "scene" if options.weighted and options.central_weight is None else options.central_weight
-    return read_settings(Objective, options, central_weight=weight, scenarios=_scenarios(options))
-
-
-def _scenarios(options: argparse.Namespace) -> Scenarios:
-    errors = [options.position_error, options.height_error, options.yaw_error, options.tilt_error]
-    errs = options.pose_errors or any(error is not None for error in errors)
-    if errs and options.traffic is not None:
-        raise SeipError("scenarios are of pose errors or of traffic: leave out --pose-errors or --traffic")
-    kind: ScenarioKind = "pose-errors" if errs else "nominal" if options.traffic is None else "traffic"
-    if kind != "traffic" and options.weights_from_traffic:
-        raise SeipError("--weights-from-traffic needs --traffic")
-    return replace(read_settings(Scenarios, options, pose_errors=_pose_errors(*errors)), kind=kind)
-
-
-def _pose_errors(position: float | None, height: float | None, yaw: float | None, tilt: float | None) -> PoseErrors:
-    """Return pose errors in metres and degrees: height follows position, and yaw tilt, where they are not given."""
-    usual = PoseErrors()
-    position = usual.position if position is None else position
-    tilted = usual.tilt if tilt is None else math.radians(tilt)
-    return PoseErrors(
-        position, position if height is None else height, tilted if yaw is None else math.radians(yaw), tilted
-    )
 
 
 def _option(name: str, about: Setting) -> str:

@@ -20,7 +20,8 @@ if not __package__:  # run as a file by `blender -P`
 from headless import runtime, survey
 from headless.charts.evaluation import save_evaluation_charts
 from headless.convergence import coarsest_settings
-from headless.options import add_objective, new_parser, read_objective, real_number
+from headless.objective_options import add_objective, read_objective
+from headless.options import new_parser, real_number
 
 from seip_addon.core.choosing.placement.deployment import price_text
 from seip_addon.core.choosing.placement.objective import Solution, check_objective

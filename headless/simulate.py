@@ -15,15 +15,15 @@ from pathlib import Path
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import runtime, survey
-from headless.options import add_settings, new_parser, read_settings
+from headless import runtime
+from headless.options import add_optics, add_settings, new_parser, read_settings
 
 import bpy
 
 from seip_addon.core.counts import counted
 from seip_addon.core.output.datasets.formats import FORMATS
 from seip_addon.core.output.datasets.sample import SPLITS
-from seip_addon.core.output.results.placement_record import versions
+from seip_addon.core.output.results.versions import versions
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.run_folder import Record, Run, check_no_placement, check_run_folder
 from seip_addon.core.sensing.scans.simulation import ScanSettings
@@ -122,7 +122,7 @@ def _parser() -> argparse.ArgumentParser:
     how = parser.add_argument_group("measurement")
     add_settings(how, ScanSettings, "seed", "rolling_shutter")
     how.add_argument("--no-noise", action="store_true", help="exact ranges without lost returns")
-    survey.add_optics(how)
+    add_optics(how)
     add_settings(how, ScanSettings, "engine")
     export = parser.add_argument_group("datasets")
     export.add_argument(

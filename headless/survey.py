@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from headless import runtime
 from headless.convergence import Convergence
-from headless.options import add_settings, name_only, read_settings
+from headless.options import add_optics, add_settings, name_only, read_settings
 
 import bpy
 import numpy as np
@@ -22,7 +22,8 @@ from seip_addon.core.choosing.placement.deployment import Sensor
 from seip_addon.core.choosing.placement.objective import Solution
 from seip_addon.core.counts import counted
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.results.placement_record import Provenance, versions
+from seip_addon.core.output.results.placement_record import Provenance
+from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.scans.run_folder import MANIFEST
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
@@ -103,20 +104,6 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
     if not in_full:
         for group in (sensors, metres, returns, work):
             name_only(group, "see: seip place --help")
-
-
-def add_optics(group: argparse._ActionsContainer) -> None:
-    """Add options of what surfaces reflect and of the weather."""
-    group.add_argument(
-        "--reflectivity",
-        nargs="+",
-        default=[],
-        metavar="M=SHARE",
-        help="reflectivity of materials M, 0 to 1 (default: from the scene)",
-    )
-    group.add_argument(
-        "--weather", nargs="+", default=[], metavar="WHAT", help="weather: rain=MM/H, visibility=M in fog, wet"
-    )
 
 
 def runs_beside(scene: Path | None, kind: str = "") -> list[Path]:

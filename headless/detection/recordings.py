@@ -14,7 +14,7 @@ from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.choosing.robustness.traffic_instants import WARM_UP
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import FRAMES, TIME_STEP
-from seip_addon.core.output.results.placement_record import versions
+from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.core.sensing.scans.run_folder import Run

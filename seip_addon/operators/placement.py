@@ -15,7 +15,8 @@ from .. import scene_survey, selection
 from ..core.choosing.placement.objective import Objective, check_objective
 from ..core.choosing.placement.search_limits import Acceptance
 from ..core.errors import SeipError
-from ..core.output.results.placement_record import Provenance, versions
+from ..core.output.results.placement_record import Provenance
+from ..core.output.results.versions import versions
 from ..core.progress import Progress
 from ..core.workflows.placing import place
 from ..core.workflows.survey import record_of

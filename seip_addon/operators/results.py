@@ -17,8 +17,9 @@ from ..core.choosing.placement.objective import Objective, target_weights
 from ..core.errors import SeipError
 from ..core.output.report.write import write_report
 from ..core.output.results.comparison import compare, packed_counts, unpacked_counts
-from ..core.output.results.placement_record import PlacementRecord, Provenance, parsed_record, versions
+from ..core.output.results.placement_record import PlacementRecord, Provenance, parsed_record
 from ..core.output.results.ranking import Ranked, rank_added, rank_alone
+from ..core.output.results.versions import versions
 from ..core.progress import Progress
 from ..core.sensing.scans.sensor import MountedSensor
 from ..core.sensing.visibility.visibility_model import VisibilityModel, visibility_model

@@ -4,7 +4,8 @@ import argparse
 import math
 from pathlib import Path
 
-from headless.options import add_objective, add_settings, new_parser, read_objective, read_settings, real_number
+from headless.objective_options import add_objective, read_objective
+from headless.options import add_settings, new_parser, read_settings, real_number
 from headless.survey import add_options
 
 import pytest

@@ -6,7 +6,7 @@ import shlex
 
 from headless import place, report
 from headless import survey as surveys
-from headless.options import read_objective
+from headless.objective_options import read_objective
 
 import bpy
 import pytest

@@ -32,7 +32,7 @@ from seip_addon.core.choosing.placement.objective import Objective, check_object
 from seip_addon.core.choosing.robustness.traffic_instants import check_runs
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import COUNT, SEED, SENSORS, TIME_STEP
-from seip_addon.core.output.results.placement_record import versions
+from seip_addon.core.output.results.versions import versions
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.source import require_own_traffic
 from seip_addon.core.storage.csv_table import save_csv

@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.results.placement_record import versions
+from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.sensing.traffic.source import describe_categories
 from seip_addon.core.sensing.traffic.varied_bodies import shaped

@@ -12,7 +12,7 @@ from ...progress import Progress
 from ...sensing.scans.frame import Frame
 from ...sensing.scans.sensor import MountedSensor
 from ...storage.files import digest, save_json, whole_file
-from ..results.placement_record import versions
+from ..results.versions import versions
 from .format_interface import Format
 from .sample import OUTCOMES, SPLITS, Sample, TrafficRun, make_sample, require_file_name
 

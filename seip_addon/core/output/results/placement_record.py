@@ -1,16 +1,12 @@
 """``placement.json``: a placement with all that it takes to read it, check it and make it again."""
 
-import importlib.util
 import json
 import math
 import os
-import platform
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from functools import cached_property, lru_cache
-from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -47,8 +43,6 @@ Count = Annotated[int, limits.COUNT]
 Seconds = Annotated[float, limits.DURATION]
 
 SCHEMA = "seip-placement/3"
-LIBRARIES = ("numpy", "shapely", "pulp", "highspy")
-MANIFEST = Path(__file__).parents[4] / "blender_manifest.toml"
 
 
 @dataclass(frozen=True)
@@ -67,17 +61,6 @@ class Provenance:
     created: datetime
     durations: Mapping[str, float]
     versions: Mapping[str, str]
-
-
-def versions(**more: str) -> dict[str, str]:
-    """Return the versions of this program, of Python and of the libraries that results stand on, and ``more``."""
-    if MANIFEST.is_file():
-        program = tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"]
-    else:  # installed by pip
-        program = metadata.version("seip")
-    there = {name for name in LIBRARIES if importlib.util.find_spec(name)}  # HiGHS need not be
-    libraries = {name: metadata.version(name) for name in LIBRARIES if name in there}
-    return {"seip": program, "python": platform.python_version(), **libraries, **more}
 
 
 def relevant_warnings(warnings: Iterable[str], considered: Iterable[str], chosen: Iterable[str]) -> list[str]:

@@ -23,8 +23,8 @@ from seip_addon.core.output.results.placement_record import (
     parsed_record,
     placement_record,
     save_placement_record,
-    versions,
 )
+from seip_addon.core.output.results.versions import versions
 from tests.builders.small_junction import Example, make_example
 from tests.oracles.json_schema import violations
 from tests.oracles.placement_schema import FILE, text
