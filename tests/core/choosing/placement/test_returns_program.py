@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.core.placement.test_returns_placement import problem_of
+from tests.core.choosing.placement.test_returns_placement import problem_of
 
 from seip_addon.core.choosing.placement import returns_solver
 from seip_addon.core.choosing.placement.concave_value import LogReturns, Saturating
