@@ -125,7 +125,7 @@ def test_the_certificate_of_a_placement_for_traffic_is_about_that_and_has_no_tic
 @pytest.mark.parametrize(
     ("pose", "sentence"),
     [
-        (None, "another state of the scene or its settings: place again"),
+        (None, "the scene or its settings have changed: place again"),
         (-1, r"sensors\[0\]\.pose is -1, not 0 to"),
         (10**6, "a sensor has the pose 1000000, and there are 16"),
     ],

@@ -218,9 +218,23 @@ def deploy(
     chosen : (k,) int
         Indices of the chosen poses; their order breaks ties between labels.
     """
-    order = _by_added_coverage(visible, chosen)
-    mounted = [sensor_at(site, models, f"S{rank + 1}", int(pose)) for rank, pose in enumerate(order)]
-    return deployment_of(site, mounted, visible[order])
+    poses = np.asarray(chosen, dtype=np.int64)
+    return deploy_rows(site, models, visible[poses], poses)
+
+
+def deploy_rows(site: Site, models: Mapping[str, LidarModel], rows: Boolean, chosen: Integer) -> Deployment:
+    """Return the chosen poses as sensors, given only their rows of the visibility grid.
+
+    Parameters
+    ----------
+    rows : (k, t) bool
+        Visibility of each target from each chosen pose.
+    chosen : (k,) int64
+        Indices of the chosen poses; their order breaks ties between labels.
+    """
+    order = _by_added_coverage(rows)
+    mounted = [sensor_at(site, models, f"S{rank + 1}", int(pose)) for rank, pose in enumerate(chosen[order])]
+    return deployment_of(site, mounted, rows[order])
 
 
 def deployment_of(site: Site, mounted: Sequence[Sensor], rows: Boolean) -> Deployment:
@@ -259,16 +273,16 @@ def weighted_share(seen: Boolean, weight: Float) -> float:
     return float(weight[seen].sum()) / total if total > 0.0 else 0.0
 
 
-def _by_added_coverage(visible: Boolean, chosen: Sequence[int] | Integer) -> Integer:
-    """Order the chosen poses so that each adds the most targets to those before it."""
-    left = [int(pose) for pose in chosen]
-    unseen = np.ones(visible.shape[1], dtype=bool)
+def _by_added_coverage(rows: Boolean) -> Integer:
+    """Return the order of poses, given their rows (k, t), in which each adds the most targets to those before it."""
+    left = list(range(len(rows)))
+    unseen = np.ones(rows.shape[1], dtype=bool)
     order: list[int] = []
     while left:
-        best = max(left, key=lambda pose: int((visible[pose] & unseen).sum()))
+        best = max(left, key=lambda row: int((rows[row] & unseen).sum()))
         left.remove(best)
         order.append(best)
-        unseen &= ~visible[best]
+        unseen &= ~rows[best]
     return np.array(order, dtype=np.int64)
 
 

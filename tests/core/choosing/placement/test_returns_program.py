@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.core.choosing.placement.test_returns_placement import problem_of
 
 from seip_addon.core.choosing.placement import returns_solver
 from seip_addon.core.choosing.placement.concave_value import LogReturns, Saturating
@@ -18,6 +17,7 @@ from seip_addon.core.choosing.placement.returns_instance import make_returns_ins
 from seip_addon.core.choosing.placement.returns_program import ReturnsProgram
 from seip_addon.core.choosing.placement.search_limits import Clock, SolverLimits
 from seip_addon.core.progress import finish
+from tests.core.choosing.placement.test_returns_placement import problem_of
 
 NONE = np.zeros(0, dtype=np.int64)
 
