@@ -50,8 +50,8 @@ class BeamWindows:
             np.full(len(hull), self._steps),
             np.full(len(hull), self._all_round),
         )
-        # An arc may run over step 0 of an all-round channel: its steps wrap. The rows of a hull in a channel have no step
-        # in common, so that no ray comes twice for a hull.
+        # An arc may run over step 0 of an all-round channel: its steps wrap. The rows of a hull in a channel have no
+        # step in common, so that no ray comes twice for a hull.
         steps = _counted(first, count) % self._steps
         return np.repeat(hull[arc], count), np.repeat(channel[arc] * self._steps, count) + steps
 
