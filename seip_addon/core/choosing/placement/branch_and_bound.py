@@ -18,8 +18,8 @@ which is submodular in R. It is tighter in every branch than above it: the next 
 adds its full value or nothing, a target that can no longer be seen often enough adds nothing, and for the last sensor
 the bound is exact.
 
-The largest bound among the open nodes holds for every placement that the search has not seen: it falls as the search
-goes on, and a search that is stopped can be continued.
+The largest bound among the open nodes holds for every placement that the search has not visited. It falls as the search
+continues, and a stopped search can be resumed.
 
 Weights are whole numbers, so a search meets the same placements in the same order on every machine.
 """

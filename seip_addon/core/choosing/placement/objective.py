@@ -162,7 +162,7 @@ class Objective:
             measure.require_sensors(self.count)
 
     def _require_no_settings_of_scenarios(self) -> None:
-        """Raise SeipError where the only scenario is the nominal one, and a setting of several would be ignored."""
+        """Raise SeipError if a setting of several scenarios is given, which the nominal scenario would ignore."""
         scenarios = self.scenarios
         given = {
             "--risk": self.risk != "auto",
@@ -360,7 +360,7 @@ def _constraints(site: Site, models: Mapping[str, LidarModel], objective: Object
 
 
 def check_objective(site: Site, models: Mapping[str, LidarModel], objective: Objective) -> None:
-    """Raise SeipError where a site cannot meet an objective, before any ray is cast."""
+    """Raise SeipError if a site cannot meet an objective, before any ray is cast."""
     _constraints(site, models, objective)
 
 
@@ -380,7 +380,7 @@ def optimise(
     Raises
     ------
     SeipError
-        As for `placement_problem`, `solve` and `cheapest_for_coverage`.
+        Same as for `placement_problem`, `solve` and `cheapest_for_coverage`.
     """
     problem = placement_problem(site, visible, models, objective)
     if objective.coverage is not None:
