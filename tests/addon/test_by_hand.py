@@ -154,7 +154,7 @@ def test_an_added_sensor_counts_and_one_below_the_ground_has_its_sentence(placed
     assert [line["id"] for line in record(placed)["sensors"]] == ["S1", "S2", "S3", "S4"]
     first.location.z -= 100.0
     bpy.context.view_layer.update()
-    with pytest.raises(RuntimeError, match=r"sensor S1 is 9\d\.\d\d m below the ground: lift it"):
+    with pytest.raises(RuntimeError, match=r"sensor S1 is 9\d\.\d\d m below the ground: raise it"):
         bpy.ops.seip.evaluate_sensors()
 
 

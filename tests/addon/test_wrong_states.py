@@ -110,7 +110,7 @@ def test_the_panel_says_what_the_record_holds(placed, monkeypatch):
 
 def test_the_certificate_of_a_placement_for_traffic_is_about_that_and_has_no_tick(placed, monkeypatch):
     record = json.loads(placed.seip.result.record)
-    note = "chosen to see the road in traffic, on average over 4 instants: objective, bound and gap are of that"
+    note = "chosen to see the road in traffic, on average over 4 instants: objective, bound and gap refer to that"
     record["notes"] = [note, *record["notes"]]
     placed.seip.result.record = json.dumps(record)
     monkeypatch.setattr(scene_status, "stale_placement", lambda _: "")
@@ -125,7 +125,7 @@ def test_the_certificate_of_a_placement_for_traffic_is_about_that_and_has_no_tic
 @pytest.mark.parametrize(
     ("pose", "sentence"),
     [
-        (None, "another state of the scene or its settings: place again"),
+        (None, "the scene or its settings have changed: place again"),
         (-1, r"sensors\[0\]\.pose is -1, not 0 to"),
         (10**6, "a sensor has the pose 1000000, and there are 16"),
     ],

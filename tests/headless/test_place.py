@@ -216,7 +216,7 @@ def test_the_reverse_problem_by_command(tmp_path, run):
     ("options", "sentence"),
     [
         (["--count", "0"], "--count must be at least 1, not 0"),
-        (["--count", "999"], "asked for 999 sensors"),
+        (["--count", "999"], "999 sensors are requested"),
         (["--tilts", "0", "90"], "a tilt must be more than -90° and less than 90°, not 90°"),
         (["--tilts", "5", "5"], "the tilt of 5° is given twice"),
         (["--budget", "5"], "below the cheapest sensor"),

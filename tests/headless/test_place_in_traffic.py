@@ -52,7 +52,7 @@ def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, option
     assert goal["criterion"] == ("height" if options else "auto")
     assert (goal["scenarios"]["kind"], goal["scenarios"]["count"], goal["scenarios"]["held_out"]) == ("traffic", 4, 24)
     assert "in traffic, on average over 4 instants" in notes[0]
-    assert ("targets weigh as many seconds as road users are there" in notes) == bool(options)
+    assert ("targets are weighted by the time that road users are there" in notes) == bool(options)
     said = capsys.readouterr().out
     assert "chosen for the empty road: " in said
     assert "vehicles of one run within 1 m of one of another at the same instant: " in said

@@ -63,10 +63,10 @@ def test_failures_of_nominal_sensors_are_optimised_without_pose_errors(tmp_path,
     [
         (["--pose-errors", "--coverage", "0.5"], "needs a number of sensors or a budget"),
         (["--pose-errors", "--criterion", "returns"], "choose the criterion road"),
-        (["--criterion", "height"], "the criterion height is of traffic: add --traffic"),
-        (["--failures", "worst", "--risk", "none"], "do not go with the risk none"),
+        (["--criterion", "height"], "the criterion height needs traffic: add --traffic"),
+        (["--failures", "worst", "--risk", "none"], "cannot be combined with the risk none"),
         (["--pose-errors", "--traffic"], "leave out --pose-errors or --traffic"),
-        (["--seen-by", "2", "--traffic"], "do not go with traffic"),
+        (["--seen-by", "2", "--traffic"], "cannot be combined with traffic"),
         (["--weights-from-traffic"], "--weights-from-traffic needs --traffic"),
         (
             ["--risk", "worst"],

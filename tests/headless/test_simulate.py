@@ -150,8 +150,8 @@ def test_traffic_that_is_animated_in_the_scene_is_simulated(folder):
     ("change", "words"),
     [
         (["--traffic", "no-such.npz"], "no-such.npz"),
-        (["--start", "9"], "known from 0 s to 1 s"),
-        (["--rate", "50"], "turns 5 times a second"),
+        (["--start", "9"], "lasts from 0 s to 1 s"),
+        (["--rate", "50"], "rotates 5 times a second"),
     ],
 )
 def test_each_mistake_has_its_sentence(folder, change, words):
@@ -176,7 +176,7 @@ def test_an_option_out_of_its_limits_is_refused_by_its_name(folder, change, word
 
 def test_a_folder_of_another_run_is_left_alone(folder, run):
     before = contents(run)
-    with pytest.raises(SeipError, match="another scene, traffic or settings"):
+    with pytest.raises(SeipError, match="different scene, traffic or settings"):
         simulate.main(arguments(folder, "run", "--seed", "1"))
     assert contents(run) == before
 
@@ -184,7 +184,7 @@ def test_a_folder_of_another_run_is_left_alone(folder, run):
 def test_a_run_is_not_written_into_the_folder_of_a_placement(folder):
     (folder / "placed").mkdir()
     (folder / "placed" / "placement.json").write_text("{}", encoding="utf-8")
-    with pytest.raises(SeipError, match="holds a placement, which a run is not written to"):
+    with pytest.raises(SeipError, match="contains a placement"):
         simulate.main(arguments(folder, "placed"))
     assert [path.name for path in (folder / "placed").iterdir()] == ["placement.json"]
 

@@ -1,4 +1,4 @@
-"""Detection as one job for programs without PyTorch: the command ``seip detect`` runs in a Python that has it."""
+"""Detection for programs without PyTorch: ``seip detect`` runs as a command in a Python that has it."""
 
 import os
 import re
@@ -13,9 +13,9 @@ from ..progress import Progress
 from ..site.weather import Weather
 
 RECORD, ERRORS = "detection.json", "errors.png"
-"""Files of the result: its figures, and the picture of found, missed and false."""
+"""Files of the result: its figures, and the picture of correct, missed and false detections."""
 INSTALL = "run `make detection` or `pip install '.[detection]'` in a checkout of this project"
-"""How a Python gets PyTorch and this project."""
+"""Instructions to install PyTorch and this project."""
 
 _BAR = re.compile(r"^(.+?): +\d+%\|.*\| (\d+)/(\d+) \[[\d:]+(<?)", re.MULTILINE)
 _ERROR = re.compile(r"^(?:[\w-]+: )?error: (.+)$", re.MULTILINE)
@@ -29,9 +29,9 @@ class DetectingPython:
     Parameters
     ----------
     program : path
-        The interpreter.
+        Path of the interpreter.
     folder : path
-        To run it in: a checkout is found from there, where the project is not installed.
+        Working folder: a checkout there is used if the project is not installed.
     """
 
     program: Path
@@ -40,18 +40,20 @@ class DetectingPython:
 
 @dataclass(frozen=True)
 class DetectionJob:
-    """What is detected with what.
+    """Inputs of a detection.
 
     Parameters
     ----------
+    python : DetectingPython
+        Python to run it with.
     runs : tuple of path
-        Of traffic.
+        Runs of traffic.
     detector : path or None
-        None for the one that ships.
+        Trained detector; None for the shipped one.
     catalogue : tuple of path
         The user's own catalogues of LiDARs.
     weather : Weather
-        That the sensors look through.
+        Weather for the sensors.
     """
 
     python: DetectingPython
@@ -74,33 +76,33 @@ class DetectionJob:
 
 
 def detect_elsewhere(job: DetectionJob, scene: Path, folder: Path) -> Generator[Progress, None, str]:
-    """Detect road users with the sensors of a scene, and put the result into a folder, in place of an earlier one.
+    """Detect road users with the sensors of a scene, and write the result to a folder, replacing an earlier one.
 
     Parameters
     ----------
     scene : path
         A .blend in a folder for temporary files, on the file system of ``folder``.
     folder : path
-        It is there.
+        Existing folder for the result.
 
     Yields
     ------
     Progress
-        Of frames; the command is ended when this is closed, and the earlier result stays.
+        Progress in frames. Closing the generator ends the command; the earlier result is then kept.
 
     Returns
     -------
     str
-        The text of ``detection.json``.
+        Text of ``detection.json``.
 
     Raises
     ------
     SeipError
-        The command refuses or fails, or its result cannot be read or written.
+        The command fails, or its result cannot be read or written.
     """
     results, log = scene.parent / "results", scene.parent / "log"
-    told = {"PYTHONUTF8": "1", "SEIP_SECONDS_BETWEEN_LINES": _SECONDS_BETWEEN_LINES}
-    running = run_logged(job.command(scene, results), log, _progress, folder=job.python.folder, environment=told)
+    variables = {"PYTHONUTF8": "1", "SEIP_SECONDS_BETWEEN_LINES": _SECONDS_BETWEEN_LINES}
+    running = run_logged(job.command(scene, results), log, _progress, folder=job.python.folder, environment=variables)
     try:
         status = yield from running
     except OSError as error:
@@ -108,9 +110,9 @@ def detect_elsewhere(job: DetectionJob, scene: Path, folder: Path) -> Generator[
             f"{job.python.program} cannot be started ({error.strerror}): name the Python with PyTorch in the "
             "preferences of the extension"
         ) from error
-    said = log.read_text(encoding="utf-8", errors="replace")
+    output = log.read_text(encoding="utf-8", errors="replace")
     if status != 0:
-        raise SeipError(_complaint(said, status, job.python.program))
+        raise SeipError(_failure(output, status, job.python.program))
     try:
         text = (results / RECORD).read_text(encoding="utf-8")
         parsed_detection(text)
@@ -121,27 +123,28 @@ def detect_elsewhere(job: DetectionJob, scene: Path, folder: Path) -> Generator[
     return text
 
 
-def _progress(said: str) -> Progress:
-    bars = _BAR.findall(said)
+def _progress(output: str) -> Progress:
+    """Return the progress in the last progress bar of the command's output."""
+    bars = _BAR.findall(output)
     if not bars:
         return Progress(0, 0, "starting PyTorch")
     what, done, total, time_left = bars[-1]
     return Progress(int(done), int(total), what, counted=bool(time_left))
 
 
-def _complaint(said: str, status: int, program: Path) -> str:
-    """Return why the command failed: its own sentence, or what stands in its place."""
-    own = _ERROR.findall(said)
+def _failure(output: str, status: int, program: Path) -> str:
+    """Return the reason why the command failed: its error message, or its last line of output."""
+    own = _ERROR.findall(output)
     if own:
         return str(own[-1])
-    if "No module named headless" in said:
+    if "No module named headless" in output:
         return f"{program} does not have this project: {INSTALL}"
-    last = said.strip().splitlines()[-1:]
+    last = output.strip().splitlines()[-1:]
     return f"detection failed in {program}: {' '.join(last) or f'it ended with status {status}'}"
 
 
 def _put_in_place(results: Path, folder: Path) -> None:
-    """Move a result to its folder, its record last; of an earlier one's frames none stays."""
+    """Move a result to its folder, its record last; all frames of an earlier result are removed."""
     (folder / RECORD).unlink(missing_ok=True)
     for frames in FORMATS:
         for old in (folder / frames).glob("[0-9]" * 6 + ".txt"):

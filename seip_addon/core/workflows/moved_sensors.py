@@ -1,4 +1,4 @@
-"""Deployments of sensors that were moved by hand, evaluated as they are."""
+"""Evaluation of deployments whose sensors were moved by hand."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from ..site.scene_geometry import joined
 from .survey import Layout, Survey, surroundings
 
 BY_HAND = "by hand"
-"""Name of a place that is no position of the site."""
+"""Name of a position that is not one of the site's."""
 
 
 def evaluate_moved_sensors(
@@ -35,45 +35,46 @@ def evaluate_moved_sensors(
     mounted: Sequence[MountedSensor],
     places: Mapping[str, str],
 ) -> Generator[Progress, None, Solution]:
-    """Find what sensors see from where they are mounted; those at candidate poses see what the grid says.
+    """Evaluate sensors at their current poses; for candidate poses, visibility comes from the grid.
 
     Parameters
     ----------
     objective : Objective
-        That the placement answered which they were moved from: its weights, and whether a price was sought.
+        Objective of the original placement, for its weights and for whether it asked for the least price.
     mounted : sequence of MountedSensor
-        In the order of their labels.
+        Sensors in the order of their labels.
     places : mapping of str to str
-        Names of the places by label, for sensors at no candidate pose.
+        Names of positions by label, for sensors that are not at a candidate pose.
 
     Yields
     ------
     Progress
+        Number of sensors done.
 
     Returns
     -------
     Solution
-        Without bound, gap or greedy answer.
+        Solution without bound, gap and greedy placement.
 
     Raises
     ------
     SeipError
-        A sensor hangs below the ground.
+        A sensor is below the ground.
     """
     site, models = survey.site, survey.models
     visibility: VisibilityModel | None = None
     sensors: list[Sensor] = []
     rows: list[Boolean] = []
     for done, one in enumerate(mounted):
-        yield Progress(done, len(mounted), "looking from where the sensors hang")
+        yield Progress(done, len(mounted), "evaluating the sensors' poses")
         pose = pose_at(site.candidates, one.model.key, one.xyz, one.orientation)
         if pose is not None:
             sensors.append(sensor_at(site, models, one.label, pose))
-            rows.append(survey.grid.visible[pose])
+            rows.append(survey.grid.sees(pose))
             continue
         if visibility is None:
             visibility = visibility_model(site, survey.settings.visibility, survey.settings.engine)
-        sensor = _elsewhere(survey, one, places.get(one.label, BY_HAND))
+        sensor = _off_candidates(survey, one, places.get(one.label, BY_HAND))
         sensors.append(sensor)
         rows.append(visibility.see(sensor.model, sensor.xyz, sensor.orientation))
     seen = np.array(rows, dtype=bool).reshape(len(rows), len(site.targets))
@@ -94,7 +95,7 @@ def evaluate_moved_sensors(
 
 
 def restored_by_hand(survey: Survey, record: PlacementRecord) -> Generator[Progress, None, Solution]:
-    """Evaluate the sensors of a record again, on the survey that it was made on."""
+    """Evaluate the sensors of a record again, on the survey of the record."""
     sensors = record.sensors
     models = find_models(load_catalogue(survey.settings.catalogue), sorted({one.sensor for one in sensors}))
     mounted = [one.mounted(models[one.sensor]) for one in sensors]
@@ -102,12 +103,12 @@ def restored_by_hand(survey: Survey, record: PlacementRecord) -> Generator[Progr
     return (yield from evaluate_moved_sensors(survey, record.asked.goal, mounted, places))
 
 
-def _elsewhere(layout: Layout, one: MountedSensor, place: str) -> Sensor:
-    """Return a sensor at no candidate pose, as exactly as records hold it."""
+def _off_candidates(layout: Layout, one: MountedSensor, place: str) -> Sensor:
+    """Return a sensor that is not at a candidate pose, rounded as in records."""
     xyz = np.round(one.xyz, 6)
     foot = np.append(xyz[:2], _ground(layout, xyz))
     if xyz[2] < foot[2]:
-        raise SeipError(f"sensor {one.label} is {foot[2] - xyz[2]:.2f} m below the ground: lift it")
+        raise SeipError(f"sensor {one.label} is {foot[2] - xyz[2]:.2f} m below the ground: raise it")
     yaw, tilt, roll = angles_of(one.orientation)
     return Sensor(
         label=one.label,
@@ -125,7 +126,7 @@ def _elsewhere(layout: Layout, one: MountedSensor, place: str) -> Sensor:
 
 
 def _ground(layout: Layout, xyz: Float) -> float:
-    """Return the height of the ground under a point, or of the nearest target where nothing lies there."""
+    """Return the height of the ground under a point, or of the nearest target if there is no ground."""
     geometry, targets = layout.geometry, layout.site.targets.xyz
     under = float(surface_height(xyz[None, :2], joined((*geometry.roads, *geometry.ground)))[0])
     if math.isfinite(under):

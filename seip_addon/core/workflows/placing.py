@@ -47,22 +47,22 @@ _OVER_INSTANTS = {1.0: "on average over", 0.25: "in the worst quarter of", 0.0: 
 def place(
     survey: Survey, objective: Objective, runs: TrafficRuns | None = None, acceptance: Acceptance | None = None
 ) -> Generator[Progress, None, Solution]:
-    """Optimise a placement, evaluate it on held-out scenarios, and note how far it can be trusted.
+    """Optimise a placement, evaluate it on held-out scenarios, and add notes on its reliability.
 
-    The notes give the number of near-optimal placements (`near_optimal_set`), what changes where heights of the scene
-    are assumed (`height_notes`), and what the evaluation shows.
+    The notes give the number of near-optimal placements (`near_optimal_set`), the effect of assumed heights
+    (`height_notes`), and the result of the evaluation.
 
     Parameters
     ----------
     runs : TrafficRuns, optional
-        Needed where the scenarios are traffic.
+        Runs of traffic; required if the scenarios are traffic.
     acceptance : Acceptance, optional
-        Lets a user end the search with the best placement found so far.
+        User's request to end the search with the best placement found so far.
 
     Raises
     ------
     SeipError
-        As for `placement_problem`, `solve`, `solve_robust` and `spread_instants`.
+        Same as for `placement_problem`, `solve`, `solve_robust` and `spread_instants`.
     """
     measure, scenarios = objective.measure, objective.scenarios
     limits = replace(survey.settings.limits, acceptance=acceptance)
@@ -100,7 +100,7 @@ def _nominal(survey: Survey, objective: Objective, limits: SolverLimits) -> Gene
 def _under_risk(
     survey: Survey, objective: Objective, limits: SolverLimits, measure: Risk
 ) -> Generator[Progress, None, Solution]:
-    """Optimise a risk measure over pose errors, or what sensor failures leave of the nominal scenario."""
+    """Optimise a risk measure over pose errors, or over sensor failures in the nominal scenario."""
     site, models, visible = survey.site, survey.models, survey.grid.visible
     around, scenarios = surroundings(survey), objective.scenarios
     problem = placement_problem(site, visible, models, objective)
@@ -114,7 +114,7 @@ def _under_risk(
         under_errors = yield from pose_study(around, deployment, settings)
     evaluation = PoseErrorEvaluation(study, under_errors)
     over = f" over {scenarios.optimised} scenarios" if scenarios.errs else ""
-    note = f"{CHOSEN_FOR}for {chosen.name}{over}: objective, bound and gap are of that"
+    note = f"{CHOSEN_FOR}for {chosen.name}{over}: objective, bound and gap refer to that"
     notes = (note, *chosen.placement.notes, *evaluation.messages())
     placement = replace(chosen.placement, notes=notes)
     return Solution(with_count(objective, site), placement, None, deployment, evaluation)
@@ -137,9 +137,9 @@ def _in_traffic(
     study = yield from traffic_study(around, problem, views, held_out, limits, measure)
     note = (
         f"{CHOSEN_FOR}to see the {LAYER_NAMES[layer]} in traffic, {_OVER_INSTANTS[measure.tail]} {len(instants)} "
-        "instants: objective, bound and gap are of that"
+        "instants: objective, bound and gap refer to that"
     )
-    weights = ("targets weigh as many seconds as road users are there",) if scenarios.weights_from_traffic else ()
+    weights = ("targets are weighted by the time that road users are there",) if scenarios.weights_from_traffic else ()
     placement = study.traffic.placement
     placement = replace(placement, notes=(note, *weights, *placement.notes, *study.messages()))
     deployment = deploy(site, models, visible, placement.chosen)
@@ -147,7 +147,7 @@ def _in_traffic(
 
 
 def _evaluated(survey: Survey, solution: Solution, runs: TrafficRuns | None) -> Generator[Progress, None, list[str]]:
-    """Return a message on a nominal placement in the scenarios of its objective."""
+    """Return messages on a nominal placement in the scenarios of its objective."""
     objective, around = solution.objective, surroundings(survey)
     scenarios = objective.scenarios
     if scenarios.errs:
@@ -163,5 +163,5 @@ def _evaluated(survey: Survey, solution: Solution, runs: TrafficRuns | None) -> 
 
 def _required(runs: TrafficRuns | None) -> TrafficRuns:
     if runs is None:
-        raise SeipError("the scenarios are traffic: name runs of traffic")
+        raise SeipError("the scenarios are traffic, but there are no runs: name runs of traffic")
     return runs

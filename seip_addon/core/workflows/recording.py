@@ -1,6 +1,6 @@
-"""Recordings: a scene's sensors scan its traffic, written as a run and as datasets.
+"""Recordings: scans of a scene's traffic by its sensors, written as a run and as datasets.
 
-Panel and batch both go this way.
+The panel and the command line both use this module.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ..settings import setting
 from ..site.scene_geometry import SceneGeometry
 
 SAME_TIME_TOLERANCE = 1e-6
-"""Seconds between two times that are one: of frames of Blender's timeline, and of a run."""
+"""Seconds; times of Blender's timeline and of a run's frames that differ by less are the same."""
 
 
 @dataclass(frozen=True)
@@ -35,14 +35,16 @@ class RecordingSettings:
 
     Parameters
     ----------
+    scan : ScanSettings
+        Settings of the scans.
     start, duration, rate : float, optional
-        Seconds, seconds, hertz; see `frame_times`.
+        Times of the frames in seconds, seconds and hertz; see `frame_times`.
     formats : tuple of str
-        Keys of `FORMATS`: datasets to write beside the frames.
+        Keys of `FORMATS`: datasets to write in addition to the frames.
     dataset : path, optional
-        Folder of the datasets; that of the run if not given.
+        Folder of the datasets; by default that of the run.
     split : str
-        One of `SPLITS`.
+        Split of the datasets, one of `SPLITS`.
     """
 
     scan: ScanSettings = field(default_factory=ScanSettings)
@@ -61,19 +63,19 @@ def make_run(
     settings: RecordingSettings,
     versions: Mapping[str, str],
 ) -> Run:
-    """Gather the inputs of a recording's frames.
+    """Return the run of a recording: all inputs of its frames.
 
     Parameters
     ----------
     trajectories : Trajectories
-        In the scene's axes.
+        Trajectories in the scene's axes.
     versions : mapping of str to str
-        Of this program and what it stands on.
+        Versions of this program and of its dependencies.
 
     Raises
     ------
     SeipError
-        As for `frame_times`.
+        Same as for `frame_times`.
     """
     return Run(
         static=static_scene(geometry, sensors),
@@ -89,14 +91,14 @@ def make_run(
 
 
 def simulation_of(run: Run) -> Generator[Progress, None, Simulation]:
-    """Make a run's sensors ready to scan; see `prepare`."""
+    """Prepare the simulation of a run; see `prepare`."""
     return prepare(run.static, run.sensors, run.trajectories, run.bodies, run.settings)
 
 
 def frame_number(run: Run, time: float) -> tuple[int, float]:
-    """Return which frame of a run a time is next to, and its time where that is the same one, else the time given.
+    """Return the number of the frame nearest to a time, and the frame's time if both are the same, else the given time.
 
-    Noise follows from the number: at a time of the run's own a scan is the run's frame.
+    Noise depends on the number, so that a scan at the time of one of the run's frames equals that frame.
     """
     number = int(np.abs(run.times - time).argmin())
     own = float(run.times[number])
@@ -106,24 +108,24 @@ def frame_number(run: Run, time: float) -> tuple[int, float]:
 def record(
     folder: Path, run: Run, simulation: Simulation, settings: RecordingSettings
 ) -> Generator[Progress, None, Record]:
-    """Write a run's frames, a picture of its first, and its datasets; what is there already is kept.
+    """Write a run's frames, a picture of the first one, and its datasets; existing frames are kept.
 
     Parameters
     ----------
     folder : path
-        Of the run; its name is the run's in datasets.
+        Folder of the run; its name is that of the run in datasets.
     simulation : Simulation
-        Of the run.
+        Simulation of the run.
 
     Returns
     -------
     dict
-        The run's manifest.
+        Manifest of the run.
 
     Raises
     ------
     SeipError
-        As for `write_run` and `write_dataset`.
+        Same as for `write_run` and `write_dataset`.
     """
     from ..output.pictures.scan_view import save_scan_view  # noqa: PLC0415  # matplotlib takes half a second to come
 
@@ -150,5 +152,5 @@ def _traffic_run(folder: Path, run: Run, settings: RecordingSettings) -> Traffic
 
 
 def dataset_folder(folder: Path, settings: RecordingSettings, key: str) -> Path:
-    """Return where the dataset of a format is written."""
+    """Return the folder of the dataset of a format."""
     return (folder if settings.dataset is None else settings.dataset) / key

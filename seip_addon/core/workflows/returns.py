@@ -1,4 +1,4 @@
-"""Placement by expected returns from road users as one job."""
+"""Placement by expected returns from road users."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def place_by_returns(survey: Survey, objective: Objective, limits: SolverLimits)
     Raises
     ------
     SeipError
-        As for `placement_problem` and `solve_returns`.
+        Same as for `placement_problem` and `solve_returns`.
     """
     site, models, visible = survey.site, survey.models, survey.grid.visible
     users = road_users(survey.geometry)
@@ -88,15 +88,15 @@ def _near_targets(targets: Targets, users: RoadUsers, grid: ReturnsGrid, chosen:
 def user_weights(users: RoadUsers, objective: Objective) -> Float:
     """Return the weight of each road user under an objective, (m,) float64.
 
-    The shares of the objective are those of all cars, all cyclists and all pedestrians on the carriageway; pedestrians
-    at the pavements' edges weigh as much as those.
+    The shares of the objective are those of all cars, all cyclists and all pedestrians on the carriageway. Pedestrians
+    at the pavements' edges have the same weight as pedestrians on the carriageway.
     """
     weights: Float = weights_in_regions(objective, users.weight, users.central) * np.array(objective.shares)[users.body]
     return weights
 
 
 def summarised(grid: ReturnsGrid, users: RoadUsers, objective: Objective, chosen: Integer) -> ReturnsSummary:
-    """Return the figures of chosen poses."""
+    """Return the summary of the returns of chosen poses."""
     together = grid.returns[chosen].sum(axis=0, dtype=np.float64)
     weight = user_weights(users, objective)
     in_regions = weights_in_regions(objective, users.weight, users.central)

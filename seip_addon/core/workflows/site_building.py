@@ -1,4 +1,4 @@
-"""From a map, an extract of OpenStreetMap or a site description to the model of a site, as one job."""
+"""Model of a site from a map, an extract of OpenStreetMap or a site description."""
 
 import tempfile
 from collections.abc import Generator
@@ -40,22 +40,22 @@ from ..world.streetscape.place import SCENE_MARGIN, Place
 
 @dataclass(frozen=True)
 class AskedSite:
-    """What is asked for beside the file that a site is built from.
+    """Options of building a site, in addition to the file that it is built from.
 
     Parameters
     ----------
     near : (x, y) or None
-        Middle of the place: map coordinates in metres.
+        Centre of the site: map coordinates in metres.
     near_latlon : (latitude, longitude) or None, degrees
-        The same on the globe.
+        Centre of the site as latitude and longitude.
     junction : tuple of str
-        Id or name of the junction in the middle, or the names of two streets that meet there.
+        Id or name of the junction at the centre, or the names of two streets that meet there.
     radius, approaches : float or None, metres
-        As of a `SiteDescription`.
+        Extent of the site, as in a `SiteDescription`.
     level : tuple of str
-        As of a `SiteDescription`.
+        Roads of the level, as in a `SiteDescription`.
     site : Path or None
-        Site description that goes with a map.
+        Site description for a map.
     osm : Path or None
         Extract whose buildings, trees and posts are added to an OpenDRIVE map.
     buildings : AskedBuildings or None
@@ -65,9 +65,9 @@ class AskedSite:
     service : bool
         Whether driveways and aisles of an extract are streets.
     left_hand : bool or None
-        On which side traffic of an extract keeps; None: as it shows.
+        Whether traffic of an extract keeps left; None to take it from the extract.
     anywhere : bool
-        Whether the middle of a map will do where no place is named.
+        Whether to use the centre of a map if no position is given.
     """
 
     near: tuple[float, float] | None = None
@@ -87,7 +87,7 @@ class AskedSite:
 
 @dataclass(frozen=True, eq=False)
 class BuiltSite:
-    """A site's model, the name of its map, the map itself where it was made of an extract, and a survey's boxes."""
+    """Model of a site with the name of its map, the map itself if made from an extract, and laser-survey boxes."""
 
     map_name: str
     model: SiteModel
@@ -96,19 +96,19 @@ class BuiltSite:
 
 
 def build_site(source: Path, asked: AskedSite, map_path: Path | None = None) -> Generator[Progress, None, BuiltSite]:
-    """Model the site that is asked for.
+    """Build the model of a site.
 
     Parameters
     ----------
     source : Path
-        An OpenDRIVE map, an extract of OpenStreetMap, or a site description that names a map.
+        OpenDRIVE map, extract of OpenStreetMap, or site description that names a map.
     map_path : Path, optional
-        Where the map of an extract's streets is written if a person must see it to choose a level.
+        File for the map of an extract's streets, which is written if a user must choose a level on it.
 
     Raises
     ------
     SeipError
-        A file cannot be read, or holds no such place, or its level is not clear.
+        A file cannot be read or does not contain the position, or the level is not clear.
     """
     yield Progress(0, 0, "map")
     if is_extract(source):
@@ -124,7 +124,7 @@ def build_site(source: Path, asked: AskedSite, map_path: Path | None = None) -> 
 
 
 def save_map(built: BuiltSite, path: Path) -> None:
-    """Write the map that a site of an extract stands on: traffic is simulated on it.
+    """Write the map of a site that was built from an extract, for simulating traffic on it.
 
     Raises
     ------
@@ -142,9 +142,9 @@ def _write_map(text: str, path: Path) -> None:
 
 def _of_extract(source: Path, asked: AskedSite, map_path: Path | None) -> Generator[Progress, None, BuiltSite]:
     if asked.near is not None or asked.osm is not None:
-        raise SeipError(f"{source.name} is an extract of OpenStreetMap: give its place by --near-latlon LAT LON")
+        raise SeipError(f"{source.name} is an extract of OpenStreetMap: give its position by --near-latlon LAT LON")
     if len(asked.junction) == 1:
-        raise SeipError(f'a junction of {source.name} has two streets: --junction "One Street" "Other Street"')
+        raise SeipError(f'a junction of {source.name} needs two streets: give --junction "One Street" "Other Street"')
     place = ExtractPlace(
         near=asked.near_latlon,
         streets=asked.junction,
@@ -184,7 +184,7 @@ def _of_extract(source: Path, asked: AskedSite, map_path: Path | None) -> Genera
 def _with_sources(
     road_map: RoadMap, description: SiteDescription, asked: AskedSite
 ) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...], tuple[Merging, ...]]]:
-    """Add to a description what files beside the map say of its place."""
+    """Add buildings and terrain from further files to a description."""
     if asked.buildings is None and asked.terrain is None:
         return description, (), ()
     middle, reach = _where(road_map, description)
@@ -204,7 +204,7 @@ def _with_sources(
 
 
 def _roads(road_map: RoadMap, area: BaseGeometry) -> tuple[Float, BaseGeometry]:
-    """Return points (n, 3) of the lanes near an area, of all where none is near, and the carriageway there."""
+    """Return points (n, 3) of the lanes near an area, or of all lanes if none is near, and the carriageway there."""
     lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
     points = np.concatenate([np.empty((0, 3)), *(edge for lane in lanes for edge in (lane.left, lane.right))])
     near = points[shapely.intersects_xy(area, points[:, :2])]
@@ -228,7 +228,7 @@ def _of_map(source: Path, asked: AskedSite) -> tuple[Path, RoadMap, SiteDescript
 
 
 def _where(road_map: RoadMap, description: SiteDescription) -> tuple[Float, float]:
-    """Return the middle of a place, (2,) metres, and how far its region may reach from there."""
+    """Return the centre of a site, (2,) metres, and the largest distance of its region from there."""
     lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
     description, _ = in_metres(description, road_map, lanes)
     if description.from_centre_lines:

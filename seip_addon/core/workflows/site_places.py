@@ -1,4 +1,4 @@
-"""Places of a file that a site can be built round: what a person chooses from."""
+"""Places of a file at which a site can be built, for a user to choose from."""
 
 import re
 from collections import Counter
@@ -28,9 +28,9 @@ class NamedPlace:
     Parameters
     ----------
     name : str
-        What people call it; no other place of the file has the same.
+        Name to display, which is unique in the file.
     key : str
-        Its id in a map; in an extract its latitude and longitude, as `parsed_position` reads them.
+        Id in a map; in an extract, latitude and longitude in the form that `parsed_position` reads.
     """
 
     name: str
@@ -44,7 +44,9 @@ class SitePlaces:
     Parameters
     ----------
     radius : float, metres
-        How large a site is where nobody says.
+        Default radius of a site.
+    places : tuple of NamedPlace
+        Junctions of the file.
     """
 
     radius: float
@@ -87,7 +89,7 @@ def parsed_position(text: str) -> tuple[float, float]:
     Raises
     ------
     SeipError
-        It is no such text.
+        The text is not a position.
     """
     found = _POSITION.fullmatch(text)
     if found is None:
@@ -106,7 +108,7 @@ def _position(crossing: Crossing) -> str:
 
 
 def _unlike(names: Iterable[str]) -> list[str]:
-    """Return names of which each is there once: those that are repeated get a number."""
+    """Return unique names: repeated ones get a number."""
     known: Counter[str] = Counter()
     numbered = []
     for name in names:

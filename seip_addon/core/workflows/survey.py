@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..choosing.placement.deployment import deploy, pose_prices
+from ..choosing.placement.deployment import deploy_rows, pose_prices
 from ..choosing.placement.integer_program import check_solver
 from ..choosing.placement.objective import Solution, target_weights
 from ..choosing.placement.search_limits import DEFAULT_EFFORT, SolverLimits
@@ -46,26 +46,27 @@ from .returns import stored_pedestrian_returns
 
 @dataclass(frozen=True)
 class SurveySettings:
-    """All that a user may choose about a survey and how it is answered.
+    """Settings of a survey and of the searches on it.
 
     Parameters
     ----------
     grid_spacing : float, metres
-        Between neighbouring targets.
+        Distance between neighbouring targets.
     catalogue : tuple of path
         The user's own catalogues of LiDARs.
     engine : {"auto", "bvh", "embree"}
-        What casts the rays.
+        Ray-casting engine.
     solver : str
-        ``auto``, ``highs``, ``cbc`` or ``gurobi``; ``auto`` is HiGHS where it is installed, else CBC.
+        Solver of integer programs: ``auto``, ``highs``, ``cbc`` or ``gurobi``; ``auto`` is HiGHS if it is installed,
+        otherwise CBC.
     time_limit : float, seconds, optional
         Limit of the wall time of each search.
     effort : float, units of work, optional
-        Limit of the counted work of each search, which gives the same result again: see `SolverLimits`.
+        Limit of the counted work of each search, which makes results reproducible: see `SolverLimits`.
     installed_cost : InstalledCost, optional
-        Counted in every price where it is given; else prices are those of sensors alone.
+        Cost of installation to include in every price; by default prices are those of sensors only.
     spacings_because : str
-        Why the spacings of targets and candidates are what they are; empty where the user chose them.
+        Reason for the spacings of targets and candidates; empty if the user chose them.
     """
 
     candidates: CandidateSettings = field(default_factory=CandidateSettings)
@@ -75,7 +76,7 @@ class SurveySettings:
     grid_spacing: float = setting(1.0, "distance between neighbouring targets on the road", unit="m", option="grid")
     catalogue: tuple[Path, ...] = setting((), "catalogues of your own; a unit's beams as KEY=FILE", metavar="FILE")
     engine: Engine = setting("auto", "ray caster")
-    solver: str = setting("auto", "auto (HiGHS where it is installed, else CBC), highs, cbc or gurobi")
+    solver: str = setting("auto", "auto (HiGHS if it is installed, otherwise CBC), highs, cbc or gurobi")
     effort: float | None = setting(
         None,
         f"limit of each search in counted work, 1 is about a second of a core ({DEFAULT_EFFORT:g})",
@@ -86,16 +87,16 @@ class SurveySettings:
     spacings_because: str = ""
 
     def models(self) -> dict[str, LidarModel]:
-        """Return the sensor types to choose from as they look through the weather, by catalogue key.
+        """Return the sensor types to choose from, in the given weather, by catalogue key.
 
         Raises
         ------
         SeipError
-            The solver or a type is unknown, a limit is no positive number, a catalogue cannot be read, or a type
-            detects nothing with the probability that is asked for.
+            The solver or a type is unknown, a limit is not a positive number, a catalogue cannot be read, or a type
+            detects nothing with the required probability.
         """
         check_solver(self.solver)
-        self.limits.clock()  # refuses what is no limit before any ray is cast
+        self.limits.clock()  # rejects invalid limits before any ray is cast
         models = find_models(load_catalogue(self.catalogue), self.candidates.sensors)
         for model in models.values():
             self.visibility.least_strength(model)
@@ -103,15 +104,22 @@ class SurveySettings:
 
     @property
     def limits(self) -> SolverLimits:
-        """The solver, and how long it searches."""
+        """Solver and limits of a search."""
         return SolverLimits(self.solver, self.time_limit, self.effort)
 
-    def reach(self) -> float:
-        """Return how far from a target a ray that sees it can begin, or be stopped, in metres."""
-        return max(model.max_range for model in self.models().values()) + self.visibility.delta
+    def reach(self, models: Mapping[str, LidarModel] | None = None) -> float:
+        """Return the largest distance from a target at which a ray that sees it can begin or be stopped, in metres.
+
+        Parameters
+        ----------
+        models : mapping of str to LidarModel, optional
+            Sensor types that `models` has returned; by default they are loaded again.
+        """
+        types = self.models() if models is None else models
+        return max(model.max_range for model in types.values()) + self.visibility.delta
 
     def as_record(self) -> dict[str, Any]:
-        """Return the settings as records hold them: defaults included, values that JSON knows."""
+        """Return the settings for records, defaults included, as values that JSON can represent."""
         limits = _finite({"time_limit_s": self.time_limit or math.inf, "effort": self.limits.work})
         return {
             "grid_spacing_m": self.grid_spacing,
@@ -129,7 +137,7 @@ class SurveySettings:
 
 
 def _finite(record: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a record without what is infinite, which JSON does not know."""
+    """Return a record without infinite values, which JSON cannot represent."""
     return {name: value for name, value in record.items() if math.isfinite(value)}
 
 
@@ -141,16 +149,16 @@ def _candidates_record(settings: CandidateSettings) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A scene laid out for a survey.
+    """A scene with targets and candidates for a survey.
 
     Parameters
     ----------
     geometry : SceneGeometry
-        What was read from the scene.
+        Geometry of the scene.
     models : dict of str to LidarModel
-        The sensor types asked for, by catalogue key.
+        Sensor types to choose from, by catalogue key.
     warnings : tuple of str
-        What a user should know before trusting the figures.
+        Warnings about the accuracy of the figures.
     """
 
     geometry: SceneGeometry
@@ -161,25 +169,26 @@ class Layout:
 
 
 def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequence[str] = ()) -> Layout:
-    """Lay targets and candidates into a scene.
+    """Place targets and candidates in a scene.
 
     Parameters
     ----------
     warnings : sequence of str
-        Of the scene's reading.
+        Warnings from reading the scene.
 
     Raises
     ------
     SeipError
-        As for `SurveySettings.models` and `make_site`.
+        Same as for `SurveySettings.models` and `make_site`.
     """
     models = settings.models()
+    reach = settings.reach(models)
     geometry = settings.weather.over(geometry)
-    site = make_site(geometry, settings.candidates, settings.grid_spacing, settings.reach(), models)
+    site = make_site(geometry, settings.candidates, settings.grid_spacing, reach, models)
     if settings.installed_cost is not None:
         candidates = settings.installed_cost.over(site.candidates, settings.candidates.bracket)
         site = replace(site, candidates=candidates)
-    near, far = without_far_objects(geometry, geometry.region, settings.reach())
+    near, far = without_far_objects(geometry, geometry.region, reach)
     limits = (
         *far,
         *bareness_warnings(near, np.concatenate([site.candidates.xyz[:, :2], site.targets.xyz[:, :2]])),
@@ -193,14 +202,14 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
 
 
 def carla_warnings(models: Mapping[str, LidarModel], settings: SurveySettings) -> tuple[str, ...]:
-    """Say which sensor types see through any weather, and whether they are compared with types that do not."""
+    """Return a warning about sensor types that no weather affects, and on comparing them with types that it affects."""
     types = [key for key, model in models.items() if isinstance(model.law, CarlaDropoff)]
     others = [key for key in models if key not in types]
     changed = settings.weather != Weather() or settings.visibility.detection != VisibilitySettings().detection
     if not types or not (others or changed):
         return ()
     named = f"{', '.join(types)}: every return in range counts (CARLA's model), whatever the weather and the surface"
-    return (f"{named}; {', '.join(others)} must detect it: the two do not compare" if others else named,)
+    return (f"{named}; {', '.join(others)} must detect it: do not compare the two" if others else named,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,7 +219,8 @@ class Survey(Layout):
     Parameters
     ----------
     returns_path : path, optional
-        File of the returns grid, read and written when a placement is chosen by it; None to keep it in memory only.
+        File of the returns grid, read and written when a placement is chosen for returns; None to keep it in memory
+        only.
     """
 
     grid: VisibilityGrid
@@ -218,15 +228,15 @@ class Survey(Layout):
 
 
 def grid_key(layout: Layout) -> str:
-    """Return the key of the visibility grid of a survey: what it is kept under."""
+    """Return the key of the visibility grid of a survey, by which it is stored."""
     settings = layout.settings
     return visibility_key(layout.site, layout.models, settings.visibility, engine_name(settings.engine))
 
 
 def inputs_of(layout: Layout) -> dict[str, str]:
-    """Return digests of what a placement follows from: of the visibility grid, and of all else about the site.
+    """Return digests of the inputs of a placement: of the visibility grid, and of the rest of the site.
 
-    Two layouts with the same digests have the same answers to the same objective.
+    Two layouts with the same digests have the same solution for the same objective.
     """
     targets, candidates = layout.site.targets, layout.site.candidates
     site = digest(
@@ -239,16 +249,16 @@ def inputs_of(layout: Layout) -> dict[str, str]:
 def see(
     layout: Layout, path: Path, scheduler: str | None = None, threads: int | None = None
 ) -> Generator[Progress, None, Survey]:
-    """Find which pose sees which target, or read it from a file where an earlier survey found the same.
+    """Compute the visibility grid of a layout, or read it from a file if it was computed from the same inputs.
 
     Parameters
     ----------
     path : path
-        The grid's file, read and written.
+        File of the grid, read and written.
     scheduler : str, optional
-        Address of a Dask scheduler whose workers do the work.
+        Address of a Dask scheduler whose workers compute the grid.
     threads : int, optional
-        How many cast at once at most.
+        Maximum number of threads.
     """
     settings = layout.settings
     grid = yield from stored_visibility(
@@ -258,30 +268,30 @@ def see(
 
 
 def with_grid(layout: Layout, grid: VisibilityGrid, path: Path | None = None) -> Survey:
-    """Return the survey of a layout whose visibility grid is known, and stored in the file ``path`` if there is one."""
+    """Return the survey of a layout with a given visibility grid; ``path`` is the file that it is stored in, if any."""
     returns_path = None if path is None else path.with_suffix(".returns.npz")
     return Survey(**{**vars(layout), "grid": grid, "returns_path": returns_path})
 
 
 def estimate(layout: Layout, threads: int | None = None) -> Generator[Progress, None, Estimate]:
-    """Estimate what `see` will take where nothing is known yet; see `estimate_visibility`."""
+    """Estimate the run time and memory of `see` without a stored grid; see `estimate_visibility`."""
     settings = layout.settings
     return estimate_visibility(layout.site, layout.models, settings.visibility, settings.engine, threads)
 
 
 def surroundings(layout: Layout) -> Surroundings:
-    """Return where the sensors of a survey may hang, and what they see there."""
+    """Return the inputs of visibility from arbitrary poses in a survey."""
     settings = layout.settings
     return Surroundings(layout.site, layout.models, settings.visibility, layout.geometry.occluders, settings.engine)
 
 
 def record_of(survey: Survey, solution: Solution, provenance: Provenance, *, render: bool = False) -> PlacementRecord:
-    """Return what ``placement.json`` holds of a solution.
+    """Return the contents of ``placement.json`` for a solution.
 
     Parameters
     ----------
     render : bool
-        Whether a rendered view belongs to the result.
+        Whether the result includes a rendered view.
     """
     objective = {"goal": as_json(solution.objective), "render": render}
     missing = missing_sentence(survey.site, LOCATED_FILES)
@@ -297,27 +307,27 @@ def record_of(survey: Survey, solution: Solution, provenance: Provenance, *, ren
 
 
 def restored_solution(survey: Survey, record: PlacementRecord) -> Solution:
-    """Return the solution that a record of `record_of` tells of, without asking a solver again.
+    """Return the solution in a record of `record_of`, without solving again.
 
     Parameters
     ----------
     survey : Survey
-        That it was made on.
+        Survey of the record.
     record : PlacementRecord
-        The greedy answer that it may hold is left out.
+        Record of the solution. A greedy placement in it is left out.
 
     Raises
     ------
     SeipError
-        The record is of another grid, or names a pose that is none of its candidates.
+        The record belongs to a different grid, or contains a pose that is not a candidate.
     """
     site, grid = survey.site, survey.grid
     poses = range(len(site.candidates))
     if record.inputs.get("visibility") != grid.key or not all(sensor.pose in poses for sensor in record.sensors):
-        raise SeipError("the placement was made for another state of the scene or its settings: place again")
+        raise SeipError("the placement is stale, as the scene or its settings have changed: place again")
     objective, chosen = record.asked.goal, record.poses
     covered = float(target_weights(site, objective)[grid.times_seen(chosen) > 0].sum())
-    deployment = deploy(site, survey.models, grid.visible, chosen)
+    deployment = deploy_rows(site, survey.models, grid.rows(chosen), chosen)
     known = replace(deployment, gain_band=record.coverage.gain_band, returns=record.returns)
     if record.returns is not None:
         known = replace(known, pedestrian_returns=stored_pedestrian_returns(survey, chosen))

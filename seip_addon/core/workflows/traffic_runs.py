@@ -1,4 +1,4 @@
-"""Runs of traffic beside a scene, split into those to optimise a placement on and those to evaluate it on."""
+"""Runs of traffic for a scene, split into those to optimise a placement on and those to evaluate it on."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .survey import Layout
 _Run = TypeVar("_Run")
 
 EVALUATION_SHARE = 1 / 3
-"""Share of the runs, the last ones, that placements are evaluated on and not optimised on."""
+"""Share of the runs that are held out for evaluation: the last ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,9 +32,9 @@ class TrafficRuns:
     Parameters
     ----------
     optimisation, evaluation : list of Trajectories
-        To optimise a placement on, and to evaluate it on.
+        Runs to optimise a placement on, and runs to evaluate it on.
     overlap : str
-        Message on how much the two overlap.
+        Message on the overlap of the two.
     """
 
     optimisation: list[Trajectories]
@@ -49,18 +49,18 @@ def split_runs(runs: Sequence[_Run]) -> tuple[list[_Run], list[_Run]]:
 
 
 def traffic_folder(scene: Path, kind: str = "") -> Path:
-    """Return the folder for runs beside the file of a scene: ``junction_traffic`` beside ``junction.blend``.
+    """Return the folder for runs next to the file of a scene: ``junction_traffic`` for ``junction.blend``.
 
     Parameters
     ----------
     kind : str
-        What else the folder's name ends with: ``_dense`` for ``junction_traffic_dense``.
+        Ending of the folder's name: ``_dense`` for ``junction_traffic_dense``.
     """
     return scene.parent / f"{scene.stem}_traffic{kind}"
 
 
 def runs_in(folder: Path) -> list[Path]:
-    """Return the files of runs in a folder by their names, numbers as such; none where there is no such folder."""
+    """Return the files of runs in a folder in natural order of their names; none if there is no such folder."""
 
     def by_number(path: Path) -> list[tuple[int, str]]:
         return [(int(part), "") if part.isdecimal() else (0, part) for part in re.split(r"([0-9]+)", path.stem)]
@@ -74,13 +74,13 @@ def found_runs(folder: Path) -> list[Path]:
     Raises
     ------
     SeipError
-        There is none.
+        There is no such file.
     """
     paths = runs_in(folder)
     if not paths:
         raise SeipError(
             f"there is no run of traffic (.npz) in {folder}: choose another folder, or make two or more runs with "
-            "headless/traffic.py, a seed each"
+            "seip traffic, each with its own seed"
         )
     return paths
 
@@ -91,12 +91,12 @@ def load_runs(paths: Sequence[Path], origin: Float) -> list[Trajectories]:
 
 
 def read_runs(paths: Sequence[Path], layout: Layout) -> Generator[Progress, None, TrafficRuns]:
-    """Read the runs that a survey's sensors are to be placed on.
+    """Read the runs of traffic for optimising a placement on a survey.
 
     Raises
     ------
     SeipError
-        A file is named twice or cannot be read, or as for `independent_runs`.
+        A file is named twice or cannot be read, or the same as for `independent_runs`.
     """
     for path in paths:
         if paths.count(path) > 1:
@@ -109,17 +109,17 @@ def read_runs(paths: Sequence[Path], layout: Layout) -> Generator[Progress, None
 
 
 def independent_runs(runs: Mapping[str, Trajectories], site: Site) -> TrafficRuns:
-    """Split runs, given by name in the axes of the site, and check that both parts show traffic of their own there.
+    """Split runs, given by name in the axes of the site, and check that both parts are independent traffic of the site.
 
     Raises
     ------
     SeipError
-        There are fewer than two, one is of another place, or two are nearly the same.
+        There are fewer than two runs, one belongs to another site, or two are nearly the same.
     """
     if len(runs) < 2:
         raise SeipError(
-            f"two runs of traffic or more are needed, not {len(runs)}: make them by headless/traffic.py with a seed "
-            "each; what is chosen on the others is evaluated on the last third"
+            f"two runs of traffic or more are needed, not {len(runs)}: make them with seip traffic, each with its own "
+            "seed; the last third is held out for evaluation"
         )
     check_runs(list(runs.values()), site.region)
     positions = [vehicle_positions(name, run) for name, run in runs.items()]

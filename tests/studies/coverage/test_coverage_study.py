@@ -86,7 +86,7 @@ def test_more_sensors_than_positions_leave_those_cells_empty_and_the_rest_solved
     empty = [cell for cell in study.cells if isinstance(cell, EmptyCell)]
     assert {cell.count for cell in empty} == {4}
     assert {cell.note for cell in empty} == {
-        "asked for 4 sensors, but there are 3 positions; ask for at most 3",
+        "4 sensors are requested, but there are only 3 positions; request at most 3",
     }
     assert {case.count for case in study.cases} == {1, 2}
     verdicts = {claim.number: claim.verdict for claim in coverage_claims(study)}

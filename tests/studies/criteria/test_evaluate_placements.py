@@ -134,7 +134,7 @@ def test_other_placements_do_not_go_on_with_a_training(run, study, tmp_path):
     ("options", "sentence"),
     [
         (("--placements", "3"), "3 placements say nothing of a correlation"),
-        (("--count", "30"), "asked for 30 sensors, but there are"),
+        (("--count", "30"), "30 sensors are requested, but there are"),
         (("--sensor", "type1", "type2"), "placements of one type are compared"),
         (("--placement", "somewhere"), "name either --placements"),
     ],

@@ -132,7 +132,7 @@ def test_a_run_without_road_users_in_the_region_is_refused_before_training(run, 
     elsewhere = Trajectories.load(runs[2])
     moved = replace(elsewhere, position=elsewhere.position + 5000.0, source="of elsewhere")
     moved.save(tmp_path / "run-9.npz")
-    with pytest.raises(SeipError, match=r"nobody of the run of traffic \(of elsewhere\) is ever in the region"):
+    with pytest.raises(SeipError, match=r"no road user of the run of traffic \(of elsewhere\) is ever in the region"):
         run(tmp_path, runs=[*runs, tmp_path / "run-9.npz"])
     assert not list(tmp_path.glob("detector*"))
 

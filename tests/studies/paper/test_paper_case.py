@@ -49,7 +49,7 @@ def run(tmp_path):
     [
         ({"junction": "965"}, r"no junction '965' in map"),
         ({}, r"a.net.xml is no network of the map junction.xodr at this place \(none of its streets is there\)"),
-        ({"net": "<net/>"}, r"a.net.xml is no SUMO network"),
+        ({"net": "<net/>"}, r"a.net.xml is not a SUMO network"),
         ({"source": MAP.with_name("none.xodr")}, r"there is no file .*none.xodr: check its path"),
     ],
 )

@@ -55,7 +55,7 @@ def test_what_goes_through_is_counted(tmp_path):
         (network(y=-8.5).replace("200,", "300,"), None, r"is no network of the map a.xodr"),
         (network(joint=100.0), None, r"no flow of a.rou.xml goes through the region of street"),
         (None, FLOWS.format(9, "").replace("w e", "w x"), r"flow 'f' takes the edge 'x', which a.net.xml has not"),
-        ("<net/>", None, r"a.net.xml is no SUMO network"),
+        ("<net/>", None, r"a.net.xml is not a SUMO network"),
     ],
 )
 def test_files_of_another_place_are_one_sentence(tmp_path, net, flows, message):

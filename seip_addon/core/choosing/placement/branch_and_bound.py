@@ -14,11 +14,12 @@ follows adds to it no more than the least concave function :math:`φ_{n,l}` abov
 .. math::
     F(S \cup R) \le F(S) + \sum_j w_j\, φ_{n_j(S),\,l}(n_j(R)), \quad |R| \le l,
 
-which is submodular in R, and tighter in every branch than above it: who has been seen once counts in full or not at
-all, who cannot be seen often enough any more counts no longer, and for the last sensor it is exact.
+which is submodular in R. It is tighter in every branch than above it: the next sensor on a target that was seen once
+adds its full value or nothing, a target that can no longer be seen often enough adds nothing, and for the last sensor
+the bound is exact.
 
-The largest bound among the open nodes holds for every placement that the search has not seen: it falls as the search
-goes on, and a search that is stopped can be continued.
+The largest bound among the open nodes holds for every placement that the search has not visited. It falls as the search
+continues, and a stopped search can be resumed.
 
 Weights are whole numbers, so a search meets the same placements in the same order on every machine.
 """
@@ -37,42 +38,46 @@ from .problem import TIE_TOLERANCE
 from .reduced_problem import MAX_EXACT_DOUBLE, WHOLE_SLACK, Instance, Numbers
 from .search_limits import Clock
 
-MIN_SENSORS = 3  # with so many sensors to come, or more, a node is bounded by Lagrangian relaxation as well
+MIN_SENSORS = 3  # least number of sensors to come for which a node is also bounded by Lagrangian relaxation
 
 MIN_CHILDREN = 60
-"""... where at least so many children are left, and each sensor adds no more than the one before it ...
+"""Least number of children of a node for which it is relaxed.
 
-Elsewhere branching itself tightens the bound, and sooner.
+A node is relaxed only where the objective is concave: otherwise branching itself tightens the bound, and sooner.
 """
 
 TRIALS, MAX_KEPT_SHARE = 4, 0.5
-"""... and, after so many trials with as many sensors to come, where it leaves no more than such a share of them."""
+"""Trials of the relaxation for each number of sensors to come, and the mean share of children that it may keep in them.
 
-FIRST_STEPS, LATER_STEPS = 300, 30  # of the multipliers of the first node, and of later ones from their parent's
-MAX_ENTRIES = 30_000_000  # entries of V that the search keeps as numbers at most: 240 MB, or twice that
+If it keeps more, nodes with this number of sensors to come are no longer relaxed.
+"""
+
+FIRST_STEPS, LATER_STEPS = 300, 30  # steps of the multipliers at the first node, and at nodes that start from others
+MAX_ENTRIES = 30_000_000  # largest number of entries of V that the search keeps as numbers: 240 MB, or twice that
 OPERATIONS_PER_FETCH = 8  # multiplications that take as long as fetching an entry of V
 
 MAX_WAITING_FOLLOWERS = 16_000_000
-"""Followers of nodes that wait to be taken by their bounds: 200 MB. With so many, new nodes are searched first."""
+"""Largest number of followers in the queue of open nodes: 200 MB. Beyond it, new nodes are searched first."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Node:
-    """Sensors chosen so far and who may follow, largest gain first.
+    """Sensors chosen so far and the candidates that may follow, largest gain first.
 
     Parameters
     ----------
     bound : float
         No placement below this node has a larger objective value.
     chosen : tuple of int
-        In the order in which they were chosen.
+        Candidates in the order in which they were chosen.
     value : float
-        Their objective value.
+        Objective value of the chosen candidates.
     goal : float
-        Objective value that a placement below this node must have to be wanted.
+        Least objective value of placements below this node that are of interest.
     followers : (n,) int64
+        Candidates that may be added.
     gains : (n,) float
-        What each follower would add at most, with those that follow it.
+        Upper bound on what each follower adds.
     multipliers : (t,) float64, optional
         Lagrangian multipliers of the targets to begin from.
     multiplier : float
@@ -106,28 +111,28 @@ def merit(instance: Instance, chosen: Integer) -> tuple[int, float, float, list[
 
 
 def relative_price(instance: Instance, price: float) -> float:
-    """Return a price in units of the dearest sensor's, rounded to what counts as equal."""
+    """Return a price as a share of the most expensive sensor's, rounded to what counts as equal."""
     return round(price / (float(instance.price.max(initial=0.0)) or 1.0), 8)
 
 
 class Search:
-    """A walk over all placements in greedy order; what is wanted of them is up to `_take` and `_is_hopeless`.
+    """Search of all placements in greedy order; subclasses select results in `_take` and prune in `_is_hopeless`.
 
     Parameters
     ----------
     goal : float
-        Objective value to be reached at least.
+        Least objective value of a result.
     depth_first : bool
         Whether to follow each branch to its end before the next one, instead of taking the largest bound first.
     root : (n,) int64 and Bound, optional
-        Candidates to search among, and a bound on what placements of these reach, where known.
+        Candidates to search among, and an upper bound on the value of their placements, where known.
 
     Attributes
     ----------
     goal : float
-        A placement of a smaller value is not wanted. It rises as placements are found.
+        Least value of a result. It rises as placements are found.
     satisfied : bool
-        Whether enough was found.
+        Whether enough placements were found.
     """
 
     def __init__(
@@ -142,6 +147,8 @@ class Search:
         self._by_target = np.ascontiguousarray(self._matrix.T)
         self._seen_by = np.ascontiguousarray(instance.visible.T)
         self._weight = instance.weight.astype(self._matrix.dtype)
+        # For plain coverage the weight that two candidates both see is the same at every node: computed once, it saves
+        # most of the work in `_overlaps`. With several values per target it depends on how often each is seen already.
         self._overlap = (self._matrix * self._weight) @ self._by_target if instance.cover.top == 1 else None
         self._excluded = instance.conflict | np.eye(len(instance), dtype=bool)
         # running sums of all gains, each at most the total, are exact below MAX_EXACT_DOUBLE and rounded beyond
@@ -151,6 +158,8 @@ class Search:
         self._stack: list[_Node] = []
         self._serial = self._waiting = self._met = 0
         self._left_over: dict[int, list[float]] = {}
+        # The root has no sensors, and all candidates as followers. The stable sort settles ties by the canonical order
+        # of candidates, so that the tree does not depend on the machine.
         gains = self._matrix @ instance.unseen_layers[0].astype(self._matrix.dtype)
         first = np.argsort(-gains, kind="stable")
         bound, multipliers = math.inf, None
@@ -160,13 +169,14 @@ class Search:
 
     @property
     def bound(self) -> float:
-        """No placement not seen yet has a larger objective value; -inf where all is seen that can be wanted."""
+        """Upper bound on the value of placements not visited yet; -inf once none of these can reach the goal."""
+        # the queue is a heap by bound, so that its first node has the largest; the stack has no order
         bounds = [node.bound for node in self._stack] + [node.bound for _, node in self._queue[:1]]
         bound = max(bounds, default=-math.inf)
         return bound if bound >= self.goal - self._rounding else -math.inf
 
     def run(self, clock: Clock, seconds: float, most: float = math.inf) -> Generator[Progress, None, bool]:
-        """Search on; return whether all was seen, or enough, before the time was up, in ``most`` branches."""
+        """Continue the search, for at most ``most`` branches; return whether it ended within the limits."""
         end, last = clock.elapsed + min(seconds, clock.left), self._met + most
         self._clock = clock
         while self._is_open() and not self.satisfied:
@@ -179,18 +189,19 @@ class Search:
         return True
 
     def _take(self, placement: Integer) -> float:
-        """Take a placement that may reach the goal; return the goal that placements with more sensors must reach."""
+        """Record a placement that may reach the goal; return the goal for placements with more sensors."""
         raise NotImplementedError
 
     def _is_hopeless(self, chosen: tuple[int, ...], followers: Integer) -> bool:  # noqa: ARG002 -- for subclasses
-        """Whether nothing below is wanted for another reason than its objective value."""
+        """Whether a node can be cut for a reason other than its bound."""
         return False
 
     def offer(self, chosen: Integer) -> float:
-        """Take a placement found elsewhere; return the goal that placements with more sensors must reach."""
+        """Record a placement found elsewhere; return the goal for placements with more sensors."""
         return self._take(np.sort(np.array(chosen, dtype=np.int64)))
 
     def _is_open(self) -> bool:
+        # once the largest bound in the queue is below the goal, all nodes in it are
         if not self._stack and self._queue and self._queue[0][1].bound < self.goal - self._rounding:
             self._queue.clear()
         return bool(self._stack or self._queue)
@@ -203,16 +214,21 @@ class Search:
         return node
 
     def _push(self, children: list[_Node]) -> None:
+        # Best first keeps all open nodes in memory. Beyond the limit the search goes depth first instead, which needs
+        # little memory and finishes subtrees. The proof stays complete, since `bound` includes the stack. Children are
+        # pushed last to first, so that the one of largest gain is taken from the stack first.
         for child in reversed(children):
             if self._depth_first or self._waiting > MAX_WAITING_FOLLOWERS:
                 self._stack.append(child)
             else:
                 self._serial += 1
+                # of equal bounds the deepest node first, as it is nearest to a placement; then in the order of creation
                 heappush(self._queue, ((-child.bound, -len(child.chosen), self._serial), child))
                 self._waiting += len(child.followers)
 
     def _expand(self, node: _Node) -> Generator[Progress, None, list[_Node]]:
-        """Return the children of a node that can still reach the goal; take those that do."""
+        """Return the children of a node that can still reach the goal, and record the placements that do."""
+        # The goal may have risen since the node was queued: everything about it is checked again here.
         goal = self._wanted(node)
         left = 0 if node.bound < goal else self._left(node)
         if left == 0:
@@ -223,6 +239,9 @@ class Search:
         if left == 1:
             self._take_leaves(node, children)
             return []
+        # The sum of the largest gains counts a target once for each follower that sees it. The Lagrangian bound
+        # corrects that, but takes a product with V in each step: it is computed only where it may remove many children.
+        # At the root the caller may have given its result already.
         known = node.multipliers is not None and not node.chosen
         if children >= MIN_CHILDREN and self.instance.cover.concave and not known and self._relaxation_pays(left):
             before = children
@@ -231,6 +250,8 @@ class Search:
             if children == 0:
                 return []
         kept = self._children(node, children, left, goal)
+        # With two sensors to come the children have leaves only. These are recorded at once and not queued: their
+        # placements are known here, and bounds could not cut any more of them.
         if left > 2:
             return kept
         for child in kept:
@@ -239,19 +260,29 @@ class Search:
         return []
 
     def _children(self, node: _Node, children: int, left: int, goal: float) -> list[_Node]:
-        """Return the children of a node whose bounds reach the goal, after offering those that reach it themselves."""
+        """Return the children of a node whose bounds reach the goal, after offering those that reach it themselves.
+
+        Child i adds follower i and keeps as followers only those after it. So every set of followers is below exactly
+        one child, the one of its first member.
+        """
         times = self.instance.times(node.chosen)
+        # Row i has the gains of all followers after child i is added: their gains so far, less what child i takes away.
+        # One matrix product gives all rows, and the sum of the largest gains in each is that child's bound.
         later = self._may_follow(node, children)
         gains_after = self._gains(node, times, left - 1) - self._overlaps(times, left - 1, node.followers, children)
         multiplier, best = self._best_completions(node, np.where(later, gains_after, 0.0), left - 1)
+        # with one sensor to come the bound on a gain is exact, so that these are the children's own values
         values = node.value + self._gains(node, times, 1)[:children].astype(np.float64)
         kept = []
         for row in np.flatnonzero(values + best >= goal):
             chosen, value, wanted = (*node.chosen, int(node.followers[row])), float(values[row]), self._wanted(node)
+            # A placement that reaches the goal raises it for all placements with more sensors, so that the child, which
+            # was within reach before, may not be any longer.
             if value >= wanted:
                 wanted = self.offer(np.array(chosen))
             if value + best[row] < wanted:
                 continue
+            # sorted again by the gains after this child: greedy order is what makes the bounds of children fall
             after, bound = later[row], min(node.bound, value + float(best[row]))
             order = np.flatnonzero(after)[np.argsort(-gains_after[row, after], kind="stable")]
             followers, gains = node.followers[order], gains_after[row, order]
@@ -259,11 +290,12 @@ class Search:
         return kept
 
     def _wanted(self, node: _Node) -> float:
-        """Return the objective value that a placement below a node must have, but for rounding."""
+        """Return the objective value that a placement below a node must have, less the largest rounding error."""
         return max(node.goal, self.goal) - self._rounding
 
     def _left(self, node: _Node) -> int:
-        """Return how many sensors can follow at most."""
+        """Return the largest number of sensors that can follow."""
+        # the cheapest followers, in turn, until the budget is spent: no other choice buys more sensors
         left = self.instance.count - len(node.chosen)
         if not math.isfinite(self.instance.budget):
             return left
@@ -272,16 +304,21 @@ class Search:
         return int(np.count_nonzero(self.instance.affordable(spent + np.cumsum(prices))))
 
     def _take_leaves(self, node: _Node, children: int) -> None:
-        """Take the placements of one sensor more."""
+        """Record the placements with one sensor more."""
         if self._left(node) == 0:
             return
+        # followers come by falling gain, and for the last sensor gains are exact: the first that falls short ends it
         for candidate, gain in zip(node.followers[:children].tolist(), node.gains[:children].tolist(), strict=True):
             if self.satisfied or node.value + gain < self._wanted(node):
                 return
             self.offer(np.array((*node.chosen, candidate)))
 
     def _rest(self, node: _Node, left: int, targets: Integer) -> Instance:
-        """Return the followers of a node, some targets, and what the sensors chosen leave of the limits."""
+        """Return the instance below a node: its followers, the given targets, and the number and budget that are left.
+
+        Conflicts other than cliques, and mandatory groups, are left out. That only enlarges the set of placements, so
+        that an upper bound on it is one on the placements below the node.
+        """
         instance, followers = self.instance, node.followers
         spent = math.fsum(instance.price[list(node.chosen)])
         return replace(
@@ -289,7 +326,7 @@ class Search:
             visible=self._seen_by[targets][:, followers].T,  # rows of targets are copied faster
             weight=instance.weight[targets],
             price=instance.price[followers],
-            conflict=np.broadcast_to(np.False_, (len(followers), len(followers))),  # bounds know the cliques alone
+            conflict=np.broadcast_to(np.False_, (len(followers), len(followers))),  # bounds use the cliques only
             clique=instance.clique[followers],
             mandatory=np.zeros((0, len(followers)), bool),
             original=instance.original[followers],
@@ -298,14 +335,16 @@ class Search:
         )
 
     def _relaxation_pays(self, left: int) -> bool:
-        """Whether enough children were cut where nodes with so many sensors to come were relaxed before."""
+        """Whether relaxing nodes with ``left`` sensors to come has cut enough children so far."""
         shares = self._left_over.get(left, [])
         return left >= MIN_SENSORS and (len(shares) < TRIALS or sum(shares) <= MAX_KEPT_SHARE * len(shares))
 
     def _relaxed(self, node: _Node, left: int, goal: float) -> Generator[Progress, None, tuple[_Node, int]]:
-        """Drop the followers that a Lagrangian bound rules out; return also how many are children."""
+        """Drop the followers that a Lagrangian bound rules out; return also the number of children."""
         instance = self.instance
         layers = instance.layers(instance.times(node.chosen), left)
+        # Targets to which no sensor can add any more are left out: they would only cost time. A child starts from the
+        # multipliers of its parent, which differs by one sensor, and so needs fewer steps than the root.
         open_targets = np.flatnonzero(layers[0] > 0)
         rest = self._rest(node, left, open_targets)
         start = None if node.multipliers is None else node.multipliers[open_targets]
@@ -325,9 +364,10 @@ class Search:
         return _within_reach(node, left, goal)
 
     def _may_follow(self, node: _Node, children: int) -> Boolean:
-        """Return who may follow each child, (children, n)."""
+        """Return which followers may follow each child, (children, n) bool."""
         instance, followers = self.instance, node.followers
         first = followers[:children]
+        # only those after the child in the order of gains: the sets with an earlier one are below that one's node
         later: Boolean = np.arange(len(followers)) > np.arange(children)[:, None]
         later &= ~self._excluded[first[:, None], followers]
         if math.isfinite(instance.budget):
@@ -336,22 +376,41 @@ class Search:
         return later
 
     def _gains(self, node: _Node, times: Integer, left: int) -> Numbers:
-        """Return what each follower adds at most to targets seen so many times, with so many to come, (n,)."""
+        """Return an upper bound on what each follower adds, (n,).
+
+        Parameters
+        ----------
+        times : (t,) int64
+            Number of chosen sensors that see each target.
+        left : int
+            Number of sensors to come.
+        """
         instance = self.instance
-        if instance.cover.concave:  # the same however many are to come
+        if instance.cover.concave:  # then the bound is the gain itself, whatever the number of sensors to come
             return node.gains
         increments = instance.increments(times, left).astype(self._matrix.dtype)
         gains: Numbers = (self._matrix @ increments)[node.followers]
         return gains
 
     def _overlaps(self, times: Integer, left: int, followers: Integer, children: int) -> Numbers:
-        """Return how much less each follower adds after each child, with so many to come, (children, n).
+        """Return the loss of each follower's gain by the choice of each child, (children, n).
 
-        For plain coverage this is the weight that both see and no chosen one: all that both see, less what is seen
-        already, where that is shorter.
+        For plain coverage this is the weight that both see and no chosen sensor sees.
+
+        Parameters
+        ----------
+        times : (t,) int64
+            Number of chosen sensors that see each target.
+        left : int
+            Number of sensors to come after the child.
         """
         instance = self.instance
+        # A target that child and follower both see, and that is seen n times, adds increment(n) before the child is
+        # chosen and increment(n + 1) after it. The sum of these differences over the common targets is the loss.
         lost = instance.increments(times, left) - instance.increments(times + 1, left)
+        # Only targets that some child sees matter. For plain coverage there are two ways to the same whole numbers: add
+        # up the targets that nobody sees yet, or take those seen already from the overlap of all targets that was
+        # computed at the start. The product over fewer targets is the cheaper one.
         by_child = instance.visible[followers[:children]].any(axis=0)
         kept, changed = np.flatnonzero(by_child & (lost == 0)), np.flatnonzero(by_child & (lost != 0))
         overlap = self._overlap if len(kept) <= len(changed) else None
@@ -359,6 +418,8 @@ class Search:
         factor = (lost if overlap is None else instance.weight)[targets].astype(self._matrix.dtype)[:, None]
         self._clock.spend(len(targets) * len(followers) * (children + OPERATIONS_PER_FETCH))
         rows, by_target = followers[:children], self._by_target[targets]
+        # V is kept by target here, since whole rows are fetched fast. Fetching the columns of the followers first costs
+        # another copy, which pays where these are fewer than half of all candidates.
         if 2 * len(followers) < len(instance):
             by_target = by_target[:, followers]
             shared: Numbers = (by_target[:, :children] * factor).T @ by_target
@@ -367,18 +428,23 @@ class Search:
         return shared if overlap is None else overlap[rows[:, None], followers] - shared
 
     def _best_completions(self, node: _Node, gains_after: Numbers, left: int) -> tuple[float, Float]:
-        """Return what so many sensors more add to each child at most, within what it leaves of the budget.
+        """Return upper bounds on what ``left`` more sensors add to each child within the budget that is left.
 
         Returns
         -------
         float
             Multiplier of the budget.
         (children,) float64
+            Upper bound for each child.
         """
+        # Submodularity: what several sensors add together is at most the sum of what each adds by itself.
         best: Float = _largest(gains_after, left).sum(axis=1, dtype=np.float64)
         if not math.isfinite(self.instance.budget):
             return 0.0, best
         rest = self._rest(node, left + 1, np.zeros(0, dtype=np.int64))
+        # Under a budget C, also for any μ >= 0: gains are at most μ C plus the sum of the largest positive gains less μ
+        # times the price. Every μ gives a valid bound, so that the one for the node serves all its children, and the
+        # search for it starts from the parent's.
         multiplier = select(rest, node.gains.astype(np.float64), node.multiplier).multiplier
         if multiplier > 0:
             net = np.maximum(gains_after - multiplier * rest.price, 0.0)
@@ -388,24 +454,24 @@ class Search:
 
 
 class BestPlacements(Search):
-    """Lists the placements of largest coverage among those that cover at least a goal.
+    """Search that lists the placements of largest coverage among those that cover at least a goal.
 
-    Each one that covers more raises the goal, and those that fall short of it by then leave the list.
+    A placement that covers more raises the goal, and placements below the new goal leave the list.
 
     Parameters
     ----------
     goal : float
-        Weight to be covered at least.
+        Least weight to cover.
     most : int
-        Longest list; of more placements these are the first that the search meets.
+        Length of the list; of more placements it has the first that the search meets.
     bound : float
-        No placement covers more: the search ends when the list is full of such.
+        Upper bound on the weight that any placement covers: the search ends when the list is full of such placements.
 
     Attributes
     ----------
     overflowed : bool
-        Whether there are more. Otherwise, once the search has come to its end, all that cover as much are listed, but
-        for those with idle sensors.
+        Whether there are more placements than the list has. If not, then at the end of the search it has all that cover
+        the same weight, except those with idle sensors.
     """
 
     def __init__(self, instance: Instance, goal: float, most: int, bound: float) -> None:
@@ -418,25 +484,27 @@ class BestPlacements(Search):
 
     @property
     def found(self) -> list[Integer]:
-        """Sorted candidates of the placements that cover most, in the order in which they were met."""
+        """Sorted candidates of the placements that cover most, in the order in which the search met them."""
         return [placement for _, placement in self._listed.values()]
 
     def _take(self, placement: Integer) -> float:
         instance, value = self.instance, self.instance.value(placement)
         if value < self.goal or not instance.feasible(placement):
             return self.goal
-        # with more sensors only those are wanted that cover more: weights are whole numbers
+        # A placement with more sensors and the same coverage is not a result, as fewer sensors come first among ties:
+        # below this one only placements that cover at least one unit more count. Weights are whole numbers.
         more = value + 1 - WHOLE_SLACK
         if value > self._value:
             self.overflowed &= value <= self._value + instance.slack
             self._value, self.goal = value, value - instance.slack
             self._listed = {key: tie for key, tie in self._listed.items() if tie[0] >= self.goal}
+        # a placement may come twice: from the search, and from `offer`
         if placement.tobytes() in self._listed:
             return more
         if len(self._listed) < self._most:
             self._listed[placement.tobytes()] = value, placement
         else:
-            # one more than can be listed: from here on only a better one is of interest
+            # the list is full: from here on only a better placement is of interest
             self.overflowed = True
             self.goal = max(self.goal, more)
         self.satisfied = self.overflowed and self._bound < more
@@ -444,10 +512,10 @@ class BestPlacements(Search):
 
 
 class FirstInOrder(Search):
-    """Keeps the first by `merit` of the placements that cover a goal with as many sensors as are allowed.
+    """Search for the first by `merit` of the placements that cover a goal with exactly ``count`` sensors.
 
-    What is dearer or doubly covers less is cut. What is covered once and what is covered twice are together a
-    submodular function too: the largest gains bound it in the same way.
+    It goes depth first, as all results have the same value: the order of bounds would not lead to the first of them.
+    Nodes that can only become more expensive, or cover less weight twice, than the best so far are cut.
 
     Parameters
     ----------
@@ -457,6 +525,7 @@ class FirstInOrder(Search):
     Attributes
     ----------
     best : (k,) int64 or None
+        First placement by `merit` so far.
     """
 
     def __init__(self, instance: Instance, goal: float) -> None:
@@ -475,23 +544,33 @@ class FirstInOrder(Search):
         if self._key is None:
             return False
         instance, left = self.instance, self.instance.count - len(chosen)
+        # Price is compared before double coverage. The cheapest followers give a lower bound on it, since all ``count``
+        # sensors are needed to reach the goal. A bound below the best price leaves the node open.
         prices = np.sort(instance.price[followers])[:left]
         price = relative_price(instance, math.fsum(instance.price[list(chosen)]) + math.fsum(prices))
         if price != self._key[1]:
             return price > self._key[1]
+        # At the same price the double coverage decides. With n sensors on a target, the weighted sum of min(n, 2) is
+        # the weight covered once or more plus that covered twice or more. It is submodular as well, so that the largest
+        # gains bound it. The first part is at least the goal; what is left bounds the second.
         twice = np.minimum(instance.times(chosen), 2)
         below_two = instance.gains(instance.weight * (twice < 2))
         reach = float(instance.weight @ twice) + float(_largest(below_two[followers], left).sum())
         doubly = reach - self.goal + self._rounding
+        # without a common unit of weights `merit` rounds to multiples of the slack: one more makes up for the rounding
         return (doubly if instance.step == 1 else doubly / instance.slack + 1) < -self._key[2]
 
 
 def _within_reach(node: _Node, left: int, goal: float) -> tuple[_Node, int]:
-    """Drop the followers whose gains are too small, and return how many can come next."""
+    """Drop the followers whose gains are too small, and return the number of children."""
     gains = node.gains.astype(np.float64)
+    # If follower i comes next, those after it follow: the bound of child i is the sum of ``left`` gains from i on, a
+    # difference of running sums. The repeated total at the end makes windows that reach beyond the last follower end
+    # there. As gains fall, so do the bounds, and the children within reach are the first ones.
     sums = np.concatenate(([0.0], np.cumsum(gains), np.full(left, gains.sum())))
     reach = node.value + sums[left : left + len(gains)] - sums[: len(gains)]
-    # A follower matters only where it reaches the goal together with the largest gains.
+    # A follower is of use only if it reaches the goal together with the ``left`` - 1 largest gains. This keeps more
+    # followers than there are children: one too small to come next may still come later.
     useful = int(np.count_nonzero(node.value + sums[left - 1] + gains >= goal))
     node = replace(node, followers=node.followers[:useful], gains=node.gains[:useful])
     return node, int(np.count_nonzero(reach >= goal))

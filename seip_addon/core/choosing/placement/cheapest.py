@@ -19,8 +19,8 @@ from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 from .solver import prove, scale_notes, solve_within
 from .tie_breaking import fewest
 
-SAME_PRICE = "among equally cheap placements "  # how the note begins that bounds what another one may cover
-MIN_TIE_BREAKING_LIMIT = 1.0  # seconds, or units of work, that choosing among equally cheap placements may always take
+SAME_PRICE = "among equally cheap placements "  # beginning of the note on the coverage that another one may reach
+MIN_TIE_BREAKING_LIMIT = 1.0  # least limit, seconds or units of work, of the choice among equally cheap placements
 
 
 def cheapest_for_coverage(
@@ -28,14 +28,14 @@ def cheapest_for_coverage(
 ) -> Generator[Progress, None, Placement]:
     """Choose the cheapest placement that covers a share of all weight.
 
-    Among the cheapest the one that covers most is returned, and among those the one that `solve` prefers. Where all
-    prices are equal, zero included, the number of sensors stands for the price: the placement has the fewest that
-    suffice. The result's objective, bound and gap are prices.
+    Among the cheapest placements the one of largest coverage is returned, and among those the one that `solve` prefers.
+    If all prices are equal, zero included, the number of sensors replaces the price: the placement has the fewest
+    sensors that suffice. The result's objective, bound and gap are prices.
 
     Parameters
     ----------
     problem : PlacementProblem
-        Its number of sensors and budget limit the placement where they are given.
+        Placement problem; its number of sensors and its budget, if given, limit the placement.
     coverage : float
         Share of the weight of all targets, above 0 and at most 1.
 

@@ -25,8 +25,8 @@ class Lines:
     Parameters
     ----------
     intercept, slope : (k,) float64
-        a and b, in the order of falling slopes: each line is the smallest one in an interval after that of the line
-        before it.
+        a and b, in the order of falling slopes: the interval in which each line is the smallest follows that of the
+        line before it.
     """
 
     intercept: Float
@@ -45,7 +45,7 @@ class Lines:
 
 
 class ConcaveValue(Protocol):
-    """A concave, monotone value of expected returns; 0 without any."""
+    """A concave, monotone value of expected returns, with g(0) = 0."""
 
     def __call__(self, s: Float) -> Float:
         """Return g(s), (n,) float64."""
@@ -72,7 +72,7 @@ class LogReturns:
 
     def lines(self, most: float, error: float) -> Lines:
         """Return tangents whose minimum exceeds g by at most ``error`` from 0 to ``most``."""
-        low, high = 0.0, 64.0  # of the largest step with that error: it grows with the step
+        low, high = 0.0, 64.0  # bounds on the largest step with that error, by bisection: the error grows with the step
         for _ in range(100):
             step = (low + high) / 2
             low, high = (step, high) if _excess(step) <= error else (low, step)
@@ -85,7 +85,7 @@ class LogReturns:
 
 
 def _excess(step: float) -> float:
-    """Return by how much tangents at neighbouring points exceed ln(1 + s) at most, these a step apart in ln(1 + t)."""
+    """Return the largest excess over ln(1 + s) of tangents at neighbouring points, a step apart in ln(1 + t)."""
     if step == 0:
         return 0.0
     ratio = step / -math.expm1(-step)

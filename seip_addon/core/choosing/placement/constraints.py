@@ -11,14 +11,14 @@ import numpy as np
 from ...arrays import Boolean, Float, Integer
 from .problem import TIE_TOLERANCE, PlacementProblem
 
-MICROMETRE = 1e-6  # metres to which positions are rounded: posts may be too close by less than this
+MICROMETRE = 1e-6  # metres; posts may be closer than the minimum distance by less than this, as positions are rounded
 
 Kind = TypeVar("Kind", bound="Constrained")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Constrained:
-    """A problem with c candidates and g mandatory groups, of which `Instance` and `ReturnsInstance` are kinds.
+    """Base class of `Instance` and `ReturnsInstance`: c candidates, g mandatory groups and their constraints.
 
     Parameters
     ----------
@@ -26,8 +26,8 @@ class Constrained:
     conflict : (c, c) bool
         Pairs that exclude each other: same position, or too close. The diagonal is false.
     clique : (c,) int64
-        A partition of the candidates into sets of which one at most can be chosen. Without a minimum distance these are
-        the positions.
+        Clique of each candidate, in a partition into sets of which at most one candidate can be chosen. Without a
+        minimum distance these are the positions.
     mandatory : (g, c) bool
     original : (c,) int64
         Index of each candidate in the problem.
@@ -100,7 +100,7 @@ def conflicts(positions: Integer, xyz: Float, min_distance: float) -> Boolean:
 
 
 def cliques(conflict: Boolean) -> Integer:
-    """Part the candidates into sets that all exclude each other, grown greedily in order, (c,) int64."""
+    """Partition the candidates into sets whose members all exclude each other, grown greedily in order, (c,) int64."""
     clique = np.full(len(conflict), -1)
     for first in range(len(conflict)):
         if clique[first] < 0:

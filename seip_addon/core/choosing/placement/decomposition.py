@@ -37,6 +37,7 @@ class _Part:
     Parameters
     ----------
     targets : (s,) int64
+        Indices of these targets in the instance.
     matrix : (n, s) float
         1 where a candidate sees a target, else 0.
     excluded : (n, n) bool
@@ -50,18 +51,24 @@ class _Part:
     def values(self, multipliers: Float, count: int) -> tuple[Float, list[Float]]:
         """Return F(0) … F(count), and the targets (s,) seen by the best one, the best two and all, as 0 or 1."""
         weight = multipliers[self.targets].astype(self.matrix.dtype)
+        # F(1) is the largest entry. The best pair is found without listing all pairs: the best partner of the best
+        # single candidate sets a limit that most candidates cannot reach in any pair.
         covered = self.matrix @ weight
         first = int(np.argmax(covered))
         gain = np.where(self.excluded[first], 0.0, covered - self.matrix @ (weight * self.matrix[first]))
-        # a pair with a candidate that covers less than the greatest gain is no better than the best pair with `first`
+        # A pair covers at most the sum of what its two candidates cover. If one of them covers less than the largest
+        # gain on top of `first`, and the other at most what `first` covers, the pair is no better than that one.
         rows = np.flatnonzero(covered >= gain.max())
         pairs = covered[rows, None] + covered[rows] - (self.matrix[rows] * weight) @ self.matrix[rows].T
         pairs[self.excluded[np.ix_(rows, rows)]] = 0.0
         one, other = np.unravel_index(int(np.argmax(pairs)), pairs.shape)
+        # where no pair is allowed, all of these are zero, and one sensor is the best choice of up to two
         best_two = max(float(pairs[one, other]), float(covered[first]))
         seen_by_two = np.maximum(self.matrix[rows[one]], self.matrix[rows[other]])
         if best_two == covered[first]:
             seen_by_two = self.matrix[first]
+        # For m > 2: coverage is submodular, so m sensors cover at most m/2 times the mean of their pairs, which is at
+        # most the best pair; nor can they cover more than all targets of the part.
         number = np.arange(count + 1)
         value = np.minimum(best_two * np.maximum(number, 2) / 2, float(weight.sum(dtype=np.float64)))
         value[:2] = 0.0, covered[first]
@@ -76,12 +83,13 @@ def decomposition_bound(
     Parameters
     ----------
     goal : float
-        Covered weight; the descent stops once the bound is below it.
+        Covered weight below which the descent may stop.
     seconds : float
         Maximum time, in units of work where the clock counts these.
     """
     parts = _partition(instance)
     end = clock.elapsed + min(seconds, clock.left)
+    # each target's weight begins divided equally among the parts that see it
     parts_seeing = np.zeros(len(instance.weight))
     for part in parts:
         parts_seeing[part.targets] += 1
@@ -92,17 +100,23 @@ def decomposition_bound(
             break
         yield Progress(0, 0, "bounding by parts of the candidates")
         clock.spend(6 * sum(part.matrix.size for part in parts))
+        # The slope of L in a multiplier is how often the parts count the target, less one. Where a multiplier is at its
+        # upper limit w, a negative slope would raise it further: it is set to zero there.
         multipliers, seen = descent.current.multipliers, descent.current.seen
         change = descent.move(np.where(multipliers < instance.weight, seen - 1.0, np.maximum(seen - 1.0, 0.0)), goal)
         if change is None:
             break
         descent.record(_bound(instance, parts, np.clip(multipliers - change, 0.0, instance.weight)))
+    # steps may use single precision, but the bound that is returned must be safe: it is computed again in double
     precise = [replace(part, matrix=part.matrix.astype(np.float64)) for part in parts]
     return _bound(instance, precise, descent.best.multipliers).value
 
 
 def _partition(instance: Instance) -> list[_Part]:
     """Assign each clique of candidates to the greedily chosen candidate that it overlaps most."""
+    # Overlaps within a part are computed exactly for pairs, those between parts are relaxed: candidates that see the
+    # same targets should share a part. Greedy choices spread over the targets and serve as centres. Cliques stay whole,
+    # so that the parts keep the rule of one sensor in each. Any partition gives a valid bound.
     number = max(1, round(instance.count / SENSORS_PER_PART))
     unconstrained = replace(instance, count=number, budget=math.inf, mandatory=np.zeros((0, len(instance)), bool))
     centres = greedy(unconstrained, np.zeros(0, np.int64))
@@ -121,7 +135,7 @@ def _part(instance: Instance, members: Integer) -> _Part:
 
 @dataclass(frozen=True, eq=False)
 class _PartsBound:
-    """The bound L(λ), its multipliers λ, and how often each target counts in Σ F; arrays (t,) float64."""
+    """The bound L(λ), its multipliers λ, and how many times each target counts in Σ F; arrays (t,) float64."""
 
     value: float
     multipliers: Float
@@ -129,8 +143,11 @@ class _PartsBound:
 
 
 def _bound(instance: Instance, parts: list[_Part], multipliers: Float) -> _PartsBound:
+    """Return L(λ) for given multipliers λ."""
     found = [part.values(multipliers, instance.count) for part in parts]
     value, counts = _allocate(np.array([values for values, _ in found]))
+    # Number of times that each target counts in the sum, which is the slope of that sum in its multiplier: once for the
+    # best single candidate, m/2 times for a value that comes from the best pair, once for all targets of a part.
     seen = np.zeros(len(multipliers))
     for part, (values, (by_one, by_two, by_all)), count in zip(parts, found, counts, strict=True):
         if count == 1:
@@ -146,6 +163,7 @@ def _allocate(values: Float) -> tuple[float, list[int]]:
 
     ``values`` (parts, N + 1) float64 has the value of 0 … N sensors in each part.
     """
+    # best[n]: largest value of n sensors over the parts so far. sums[n, m]: the same when this part has m of the n.
     best, choices = np.zeros(values.shape[1]), []
     for row in values:
         sums = np.full((len(row), len(row)), -np.inf)
@@ -153,6 +171,7 @@ def _allocate(values: Float) -> tuple[float, list[int]]:
             sums[count:, count] = best[: len(row) - count] + value
         choices.append(sums.argmax(axis=1))
         best = sums.max(axis=1)
+    # backwards through the parts: the number in each, given the number of sensors left for it and those before it
     left, counts = len(best) - 1, []
     for choice in reversed(choices):
         counts.append(int(choice[left]))

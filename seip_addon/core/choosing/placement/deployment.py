@@ -16,7 +16,7 @@ from ...site.site import Candidates, Site
 from .returns_summary import ReturnsSummary
 
 BAND, UNRANKED = "over plausible gains", "not ranked"
-"""How the messages of a `GainBand` begin."""
+"""First words of the messages of a `GainBand`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +26,11 @@ class Sensor:
     Parameters
     ----------
     label : str
-        ``S1``, ``S2``, … in the order in which each adds the most to those before it.
+        Label ``S1``, ``S2``, … in the order in which each adds the most to those before it.
     pose : int or None
-        Index among the site's candidates; None where a hand has put it elsewhere.
+        Index among the site's candidates; None if a user has moved the sensor.
     position_name : str
-        Name of the pole, or of the sampled place on the sidewalk.
+        Name of the pole, or of the sampled position on the sidewalk.
     on_pole : bool
         Whether it is mounted on an existing pole.
     foot : (3,) float64, metres
@@ -42,17 +42,17 @@ class Sensor:
     yaw : float, radians
         Direction of azimuth zero, counter-clockwise from +x.
     tilt : float, radians
-        How far azimuth zero is turned down.
+        Downward rotation of azimuth zero.
     alone : float
-        Share of the targets that it sees.
+        Share of the targets that the sensor sees.
     added : float
-        Share of the targets that it sees and no sensor before it does; they add up to the whole coverage.
+        Share of the targets that the sensor sees and no sensor before it does; these shares add up to the coverage.
     marginal : float
-        Share of the targets that it alone sees: what is lost without it.
+        Share of the targets that only this sensor sees: the loss of coverage without it.
     roll : float, radians
-        How far it is rolled about its azimuth zero; only a hand does that.
+        Rotation about azimuth zero; other than zero only after a user has rotated the sensor.
     installation : float, dollars, optional
-        What it costs to install it there; None where prices are those of sensors alone.
+        Cost of the installation; None if prices are those of sensors only.
     """
 
     label: str
@@ -73,7 +73,7 @@ class Sensor:
 
     @property
     def price(self) -> float:
-        """Its price in dollars: installed where that is counted."""
+        """Price in dollars, with the installation if its cost is given."""
         return self.model.price + (self.installation or 0.0)
 
     @property
@@ -83,12 +83,12 @@ class Sensor:
 
     @property
     def mounted(self) -> MountedSensor:
-        """The sensor as scans have it: what measures, without what it sees or costs."""
+        """The sensor for scans: model and pose, without coverage and price."""
         return MountedSensor(self.label, self.model, self.xyz, self.orientation)
 
     @property
     def turned(self) -> str:
-        """How it is turned, as words to be put after its height."""
+        """Yaw and tilt as text that follows the height."""
         return describe_turn(self.tilt, None if self.model.all_round else self.yaw)
 
 
@@ -110,9 +110,9 @@ class GainBand:
     low, high : float
         Share of the targets that is seen at the lowest and at the highest gains.
     sheets : tuple of str
-        Sensor types of the placement whose law of detection comes from a data sheet, by catalogue key.
+        Catalogue keys of the placement's sensor types whose law of detection comes from a data sheet.
     types : tuple of TypeBand
-        For each type that there was to choose from; empty where there was only one.
+        Band of each type that could be chosen; empty if there was only one.
     """
 
     low: Annotated[float, SHARE]
@@ -122,12 +122,12 @@ class GainBand:
 
     @property
     def unranked(self) -> tuple[tuple[TypeBand, TypeBand], ...]:
-        """Pairs of types whose bands overlap, so that neither is better by what is known of them."""
+        """Pairs of types whose bands overlap, so that they cannot be ranked."""
         pairs = combinations(self.types, 2)
         return tuple((one, other) for one, other in pairs if one.low <= other.high and other.low <= one.high)
 
     def messages(self) -> tuple[str, ...]:
-        """Describe the band, and name the types that it does not rank."""
+        """Return messages on the band, and on the types that it does not rank."""
         messages = []
         if self.sheets:
             sheets = ", ".join(self.sheets)
@@ -144,31 +144,32 @@ class GainBand:
 
 @dataclass(frozen=True, eq=False)
 class Deployment:
-    """The chosen sensors and what they see together.
+    """The chosen sensors and their joint coverage.
 
     Parameters
     ----------
     sensors : tuple of Sensor
-        In the order of their labels.
+        Sensors in the order of their labels.
     seen_by : (t,) int64
-        How many of the sensors see each target.
+        Number of sensors that see each target.
     coverage : float
         Share of the targets that some sensor sees.
     seen_twice : float
         Share of the targets that two sensors or more see.
     central : float or None
-        Coverage of the targets in weighted regions; None where there are none.
+        Coverage of the targets in weighted regions; None if there are none.
     weighted : float
         Share of the targets' weight that is seen.
     price : float, dollars
+        Total price.
     rows : (k, t) bool
-        What each of them sees.
+        Visibility of each target from each sensor.
     gain_band : GainBand, optional
-        Coverage over the plausible gains, where some type is not calibrated on a sweep.
+        Coverage over the plausible gains, if some sensor type is not calibrated on a sweep.
     returns : ReturnsSummary, optional
-        Returns from road users, where the sensors were chosen for them.
+        Returns from road users, if the sensors were chosen for them.
     pedestrian_returns : (t,) float64, optional
-        Expected returns from a pedestrian near each target, likewise.
+        Expected returns from a pedestrian near each target, if the sensors were chosen for returns.
     """
 
     sensors: tuple[Sensor, ...]
@@ -185,22 +186,22 @@ class Deployment:
 
     @property
     def mounted(self) -> tuple[MountedSensor, ...]:
-        """The sensors as scans have them."""
+        """The sensors for scans."""
         return tuple(sensor.mounted for sensor in self.sensors)
 
     @property
     def installed(self) -> bool:
-        """Whether its price counts posts, mounting, power and backhaul."""
+        """Whether the price includes posts, mounting, power and backhaul."""
         return any(sensor.installation is not None for sensor in self.sensors)
 
 
 def price_text(price: float, *, installed: bool) -> str:
-    """Return a price in whole dollars, with the word that it is of installed sensors where it is."""
+    """Return a price in whole dollars, followed by "installed" if it includes the installation."""
     return f"${price:,.0f}{' installed' if installed else ''}"
 
 
 def pose_prices(candidates: Candidates, models: Mapping[str, LidarModel]) -> Float:
-    """Return what a sensor at each candidate pose costs (c,), in dollars: installed where that is counted."""
+    """Return the price of a sensor at each candidate pose (c,), in dollars, with its installation if that is given."""
     prices = np.array([models[key].price for key in candidates.sensor])
     installation = candidates.installation
     return prices if installation is None else prices + installation[candidates.position_of]
@@ -209,7 +210,7 @@ def pose_prices(candidates: Candidates, models: Mapping[str, LidarModel]) -> Flo
 def deploy(
     site: Site, models: Mapping[str, LidarModel], visible: Boolean, chosen: Sequence[int] | Integer
 ) -> Deployment:
-    """Return the chosen poses as sensors, with what they see.
+    """Return the chosen poses as sensors, with their coverage.
 
     Parameters
     ----------
@@ -217,20 +218,34 @@ def deploy(
     chosen : (k,) int
         Indices of the chosen poses; their order breaks ties between labels.
     """
-    order = _by_added_coverage(visible, chosen)
-    mounted = [sensor_at(site, models, f"S{rank + 1}", int(pose)) for rank, pose in enumerate(order)]
-    return deployment_of(site, mounted, visible[order])
+    poses = np.asarray(chosen, dtype=np.int64)
+    return deploy_rows(site, models, visible[poses], poses)
+
+
+def deploy_rows(site: Site, models: Mapping[str, LidarModel], rows: Boolean, chosen: Integer) -> Deployment:
+    """Return the chosen poses as sensors, given only their rows of the visibility grid.
+
+    Parameters
+    ----------
+    rows : (k, t) bool
+        Visibility of each target from each chosen pose.
+    chosen : (k,) int64
+        Indices of the chosen poses; their order breaks ties between labels.
+    """
+    order = _by_added_coverage(rows)
+    mounted = [sensor_at(site, models, f"S{rank + 1}", int(pose)) for rank, pose in enumerate(chosen[order])]
+    return deployment_of(site, mounted, rows[order])
 
 
 def deployment_of(site: Site, mounted: Sequence[Sensor], rows: Boolean) -> Deployment:
-    """Return sensors with what they see, each and together.
+    """Return sensors with their coverage, of each and of all together.
 
     Parameters
     ----------
     mounted : sequence of Sensor
-        In the order in which each adds to those before it; their own shares are ignored.
+        Sensors in the order in which each adds to those before it; the shares in them are ignored.
     rows : (k, t) bool
-        What each of them sees.
+        Visibility of each target from each sensor.
     """
     seen_by = rows.sum(axis=0, dtype=np.int64)
     seen = seen_by > 0
@@ -258,21 +273,21 @@ def weighted_share(seen: Boolean, weight: Float) -> float:
     return float(weight[seen].sum()) / total if total > 0.0 else 0.0
 
 
-def _by_added_coverage(visible: Boolean, chosen: Sequence[int] | Integer) -> Integer:
-    """Order the chosen poses so that each adds the most targets to those before it."""
-    left = [int(pose) for pose in chosen]
-    unseen = np.ones(visible.shape[1], dtype=bool)
+def _by_added_coverage(rows: Boolean) -> Integer:
+    """Return the order of poses, given their rows (k, t), in which each adds the most targets to those before it."""
+    left = list(range(len(rows)))
+    unseen = np.ones(rows.shape[1], dtype=bool)
     order: list[int] = []
     while left:
-        best = max(left, key=lambda pose: int((visible[pose] & unseen).sum()))
+        best = max(left, key=lambda row: int((rows[row] & unseen).sum()))
         left.remove(best)
         order.append(best)
-        unseen &= ~visible[best]
+        unseen &= ~rows[best]
     return np.array(order, dtype=np.int64)
 
 
 def sensor_at(site: Site, models: Mapping[str, LidarModel], label: str, pose: int) -> Sensor:
-    """Return the sensor at a candidate pose, without what it sees."""
+    """Return the sensor at a candidate pose, without its coverage."""
     candidates = site.candidates
     position = int(candidates.position_of[pose])
     return Sensor(

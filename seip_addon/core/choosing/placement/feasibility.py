@@ -14,7 +14,7 @@ from .problem import PlacementProblem
 from .reduced_problem import Instance
 from .search_limits import Clock
 
-TIME_LIMIT = 20.0  # time for a program without targets: far more than it takes, and apart from the user's time limit
+TIME_LIMIT = 20.0  # seconds for a program without targets: far more than it takes; the user's time limit does not apply
 
 
 def starting_choice(problem: PlacementProblem, instance: Instance, solver: str) -> Generator[Progress, None, Integer]:
@@ -23,7 +23,7 @@ def starting_choice(problem: PlacementProblem, instance: Instance, solver: str) 
     Raises
     ------
     SeipError
-        The groups cannot all be served; the limit that prevents it is named. Or the time was too short to tell.
+        The groups cannot all be served, and the message names the limit that prevents it; or the time was too short.
     """
     if len(instance.mandatory) == 0:
         return np.zeros(0, np.int64)
@@ -31,21 +31,25 @@ def starting_choice(problem: PlacementProblem, instance: Instance, solver: str) 
     part = instance.part(members)
     program = CoverProgram(part)
     program.require(program.number <= len(part.mandatory))
-    alone = program.number_among(np.arange(len(part)), part.visible @ part.weight * program.weight_scale)
-    chosen = yield from _decide(problem, program, alone, solver)
+    # of all choices one with much coverage by each sensor, as a start for the search
+    separately = program.number_among(np.arange(len(part)), part.visible @ part.weight * program.weight_scale)
+    chosen = yield from _decide(problem, program, separately, solver)
     if chosen is None:
         raise SeipError((yield from _why_infeasible(problem, part, solver)))
     return members[chosen]
 
 
 def _why_infeasible(problem: PlacementProblem, part: Instance, solver: str) -> Generator[Progress, None, str]:
+    """Return the error message: the limit that keeps the groups from being served, and how to change it."""
     groups = f"the mandatory places ({', '.join(problem.group_names)}) cannot all carry a sensor"
+    # Constraints are dropped one after another, the budget and the number of sensors first: the first program that has
+    # a solution without one names the constraint that is at fault. The part's own count is limited by the budget too.
     unlimited = len(part)
-    asked = unlimited if problem.count is None else problem.count  # the part's own is what the budget buys
+    count = unlimited if problem.count is None else problem.count
     fewest = yield from _least(problem, replace(part, count=unlimited), solver)
     if fewest is not None:
-        return f"{groups} with {problem.count} sensors; ask for at least {len(fewest)} or lift a demand"
-    cheapest = yield from _least(problem, replace(part, count=asked, budget=math.inf), solver, by_price=True)
+        return f"{groups} with {problem.count} sensors; allow at least {len(fewest)} or lift a demand"
+    cheapest = yield from _least(problem, replace(part, count=count, budget=math.inf), solver, by_price=True)
     if cheapest is not None:
         price = math.fsum(part.price[cheapest])
         return f"{groups} within the budget of {problem.budget:g}; raise it to at least {price:g} or lift a demand"
@@ -74,7 +78,7 @@ def _decide(
     outcome = yield from program.maximise(objective, solver, Clock(TIME_LIMIT))
     if outcome.chosen is None and not outcome.finished:
         raise SeipError(
-            f"{TIME_LIMIT:g} s were too short to tell whether the mandatory places ({', '.join(problem.group_names)}) "
-            "can all carry a sensor; lift a demand, or choose another solver"
+            f"the solver did not find out within {TIME_LIMIT:g} s whether the mandatory places "
+            f"({', '.join(problem.group_names)}) can all carry a sensor; lift a demand, or choose another solver"
         )
     return outcome.chosen

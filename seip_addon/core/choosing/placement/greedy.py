@@ -16,7 +16,7 @@ GREEDY_STARTS = 8  # candidates to begin a greedy choice with, before swaps
 
 
 def greedy(instance: Instance, start: Integer, *, per_price: bool = False, enough: float = math.inf) -> Integer:
-    """Add the candidate of largest gain until nothing that is allowed gains; return the choice, ascending.
+    """Add the candidate of largest gain until no allowed candidate adds anything; return the choice, ascending.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def greedy(instance: Instance, start: Integer, *, per_price: bool = False, enoug
 def greedy_steps(
     instance: Instance, start: Integer, *, per_price: bool = False, enough: float = math.inf
 ) -> Iterator[Integer]:
-    """Yield what `greedy` has chosen before and after each step, in the order in which it was chosen."""
+    """Yield the choice of `greedy` before and after each step, in the order in which candidates were added."""
     chosen = start
     while True:
         yield chosen
@@ -51,8 +51,8 @@ def greedy_steps(
 def greedy_bound(instance: Instance, steps: Iterable[Integer]) -> float:
     """Return an upper bound on the covered weight of any placement, for `COVERAGE`.
 
-    It is the smallest, over all steps, of what is covered and the best gains
-    on top of it (Leskovec et al. 2007, section 3.2).
+    It is the smallest, over all steps, of the weight covered plus the largest gains on top of it (Leskovec et al. 2007,
+    section 3.2).
     """
     reached = [
         instance.value(chosen) + select(instance, instance.gains(instance.increments(instance.times(chosen)))).value
@@ -62,15 +62,15 @@ def greedy_bound(instance: Instance, steps: Iterable[Integer]) -> float:
 
 
 def orders(instance: Instance) -> list[bool]:
-    """Return whether to choose greedily by gain per price, under a budget in both ways."""
+    """Return whether to choose greedily by gain per price; under a budget both orders are tried."""
     return [False, True] if math.isfinite(instance.budget) and instance.price.max() > 0 else [False]
 
 
 def greedy_with_swaps(instance: Instance, start: Integer) -> Generator[Progress, None, Integer]:
     """Return the best of several greedy choices after swaps, ascending.
 
-    Swaps end in a local optimum; beside the greedy choices themselves those
-    are improved that begin with another of the candidates that see the most.
+    Swaps end in a local optimum. So in addition to the greedy choices themselves, those that begin with other
+    candidates of large gain are improved too.
     """
     best = start
     for per_price in orders(instance):
@@ -99,7 +99,7 @@ def swap_search(instance: Instance, chosen: Integer) -> Generator[Progress, None
 
 
 def drop_redundant(instance: Instance, chosen: Integer, goal: float) -> Integer:
-    """Take away sensors, the dearest first, that neither the coverage to reach nor a mandatory group needs."""
+    """Remove sensors, the most expensive first, that neither the goal nor a mandatory group needs."""
     for candidate in chosen[np.argsort(-instance.price[chosen], kind="stable")]:
         rest = chosen[chosen != candidate]
         if instance.mandatory[:, rest].any(axis=1).all() and instance.value(rest) >= goal - instance.slack:
@@ -108,7 +108,7 @@ def drop_redundant(instance: Instance, chosen: Integer, goal: float) -> Integer:
 
 
 def drop_weakest(instance: Instance, chosen: Integer) -> Integer:
-    """Take away the sensor that is missed least."""
+    """Remove the sensor whose loss lowers the value least."""
     return max((chosen[chosen != candidate] for candidate in chosen), key=instance.value)
 
 
@@ -125,17 +125,17 @@ def addable(instance: Constrained, chosen: Integer) -> Boolean:
 
 
 def swap_gains(instance: Instance, chosen: Integer) -> Float:
-    """Return what it adds to swap each chosen candidate for any other, (k, c); -inf where that is forbidden."""
+    """Return the gain of swapping each chosen candidate for each other one, (k, c); -inf where that is forbidden."""
     return _allowed_gains(instance, chosen, instance.gains(_rests(instance, chosen).T).T)
 
 
 def _rests(instance: Instance, chosen: Integer) -> Float:
-    """Return what one sensor adds to each target once each of the chosen candidates is gone, (k, t) float64."""
+    """Return what one sensor adds to each target after each of the chosen candidates is removed, (k, t) float64."""
     return instance.increments(instance.times(chosen) - instance.visible[chosen])
 
 
 def _allowed_gains(instance: Instance, chosen: Integer, seen: Float) -> Float:
-    """Return `swap_gains` by what each candidate adds to the others, (k, c)."""
+    """Return `swap_gains` from what each candidate adds to the remaining ones, (k, c)."""
     without = instance.cover.value(instance.times(chosen) - instance.visible[chosen]) @ instance.weight
     gain: Float = seen + (without - instance.value(chosen))[:, None]
     for row, candidate in zip(gain, chosen, strict=True):

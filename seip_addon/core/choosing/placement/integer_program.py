@@ -1,4 +1,4 @@
-"""Integer programs in PuLP, and the solvers that they can be given to by name."""
+"""Integer programs in PuLP, and the solvers for them."""
 
 import importlib.metadata
 import math
@@ -29,7 +29,7 @@ from .search_limits import OPERATIONS_PER_UNIT, Clock
 Expression = Any  # of PuLP, which has no types
 TOTAL_WEIGHT = 1e4  # total weight in a program: far above the solvers' absolute tolerances of 1e-6
 TOLERANCE = 2e-6  # share of all weight that a solver's tolerance of 1e-6 on every variable may add up to, doubled
-SOLVERS = ("highs", "cbc", "gurobi")  # what `solver_name` knows beside ``auto``
+SOLVERS = ("highs", "cbc", "gurobi")  # names of solvers besides ``auto``
 MAX_ENTRIES = 1_000_000  # entries of V up to which a program is built: PuLP takes 0.5 kB for each
 MAX_REJECTED = 100  # choices in a row that a solver's tolerance admits and exact arithmetic does not, before giving up
 MIN_SECONDS = 0.01  # seconds that a solver is given where none are left
@@ -46,9 +46,9 @@ class Outcome:
     Parameters
     ----------
     chosen : (k,) int64 or None
-        The best placement found, none where the time was too short or none exists.
+        The best placement found; None if the time was too short or no placement exists.
     bound : float
-        No placement has a larger objective; infinite where the solver does not say.
+        Upper bound on the objective of any placement; infinite if the solver reports none.
     finished : bool
         Whether the solver ran to its end: ``chosen`` is optimal, or nothing is feasible.
     nodes : int
@@ -62,14 +62,14 @@ class Outcome:
 
 
 class PlacementProgram:
-    """An integer program that chooses candidates, whatever its objective; requirements are added stage by stage.
+    """An integer program that chooses candidates, for any objective; constraints can be added between solves.
 
     Parameters
     ----------
     rules : Constrained
-        The constraints; ``x`` are binary, one for each candidate.
+        Candidates and constraints; ``x`` has one binary variable for each candidate.
     entries : int
-        Entries of the objective's matrix other than zero, which the work of a solver grows with.
+        Number of non-zero entries of the objective's matrix, with which the work of a solver grows.
     """
 
     def __init__(self, rules: Constrained, entries: int) -> None:
@@ -94,12 +94,12 @@ class PlacementProgram:
 
     @property
     def price(self) -> Expression:
-        """The total price, scaled as `price_scale` says."""
+        """The total price, scaled by `price_scale`."""
         return _linear(self.x, self._rules.price * self.price_scale)
 
     @property
     def price_scale(self) -> float:
-        """Factor that brings the dearest sensor to 10,000, away from the solvers' absolute tolerances."""
+        """Factor that scales the highest price to 10,000, far above the solvers' absolute tolerances."""
         dearest = float(self._rules.price.max(initial=0.0))
         return 1e4 / dearest if dearest > 0 else 1.0
 
@@ -108,13 +108,13 @@ class PlacementProgram:
         return _linear([self.x[i] for i in candidates], np.ones(len(candidates)) if factors is None else factors)
 
     def require(self, constraint: Expression, check: Callable[[Integer], bool] | None = None) -> None:
-        """Add a constraint for this and all later solves, and what it means in exact arithmetic."""
+        """Add a constraint for this and all later solves, and its check in exact arithmetic."""
         self.model += constraint
         if check is not None:
             self._checks.append(check)
 
     def require_price(self, price: float) -> None:
-        """Require a total price of at most ``price``, but for `TIE_TOLERANCE`."""
+        """Require a total price of at most ``price``, within `TIE_TOLERANCE`."""
         limit = price * (1 + TIE_TOLERANCE)
         prices = self._rules.price
         self.require(self.price <= limit * self.price_scale, lambda c: math.fsum(prices[c]) <= limit)
@@ -124,7 +124,7 @@ class PlacementProgram:
     ) -> Generator[Progress, None, Outcome]:
         """Solve for the largest objective within a share of what is left of the limits.
 
-        The solver works in a thread of its own; when the generator is closed it is told to stop.
+        The solver runs in a thread of its own. Closing the generator asks it to stop.
         """
         if clock.left <= 0:
             return Outcome(None, math.inf, finished=False)
@@ -148,7 +148,7 @@ class PlacementProgram:
         return replace(outcome, chosen=None, finished=False)
 
     def exclude(self, chosen: Integer) -> None:
-        """Forbid a choice, and no other one."""
+        """Forbid a single choice."""
         others = np.setdiff1d(np.arange(len(self.x)), chosen)
         self.model += self.number_among(chosen) - self.number_among(others) <= len(chosen) - 1
 
@@ -170,8 +170,8 @@ class PlacementProgram:
 class CoverProgram(PlacementProgram):
     """The integer program of maximal covering; see `PlacementProblem` for the formulation.
 
-    The covered share ``y`` and the doubly covered share ``z`` of each target are continuous: at an optimum they are
-    integral by themselves. ``z`` is right wherever the covered weight is required to be the largest possible.
+    The covered share ``y`` and the doubly covered share ``z`` of each target are continuous: they are integral at an
+    optimum. ``z`` is correct only if the covered weight is required to be the largest possible.
     """
 
     def __init__(self, instance: Instance) -> None:
@@ -180,14 +180,14 @@ class CoverProgram(PlacementProgram):
 
     @cached_property
     def covered(self) -> Expression:
-        """The covered weight, scaled as `weight_scale` says."""
+        """The covered weight, scaled by `weight_scale`."""
         for y, seen in zip(self._y, self._seen, strict=True):
             self.model += y <= seen
         return _linear(self._y, self.instance.weight * self.weight_scale)
 
     @cached_property
     def doubly_covered(self) -> Expression:
-        """The weight covered twice or more, scaled alike; `covered` must be required to be at its maximum."""
+        """The weight covered twice or more, scaled likewise; `covered` must be required to be at its maximum."""
         z = [self.model.add_variable(f"z{j}", 0, 1) for j in range(len(self.instance.weight))]
         for z_j, y, seen in zip(z, self._y, self._seen, strict=True):
             self.model += z_j + y <= seen
@@ -199,7 +199,7 @@ class CoverProgram(PlacementProgram):
         return TOTAL_WEIGHT / self.instance.total if self.instance.total > 0 else 1.0
 
     def require_coverage(self, goal: float) -> None:
-        """Require a covered weight, but for the instance's slack."""
+        """Require a covered weight, within the instance's slack."""
         instance = self.instance
         self.require(self._at_least(self.covered, goal), lambda c: instance.value(c) >= goal - instance.slack)
 
@@ -209,7 +209,7 @@ class CoverProgram(PlacementProgram):
         self.require(self._at_least(self.covered, goal), lambda c: instance.value(c) >= goal)
 
     def require_double_coverage(self, goal: float) -> None:
-        """Require a doubly covered weight, but for the instance's slack."""
+        """Require a doubly covered weight, within the instance's slack."""
         instance = self.instance
         self.require(self._at_least(self.doubly_covered, goal), lambda c: instance.doubly(c) >= goal - instance.slack)
 
@@ -219,7 +219,7 @@ class CoverProgram(PlacementProgram):
         return replace(outcome, bound=outcome.bound / self.weight_scale)
 
     def _at_least(self, covered: Expression, goal: float) -> Expression:
-        """Return the requirement of a weight, lowered by what a solver may miss it by."""
+        """Return the constraint for a least weight, lowered by a solver's tolerance."""
         margin = max(self.instance.step / 2, TOLERANCE * self.instance.total)
         return covered >= (goal - margin) * self.weight_scale
 
@@ -267,10 +267,10 @@ def reaching(instance: Instance, goal: float) -> CoverProgram:
 
 
 def cover_by_cliques(conflict: Boolean) -> Iterator[Integer]:
-    """Cover all conflicts by cliques, of each of which one candidate at most can be chosen, (k,) int64.
+    """Cover all conflicts by cliques, sets of candidates of which at most one can be chosen, (k,) int64.
 
-    Cliques bound the linear relaxation more tightly than the pairs they are
-    made of. They are grown greedily, in order, so the result is always the same.
+    Cliques give a tighter linear relaxation than the pairs they consist of. They are grown greedily, in order, so the
+    result is always the same.
 
     Parameters
     ----------
@@ -294,19 +294,19 @@ def cover_by_cliques(conflict: Boolean) -> Iterator[Integer]:
 
 
 def solver_name(solver: str) -> str:
-    """Return the solver that a name means; for ``auto`` HiGHS where it is installed, else CBC."""
+    """Return the solver for a name; ``auto`` is HiGHS if it is installed, otherwise CBC."""
     if solver == "auto":
         return "highs" if is_available("highs") else "cbc"
     return solver
 
 
 def check_solver(solver: str) -> str:
-    """Return name and version of a solver, for the record.
+    """Return name and version of a solver.
 
     Raises
     ------
     SeipError
-        The solver is unknown or cannot run here; those that can are named.
+        The solver is unknown or cannot run here; the message lists those that can.
     """
     solver = solver_name(solver)
     if solver not in SOLVERS:
@@ -323,7 +323,7 @@ def _linear(variables: list[Any], factors: Float) -> Expression:
 
 
 class _Highs(pulp.HiGHS):  # type: ignore[misc]
-    """PuLP's interface to HiGHS, with the status that PuLP does not know: the limit of branches was reached."""
+    """PuLP's interface to HiGHS, with a status that PuLP lacks: the limit on the number of nodes was reached."""
 
     def findSolutionValues(self, lp: pulp.LpProblem) -> tuple[int, int]:  # noqa: N802 -- PuLP's name
         """Return PuLP's status of problem and solution, after setting the variables."""
@@ -345,7 +345,7 @@ def _engine(solver: str, limits: tuple[float, int | None], stop: threading.Event
     limit, nodes = min(limits[0], UNLIMITED_SECONDS), limits[1]
     solver = solver_name(solver)
     if solver == "highs":
-        import highspy  # noqa: PLC0415 -- only where it is asked for: another solver may be all there is
+        import highspy  # noqa: PLC0415 -- imported only for HiGHS: an installation may have another solver only
 
         def interrupt(kind: object, message: object, output: object, answer: Any, data: object) -> None:  # noqa: ANN401, ARG001
             answer.user_interrupt = stop.is_set()
@@ -381,7 +381,7 @@ def _bound(model: pulp.LpProblem, solver: str) -> float:
 
 
 def _nodes(model: pulp.LpProblem, solver: str) -> int:
-    """Return how many branches a solver took; 0 where it does not say."""
+    """Return the number of branches that a solver took; 0 if it does not report it."""
     return max(int(model.solverModel.getInfo().mip_node_count), 0) if solver_name(solver) == "highs" else 0
 
 
@@ -389,8 +389,8 @@ def _nodes(model: pulp.LpProblem, solver: str) -> int:
 def _executable_cbc() -> Iterator[str]:
     """Yield a path of PuLP's CBC that can be run.
 
-    Archives that drop permissions leave it without its run bit, and a
-    read-only installation cannot be mended in place; a copy can.
+    Archives that drop permissions leave it without its executable bit. A read-only installation cannot be repaired in
+    place, so a copy is made executable.
     """
     if os.access(pulp_cbc_path, os.X_OK):
         yield pulp_cbc_path

@@ -1,7 +1,7 @@
-"""Tabu search of swaps, and one for each composition of sensors that a budget allows.
+"""Tabu search of swaps, once for each composition of sensor types that a budget allows.
 
 Where a budget is spent, a swap exchanges a sensor for one of about the same price only: the numbers of cheap and of
-expensive sensors, the composition, stay as they are. So each composition that spends the budget is searched by itself.
+expensive sensors, the composition, stay as they are. So each composition that spends the budget is searched separately.
 """
 
 from __future__ import annotations
@@ -20,49 +20,53 @@ from .reduced_problem import Instance
 from .search_limits import Clock
 
 SHORT_PATIENCE, LONG_PATIENCE = 60, 50
-"""Swaps in a row without a better choice that end a tabu search of each composition, and, for each sensor, of the best.
-"""
+"""Swaps without a better choice that end a tabu search: in a short one, and for each sensor in a long one."""
 
-SEARCHED_AGAIN = 5  # compositions that are searched with the longer patience; of so few, none is searched before
-MAX_COMPOSITIONS = 30  # compositions that are searched at most; of more, those that promise most
+SEARCHED_AGAIN = 5  # compositions with a long search; if there are no more than these, short ones are skipped
+MAX_COMPOSITIONS = 30  # largest number of compositions that are searched, the most promising ones
 
 RENEWAL_INTERVAL, RENEWED_SHARE = 120, 0.3  # swaps without a better choice, and share of the sensors replaced then
 
 ADDED_TENURE, DROPPED_TENURE = 4, 12
-"""A candidate added stays for fewer steps than the first; one dropped stays out for one to two times the second."""
+"""A candidate that was added cannot be dropped for fewer steps than the first number, drawn at random; one that was
+dropped cannot return for one to two times the second.
+"""
 
-MAX_TIERS = 3  # price tiers at most: the number of compositions grows with each
+MAX_TIERS = 3  # largest number of price tiers: the number of compositions grows with each
 TIER_RATIO = 1.25  # prices that differ by less than this factor are in one tier
 STEP_OPERATIONS = 3e6  # multiplications that take as long as the rest of a step
 OPERATIONS_PER_ENTRY = 60  # multiplications that take as long as updating one sum of gains
 
 
 class SwapGains:
-    """What each swap adds to the objective value, kept up to date from swap to swap.
+    """Change of the objective value by each swap, updated incrementally after every swap.
 
-    Adding candidate c where slot s is emptied first adds ``base[c] + back[s, c]`` less what the sensor of s is worth:
-    ``base`` is what c adds to all chosen sensors, ``back`` how much more it adds without that of s. Both are sums over
-    targets of which a swap changes few: only the candidates that see these are updated. All sums are whole numbers.
+    If candidate c replaces the sensor of slot s, the value changes by ``base[c] + back[s, c]`` minus the same sum for
+    the replaced sensor. Here ``base[c]`` is the gain of c on top of all chosen sensors, and ``back[s, c]`` is the
+    increase of that gain when the sensor of s is gone. Both are sums over targets, of which a swap changes few: only
+    the candidates that see these are updated. All sums are whole numbers.
 
     Parameters
     ----------
     chosen : (k,) int64
+        Candidates to begin with.
 
     Attributes
     ----------
     slots : (k or k + 1,) int64
-        The sensors chosen; -1 at the end for one that may be added.
+        Chosen sensors; -1 at the end is an empty slot, where one more sensor may be added.
     value : float
-        Objective value of these.
+        Objective value of the chosen sensors.
     work : float
-        Multiplications that take as long as the updates so far.
+        Number of multiplications that take as long as the updates so far.
     """
 
     def __init__(self, instance: Instance, chosen: Integer) -> None:
         self.instance = instance
         self.slots = np.zeros(0, dtype=np.int64)
         self.work = 0.0
-        # what one sensor more adds to a target seen n times, and how much more that is with one sensor less
+        # For a target seen n times: what one sensor more adds (`_rise`), and how much more that sensor would add if one
+        # of the n were gone (`_fall`, zero for n = 0, where none can go). `base` and `back` are sums of these.
         seen = np.arange(instance.count + 2)
         self._rise = np.diff(instance.cover.value(seen)).astype(np.float64)
         self._fall = np.concatenate(([0.0], -np.diff(self._rise)))
@@ -86,9 +90,11 @@ class SwapGains:
 
     @property
     def gains(self) -> Float:
-        """What it adds to put each candidate in place of each slot's sensor, (slots, c)."""
+        """Change of the objective value if each candidate replaces each slot's sensor, (slots, c)."""
         base, back = self._sums[0], self._sums[1:]
         gain: Float = base + back
+        # The replaced sensor itself is a candidate for its slot: putting it back gives the value of today, so that its
+        # entry is what is lost by removing it.
         gain -= np.where(self.slots >= 0, gain[np.arange(len(self.slots)), self.slots], 0.0)[:, None]
         return gain
 
@@ -121,6 +127,8 @@ class SwapGains:
         now[filled + 1] = weight * self._fall[times] * instance.visible[np.ix_(self.slots[filled], targets)]
         change = now - self._per_target[:, targets]
         self._per_target[:, targets] = now
+        # Every changed summand is added to the sums of all candidates that see its target. `seen_by` lists these target
+        # by target in one array; the index arithmetic below joins the lists of the changed targets without a loop.
         row, column = np.nonzero(change)
         first, candidates = instance.seen_by
         number = (first[1:] - first[:-1])[targets[column]]
@@ -143,12 +151,12 @@ def composition_search(
     start : (s,) int64
         Candidates that each composition begins with, for instance for the mandatory groups.
     chosen : (k,) int64
-        A placement.
+        Known placement.
 
     Returns
     -------
     (k,) int64
-        A placement that is at least as good.
+        Placement that is at least as good.
     """
     tier = price_tiers(instance)
     unlimited = np.full(int(tier.max()) + 1, instance.count)
@@ -156,6 +164,7 @@ def composition_search(
     rooms = compositions(instance, tier) if spends else [unlimited]
     beginnings = [(start, room) for room in rooms if (np.bincount(tier[start], minlength=len(room)) <= room).all()]
     found = [(chosen, unlimited), *beginnings]
+    # With many compositions, a short search of each decides which of them deserve a long one.
     if len(found) > SEARCHED_AGAIN:
         for number, (beginning, room) in enumerate(found):
             found[number] = (yield from tabu_search(instance, beginning, clock, SHORT_PATIENCE, tier, room)), room
@@ -169,11 +178,11 @@ def composition_search(
 def tabu_search(  # where it begins, and its limits
     instance: Instance, chosen: Integer, clock: Clock, patience: int, tier: Integer, room: Integer
 ) -> Generator[Progress, None, Integer]:
-    """Make the best swap again and again, even for the worse, and return the best choice met (Glover 1989).
+    """Make the best swap repeatedly, even if it lowers the value, and return the best choice found (Glover 1989).
 
-    Who went cannot come back for a while, and who came cannot go, unless that leads to a choice better than any before.
-    From time to time it goes back to the best choice and replaces some of its sensors, chosen at random (from a fixed
-    seed), to leave the neighbourhood of that choice.
+    A sensor that was dropped cannot return for a while, and one that was added cannot be dropped, unless that leads to
+    a choice better than any before. From time to time the search returns to the best choice and replaces some of its
+    sensors, drawn at random from a fixed seed, to leave the neighbourhood of that choice.
 
     Parameters
     ----------
@@ -185,6 +194,8 @@ def tabu_search(  # where it begins, and its limits
         Largest number of sensors of each tier.
     """
     swaps = SwapGains(instance, chosen)
+    # `most` is the value of the best choice and `better_at` its step; `locked` the step up to which each candidate is
+    # tabu, whether it was added or dropped.
     best, most, better_at, step = swaps.chosen, swaps.value, 0, 0
     value = most
     locked = np.zeros(len(instance), np.int64)
@@ -192,6 +203,8 @@ def tabu_search(  # where it begins, and its limits
     while step <= better_at + patience and clock.left > 0 and most < instance.total:
         step += 1
         yield Progress(0, 0, "searching swaps")
+        # Renewal: some sensors of the best choice are dropped and locked out, so that the steps below refill their
+        # slots with others. It is skipped where mandatory groups need the dropped sensors.
         if (step - better_at) % RENEWAL_INTERVAL == 0:
             gone = random.choice(best, math.ceil(RENEWED_SHARE * len(best)), replace=False)
             rest = np.setdiff1d(best, gone)
@@ -200,13 +213,16 @@ def tabu_search(  # where it begins, and its limits
                 locked[gone] = step + random.integers(DROPPED_TENURE, 2 * DROPPED_TENURE, len(gone))
                 value = swaps.value
         gain = np.where(_allowed(instance, swaps.slots, tier, room), swaps.gains, -np.inf)
+        # Tabu swaps are those of a locked candidate or a locked sensor. Aspiration: one that leads to a choice better
+        # than the best is allowed nevertheless.
         filled = swaps.slots >= 0
-        held = filled & (locked[swaps.slots] > step)
-        gain[((locked > step) | held[:, None]) & (value + gain <= most + instance.slack)] = -np.inf
+        locked_in = filled & (locked[swaps.slots] > step)
+        gain[((locked > step) | locked_in[:, None]) & (value + gain <= most + instance.slack)] = -np.inf
         adding = len(gain) > 0 and not filled[-1] and gain[-1].max() > 0
-        if adding:  # a sensor more is no worse than any swap that could follow
+        if adding:  # an empty slot is filled before any swap: one sensor more is no worse than what a swap could add
             gain[:-1] = -np.inf
         slot, came = np.unravel_index(int(np.argmax(gain)), gain.shape) if gain.size else (0, 0)
+        # No swap is allowed: wait for locks to expire, or end where there are none.
         if gain.size == 0 or not np.isfinite(gain[slot, came]):
             if not (locked > step).any():
                 break
@@ -225,6 +241,8 @@ def tabu_search(  # where it begins, and its limits
 
 def price_tiers(instance: Instance) -> Integer:
     """Return the price tier of each candidate, (c,) int64; tiers end where prices differ most."""
+    # The widest relative gaps between successive prices separate the tiers. The maximum keeps a price of zero out of
+    # the division.
     price = np.unique(instance.price)
     ratio = price[1:] / np.maximum(price[:-1], TIE_TOLERANCE * max(float(price[-1]), TIE_TOLERANCE))
     widest = np.argsort(-ratio, kind="stable")[: MAX_TIERS - 1]
@@ -233,12 +251,14 @@ def price_tiers(instance: Instance) -> Integer:
 
 
 def compositions(instance: Instance, tier: Integer) -> list[Integer]:
-    """Return how many sensors of each tier spend the budget, (tiers,) int64 each, the most promising first.
+    """Return the numbers of sensors of each tier that spend the budget, (tiers,) int64 each, the most promising first.
 
-    For any number of expensive sensors there are as many of the cheapest tier as the budget, or the number of sensors,
-    then allows. If there are more compositions than `MAX_COMPOSITIONS`, each is rated by what greedy choices of one
-    tier cover, as if their coverage were independent.
+    For each combination of expensive sensors, the number of sensors of the cheapest tier is the largest that the budget
+    and the limit on sensors then allow. If there are more compositions than `MAX_COMPOSITIONS`, each is rated by the
+    coverage of greedy choices within each tier, as if coverage of tiers were independent.
     """
+    # The least price of each tier gives the largest number of its sensors. Prices are raised to at least the one at
+    # which ``count`` + 1 sensors use up the budget: that changes no result, and free sensors do not divide by zero.
     cheapest = np.array([instance.price[tier == number].min() for number in range(int(tier.max()) + 1)])
     budget = instance.budget * (1 + TIE_TOLERANCE)
     most = np.minimum(budget // np.maximum(cheapest, budget / (instance.count + 1)), instance.count).astype(np.int64)
@@ -247,6 +267,8 @@ def compositions(instance: Instance, tier: Integer) -> list[Integer]:
     left = budget - dear @ cheapest[1:]
     cheap = np.minimum(left // max(cheapest[0], budget / (instance.count + 1)), instance.count - dear.sum(axis=1))
     rooms = np.column_stack((cheap.astype(np.int64), dear))[(left >= 0) & (cheap >= 0)]
+    # Compositions within a larger one are searched with it. Of too many, the rating multiplies the shares that the
+    # tiers miss: that is the share missed by all if what they cover were independent.
     rooms = np.array([room for room in rooms if not _outdone(room, rooms)])
     if len(rooms) > MAX_COMPOSITIONS:
         missed = np.ones(len(rooms))
@@ -257,7 +279,7 @@ def compositions(instance: Instance, tier: Integer) -> list[Integer]:
 
 
 def _outdone(room: Integer, rooms: Integer) -> bool:
-    """Whether another composition has as many sensors of each tier, or more."""
+    """Whether another composition has at least the same number of sensors in each tier, and more in one."""
     return bool(((rooms >= room).all(axis=1) & (rooms > room).any(axis=1)).any())
 
 
@@ -269,11 +291,13 @@ def _greedy_shares(instance: Instance, members: Integer, most: int) -> Float:
 
 
 def _allowed(instance: Instance, slots: Integer, tier: Integer, room: Integer) -> Boolean:
-    """Return which candidates may take the place of each slot's sensor within all constraints, (slots, c) bool."""
+    """Return which candidates may replace each slot's sensor within all constraints, (slots, c) bool."""
+    # One pass over arrays in place of a check of each swap: conflicts, budget, tiers, mandatory groups.
     filled = slots[slots >= 0]
     rows = np.zeros((len(slots), len(instance)), dtype=bool)
     rows[slots >= 0] = instance.conflict[filled]
-    allowed: Boolean = rows.sum(axis=0) == rows  # no conflict but with the sensor that goes
+    # no conflicts at all (0 == False), or exactly one, with the sensor that goes (1 == True)
+    allowed: Boolean = rows.sum(axis=0) == rows
     price = np.where(slots >= 0, instance.price[slots], 0.0)
     allowed &= np.asarray(instance.affordable((price.sum() - price)[:, None] + instance.price))
     number = np.bincount(tier[filled], minlength=len(room))
@@ -281,6 +305,7 @@ def _allowed(instance: Instance, slots: Integer, tier: Integer, room: Integer) -
     allowed &= (number - freed < room)[:, tier]
     served = instance.mandatory[:, filled]
     for slot in range(len(slots) if len(served) else 0):
+        # without this slot's sensor some groups may have none: the candidate must be in all of these
         unserved = ~np.delete(served, slot, axis=1).any(axis=1) if slot < len(filled) else ~served.any(axis=1)
         allowed[slot] &= instance.mandatory[unserved].all(axis=0)
     allowed[:, filled] = False

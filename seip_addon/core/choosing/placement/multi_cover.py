@@ -18,13 +18,13 @@ class MultiCover:
     Parameters
     ----------
     values : (top + 1,) int64
-        Value of a target seen 0, 1, … times; the last one for all that are seen more often.
+        Value of a target seen 0, 1, … times; the last one applies to all that are seen more often.
     rises : (top + 1, top + 1, top) int64
-        What the next sensor, the one after it, … adds to the least concave function above the value of a target
-        that is seen n times and can be seen by l more. It is exact at n, and the first rise of l = 1 is what one
-        sensor adds indeed.
+        Increments by the next sensor, the one after it, … of the least concave function above the value of a target
+        that is seen n times and can be seen by l more. This function is exact at n. For l = 1 the first increment is
+        what one sensor really adds.
     unit : int
-        Units that make 1.
+        Number of units in a value of 1.
     """
 
     values: Integer
@@ -42,12 +42,20 @@ class MultiCover:
         return bool((np.diff(self.values, 2) <= 0).all())
 
     def value(self, times: Integer) -> Integer:
-        """Return the value of targets seen so many times, of the same shape."""
+        """Return the value of targets that are seen ``times`` times, of the same shape."""
         value: Integer = self.values[np.minimum(times, self.top)]
         return value
 
     def increment(self, times: Integer, left: int, level: int = 0) -> Integer:
-        """Return what the next sensor adds at most, or with ``level`` one after it, if so many are to come."""
+        """Return the largest increment by the next sensor, or by the one ``level`` sensors after it.
+
+        Parameters
+        ----------
+        times : array of int64
+            Number of sensors that see each target.
+        left : int
+            Number of sensors to come.
+        """
         more: Integer = self.rises[np.minimum(times, self.top), min(left, self.top), level]
         return more
 
@@ -65,7 +73,7 @@ def multi_cover(values: Sequence[Fraction]) -> MultiCover:
 
 
 def _concave_rises(values: Sequence[Fraction], number: int) -> list[Fraction]:
-    """Return what each step adds to the least concave function above points, zero after the last."""
+    """Return the increments of the least concave function above points, zero after the last."""
     corners = _upper_hull(values)
     rises = [(values[b] - values[a]) / (b - a) for a, b in pairwise(corners) for _ in range(a, b)]
     return rises + [Fraction(0)] * (number - len(rises))

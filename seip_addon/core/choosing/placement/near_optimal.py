@@ -15,8 +15,8 @@ from .problem import PlacementProblem
 from .reduced_problem import Instance, make_instance
 from .search_limits import Clock
 
-MAX_LISTED = 10_000  # placements that are listed at most
-MAX_BRANCHES = 300  # branches that are searched at most: no clock decides what is found
+MAX_LISTED = 10_000  # largest number of placements in the list
+MAX_BRANCHES = 300  # largest number of branches: the result depends on no clock
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,18 +26,18 @@ class NearOptimalSet:
     Parameters
     ----------
     share : float
-        How much less than the best these may cover, as a share of it.
+        Largest loss of coverage against the best placement, as a share of its coverage.
     placements : (n, k) int64
-        Their poses in the problem's numbering, in ascending order; -1 where one has fewer sensors than another.
+        Poses of each placement in the problem's numbering, ascending; rows of fewer sensors end with -1.
     covered : (n,) float64
-        What each covers.
+        Weight that each placement covers.
     complete : bool
-        Whether these are all, but for poses that another at the same position outdoes; else these are those of the
-        first branches of the search, and those that differ from the best in one sensor.
+        Whether the list has all such placements, apart from poses that another one at the same position dominates.
+        Otherwise it has those of the first branches of the search, and those that differ from the best in one sensor.
     in_common : (k + 1,) int64
-        How many of them have 0, 1, … k positions in common with the best one.
+        Number of placements that have 0, 1, … k positions in common with the best one.
     positions : int
-        How many different positions they use.
+        Number of different positions in these placements.
     """
 
     share: float
@@ -75,21 +75,21 @@ def near_optimal_set(
     Parameters
     ----------
     problem : PlacementProblem
-        Of most coverage.
+        Problem of largest coverage.
     chosen : (k,) int64
-        Its optimal placement.
+        Optimal placement of the problem.
     share : float
-        0 to 1.
+        Largest loss of coverage, as a share: at least 0 and below 1.
 
     Returns
     -------
     NearOptimalSet or None
-        None where there are too many sensors or candidates to search among.
+        The set, or None if there are too many sensors or candidates to search.
 
     Raises
     ------
     SeipError
-        The share is none.
+        The share is out of its limits.
     """
     if not 0 <= share < 1:
         raise SeipError(f"the share below the best must be at least 0 and below 1, not {share:g}")
@@ -115,14 +115,14 @@ def near_optimal_set(
 
 
 class _NearOptimal(Search):
-    """Lists every placement that reaches the goal."""
+    """Search that lists every placement that reaches the goal."""
 
     def __init__(self, instance: Instance, goal: float) -> None:
         super().__init__(instance, goal, depth_first=True)
         self.found: dict[tuple[int, ...], float] = {}
 
     def take_swaps(self, chosen: Integer) -> None:
-        """Take a placement, and those that have another candidate in place of one of its own."""
+        """Record a placement, and those that differ from it in one candidate."""
         self.offer(chosen)
         for kept in (np.delete(chosen, number) for number in range(len(chosen))):
             increments = self.instance.increments(self.instance.times(kept))

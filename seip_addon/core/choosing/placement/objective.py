@@ -18,16 +18,16 @@ from ...settings import setting
 from ...site.site import Candidates, Site
 from .cheapest import cheapest_for_coverage
 from .deployment import BAND, UNRANKED, Deployment, deploy, pose_prices
-from .problem import Placement, PlacementProblem
+from .problem import Placement, PlacementConstraints, PlacementProblem
 from .risk import Failure, Risk
 from .scenarios import Scenarios
 from .search_limits import DEFAULT_LIMITS, SolverLimits
 from .solver import solve, solve_greedy
 
-DEFAULT_COUNT = 4  # sensors to place where neither a number nor a budget nor a coverage is asked for: the study's four
-MOVED = "moved by hand"  # status of a placement whose sensors hang where a hand has put them
-MOVED_MESSAGE = "Moved by hand: evaluated where the sensors hang; nothing is proven of it."
-CHOSEN_FOR = "chosen "  # how a note begins that says what was optimised in place of nominal coverage
+DEFAULT_COUNT = 4  # number of sensors if neither a number nor a budget nor a coverage is given: that of the study
+MOVED = "moved by hand"  # status of a placement whose sensors a user has moved
+MOVED_MESSAGE = "Moved by hand: evaluated at the sensors' current poses, without proof of optimality."
+CHOSEN_FOR = "chosen "  # beginning of a note on what was optimised in place of nominal coverage
 
 TAILS = {"mean": 1.0, "worst-quarter": 0.25, "worst": 0.0}
 """Share of the scenarios, the worst ones, over which each risk measure averages."""
@@ -48,25 +48,26 @@ class Objective:
     coverage : float, optional
         Share (0 to 1] of the weight to be seen at the least price; the reverse problem.
     central_weight : float or "scene", optional
-        The weighted problem: weight of the targets in weighted regions, or the scene's own weights. Without it
-        all targets count alike: the vanilla problem.
+        The weighted problem: weight of the targets in weighted regions, or the scene's own weights. Default: the
+        vanilla problem, in which all targets have the same weight.
     min_distance : float, metres
         Least distance between two sensors.
     forbidden, mandatory : tuple of str
         Names of positions that must not, and that must, carry a sensor.
     criterion : {"auto", "road", "returns", "height"}
-        What is maximised: the road seen, the expected returns from road users, or the points above the road that beams
-        pass, as traffic leaves them; see `criterion_of`.
+        Quantity that is maximised: the road seen, the expected returns from road users, or the points above the road
+        that beams pass between the vehicles of traffic; see `criterion_of`.
     shares : (float, float, float)
         Importance of cars, cyclists and pedestrians for the returns, in proportion.
     scenarios : Scenarios
-        What the placement is optimised over, and evaluated on.
+        Scenarios over which the placement is optimised, and on which it is evaluated.
     risk : {"auto", "none", "mean", "worst-quarter", "worst"}
         Risk measure over the scenarios: their mean, or that of the worst quarter (the conditional value at risk), or
         the worst. ``auto`` is the worst quarter of pose errors and the mean of traffic; with ``none`` the placement is
         optimised for the nominal scenario, and only evaluated on the others.
     failures : {"none", "worst", "mean"}
-        What counts after one sensor has failed: the one that matters most, or any, on average.
+        Failure of one sensor after which the outcome is measured: none, the most important sensor, or any of them on
+        average.
     seen_by : int
         Number of sensors that must see a target.
 
@@ -136,11 +137,13 @@ class Objective:
         kind, measure = self.scenarios.kind, self.measure
         if self._multi_cover and (self.risk == "none" or kind == "traffic"):
             other = "the risk none" if self.risk == "none" else "traffic"
-            raise SeipError(f"sensor failures and several sensors per target do not go with {other}: leave one out")
+            raise SeipError(
+                f"sensor failures and several sensors per target cannot be combined with {other}: leave one out"
+            )
         if kind == "nominal":
             self._require_no_settings_of_scenarios()
         if self.criterion == "height" and (kind != "traffic" or measure is None):
-            raise SeipError("the criterion height is of traffic: add --traffic, or choose another criterion")
+            raise SeipError("the criterion height needs traffic: add --traffic, or choose another criterion")
         if measure is None:
             return
         # With failures the risk none is refused: only evaluating is no cure there.
@@ -159,7 +162,7 @@ class Objective:
             measure.require_sensors(self.count)
 
     def _require_no_settings_of_scenarios(self) -> None:
-        """Raise SeipError where the only scenario is the nominal one, and a setting of several would be ignored."""
+        """Raise SeipError if a setting of several scenarios is given, which the nominal scenario would ignore."""
         scenarios = self.scenarios
         given = {
             "--risk": self.risk != "auto",
@@ -176,7 +179,7 @@ class Objective:
 
     @property
     def _multi_cover(self) -> bool:
-        """Whether it matters how many sensors see a target."""
+        """Whether the objective depends on the number of sensors that see a target."""
         return self.failures != "none" or self.seen_by > 1
 
     @property
@@ -194,15 +197,16 @@ class Objective:
 
     @property
     def cheapest(self) -> bool:
-        """Whether the least price for a coverage is asked for."""
+        """Whether this is the reverse problem: the least price for a coverage."""
         return self.coverage is not None
 
 
 def criterion_of(objective: Objective, models: Mapping[str, LidarModel]) -> Literal["road", "returns", "height"]:
     """Return the criterion of an objective for the sensor types to choose from.
 
-    Coverage of the road predicts detection where every return counts, as for the sensors of the SEIP paper. Sensors of
-    a range law detect vehicles several times as far as asphalt: there the returns from road users do.
+    Coverage of the road predicts detection where every return counts, as for the sensors of the SEIP paper. Sensors
+    with a range law detect vehicles at several times the distance of asphalt: for these, the returns from road users
+    are the better predictor.
     """
     if objective.criterion != "auto":
         return objective.criterion
@@ -227,11 +231,11 @@ class Solution:
     Parameters
     ----------
     objective : Objective
-        With the number of sensors filled in where none was asked for.
+        Objective, with the number of sensors filled in where none was given.
     greedy : Placement or None
         Greedy solution of the same problem; None for the reverse problem and over scenarios.
     evaluation : Evaluation, optional
-        On held-out scenarios, where the placement was optimised over scenarios.
+        Evaluation on held-out scenarios, where the placement was optimised over scenarios.
     """
 
     objective: Objective
@@ -254,19 +258,19 @@ class Solution:
 
     @property
     def caption(self) -> tuple[str, ...]:
-        """What a picture says of it: certificate, plausible gains, and the objective if not nominal coverage."""
+        """Caption of a picture: certificate, plausible gains, and the objective if it is not nominal coverage."""
         return (self.certificate, *(note for note in self.notes if note.startswith((CHOSEN_FOR, BAND, UNRANKED))))
 
 
 def certificate(status: str, gap: float | None, *, cheapest: bool, notes: Sequence[str] = ()) -> str:
-    """Return a placement's certificate as a message: what is proven optimal, or within which gap.
+    """Return a placement's certificate as a message: proven optimal, or within a gap.
 
     Parameters
     ----------
     gap : float or None
-        Between bound and objective, as a share of the objective; None or infinite where nothing bounds it.
+        Gap between bound and objective, as a share of the objective; None or infinite without a bound.
     notes : sequence of str
-        Those of the placement: one may say that something other than nominal coverage was optimised.
+        Notes on the placement. One may state that something other than nominal coverage was optimised.
     """
     if status == MOVED:
         return MOVED_MESSAGE
@@ -278,7 +282,7 @@ def certificate(status: str, gap: float | None, *, cheapest: bool, notes: Sequen
 
 
 def purpose(notes: Sequence[str]) -> str:
-    """Return what a placement was optimised for, from its notes, after a space; empty for nominal coverage."""
+    """Return the purpose of a placement from its notes, after a space, or "" for nominal coverage."""
     chosen_for = next((note.removeprefix(CHOSEN_FOR) for note in notes if note.startswith(CHOSEN_FOR)), "")
     return chosen_for and f" {chosen_for.partition(':')[0]}"
 
@@ -328,14 +332,19 @@ def placement_problem(
     SeipError
         The objective contradicts itself or the site.
     """
+    constraints = _constraints(site, models, objective)
+    return PlacementProblem(visible=visible, **vars(constraints))
+
+
+def _constraints(site: Site, models: Mapping[str, LidarModel], objective: Objective) -> PlacementConstraints:
+    """Return the constraints and weights of an objective on a site, checked."""
     candidates = site.candidates
     demanded = np.array([_named(candidates, name) for name in objective.mandatory], dtype=bool)
     groups = np.concatenate((candidates.mandatory, demanded.reshape(-1, len(candidates.position))))
     forbidden = np.zeros(len(candidates.position), dtype=bool)
     for name in objective.forbidden:
         forbidden |= _named(candidates, name)
-    return PlacementProblem(
-        visible=visible,
+    return PlacementConstraints(
         weights=target_weights(site, objective),
         prices=pose_prices(candidates, models),
         positions=candidates.position_of,
@@ -351,9 +360,8 @@ def placement_problem(
 
 
 def check_objective(site: Site, models: Mapping[str, LidarModel], objective: Objective) -> None:
-    """Raise SeipError where a site cannot meet an objective, before any ray is cast."""
-    everything = np.ones((len(site.candidates), len(site.targets)), dtype=bool)
-    placement_problem(site, everything, models, objective)
+    """Raise SeipError if a site cannot meet an objective, before any ray is cast."""
+    _constraints(site, models, objective)
 
 
 def optimise(
@@ -372,7 +380,7 @@ def optimise(
     Raises
     ------
     SeipError
-        As for `placement_problem`, `solve` and `cheapest_for_coverage`.
+        Same as for `placement_problem`, `solve` and `cheapest_for_coverage`.
     """
     problem = placement_problem(site, visible, models, objective)
     if objective.coverage is not None:
@@ -385,13 +393,13 @@ def optimise(
 
 
 def with_count(objective: Objective, site: Site) -> Objective:
-    """Fill in the number of sensors where nothing is asked for that limits it."""
+    """Return the objective with the default number of sensors if no number, budget or coverage is given."""
     free = objective.count is None and objective.budget is None and objective.coverage is None
     return replace(objective, count=min(DEFAULT_COUNT, len(site.candidates.position))) if free else objective
 
 
 def _named(candidates: Candidates, name: str) -> NDArray[np.bool_]:
-    """Positions of that name, (p,) bool."""
+    """Return the positions of a given name, (p,) bool."""
     found: NDArray[np.bool_] = candidates.position_name == name
     if not found.any():
         raise SeipError(f"there is no position {name!r}{_close(name, candidates.position_name.tolist())}")

@@ -11,23 +11,14 @@ from ...errors import SeipError
 TIE_TOLERANCE = 1e-9  # share of all weight, or of the price, below which differences count as rounding
 
 
-@dataclass(frozen=True, eq=False)
-class PlacementProblem:
-    r"""A maximal covering location problem over candidate poses (Church and ReVelle 1974).
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlacementConstraints:
+    """Candidates, target weights and constraints of a placement problem, without the visibility matrix.
 
-    .. math::
-        \max \sum_j w_j y_j \quad\text{subject to}\quad
-        y_j \le \sum_i V_{ij} x_i, \quad
-        \sum_i x_i \le N, \quad \sum_i p_i x_i \le C, \quad
-        x_i \in \{0, 1\},\; 0 \le y_j \le 1,
-
-    with at most one pose per position, at least one pose of each mandatory group, and no two poses closer than the
-    minimum distance. The vanilla problem has unit weights.
+    They can be checked before any ray is cast.
 
     Parameters
     ----------
-    visible : (c, t) bool
-        V: whether candidate pose i sees target j.
     weights : (t,) float64
         w, at least 0; all ones in the vanilla problem.
     prices : (c,) float64
@@ -56,7 +47,6 @@ class PlacementProblem:
         The figures contradict themselves or leave nothing to choose.
     """
 
-    visible: Boolean
     weights: Float
     prices: Float
     positions: Integer
@@ -82,12 +72,12 @@ class PlacementProblem:
     @property
     def allowed(self) -> Boolean:
         """Poses that may be chosen, (c,) bool."""
-        return np.ones(len(self.visible), bool) if self.forbidden is None else ~self.forbidden
+        return np.ones(len(self.prices), bool) if self.forbidden is None else ~self.forbidden
 
     @property
     def mandatory_groups(self) -> Boolean:
         """The mandatory groups, (g, c) bool; g is 0 when there are none."""
-        return np.zeros((0, len(self.visible)), bool) if self.mandatory is None else self.mandatory
+        return np.zeros((0, len(self.prices)), bool) if self.mandatory is None else self.mandatory
 
     @property
     def group_names(self) -> list[str]:
@@ -108,20 +98,13 @@ class PlacementProblem:
         affordable = np.count_nonzero(np.cumsum(np.sort(cheapest)) <= self.budget * (1 + TIE_TOLERANCE))
         return min(most, max(1, int(affordable)))
 
-    def covered(self, chosen: Integer) -> float:
-        """Return the weight of the targets that some chosen candidate sees."""
-        return math.fsum(self.weights[self.visible[chosen].any(axis=0)])
-
     def _check_values(self) -> None:
-        if len(self.visible) == 0:
-            raise SeipError("there is no candidate to choose from; add poles or candidate areas")
-        if self.visible.shape[1] == 0:
-            raise SeipError("there is no target to see; let the region of interest overlap the roads")
+        _check_size(len(self.prices), len(self.weights))
         for name, values in (("weight", self.weights), ("price", self.prices)):
             if not np.isfinite(values).all() or (values < 0).any():
                 raise SeipError(f"every {name} must be a finite number of at least 0; correct the {name}s")
         if not self.weights.any():
-            raise SeipError("every target weighs 0; give some target a positive weight")
+            raise SeipError("the weight of every target is 0; give some target a positive weight")
         if not self.allowed.any():
             raise SeipError("every candidate is forbidden; shrink the forbidden areas")
         if not np.isfinite(self.xyz).all():
@@ -132,10 +115,10 @@ class PlacementProblem:
     def _check_limits(self) -> None:
         places = len(np.unique(self.positions[self.allowed]))
         if self.count is not None and self.count < 1:
-            raise SeipError(f"asked for {self.count} sensors; ask for at least 1")
+            raise SeipError(f"the number of sensors is {self.count}; it must be at least 1")
         if self.count is not None and self.count > places:
             raise SeipError(
-                f"asked for {self.count} sensors, but there are {places} positions; ask for at most {places}"
+                f"{self.count} sensors are requested, but there are only {places} positions; request at most {places}"
             )
         cheapest = float(self.prices[self.allowed].min())
         if self.budget is not None and not self.budget >= cheapest:
@@ -145,17 +128,51 @@ class PlacementProblem:
             )
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlacementProblem(PlacementConstraints):
+    r"""A maximal covering location problem over candidate poses (Church and ReVelle 1974).
+
+    .. math::
+        \max \sum_j w_j y_j \quad\text{subject to}\quad
+        y_j \le \sum_i V_{ij} x_i, \quad
+        \sum_i x_i \le N, \quad \sum_i p_i x_i \le C, \quad
+        x_i \in \{0, 1\},\; 0 \le y_j \le 1,
+
+    with at most one pose per position, at least one pose of each mandatory group, and no two poses closer than the
+    minimum distance. The vanilla problem has unit weights.
+
+    Parameters
+    ----------
+    visible : (c, t) bool
+        V: whether candidate pose i sees target j. The other parameters are those of `PlacementConstraints`.
+
+    Raises
+    ------
+    SeipError
+        The figures contradict themselves or leave nothing to choose.
+    """
+
+    visible: Boolean
+
+    def __post_init__(self) -> None:
+        _check_size(*self.visible.shape)
+        super().__post_init__()
+
+    def covered(self, chosen: Integer) -> float:
+        """Return the weight of the targets that some chosen candidate sees."""
+        return math.fsum(self.weights[self.visible[chosen].any(axis=0)])
+
+
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Chosen poses, and how good they provably are.
+    """Chosen poses with their objective value, bound and gap.
 
     Parameters
     ----------
     chosen : (k,) int64
         Indices into the problem's candidates, in the order of x, y, z and label.
     objective : float
-        What was optimised: the covered weight, or the total price where the
-        cheapest placement for a coverage was asked for.
+        Value of what was optimised: the covered weight, or the total price of the cheapest placement for a coverage.
     bound : float
         No placement has a better objective than this.
     gap : float
@@ -163,7 +180,7 @@ class Placement:
     status : str
         ``optimal`` (proven) or ``feasible``.
     solver : str
-        Name and version of what solved it.
+        Name and version of the solver.
     covered : float
         Weight of the targets that some chosen sensor sees.
     notes : tuple of str
@@ -180,6 +197,13 @@ class Placement:
     covered: float
     price: float
     notes: tuple[str, ...] = ()
+
+
+def _check_size(candidates: int, targets: int) -> None:
+    if candidates == 0:
+        raise SeipError("there is no candidate to choose from; add poles or candidate areas")
+    if targets == 0:
+        raise SeipError("there is no target to see; let the region of interest overlap the roads")
 
 
 def canonical_order(problem: PlacementProblem) -> Integer:
@@ -220,7 +244,7 @@ def assess(  # noqa: PLR0913 -- the fields of one record
 
 
 def relative_gap(objective: float, bound: float) -> float:
-    """Return how far a bound is from an objective, as a share of the objective."""
+    """Return the distance of a bound from an objective, as a share of the objective."""
     if bound == objective:
         return 0.0
     return abs(bound - objective) / objective if objective > 0 else math.inf

@@ -36,7 +36,7 @@ Numbers = NDArray[np.floating[Any]]
 class Instance(Constrained):
     """A reduced maximal covering instance: c candidates in canonical order, t merged targets, g mandatory groups.
 
-    Beside the parameters of `Constrained` it has these.
+    It adds these parameters to those of `Constrained`.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Instance(Constrained):
     margin : float
         Rounding error that the bound of a relaxation may have.
     cover : MultiCover
-        What a unit of weight is worth by how many sensors see it.
+        Value of a unit of weight by the number of sensors that see it.
     """
 
     rows = (*Constrained.rows, "visible")
@@ -71,14 +71,14 @@ class Instance(Constrained):
 
     @cached_property
     def seen_by(self) -> tuple[Integer, Integer]:
-        """Candidates that see each target: where those of each begin (t + 1,), and all of them in a row (n,) int64."""
+        """Candidates that see each target: the index of each target's first one (t + 1,), and their list (n,) int64."""
         target, candidate = np.nonzero(self.visible.T)
         number = np.bincount(target, minlength=len(self.weight))
         return np.concatenate(([0], np.cumsum(number))), candidate
 
     @cached_property
     def total(self) -> float:
-        """Value of all targets, each seen as often as counts."""
+        """Value of all targets if each is seen by enough sensors."""
         return float(self.weight.sum()) * self.cover.unit
 
     def attainable(self, goal: float) -> float:
@@ -99,21 +99,21 @@ class Instance(Constrained):
         return seen
 
     def increments(self, times: Integer, left: int = 1, level: int = 0) -> Float:
-        """Return what the next sensor adds at most to targets seen so many times; see `MultiCover.increment`."""
+        """Return the largest increment by the next sensor on targets seen ``times`` times (`MultiCover.increment`)."""
         more: Float = self.weight * self.cover.increment(times, left, level)
         return more
 
     def layers(self, times: Integer, left: int) -> Float:
-        """Return what each of the next sensors adds at most to targets seen so many times, (top, t) float64."""
+        """Return the largest increment by each of the next sensors on targets seen ``times`` times, (top, t)."""
         return np.stack([self.increments(times, left, level) for level in range(self.cover.top)])
 
     @property
     def unseen_layers(self) -> Float:
-        """What each of the sensors adds at most to targets that are not seen yet, (top, t) float64."""
+        """Largest increments by each of the sensors on targets that are not seen yet, (top, t) float64."""
         return self.layers(np.zeros(len(self.weight), dtype=np.int64), self.count)
 
     def gains(self, per_target: Float) -> Float:
-        """Return what each candidate sees of increments per target, exactly, (c, ...) float64.
+        """Return the sum over each candidate's visible targets of increments per target, exactly, (c, ...) float64.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class Instance(Constrained):
         return float(self.weight[self.visible[chosen].sum(axis=0) > 1].sum())
 
     def part(self, keep: Integer) -> Instance:
-        """Return the same instance with only the candidates ``keep``, targets merged anew."""
+        """Return the same instance with only the candidates ``keep``, and with its targets merged again."""
         visible, weight = merge_targets(self.visible[keep], self.weight)
         return replace(self.of(keep), visible=visible, weight=weight)
 
@@ -149,8 +149,8 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
     seen = problem.visible[order].any(axis=0) & (problem.weights > 0)
     if not seen.any():
         raise SeipError(
-            "no candidate sees any target; try other heights or sensor types, widen δ, ask for less probability of "
-            "detection or fairer weather, or clear what stands in the way"
+            "no candidate sees any target; try other heights or sensor types, a larger δ, a lower probability of "
+            "detection or better weather, or remove obstacles"
         )
     unit, whole = common_unit(problem.weights[seen])
     visible, weight = merge_targets(problem.visible[order][:, seen], np.rint(problem.weights[seen] / unit))
@@ -168,11 +168,11 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
 
 
 def common_unit(weights: Float) -> tuple[float, bool]:
-    """Return a unit in which all weights are whole numbers, and whether it is theirs or only a fine grain.
+    """Return a unit in which all weights are whole numbers, and whether it is a common unit or only a fine grain.
 
-    It is theirs where all weights are whole numbers, or binary fractions, whose sum is exact in double precision, or
-    where rounding all weights to its multiples moves no sum of them by more than `TIE_TOLERANCE` and a single unit
-    counts for more than that.
+    It is a common unit if all weights are whole numbers, or binary fractions, whose sum is exact in double precision;
+    or if rounding all weights to its multiples moves no sum of them by more than `TIE_TOLERANCE` and one unit is more
+    than that.
 
     Parameters
     ----------
@@ -219,10 +219,10 @@ def merge_targets(visible: Boolean, weight: Float) -> tuple[Boolean, Float]:
 def _superfluous(instance: Instance, positions: Integer) -> Boolean:
     """Mark candidates that no canonical optimum contains.
 
-    A candidate that sees nothing and serves no mandatory group only adds to the number of sensors. A candidate at the
-    same position as another that sees all it sees, is in all its groups, excludes nothing more and is cheaper (or costs
-    the same and comes first) can always give way to it: coverage, number, price, double coverage and order all stay or
-    improve.
+    A candidate that sees nothing and serves no mandatory group only adds to the number of sensors. A candidate can be
+    replaced by another one at the same position that sees at least the same targets, is in at least the same groups,
+    excludes nothing more, and is cheaper (or costs the same and comes first): coverage, number, price, double coverage
+    and order all stay or improve.
     """
     superfluous: Boolean = ~instance.visible.any(axis=1) & ~instance.mandatory.any(axis=0)
     excluded = instance.conflict | np.eye(len(instance), dtype=bool)

@@ -40,23 +40,23 @@ from ...arrays import Float
 from .bounds import Selection, select
 from .returns_instance import ReturnsInstance, row_blocks
 
-HALVINGS = 8  # of the interval in which the best c of a road user lies
-LEAST_SHARE = 0.02  # of the largest one: candidates of a fractional choice below it do not affect the parameters
-ROUNDING = 2e-6  # by which single precision may lower a bound, with room to spare
+HALVINGS = 8  # halvings of the interval in which the best c of a road user lies
+LEAST_SHARE = 0.02  # candidates with less than this part of the largest share in a choice do not affect the parameters
+ROUNDING = 2e-6  # relative and absolute error that single precision may cause in a bound, with room to spare
 _TABLE = np.concatenate([[0.0], np.geomspace(1e-4, 1e7, 4000)])
 _TABLE_INTERCEPT = np.log1p(_TABLE) - _TABLE / (1 + _TABLE)
 
 
 @dataclass(frozen=True, eq=False)
 class ReturnsBound:
-    """An upper bound on what the candidates of an instance add to those chosen.
+    """An upper bound on the value that the candidates of an instance add to a choice.
 
     Parameters
     ----------
     value : float
-        No placement adds more.
+        Upper bound on what any placement adds.
     fixed : float
-        Part of the bound that no candidate contributes.
+        Part of the bound that does not depend on candidates: the weighted sum of c.
     selection : Selection
         The candidates of largest contributions.
     """
@@ -68,12 +68,12 @@ class ReturnsBound:
 
 @dataclass(frozen=True, eq=False)
 class Completion:
-    """What is left to choose where some sensors are chosen.
+    """Remaining choice after some sensors have been chosen.
 
     Parameters
     ----------
     rules : ReturnsInstance
-        Candidates that are left, with the number and the budget that are left.
+        Candidates that are left, with the number of sensors and the budget that are left.
     base : (m,) float64
         Returns of the chosen sensors.
     """
@@ -83,6 +83,8 @@ class Completion:
 
     def bound_at(self, t: Float) -> ReturnsBound:
         """Return the bound for parameters t (m,), each at least 0."""
+        # The bound c + Σ a(r_i) of each road user, with returns as shares r/(1 + base). Both terms of a are written so
+        # that one factor per road user is left: the tangent r/(1 + t), and ln(e^c + r) - c = ln(1 + r e^-c).
         rules = self.rules
         intercept = np.log1p(t) - t / (1.0 + t)
         linear = (1.0 / ((1.0 + t) * (1.0 + self.base))).astype(np.float32)
@@ -90,27 +92,32 @@ class Completion:
         weight = rules.weight.astype(np.float32)
         score = np.empty(len(rules))
         for part in row_blocks(len(rules)):
+            # a few rows at a time stay in the processor's cache; the steps work in place for the same reason
             rows = rules.returns[part]
             least = rows * curved
             least += np.float32(1.0)
             np.log(least, out=least)
             np.minimum(least, rows * linear, out=least)
             score[part] = least @ weight
+        # linear in the poses: the best choice under number, budget and cliques is a matter of sorting
         fixed = float(rules.weight @ intercept)
         selection = select(rules, score)
+        # single precision may have made the scores too small, and a bound must not be
         return ReturnsBound((fixed + selection.value) * (1 + ROUNDING) + ROUNDING, fixed, selection)
 
     def falling_bounds(self, share: Float) -> Iterator[tuple[ReturnsBound, Float]]:
-        """Yield bounds, and the fractional choice of candidates that each follows from.
+        """Yield bounds, each with the fractional choice of candidates from which it was computed.
 
-        The parameters t are those with the smallest bound for a fractional choice; the selection of the bound then
-        joins that choice, with a smaller share in each step (Frank and Wolfe 1956).
+        The parameters t minimise the bound for a fractional choice. The selection of that bound then joins the choice,
+        with a smaller share in each step (Frank and Wolfe 1956).
 
         Parameters
         ----------
         share : (c,) float64
             Fractional choice to begin from.
         """
+        # The smallest bound over t is a minimum over t of a maximum over choices. Each t gives a valid bound, however
+        # rough the fractional choice is: it only decides how small the bound becomes, never whether it holds.
         step = 0
         while True:
             bound = self.bound_at(self._parameters(share))
@@ -121,11 +128,15 @@ class Completion:
             step += 1
 
     def _parameters(self, share: Float) -> Float:
-        """Return about the t (m,) with the smallest bound for a fractional choice of candidates.
+        """Return nearly the parameters t (m,) that minimise the bound for a fractional choice of candidates.
 
-        The bound is smallest where its derivative by c is zero: where the shares of r/t over small r and of
-        r/(exp(c) + r) over large r add up to 1.
+        The bound is smallest where its derivative by c is zero: where r/t of small r and r/(exp(c) + r) of large r,
+        weighted by the shares, add up to 1.
         """
+        # From dc/dt = t/(1 + t)² the derivative of r/(1 + t) by c is -r/t, and that of ln(e^c + r) - c is -r/(e^c + r);
+        # c itself gives 1. Each of these terms falls as c grows, so that bisection leads near the zero. c is searched
+        # in place of t, since it lies between 0 and ln(1 + Σ r). The table inverts c(t), which has no closed form.
+        # Candidates with hardly any share are left out, as they would make up most of the work.
         used = np.flatnonzero(share > LEAST_SHARE * share.max())
         part = share[used].astype(np.float32)
         returns = self.rules.returns[used] * (1.0 / (1.0 + self.base)).astype(np.float32)
@@ -134,6 +145,7 @@ class Completion:
             intercept = (low + high) / 2
             t = np.interp(intercept, _TABLE_INTERCEPT, _TABLE)
             base = np.exp(intercept).astype(np.float32)
+            # t = 0 would divide by zero
             linear = (1.0 / np.maximum(t, _TABLE[1])).astype(np.float32)
             small = returns * (1.0 / (1.0 + t)).astype(np.float32) <= np.log1p(returns / base)
             slope = part @ np.where(small, returns * linear, returns / (base + returns))

@@ -30,14 +30,14 @@ _ROWS_AT_ONCE = 32
 class ReturnsInstance(Constrained):
     """A placement problem by expected returns: c candidates in canonical order, m road users, g mandatory groups.
 
-    Beside the parameters of `Constrained` it has these.
+    It adds these parameters to those of `Constrained`.
 
     Parameters
     ----------
     returns : (c, m) float32
-        R.
+        R, the expected returns of each candidate from each road user.
     weight : (m,) float64
-        w; they add up to 1.
+        w, the weights of the road users, which add up to 1.
     """
 
     rows = (*Constrained.rows, "returns")
@@ -60,7 +60,7 @@ class ReturnsInstance(Constrained):
         return float(self.weight @ np.log1p(self.together(chosen)))
 
     def added(self, base: Float, among: Integer | None = None) -> Float:
-        """Return what each candidate adds to returns ``base``, (c,) float64, or each of those ``among``, (k,)."""
+        """Return the gain on top of returns ``base`` by each candidate, (c,) float64, or by those ``among``, (k,)."""
         among = np.arange(len(self)) if among is None else among
         gained = np.empty(len(among))
         scale = 1.0 / (1.0 + base)
@@ -79,14 +79,14 @@ def row_blocks(rows: int) -> Iterator[slice]:
 def make_returns_instance(problem: PlacementProblem, returns: NDArray[np.float32]) -> ReturnsInstance:
     """Reduce a problem to the candidates and road users that matter.
 
-    Left out are road users without weight or without returns, candidates without returns that serve no mandatory group,
-    and candidates that another one at the same position dominates: it returns as much from every road user, serves the
-    same groups and costs no more.
+    The instance leaves out road users without weight or without returns, candidates without returns that serve no
+    mandatory group, and dominated candidates: those for which another one at the same position has at least the same
+    returns from every road user, serves the same groups and costs no more.
 
     Parameters
     ----------
     problem : PlacementProblem
-        Its weights are those of the road users; its ``visible`` is not used.
+        Problem whose weights are those of the road users; its ``visible`` is not used.
     returns : (c, m) float
 
     Raises
@@ -99,8 +99,7 @@ def make_returns_instance(problem: PlacementProblem, returns: NDArray[np.float32
     met = np.flatnonzero((problem.weights > 0) & (returns[order] > 0).any(axis=0))
     if not len(met):
         raise SeipError(
-            "no candidate has returns from any road user; try other heights or sensor types, or clear what stands in "
-            "the way"
+            "no candidate has returns from any road user; try other heights or sensor types, or remove obstacles"
         )
     instance = ReturnsInstance(
         returns=np.ascontiguousarray(returns[np.ix_(order, met)], dtype=np.float32),

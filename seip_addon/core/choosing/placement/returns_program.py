@@ -62,7 +62,7 @@ class ProgramProof:
     value : float
         Its exact value.
     bound : float
-        No placement has a larger value, but for a solver's tolerances.
+        Upper bound on the value of any placement, within a solver's tolerances.
     optimal : bool
         Whether none is better by more than `TIE_TOLERANCE`. Among many ties this stays open, and the bound ends a few
         millionths above the value, which is as close as a solver's tolerances allow.

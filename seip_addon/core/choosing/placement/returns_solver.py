@@ -24,12 +24,15 @@ from .returns_program import ReturnsProgram, entries_of
 from .returns_summary import returns_text
 from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 
-STARTS = 6  # candidates that a greedy choice begins with, before swaps
-ROOT_STEPS, NODE_STEPS = 60, 6  # of the bound, for all candidates and at each node
-BRANCHING_SHARE = 0.5  # of the limits, for branch and bound before the integer program
-PROGRAM_SHARE = 0.5  # of what is left of them then, for the integer program, where it is small enough
-OPERATIONS_PER_LOGARITHM = 20  # multiplications that take as long
-UNPROVEN = "the limit was reached before this placement was proven the best: the gap says by how much it may fall short"
+STARTS = 6  # number of greedy choices, each from a different first candidate, that swaps improve
+ROOT_STEPS, NODE_STEPS = 60, 6  # steps of the bound at the root, with all candidates, and at each other node
+BRANCHING_SHARE = 0.5  # share of the limits for branch and bound before the integer program
+PROGRAM_SHARE = 0.5  # share of what is left then for the integer program, where it is small enough
+OPERATIONS_PER_LOGARITHM = 20  # multiplications that take as long as one logarithm
+UNPROVEN = (
+    "the limit was reached before this placement was proven the best: the gap is the most by which it may fall short; "
+    "a higher limit may close it"
+)
 
 
 def solve_returns(
@@ -37,25 +40,25 @@ def solve_returns(
 ) -> Generator[Progress, None, Placement]:
     """Choose the placement of largest mean of ln(1 + expected returns) from road users.
 
-    Placements are equally good where their values differ by at most `TIE_TOLERANCE`; of these the first one found is
-    returned, which the order of candidates does not change.
+    Placements are equally good where their values differ by at most `TIE_TOLERANCE`. Of these the first one found is
+    returned, which does not depend on the order of candidates.
 
-    Branch and bound goes first: on random problems of 120 candidates it took half as long as with the integer program
-    (`returns_program`). That one has a share of the limits only where these name a solver, not ``auto``, where branch
-    and bound has no proof by then, and where it is small enough.
+    Branch and bound runs first: on random problems of 120 candidates it took half as long as with the integer program
+    (`returns_program`). The program has a share of the limits only if these name a solver other than ``auto``, branch
+    and bound has no proof by then, and the program is small enough.
 
     Parameters
     ----------
     problem : PlacementProblem
-        Weights are those of the m road users; ``visible`` is used for mandatory groups only.
+        Problem whose weights are those of the m road users; ``visible`` is used for mandatory groups only.
     returns : (c, m) float
         Expected returns of each candidate from each road user.
 
     Returns
     -------
     Placement
-        Objective and bound are means of ln(1 + returns); the gap is the share by which the geometric mean of
-        1 + returns may be larger.
+        Placement whose objective and bound are means of ln(1 + returns). Its gap is the share by which the geometric
+        mean of 1 + returns may be larger.
 
     Raises
     ------
@@ -73,6 +76,7 @@ def solve_returns(
     if by_program and not finished and fits(entries_of(search.rest), clock, PROGRAM_SHARE):
         solver = f"{solver}, {check_solver(limits.solver)}"
         finished = yield from search.prove_by_program(limits.solver, clock.part(PROGRAM_SHARE * clock.left))
+    # the program may have raised the best value, and so cut open nodes: the search continues with it
     finished = finished or (yield from search.run())
     placement = assess(
         problem,
@@ -105,11 +109,11 @@ class Standing:
         self.value, self.bound = instance.value(chosen), first.value
 
     def note(self, value: float, bound: float = math.inf) -> None:
-        """Take a value that was reached and a bound that was proven; worse ones change nothing."""
+        """Record a value that was reached and a bound that was proven; worse ones change nothing."""
         self.value, self.bound = max(self.value, value), min(self.bound, bound)
 
     def describe(self, work: str) -> str:
-        """Return what a search does, with its typical number of returns and its gap so far."""
+        """Return a message: the work of a search, with its typical number of returns and its gap so far."""
         typical, gap = math.expm1(self.value), math.expm1(max(self.bound - self.value, 0.0))
         return f"{work}; returns so far: {returns_text(typical)}, gap {gap:.1%}"
 
@@ -139,12 +143,13 @@ def _starting_choice(
         return np.zeros(0, dtype=np.int64)
     covering, _ = make_instance(problem)
     chosen = yield from starting_choice(problem, covering, solver)
-    # a dominated candidate gives way to the one at its position that serves the same groups
+    # a candidate that the returns instance left out as dominated is replaced by the one that dominates it
     found = [_stand_in(instance, problem, int(covering.original[one])) for one in chosen]
     return np.sort(np.array(found, dtype=np.int64))
 
 
 def _stand_in(instance: ReturnsInstance, problem: PlacementProblem, candidate: int) -> int:
+    """Return a candidate of the instance, or the one at its position that serves the same groups and costs no more."""
     own = np.flatnonzero(instance.original == candidate)
     if len(own):
         return int(own[0])
@@ -187,8 +192,8 @@ def swapped(
 ) -> Generator[Progress, None, Integer]:
     """Replace one sensor by another, and add sensors, for as long as the value grows.
 
-    Where a budget limits the choice, the sensors that are left may cost less than before: what can then be added is
-    added greedily, so that the numbers of sensors of each type change too.
+    Under a budget a swap may leave money for more sensors. These are added greedily, so that the numbers of sensors of
+    each type change too.
     """
     value = instance.value(chosen)
     while True:
@@ -200,6 +205,8 @@ def swapped(
             clock.spend(OPERATIONS_PER_LOGARITHM * instance.returns.size)
             gain = np.where(addable(instance, rest), instance.added(instance.together(rest)), -np.inf)
             gain[gone] = -np.inf
+            # The best replacement. Under a budget also the best one of each price, followed by what the rest of the
+            # budget buys: one cheap sensor in place of an expensive one loses value unless a second one joins it.
             rivals = [np.append(rest, int(np.argmax(gain)))] if np.isfinite(gain).any() else []
             if math.isfinite(instance.budget):
                 rivals += [greedy(instance, np.append(rest, cheap)) for cheap in _best_of_each_price(instance, gain)]
@@ -223,19 +230,26 @@ def _best_of_each_price(instance: ReturnsInstance, gain: Float) -> list[int]:
 
 
 def _orders(instance: ReturnsInstance) -> list[bool]:
+    """Return whether to choose greedily by gain per price; under a budget both orders are tried."""
     return [False, True] if math.isfinite(instance.budget) and instance.price.max() > 0 else [False]
 
 
 @dataclass(order=True)
 class _Node:
-    """Placements that contain some chosen candidates, and otherwise only some of those left.
+    """Node of the search tree: all placements with the chosen candidates and any of those left.
 
     Parameters
     ----------
     rank : float
-        Bound on their value, negative: nodes are taken in the order of their bounds.
+        Negative upper bound on the value of these placements: the heap gives the node of the largest bound first.
     number : int
-        Order in which nodes were made.
+        Serial number of the node, which settles equal bounds.
+    chosen : (k,) int64
+        Candidates that all these placements contain.
+    left : (n,) int64
+        Candidates that they may contain besides.
+    share : (n,) float64, optional
+        Fractional choice of the candidates left, from the parent, to begin the bound with.
     """
 
     rank: float
@@ -248,15 +262,16 @@ class _Node:
 class _Search:
     """Best-first branch and bound.
 
-    A node's children add one candidate each and leave out those before it, in the order of their contributions to the
-    bound of the node. The bounds of children fall along that order, so that all after the first that falls short are
-    cut at once. A child gets a bound of its own when it is taken.
+    The candidates left are sorted by their contributions to the bound of the node. Each child adds one of them and
+    excludes those before it. The bounds of children fall along that order, so that all after the first that falls short
+    are cut at once. A child gets a bound of its own when it is taken from the heap.
 
     Attributes
     ----------
     best : (k,) int64
+        Best placement so far.
     value : float
-        The best placement so far and its value.
+        Value of the best placement.
     """
 
     def __init__(self, instance: ReturnsInstance, chosen: Integer, clock: Clock, standing: Standing) -> None:
@@ -268,15 +283,18 @@ class _Search:
 
     @property
     def bound(self) -> float:
-        """No placement has a larger value."""
+        """Upper bound on the value of any placement."""
+        # Placements are in nodes that were explored, where none is better than the best, or in open ones, of which the
+        # first of the heap has the largest bound. The integer program may have proven less.
         return max(self.value, min(self._proven, -self._open[0].rank) if self._open else -math.inf)
 
     @property
     def rest(self) -> ReturnsInstance:
-        """The instance with only the best candidates so far and those that a better placement may contain."""
+        """The instance reduced to the best placement so far and the candidates that a better one may contain."""
         return self.instance.of(self._left())
 
     def _left(self) -> Integer:
+        """Return the candidates of the best placement and of all open nodes, ascending."""
         members = [part for node in self._open for part in (node.chosen, node.left)]
         left: Integer = np.unique(np.concatenate([self.best, *members]))
         return left
@@ -292,6 +310,7 @@ class _Search:
 
     def run(self, share: float = 1.0) -> Generator[Progress, None, bool]:
         """Search until the best placement is proven, or a share of the limits is used; return whether it is proven."""
+        # the part of the limits that must be left for later
         spare = (1.0 - share) * self._clock.left if share < 1.0 else 0.0
         while self._open and -self._open[0].rank > self._least:
             if self._clock.left <= spare:
@@ -308,8 +327,10 @@ class _Search:
         return self.value + TIE_TOLERANCE
 
     def _take(self, node: _Node) -> None:
+        """Bound a node, offer the placement that its bound selects, and open its children."""
         whole = self.instance
         base = whole.together(node.chosen)
+        # With one sensor to come its gain is exact: no bound is needed.
         left = node.left[_addable_later(whole, node.chosen, node.left)]
         if len(node.chosen) + 1 == whole.count or not len(left):
             self._complete(node.chosen, base, left)
@@ -321,16 +342,21 @@ class _Search:
             budget=whole.budget - math.fsum(whole.price[node.chosen]),
         )
         part = Completion(rules, base)
+        # The bound begins at the fractional choice of the parent, restricted to the candidates left. Where none of it
+        # is left, at those of the largest gains. A start near the optimum gives a small bound after few steps.
         share = np.zeros(len(left)) if node.share is None else node.share[np.searchsorted(node.left, left)]
         if not share.any():
             gain = whole.added(base, left)
             share[np.argsort(-gain, kind="stable")[: rules.count]] = 1.0
+        # The root's bound sorts the whole tree and is worth many steps; its selection, and those of nodes, are
+        # placements too, which often improve the best one.
         bound, share = self._bounded(part, reached, share, NODE_STEPS if len(node.chosen) else ROOT_STEPS)
         self._offer(np.append(node.chosen, left[bound.selection.picked]))
         self._branch(node, rules, left, reached, bound, share)
 
     def _bounded(self, part: Completion, reached: float, share: Float, steps: int) -> tuple[ReturnsBound, Float]:
-        """Return the smallest of several bounds, and the fractional choice that it comes from."""
+        """Return the smallest of several bounds, and the fractional choice from which it was computed."""
+        # The bounds of successive steps need not fall. The steps end early once the node can be cut.
         best: tuple[ReturnsBound, Float] | None = None
         for step, (bound, own) in enumerate(part.falling_bounds(share)):
             self._clock.spend(OPERATIONS_PER_LOGARITHM * part.rules.returns.size)
@@ -343,15 +369,22 @@ class _Search:
     def _branch(
         self, node: _Node, rules: ReturnsInstance, left: Integer, reached: float, bound: ReturnsBound, share: Float
     ) -> None:
-        """Open the children of a node whose bound is above the best value."""
+        """Open the children of a node whose bounds are above the best value."""
+        # The node's bound is linear in the candidates: a fixed part plus the net contributions of those selected. If
+        # the first candidate of a placement in this order is at some rank, the others come after it, and the bound on
+        # such placements is the fixed part plus the largest contributions from that rank on. It needs no new
+        # evaluation.
         net = bound.selection.net
         order = np.argsort(-net, kind="stable")
         fixed = reached + bound.value - bound.selection.value
         for rank, (candidate, most, weakest) in enumerate(_best_after(rules, bound, order)):
+            # a child is part of its parent, whose bound therefore holds for it too
             limit = min(fixed + most, -node.rank)
             if limit <= self._least:
                 break
-            # candidates that fall short even in place of the weakest one beside this candidate are left out
+            # A later candidate is of use only if the bound with it is above the best value. With it, the weakest
+            # candidate of the selection must go (or none, where there is room): those that fall short are left out of
+            # the child, and so of the whole subtree.
             enough = order[rank + 1 :]
             after = np.sort(enough[fixed + most - weakest + net[enough] > self._least])
             chosen = np.append(node.chosen, left[candidate])
@@ -371,23 +404,25 @@ class _Search:
             self._offer(np.append(chosen, left[best]))
 
     def _offer(self, chosen: Integer) -> None:
+        """Keep a placement if it is feasible and better than the best so far."""
         chosen = np.sort(chosen)
         if self.instance.feasible(chosen) and (value := self.instance.value(chosen)) > self._least:
             self.best, self.value = chosen, value
 
 
 def _addable_later(instance: ReturnsInstance, chosen: Integer, left: Integer) -> Boolean:
-    """Return which candidates left do not exclude, or cost too much beside, those chosen, (k,) bool."""
+    """Return which candidates left are affordable and have no conflict with those chosen, (k,) bool."""
     room: Boolean = ~instance.conflict[np.ix_(chosen, left)].any(axis=0)
     room &= instance.affordable(math.fsum(instance.price[chosen]) + instance.price[left])
     return room
 
 
 def _best_after(rules: ReturnsInstance, bound: ReturnsBound, order: Integer) -> Iterator[tuple[int, float, float]]:
-    """Yield each candidate of an order with the largest contributions of it and of those after it together.
+    """Yield each candidate of an order with the largest sum of contributions of it and of candidates after it.
 
-    At most ``count`` candidates contribute, one of each clique; the budget counts by its multiplier. The sums fall. The
-    third value is the smallest of the contributions that one more candidate would replace: 0 where there is room.
+    At most ``count`` candidates contribute, one of each clique; the budget is included by its multiplier. The sums fall
+    along the order. The third value is the contribution that one more candidate would replace: the smallest of the sum,
+    or 0 where there is room for one more.
     """
     selection = bound.selection
     net, clique = selection.net[order].tolist(), rules.clique[order].tolist()

@@ -1,4 +1,4 @@
-"""Returns from road users that a placement has, in figures for people."""
+"""Summary of the expected returns of a placement from road users."""
 
 import math
 from collections.abc import Mapping
@@ -9,17 +9,17 @@ from ...limits import COUNT, Limits
 
 RETURNS = Limits(0.0, COUNT.most)
 FEW_RETURNS = 5.0
-"""Returns of a pedestrian below which a crossing is named."""
+"""Number of returns from a pedestrian below which a warning names the crossing."""
 
 
 def share_reached(value: float, best: float, *, of_returns: bool) -> float:
-    """Return the share of what the best placement has that another one has, from their objective values.
+    """Return the share of the best placement's outcome that another placement reaches, from their objective values.
 
     Parameters
     ----------
     of_returns : bool
-        Whether the values are means of ln(1 + returns), and the share is one of the geometric mean of 1 + returns;
-        otherwise they are covered weight.
+        Whether the values are means of ln(1 + returns); the share is then one of the geometric mean of 1 + returns.
+        Otherwise the values are covered weights.
     """
     if of_returns:
         return math.exp(value - best)
@@ -27,12 +27,12 @@ def share_reached(value: float, best: float, *, of_returns: bool) -> float:
 
 
 def returns_text(number: float) -> str:
-    """Return a number of returns with two digits or, if large, none after the point."""
+    """Return a number of returns as text: two significant digits, or a whole number from 10 on."""
     return f"{number:,.0f}" if number >= 10 else f"{number:.2g}"
 
 
 def _rounded_down(number: float) -> str:
-    """Return a number of few returns as text that reads as few: 4.98 is 4.9 and not 5."""
+    """Return a number below `FEW_RETURNS` as text that is below it too: 4.98 becomes 4.9, not 5."""
     text = returns_text(number)
     return text if float(text) < FEW_RETURNS else f"{math.floor(10 * number) / 10:.1f}"
 
@@ -52,10 +52,11 @@ class ReturnsSummary:
     Parameters
     ----------
     typical : float
-        Geometric mean over road users of 1 + returns, less 1: what the placement maximises.
+        Geometric mean over road users of 1 + returns, less 1: the quantity that the placement maximises.
     of_each : mapping of str to float
-        The same for each kind of road user.
+        The same mean for each kind of road user.
     crossings : tuple of CrossingReturns
+        Returns from a pedestrian at each crossing.
     """
 
     typical: Annotated[float, RETURNS]
@@ -63,13 +64,13 @@ class ReturnsSummary:
     crossings: tuple[CrossingReturns, ...]
 
     def describe(self) -> str:
-        """Return the returns from each kind of road user as part of a sentence."""
+        """Return the number of returns from each kind of road user as text."""
         parts = [f"{returns_text(number)} from a {name}" for name, number in self.of_each.items()]
         parts[0] = parts[0].replace(" from", " returns from", 1)
         return f"{', '.join(parts[:-1])} and {parts[-1]}"
 
     def warnings(self) -> tuple[str, ...]:
-        """Name the crossings where a pedestrian may have few returns."""
+        """Return a warning that names the crossings where a pedestrian may have few returns."""
         few = [one for one in self.crossings if one.least < FEW_RETURNS]
         if not few:
             return ()

@@ -6,9 +6,10 @@ outcome of the scenario is the weight of the targets seen often enough,
 .. math::
     f_k(S) = \sum_j w_j\, [n_{jk}(S) \ge κ],
 
-or what is left of it after one of the sensors failed: at worst :math:`\min_{i \in S} f_k(S \setminus i)`, or on
-average, each of the N sensors that are allowed failing alike (had the chosen alone part in it, a sensor that sees
-nothing would be worth adding). Of K outcomes the mean of the m smallest counts, :math:`m = \lceil αK \rceil`:
+or what is left of it after the failure of one sensor: at worst :math:`\min_{i \in S} f_k(S \setminus i)`, or on
+average, where each of the N sensors that are allowed is equally likely to fail (if only chosen sensors could fail,
+adding a sensor that sees nothing would raise the average). The risk measure is the mean of the m smallest of K
+outcomes, :math:`m = \lceil αK \rceil`:
 
 .. math::
     T(S) = \min_{p \in P} \sum_k p_k f_k(S), \qquad
@@ -37,16 +38,16 @@ Failure = Literal["none", "worst", "mean"]
 
 @dataclass(frozen=True)
 class Risk:
-    """What a robust placement maximises.
+    """Risk measure that a robust placement maximises.
 
     Parameters
     ----------
     tail : float
-        α: the share of the scenarios, the worst ones, whose mean counts; 1 for the expectation, 0 for the worst alone.
+        α, the share of the worst scenarios that are averaged; 1 for the expectation, 0 for the single worst one.
     seen_by : int
-        κ: by so many sensors a target must be seen.
+        κ, the number of sensors that must see a target.
     failure : {"none", "worst", "mean"}
-        Whether one of the sensors has failed: the one that is missed most, or any.
+        Failure of one sensor: none, the most important one, or any of them on average.
     """
 
     tail: float = 1.0
@@ -57,7 +58,7 @@ class Risk:
         if not 0 <= self.tail <= 1:
             raise SeipError(f"the tail must be a share of the scenarios from 0 to 1, not {self.tail:g}")
         if self.seen_by < 1:
-            raise SeipError(f"targets cannot be seen by {self.seen_by} sensors; ask for at least 1")
+            raise SeipError(f"the number of sensors that see a target is {self.seen_by}; it must be at least 1")
 
     @property
     def least_sensors(self) -> int:
@@ -65,7 +66,7 @@ class Risk:
         return self.seen_by + (self.failure != "none")
 
     def require_sensors(self, most: int) -> None:
-        """Raise SeipError where ``most`` sensors leave nothing in any outcome."""
+        """Raise SeipError if every outcome of ``most`` sensors is zero."""
         if most < self.least_sensors:
             raise SeipError(f"{self.describe()} needs at least {self.least_sensors} sensors, not {most}; allow more")
 
@@ -114,24 +115,25 @@ class Risk:
             return whole
         if seen.shape[1] == 0:
             return np.zeros(len(seen))
-        lost: Float = ((times == self.seen_by)[:, None] & seen.view(bool)) @ weight  # what each is needed for, (K, s)
+        # weight of the targets that fall below κ without each sensor: those seen by exactly κ, one of them this, (K, s)
+        lost: Float = ((times == self.seen_by)[:, None] & seen.view(bool)) @ weight
         after: Float = whole - (lost.max(axis=1) if self.failure == "worst" else lost.sum(axis=1) / sensors)
         return after
 
     def of(self, outcomes: Float) -> float:
-        """Return T of outcomes (K,)."""
+        """Return the risk measure T of outcomes (K,)."""
         counted = self.counted(len(outcomes))
         return math.fsum(np.sort(outcomes)[:counted]) / counted
 
     def worst(self, outcomes: Float) -> Integer:
-        """Return the scenarios that count, (m,) int64; of equal ones the first."""
+        """Return the m worst scenarios, (m,) int64; among equal ones the first."""
         return np.argsort(outcomes, kind="stable")[: self.counted(len(outcomes))]
 
     def cover(self, sensors: int) -> MultiCover:
-        r"""Return the value of a target by the sensors that see it: on average, or more than at worst.
+        r"""Return the value of a target by the number of sensors that see it; for worst failures, an upper bound.
 
-        A target seen n times is worth 1 from n = κ on. After a failure among N sensors it is worth :math:`1 - κ/N` on
-        average at n = κ and 1 from :math:`κ + 1` on, which no failure of the worst kind exceeds.
+        Without failures a target seen n times has the value 1 from n = κ on. After a failure among N sensors its mean
+        value is :math:`1 - κ/N` at n = κ and 1 from :math:`κ + 1` on. The worst failure gives no more.
 
         Parameters
         ----------

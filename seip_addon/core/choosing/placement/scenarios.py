@@ -25,11 +25,13 @@ class PoseErrors:
     Parameters
     ----------
     position : float, metres
-        Of x and of y.
+        Standard deviation of x and of y.
     height : float, metres
+        Standard deviation of the height.
     yaw : float, radians
+        Standard deviation of the yaw.
     tilt : float, radians
-        Of pitch and of roll.
+        Standard deviation of pitch and of roll.
 
     Raises
     ------
@@ -91,12 +93,12 @@ class Scenarios:
     Parameters
     ----------
     kind : {"nominal", "pose-errors", "traffic"}
-        One scenario with all poses as planned on the empty road; random pose errors; or instants of traffic at which
-        vehicles block the view.
+        Kind of the scenarios: a single one with all poses as planned on the empty road; random pose errors; or instants
+        of traffic at which vehicles block the view.
     pose_errors : PoseErrors
-        Used by pose errors only.
+        Standard deviations, for pose errors only.
     weights_from_traffic : bool
-        Whether each target has as its weight the seconds for which road users are there; for traffic only.
+        Whether the weight of each target is the number of seconds for which road users are there; for traffic only.
     count, held_out : int, optional
         Number of scenarios to optimise over and of held-out ones; `DEFAULT_COUNTS` if not given.
     seed : int

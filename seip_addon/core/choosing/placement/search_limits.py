@@ -11,8 +11,8 @@ from ...errors import SeipError
 
 OPERATIONS_PER_UNIT = 1e10  # multiplications that make a unit of work: about a second of one processor core
 OVERHEAD_OPERATIONS = 3e6  # multiplications that take as long as what goes on around each counted step
-DEFAULT_EFFORT = 60.0  # units of work for an answer where nothing else limits it
-MIN_PART = 0.01  # seconds, or units of work, of a part of a limit where nothing is left
+DEFAULT_EFFORT = 60.0  # units of work of a search without other limits
+MIN_PART = 0.01  # least part of a limit, seconds or units of work, even where nothing is left
 
 
 class Acceptance:
@@ -54,7 +54,7 @@ class SolverLimits:
         Limit of counted work, about a second of one processor core for each unit. The same inputs give the same
         result on every machine. Default: `DEFAULT_EFFORT`, or no limit where there is a time limit.
     acceptance : Acceptance, optional
-        Ends the search early where a user asks for that.
+        User's request to end the search early.
     """
 
     solver: str = "highs"
@@ -89,19 +89,19 @@ DEFAULT_LIMITS = SolverLimits()
 class Clock:
     """Limits of a search: of time from now on, and of counted work, which is the same on every machine.
 
-    Where work is limited, shares of what is left are shares of work: as long as
-    the time suffices, nothing depends on how fast the machine is.
+    Where work is limited, shares of what is left are shares of work: as long as the time suffices, results do not
+    depend on the speed of the machine.
 
     Parameters
     ----------
     limit : float, seconds
-        May be infinite.
+        Limit of wall time; may be infinite.
     effort : float, units of work
-        About as many seconds of one processor core. May be infinite.
+        Limit of counted work, about one second of one processor core for each unit; may be infinite.
     whole : Clock, optional
-        What this is a part of: work that is done here is done there as well.
+        Clock of which this is a part: work spent here is spent there as well.
     acceptance : Acceptance, optional
-        Once it is accepted, nothing is left.
+        User's request to end the search; once it is accepted, nothing is left.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class Clock:
     Raises
     ------
     SeipError
-        A limit is no positive number.
+        A limit is not a positive number.
     """
 
     def __init__(
@@ -133,20 +133,20 @@ class Clock:
         self.work = 0.0
 
     def spend(self, operations: float) -> None:
-        """Count a step of so many multiplications as work."""
+        """Record a step of ``operations`` multiplications as work."""
         self.work += (operations + OVERHEAD_OPERATIONS) / OPERATIONS_PER_UNIT
         if self._whole is not None:
             self._whole.spend(operations)
 
     def part(self, most: float, least: float = MIN_PART) -> Clock:
-        """Return a limit within this one, in the same measure; what is spent there is spent here."""
+        """Return a clock for a part of this limit, in the same measure; what is spent there is spent here."""
         share = max(min(most, self.left), least)
         if self.counts_work:
             return Clock(max(self.seconds_left, least), share, self, self.acceptance)
         return Clock(share, whole=self, acceptance=self.acceptance)
 
     def counted_part(self, most: float) -> Clock:
-        """Return a limit of so many units of work within what is left of this one."""
+        """Return a clock with at most ``most`` units of work, within what is left of this one."""
         limit = min(most, self.left) if self.counts_work else most
         return Clock(max(self.seconds_left, MIN_PART), max(limit, MIN_PART), self, self.acceptance)
 

@@ -36,13 +36,13 @@ FIRST_DECOMPOSITION_SHARE, FULL_DECOMPOSITION_SHARE = 0.05, 0.4
 """Shares for a first bound by decomposition, and for a full one where the first gains."""
 
 MIN_BOUND_GAIN = 0.05  # share of the gap that the first bound by decomposition must close for a full one to be worth it
-MIN_CLOSED_SHARE = 0.5  # share of the gap that a first branch and bound must close to go on without goals in between
-FIRST_GOALS = 32  # the first goal that is proven out of reach is such a part of the gap below the bound
-QUICK_SHARE = 0.1  # share of what is left of the limits below which a goal was quick to prove: the next step is doubled
-PROGRAM_SHARE = 0.5  # share for the integer program, beside branch and bound
-MAX_RELAXATION_GAP = 0.01  # gap of the linear relaxation up to which the program is tried, beside branch and bound
-MIN_TIE_BREAKING_WORK = 10.0  # units of work for the choice among equally good placements, or as many as the proof took
-MIN_GAP_PROGRESS = 0.02  # share of the gap that closes in the second half of the time where more time is of use
+MIN_CLOSED_SHARE = 0.5  # share of the gap that a first branch and bound must close to continue without goals in between
+FIRST_GOALS = 32  # the first goal lies below the bound by the gap divided by this
+QUICK_SHARE = 0.1  # a goal proven within this share of the remaining limits was quick: the next step is doubled
+PROGRAM_SHARE = 0.5  # share for the integer program, in addition to branch and bound
+MAX_RELAXATION_GAP = 0.01  # largest gap of the linear relaxation at which the program is tried besides branch and bound
+MIN_TIE_BREAKING_WORK = 10.0  # least work for the choice among equally good placements; otherwise that of the proof
+MIN_GAP_PROGRESS = 0.02  # share of the gap that must close in the second half of the time for more time to be of use
 
 Note = Callable[[float, float], None]
 Result = TypeVar("Result")
@@ -56,11 +56,11 @@ class Proof:
     ----------
     chosen : (k,) int64
     bound : float
-        No placement covers more.
+        Upper bound on the weight that any placement covers.
     ties : tuple of (k,) int64, optional
-        All placements that cover as much, but for those with idle sensors, where they are known.
+        All placements that cover the same weight except those with idle sensors, where they are known.
     halfway : float, optional
-        The bound when half the time of the last search was over, where that ended without a proof.
+        Bound after half the time of the last search, if that ended without a proof.
     """
 
     chosen: Integer
@@ -76,7 +76,7 @@ class _Standing:
     Parameters
     ----------
     unit : float
-        Weight of the problem that makes one of the instance.
+        Weight in the problem of one unit of weight in the instance.
     """
 
     def __init__(self, unit: float) -> None:
@@ -84,11 +84,11 @@ class _Standing:
         self._value, self._bound = 0.0, math.inf
 
     def note(self, value: float, bound: float) -> None:
-        """Take an objective value that was reached and a bound that was proven; worse ones change nothing."""
+        """Record an objective value that was reached and a bound that was proven; worse ones change nothing."""
         self._value, self._bound = max(self._value, value), min(self._bound, bound)
 
     def shown(self, steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
-        """Run a search and add to each of its steps what is covered, and within which gap of the best possible."""
+        """Run a search and add the covered weight and the gap to the message of each step."""
         while True:
             try:
                 step = next(steps)
@@ -106,26 +106,26 @@ class _Standing:
 def solve(
     problem: PlacementProblem, limits: SolverLimits = DEFAULT_LIMITS, start: Integer | None = None
 ) -> Generator[Progress, None, Placement]:
-    """Choose the placement that covers most.
+    """Choose the placement of largest coverage.
 
     Among optimal placements the one with fewest sensors is returned, then the cheapest, then the one with the largest
-    doubly covered weight, then the first in the canonical order of candidates: always the same one, however candidates
-    and targets are ordered.
+    doubly covered weight, then the first in the canonical order of candidates. The result does not depend on the order
+    of candidates and targets.
 
     Placements are equally good if they cover the same weight. Weights that are whole multiples of one unit are compared
     exactly, however large their sum (up to 2^53 units). For other weights, placements are equally good if they cover at
     most `TIE_TOLERANCE` (1e-9) of the weight that all candidates see together less than the best one.
 
-    Reductions that lose nothing come first; a greedy choice improved by swaps gives an incumbent, a Lagrangian
-    relaxation a bound; candidates that the bound rules out are dropped. Among the rest branch and bound decides; where
-    it does not soon, a tabu search improves the incumbent, decomposition and an integer program the bound where they
-    can, and branch and bound goes on with the time that is left, its bound falling all the while.
+    Exact reductions come first. A greedy choice improved by swaps and tabu search gives an incumbent, and a Lagrangian
+    relaxation gives a bound; candidates that the bound rules out are dropped. The rest is searched by branch and bound.
+    If that does not end soon, decomposition and an integer program lower the bound where they can, and branch and bound
+    continues with the remaining time, while its bound falls.
 
     Parameters
     ----------
     start : (k,) int64, optional
-        Candidates of a known placement of the same problem, or of one with another number of sensors. The result
-        covers at least as much as the best that dropping, adding and swapping its sensors leads to.
+        Candidates of a known placement of the same problem, or of one with a different number of sensors. The result
+        covers no less than the best placement found from it by dropping, adding and swapping sensors.
 
     Raises
     ------
@@ -138,9 +138,11 @@ def solve(
 def solve_within(
     problem: PlacementProblem, solver: str, clock: Clock, known: Integer | None = None
 ) -> Generator[Progress, None, Placement]:
-    """Do the work of `solve` within given limits."""
+    """Solve as `solve` does, within the limits of a clock."""
     version = check_solver(solver)
     instance, factor = make_instance(problem)
+    # The incumbent: greedy, then swaps, then tabu search; each starts from the result of the one before and is never
+    # worse.
     start = yield from starting_choice(problem, instance, solver)
     standing = _Standing(1 / factor)
     steps = [*greedy_steps(instance, start)]
@@ -155,6 +157,8 @@ def solve_within(
     proof = yield from standing.shown(prove(instance, first, solver, clock, standing.note))
     notes = [*scale_notes(problem)]
     if proof.optimal:
+        # Tie-breaking has limits of its own. With a common unit of weights the optimum is exact, and ties are
+        # placements of the same weight; without one they are those within the slack of the bound.
         part = clock.counted_part(max(clock.work, MIN_TIE_BREAKING_WORK))
         best = instance.value(proof.chosen) if instance.step == 1 else proof.bound
         chosen, settled = yield from canonical_optimum(instance, proof.chosen, best, proof.ties, solver, part)
@@ -166,7 +170,7 @@ def solve_within(
     else:
         chosen = drop_redundant(instance, proof.chosen, instance.value(proof.chosen))
         notes += [
-            "the search ended before this placement was proven optimal: the gap says by how much it may fall short",
+            "the search ended before this placement was proven optimal: the gap is the most by which it may fall short",
             *_outlook(instance, proof),
         ]
     if problem.count is not None and len(chosen) < problem.count:
@@ -184,7 +188,7 @@ def solve_within(
 
 
 def _adapted(instance: Instance, chosen: Integer) -> Generator[Progress, None, Integer]:
-    """Return a placement of an instance made from that of a similar one; empty where its constraints forbid that."""
+    """Adapt the placement of a similar instance to an instance; the result is empty if the constraints forbid that."""
     while len(chosen) > instance.count:
         chosen = drop_weakest(instance, chosen)
     if not instance.feasible(chosen):
@@ -195,10 +199,10 @@ def _adapted(instance: Instance, chosen: Integer) -> Generator[Progress, None, I
 def solve_greedy(problem: PlacementProblem) -> Placement:
     """Choose greedily, with a certificate.
 
-    With the number of sensors alone and one pose per position, greedy covers at least 1 - 1/e (63 %) of the optimum
-    (Nemhauser, Wolsey and Fisher 1978); with several poses per position at least a half (Fisher, Nemhauser and Wolsey
-    1978); the better of gain and gain per price, under a budget alone, at least (1 - 1/e)/2 (Khuller, Moss and Naor
-    1999). The bound of the result is computed from the data and is usually far closer.
+    Greedy covers at least these shares of the optimum: 1 - 1/e (63 %) if only the number of sensors is limited and each
+    position has one pose (Nemhauser, Wolsey and Fisher 1978); one half with several poses per position (Fisher,
+    Nemhauser and Wolsey 1978); (1 - 1/e)/2 for the better of gain and gain per price if only a budget is given
+    (Khuller, Moss and Naor 1999). The bound of the result is computed from the data and is usually far closer.
 
     Raises
     ------
@@ -232,10 +236,11 @@ def prove(
     Parameters
     ----------
     chosen : (k,) int64
-        A placement to begin from.
+        Placement to begin from.
     note : callable, optional
-        Called with the objective value reached and the bound proven each time that one of these may have improved.
+        Function that is called with the objective value reached and the bound proven whenever one may have improved.
     """
+    # First reduction: only candidates that an equally good or better placement may contain, and the incumbent's own.
     keep, bound = yield from lagrangian_bound(instance, instance.as_good(instance.value(chosen)), clock)
     note(instance.value(chosen), bound.value)
     proof = yield from _prove_among(instance.part(keep), np.searchsorted(keep, chosen), bound, solver, clock, note)
@@ -243,13 +248,17 @@ def prove(
     return replace(proof, chosen=keep[proof.chosen], bound=instance.attained(proof.bound), ties=ties)
 
 
-def _prove_among(  # what is known, how far to go, and who is told
+def _prove_among(  # incumbent and bound, the limits, and the callback
     instance: Instance, chosen: Integer, bound: Bound, solver: str, clock: Clock, note: Note
 ) -> Generator[Progress, None, Proof]:
-    """Improve an incumbent among the candidates that a bound leaves, none better being among the others."""
+    """Improve an incumbent and its bound among the candidates that a bound has not ruled out."""
+    # The methods run in the order of their cost, and each gets what the ones before have found: the smallest bound
+    # (`least`), the best placement, and the candidates that can still matter.
     relaxed = yield from _from_relaxation(instance, bound, chosen)
     chosen = max(chosen, relaxed, key=instance.value)
     least = min(bound.value, instance.total)
+    # Branch and bound searches for ties too, so that it needs the candidates of all equally good placements. The later
+    # methods only look for better ones (`keep`), which leaves fewer candidates.
     as_good = np.union1d(can_reach(instance, bound, instance.as_good(instance.value(chosen))), chosen)
     search = None
     if is_worthwhile(instance, as_good):
@@ -266,6 +275,8 @@ def _prove_among(  # what is known, how far to go, and who is told
     keep = can_reach(instance, bound, _better(instance, chosen))
     if least < _better(instance, chosen) - instance.margin or len(keep) == 0:
         return _proven(instance, chosen)
+    # An integer program is quick where the linear relaxation is tight. Where it is not, it is the last resort of
+    # instances too large for branch and bound.
     tight = bound.value - instance.value(chosen) <= MAX_RELAXATION_GAP * instance.value(chosen)
     share = 1.0 if search is None else PROGRAM_SHARE
     if (tight or search is None) and is_affordable(instance.of(keep), clock, share):
@@ -277,6 +288,8 @@ def _prove_among(  # what is known, how far to go, and who is told
         chosen, least = proof.chosen, proof.bound
     if search is None or clock.left <= 0:
         return Proof(chosen, least, optimal=False)
+    # Branch and bound has closed less than half of the gap: a proof of optimality is not near, and the bound falls
+    # faster by goals. Otherwise the first search continues where it stopped.
     known, value = Proof(chosen, least, optimal=False), instance.value(chosen)
     if search.bound - value > (1 - MIN_CLOSED_SHARE) * (bound.value - value):
         known = yield from lower_by_goals(instance, bound, known, clock, note)
@@ -290,13 +303,16 @@ def lower_by_goals(
 ) -> Generator[Progress, None, Proof]:
     """Lower the bound by proofs that no placement reaches a goal, each goal below the one before.
 
-    A search for a goal near the bound cuts far more than one for what is better than the incumbent: it is quick, and
-    where no proof of optimality can be had it is the better use of the time.
+    A search for placements near the bound prunes far more than one for any that is better than the incumbent. It is
+    quick, and where a proof of optimality is out of reach it is the better use of the time.
     """
     chosen, least, halfway, half = known.chosen, min(known.bound, instance.total), None, clock.left / 2
     step = (least - instance.value(chosen)) / FIRST_GOALS
     while clock.left > 0 and least - step > _better(instance, chosen):
         goal, left = least - step, clock.left
+        # Three outcomes. The search reaches the limits: its own bound holds. It ends with a placement that reaches the
+        # goal: that is the best one, as the search compared all that do. It ends without one: the goal is the new
+        # bound.
         keep = can_reach(instance, bound, goal)
         yield Progress(0, 0, f"proving that no placement covers {goal / instance.total:.2%}")
         search = BestPlacements(instance.part(keep), goal, 1, least) if len(keep) else None
@@ -318,10 +334,11 @@ def lower_by_goals(
     return Proof(chosen, max(least, instance.value(chosen)), optimal=optimal, halfway=halfway)
 
 
-def _search_on(  # what is known, and how far to go
+def _search_on(  # the search, its results so far, and the limits
     instance: Instance, search: BestPlacements, among: Integer, least: float, chosen: Integer, clock: Clock
 ) -> Generator[Progress, None, Proof]:
-    """Go on with a branch and bound until it ends or the limits are reached."""
+    """Continue a branch and bound until it ends or the limits are reached."""
+    # a better placement found by another method raises the goal of the search, which then prunes more
     if np.isin(chosen, among).all():
         search.offer(np.searchsorted(among, chosen))
     halfway = None
@@ -341,7 +358,7 @@ def _found(search: BestPlacements, among: Integer) -> list[Integer]:
 
 
 def _finished(instance: Instance, search: BestPlacements, among: Integer, chosen: Integer) -> Proof:
-    """Return the proof that a search has come to its end gives."""
+    """Return the proof given by a search that has ended."""
     ties = None if search.overflowed else (chosen, *_found(search, among))
     return Proof(chosen, instance.value(chosen), optimal=True, ties=ties)
 
@@ -349,7 +366,7 @@ def _finished(instance: Instance, search: BestPlacements, among: Integer, chosen
 def _decomposition_bound(
     instance: Instance, least: float, chosen: Integer, clock: Clock
 ) -> Generator[Progress, None, float]:
-    """Bound by parts of the candidates: shortly first, and with more time where that closes part of the gap."""
+    """Bound by parts of the candidates: briefly first, and with more time if that closes part of the gap."""
     better = _better(instance, chosen)
     first = yield from decomposition_bound(instance, better, clock, FIRST_DECOMPOSITION_SHARE * clock.left)
     if first < better or least - first < MIN_BOUND_GAIN * (least - better):
@@ -358,25 +375,25 @@ def _decomposition_bound(
 
 
 def _better(instance: Instance, chosen: Integer) -> float:
-    """Return the covered weight that a strictly better placement reaches at least."""
+    """Return the least covered weight of a strictly better placement."""
     return instance.value(chosen) + instance.step
 
 
 def _from_relaxation(instance: Instance, bound: Bound, chosen: Integer) -> Generator[Progress, None, Integer]:
-    """Return a placement made from the relaxation's own selection, where that meets the constraints."""
+    """Return a placement from the relaxation's selection if that meets the constraints, else the chosen one."""
     picked = np.sort(bound.selection.picked)
     if not instance.feasible(picked):
         return chosen
     return (yield from swap_search(instance, picked))
 
 
-def _decide(  # what is known, and how far to go
+def _decide(  # the proof so far, and the limits
     instance: Instance, keep: Integer, known: Proof, solver: str, clock: Clock, share: float
 ) -> Generator[Progress, None, Proof]:
-    """Look for better placements among the candidates that one may contain; that there is none is the proof.
+    """Search for better placements by an integer program until there is none, which is the proof.
 
-    Solvers have tolerances: of two placements that differ by less they may return either. So what they call the best
-    is only a better one, until they find none.
+    Solvers have tolerances: of two placements that differ by less they may return either. So a solver's optimum is only
+    taken as a better placement, and the program is solved again until it has no solution.
     """
     program, chosen, bound = CoverProgram(instance.part(keep)), known.chosen, known.bound
     ends = clock.elapsed + share * clock.left
@@ -408,18 +425,18 @@ def _outlook(instance: Instance, proof: Proof) -> list[str]:
     before, now = (bound / value - 1 for bound in (proof.halfway, proof.bound))
     if before - now < MIN_GAP_PROGRESS * before:
         slow = (
-            "the gap has hardly closed in the second half of the search: a proof may take many times as long; fewer "
-            "candidates (a larger spacing, fewer heights) or fewer sensors make it easier"
+            "the gap has hardly closed in the second half of the search: a proof may take many times longer; use fewer "
+            "candidates (a larger spacing, fewer heights) or fewer sensors to make it easier"
         )
         return [slow]
     return [
-        f"the gap was {before:.2%} halfway through the search and is {now:.2%} now: a higher limit may close more of it"
+        f"the gap was {before:.2%} halfway through the search and is {now:.2%} now: a higher limit may close it further"
     ]
 
 
-def _surplus(asked: int, used: int) -> str:
-    enough = counted(used, "suffices", "suffice")
-    return f"asked for {counted(asked, 'sensor')}, {enough}: no further sensor that the constraints allow adds coverage"
+def _surplus(most: int, used: int) -> str:
+    suffice = "suffices" if used == 1 else "suffice"
+    return f"{used} of {counted(most, 'sensor')} {suffice}: no further sensor that the constraints allow adds coverage"
 
 
 def _guarantee(problem: PlacementProblem, instance: Instance) -> str:
@@ -433,26 +450,26 @@ def _guarantee(problem: PlacementProblem, instance: Instance) -> str:
 
 
 def scale_notes(problem: PlacementProblem) -> tuple[str, ...]:
-    """Return notes on targets and prices too small, beside others, to affect the choice.
+    """Return notes on weights and prices that are too small next to others to affect the choice.
 
     Returns
     -------
     tuple of str
-        One sentence for weights and one for prices, where there is anything to say.
+        Up to two notes: one on weights and one on prices.
     """
     notes = []
     weights = problem.weights[problem.weights > 0]
     light = int(np.count_nonzero(weights < TIE_TOLERANCE * weights.sum()))
     if light and not common_unit(weights)[1]:
         notes.append(
-            f"{light:,} of {len(weights):,} targets weigh less than {TIE_TOLERANCE:g} of all weight each: beside the "
-            "others they cannot decide; bring the weights closer together"
+            f"{light:,} of {len(weights):,} targets weigh less than {TIE_TOLERANCE:g} of all weight each, too little "
+            "to affect the choice; bring the weights closer together"
         )
     prices = problem.prices[problem.allowed & (problem.prices > 0)]
     cheap = int(np.count_nonzero(prices < TIE_TOLERANCE * prices.max(initial=0.0)))
     if cheap:
         notes.append(
-            f"{cheap:,} candidates cost less than {TIE_TOLERANCE:g} of the dearest: beside it their prices cannot "
-            "decide; give all prices in the same currency"
+            f"{cheap:,} candidates cost less than {TIE_TOLERANCE:g} of the most expensive one, too little to affect "
+            "the choice; give all prices in the same currency"
         )
     return tuple(notes)

@@ -1,4 +1,4 @@
-"""What a placement sees where heights that nobody has measured are other than assumed."""
+"""Coverage of a placement if assumed heights of obstacles are wrong."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,12 +12,12 @@ from ...site.scene_geometry import Mesh, SceneGeometry, ordered_surfaces
 from ..placement.deployment import Sensor
 
 CHANGES = (0.7, 1.3)
-"""Factors by which assumed heights are tried."""
-MIN_CHANGE = 0.01  # of the region's coverage, from which on a change is told
+"""Factors by which assumed heights are varied."""
+MIN_CHANGE = 0.01  # least change of the region's coverage for a note
 
 
 def with_heights(geometry: SceneGeometry, factor: float) -> SceneGeometry:
-    """Return a scene whose occluders of assumed height are so many times as high, above their own feet."""
+    """Return a scene with the assumed heights of occluders, above their own feet, multiplied by a factor."""
     return replace(geometry, occluders=tuple(_scaled(mesh, factor) for mesh in geometry.occluders))
 
 
@@ -29,7 +29,7 @@ def _scaled(mesh: Mesh, factor: float) -> Mesh:
 
 
 def coverage_by_heights(around: Surroundings, geometry: SceneGeometry, sensors: Sequence[Sensor]) -> dict[float, float]:
-    """Return the coverage of sensors with each of `CHANGES`, by its factor; empty where no height is assumed."""
+    """Return the coverage of sensors for each factor of `CHANGES`; empty if no height is assumed."""
     if not sensors or not any(mesh.height_assumed for mesh in geometry.occluders):
         return {}
     reach = max(sensor.model.max_range for sensor in sensors)
@@ -47,7 +47,7 @@ def coverage_by_heights(around: Surroundings, geometry: SceneGeometry, sensors: 
 def height_notes(
     around: Surroundings, geometry: SceneGeometry, sensors: Sequence[Sensor], coverage: float
 ) -> tuple[str, ...]:
-    """Say what coverage would be if assumed heights were other, where that changes it by more than a point."""
+    """Return a note on coverage under changed heights, if it changes by more than `MIN_CHANGE`."""
     found = coverage_by_heights(around, geometry, sensors)
     if max((abs(other - coverage) for other in found.values()), default=0.0) <= MIN_CHANGE:
         return ()

@@ -17,18 +17,18 @@ from ..placement.deployment import Deployment, GainBand, TypeBand
 def with_gain_band(around: Surroundings, deployment: Deployment) -> Generator[Progress, None, Deployment]:
     """Return a deployment with its coverage at the lowest and at the highest plausible gains of its sensors.
 
-    Where there are several sensor types to choose from, the band has the coverage of each type as well, with all of the
-    sensors of that type: what an uncertain gain leaves of a comparison of types at this site.
+    If there are several sensor types to choose from, the band also has the coverage with all sensors of each type. It
+    shows how far types can be compared at this site in spite of uncertain gains.
 
     Parameters
     ----------
     around : Surroundings
-        With all types that there were to choose from.
+        Site with all sensor types that could be chosen.
 
     Returns
     -------
     Deployment
-        Unchanged if no sweep is missing: each type is calibrated, or counts every return.
+        Deployment with the band; unchanged if each type is calibrated or counts every return.
     """
     sensors = deployment.sensors
     types = list(around.models.values())

@@ -15,16 +15,16 @@ class PoseErrorEvaluation:
     Parameters
     ----------
     study : RobustStudy
-        With one robust placement, the one that is evaluated.
+        Study with one robust placement, which is the evaluated one.
     pose_study : PoseStudy or None
-        Its coverage under pose errors; None where the scenarios are nominal.
+        Coverage of the placement under pose errors; None if the scenarios are nominal.
     """
 
     study: RobustStudy
     pose_study: PoseStudy | None
 
     def messages(self) -> tuple[str, ...]:
-        """Return what the placement loses as planned and saves under errors, and a warning where errors cost much."""
+        """Return messages on the loss as planned and the gain under errors, and a warning if errors cost much."""
         (chosen,), nominal = self.study.robust, self.study.nominal[0]
         lost = self.study.price(chosen)
         change = f"{100 * abs(lost):.2f} points {'less' if lost >= 0.0 else 'more'}"

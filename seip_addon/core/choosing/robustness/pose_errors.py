@@ -1,14 +1,14 @@
 r"""Pose errors: normally distributed position, height, yaw and tilt.
 
-A sensor planned at p with the yaw ψ and the tilt θ hangs at p + e and is turned as
+A sensor planned at p with the yaw ψ and the tilt θ is mounted at p + e with the orientation
 
 .. math::
     R = R_z(ψ + δ_ψ)\, R_y(θ + δ_θ)\, R_x(δ_φ), \qquad
     e_x, e_y \sim N(0, σ_p^2),\; e_z \sim N(0, σ_h^2),\;
     δ_ψ \sim N(0, σ_ψ^2),\; δ_θ, δ_φ \sim N(0, σ_t^2),
 
-all independent of each other and from post to post: yaw first, then pitch about
-the new y axis (nose down is positive), then roll about the new x axis.
+All errors are independent of each other and between posts. The rotations are yaw first, then pitch about the new y axis
+(nose down is positive), then roll about the new x axis.
 """
 
 from __future__ import annotations
@@ -37,8 +37,9 @@ class PoseDraws:
     Parameters
     ----------
     shift : (n, s, 3) float64, metres
-        From where each was planned.
+        Errors of the positions.
     yaw, pitch, roll : (n, s) float64, radians
+        Errors of the angles.
     """
 
     shift: Float
@@ -50,27 +51,28 @@ class PoseDraws:
         return len(self.shift)
 
     def orientations(self, planned_yaw: Float, planned_tilt: Float) -> Float:
-        """Return how sensors hang, (n, s, 3, 3) float64, from their axes to the site's.
+        """Return the orientations of sensors, (n, s, 3, 3) float64, from their axes to the site's.
 
         Parameters
         ----------
         planned_yaw, planned_tilt : (s,) float64, radians
+            Angles without errors.
         """
         return orientations(planned_yaw + self.yaw, planned_tilt + self.pitch, self.roll)
 
 
 def require_draws(draws: int) -> None:
-    """Raise SeipError where the number of draws is below one, or more than memory holds."""
+    """Raise SeipError if the number of draws is below one, or too large for memory."""
     if not DRAWS.allow(draws):
-        raise SeipError(f"asked for {draws} draws or scenarios of pose errors; ask for {DRAWS}")
+        raise SeipError(f"the number of draws or scenarios of pose errors must be {DRAWS}, not {draws}")
 
 
 def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseDraws:
     """Draw random pose errors of sensors.
 
-    What is drawn for a sensor follows from the seed, the number of the draw and the sensor's position alone: whichever
-    type hangs there at whichever height, whatever hangs elsewhere, and however many draws there are. Errors of other
-    sizes are the same draws, scaled.
+    The errors of a sensor depend only on the seed, the number of the draw and the sensor's position. They do not depend
+    on its type and height, on other sensors, or on the number of draws. Errors with other standard deviations are the
+    same draws, scaled.
 
     Parameters
     ----------
@@ -81,7 +83,7 @@ def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseD
     """
     require_draws(draws)
     if seed < 0:
-        raise SeipError(f"the seed of the pose errors is {seed}; give a whole number of at least 0")
+        raise SeipError(f"the seed of the pose errors must be a whole number of at least 0, not {seed}")
     positions, of_position = np.unique(np.rint(foot / _MICROMETRE).astype(np.int64), axis=0, return_inverse=True)
     standard = np.stack([_standard_normal(seed, position, draws) for position in positions.tolist()], axis=1)
     scale = [errors.position, errors.position, errors.height, errors.yaw, errors.tilt, errors.tilt]
@@ -90,25 +92,26 @@ def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseD
 
 
 def _standard_normal(seed: int, position: Sequence[int], draws: int) -> Float:
-    """Return one position's draws, (draws, 6): more draws begin with the same."""
+    """Return one position's draws, (draws, 6): a larger number of draws begins with the same ones."""
     signs = sum((coordinate < 0) << bit for bit, coordinate in enumerate(position))
     words = [seed, signs, *(abs(coordinate) for coordinate in position)]
     return np.random.default_rng(words).standard_normal((draws, _KINDS_DRAWN))
 
 
 def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> tuple[PoseDraws, Boolean]:
-    """Move sensors that a draw puts inside an object: to the opposite side, or else to the planned position.
+    """Move sensors that a draw puts inside an object to the opposite side, or, if that fails, to the planned position.
 
     Parameters
     ----------
     xyz : (s, 3) float64, metres
-        The planned positions.
+        Planned positions.
 
     Returns
     -------
     PoseDraws
+        Draws without sensors inside objects.
     (n, s) bool
-        Which draws would have put a sensor inside an object.
+        Whether each draw would have put the sensor inside an object.
     """
     shift = draws.shift.copy()
     blocked: Boolean = inside_any((xyz + shift).reshape(-1, 3), objects).reshape(shift.shape[:-1])

@@ -1,8 +1,8 @@
 """Coverage of a placement under pose errors, jointly, per sensor and per kind of error.
 
-All sensors err in each draw. The same draws tell what comes of it when one sensor alone errs: a first-order effect,
-that of its own row of V beside the planned rows of the others. Draws with one kind of error alone, scaled from the same
-standard ones, tell which kind hurts most.
+In each draw all sensors have errors. The same draws give the effect of each sensor's own errors: its row of V with
+errors is combined with the planned rows of the others (a first-order effect). Draws with a single kind of error, scaled
+from the same standard ones, show which kind costs most.
 """
 
 from collections.abc import Generator, Sequence
@@ -31,10 +31,14 @@ class PoseStudySettings:
 
     Parameters
     ----------
+    errors : PoseErrors
+        Standard deviations of the errors.
     draws : int
-        With all sensors erring in all ways.
+        Number of draws with all kinds of errors.
     draws_of_kind : int
-        With one kind of error alone; 0 leaves the kinds out.
+        Number of draws with each single kind of error; 0 to leave these out.
+    seed : int
+        Seed of the draws.
     """
 
     errors: PoseErrors = field(default_factory=PoseErrors)
@@ -52,7 +56,7 @@ class Coverages:
     whole : (n,) float64
         Share of all targets that is seen.
     central : (n,) float64 or None
-        Share of the targets in weighted regions; None where there are none.
+        Share of the targets in weighted regions that is seen; None if there are none.
     """
 
     whole: Float
@@ -66,15 +70,15 @@ class PoseStudy:
     Parameters
     ----------
     planned : Coverages
-        Of the poses as planned: n = 1.
+        Coverage of the poses as planned: n = 1.
     together : Coverages
-        With errors of all sensors.
+        Coverage with errors of all sensors.
     alone : tuple of Coverages
-        With errors of one sensor alone, for each, in the same draws.
+        Coverage with errors of only one sensor, for each sensor, in the same draws.
     by_kind : dict of str to Coverages
-        With one kind of error alone, for each kind.
+        Coverage with a single kind of error, for each kind.
     blocked : float
-        Share of the drawn poses that would have been inside an object, and were moved out of it.
+        Share of the drawn poses that were inside an object and were moved out of it.
     """
 
     settings: PoseStudySettings
@@ -90,15 +94,15 @@ class PoseStudy:
         return quantile_of(self.together.whole, share)
 
     def loss_by_sensor(self) -> tuple[IntervalEstimate, ...]:
-        """Estimate the mean loss of coverage when each sensor alone has errors."""
+        """Estimate the mean loss of coverage if only one sensor has errors, for each sensor."""
         return tuple(mean_of(self.planned.whole[0] - coverages.whole) for coverages in self.alone)
 
     def loss_by_kind(self) -> dict[str, IntervalEstimate]:
-        """Estimate the mean loss of coverage from each kind of error alone."""
+        """Estimate the mean loss of coverage from each kind of error by itself."""
         return {kind: mean_of(self.planned.whole[0] - each.whole) for kind, each in self.by_kind.items()}
 
     def worst_sensor(self) -> tuple[str, bool]:
-        """Return the sensor whose error costs most, and whether the draws tell that it does, and costs any coverage."""
+        """Return the sensor whose errors cost most, and whether this is significant in the draws."""
         losses = self.loss_by_sensor()
         worst = max(range(len(losses)), key=lambda number: losses[number].value)
         behind = [
@@ -107,7 +111,7 @@ class PoseStudy:
         return self.labels[worst], losses[worst].low > 0 and all(mean_of(difference).low > 0 for difference in behind)
 
     def is_converged(self) -> bool:
-        """Whether half of the draws give the same mean and quantiles, within their intervals."""
+        """Return whether half of the draws give the same mean and quantiles, within their intervals."""
         whole = self.together.whole
         half = whole[: len(whole) // 2]
         pairs = [(mean_of(half), mean_of(whole)), *((quantile_of(half, q), quantile_of(whole, q)) for q in QUANTILES)]
@@ -122,7 +126,7 @@ def pose_study(
     Parameters
     ----------
     deployment : Deployment
-        The placement, at poses of the site.
+        Placement at candidate poses of the site.
     """
     site = around.site
     poses = np.array([sensor.pose for sensor in deployment.sensors if sensor.pose is not None], dtype=np.int64)
@@ -164,13 +168,13 @@ def _one_errs(site: Site, planned: Boolean, together: ScenarioVisibility, number
 
 
 def pose_warnings(study: PoseStudy) -> tuple[str, ...]:
-    """Return a warning where pose errors cost a placement much of its coverage."""
+    """Return a warning if pose errors cost a placement much of its coverage."""
     lost = study.planned.whole[0] - study.quantile(QUANTILES[0]).value
     return (pose_message(study),) if lost >= NOTABLE_LOSS else ()
 
 
 def pose_message(study: PoseStudy) -> str:
-    """Describe the 5 % quantile of a placement's coverage, and which sensor's error costs most."""
+    """Return a message on the 5 % quantile of a placement's coverage and the sensor whose errors cost most."""
     errors, low = study.settings.errors, study.quantile(QUANTILES[0])
     lost = max(study.planned.whole[0] - low.value, 0.0)
     worst, certain = study.worst_sensor()

@@ -7,17 +7,17 @@ With K scenarios of pose errors, V of each known for every candidate,
     \quad\text{subject to}\quad
     κ\, y_{jk} \le \sum_i V_{ijk} x_i, \quad y_{jk} \in \{0, 1\},
 
-X being the placements of the problem (number, budget, one sensor per position, mandatory and forbidden places, least
-distance) and P that of `risk`. The expectation is the maximal covering location problem of K × t targets. Any p in P
-gives an upper bound,
+where X are the placements of the problem (number, budget, one sensor per position, mandatory and forbidden positions,
+least distance) and P is defined in `risk`. The expectation is the maximal covering location problem of K × t targets.
+Any p in P gives an upper bound,
 
 .. math::
     \max_{x \in X} T(x) \le \max_{x \in X} F_p(x),
 
-of which p = 1/K says that nothing exceeds the largest expectation. A p with a small bound comes of fictitious play
-(Brown 1951): placements answer the mean of the scenarios that were worst for the placements before. Branch and bound on
-F_p then proves the best T (`robust_search`), where it comes to an end. Another bound knows each scenario beforehand
-(Madansky 1960), and takes K problems of t targets:
+With p = 1/K it is the largest expectation. A p with a small bound is found by fictitious play (Brown 1951): each
+placement maximises the mean of the scenarios that were worst for the placements before. Branch and bound on F_p then
+proves the best T (`robust_search`), if it ends within the limits. A second bound assumes that each scenario is known
+beforehand (Madansky 1960), and takes K problems of t targets:
 
 .. math::
     \max_{x \in X} T(x) \le \min_{p \in P} \sum_k p_k \max_{x \in X} f_k(x),
@@ -45,15 +45,15 @@ from ..placement.solver import BRANCHING_SHARE, MIN_CLOSED_SHARE, Proof, lower_b
 from .robust_search import BestUnderRisk, swap_search_by_risk, swap_search_from_pairs
 from .scenario_visibility import ScenarioVisibility
 
-ROUNDS = 16  # of fictitious play; weights of scenarios are multiples of 1 / (ROUNDS · m)
+ROUNDS = 16  # rounds of fictitious play; weights of scenarios are multiples of 1 / (ROUNDS · m)
 SCENARIO_SHARE = 0.5  # share of the time for the problems of single scenarios
 GOALS_SHARE = 0.98  # share of the time for proofs that goals cannot be reached, where branching lowers no bound
 WEAK_BRANCHING_SHARE = 0.05  # share of the time for a first branch and bound where its bounds are weak
-MIN_SECONDS = 1.0  # or units of work, for what comes after them, however slow they were
+MIN_SECONDS = 1.0  # least time, seconds or units of work, for the later steps, however long the earlier ones took
 
 
 UNPROVEN_MESSAGE = (
-    "the search ended before this placement was proven optimal: the gap says by how much it may fall short"
+    "the search ended before this placement was proven optimal: the gap is the most by which it may fall short"
 )
 
 
@@ -69,23 +69,24 @@ def solve_robust(
     Parameters
     ----------
     problem : PlacementProblem
-        With the visibility of the poses as planned.
+        Problem with the visibility of the poses as planned.
     scenarios : ScenarioVisibility
-        Of all candidates.
+        Visibility of all candidates in each scenario.
     foreseen : sequence of Placement, optional
-        See `foresee`; found within the time limit if not given, and only of use where one look is enough.
+        Best placement of each scenario, see `foresee`. By default they are computed within the time limit. They are
+        used only if a target must be seen by one sensor.
 
     Returns
     -------
     Placement
-        Objective and bound are T, in units of the targets' weight; ``covered`` is what it covers as planned. The same
-        whatever the order of candidates. Of equally good placements the one with fewest sensors, then the cheapest;
-        for the expectation as `placement.solve` chooses.
+        Placement whose objective and bound are T, in units of the targets' weight; ``covered`` is its coverage as
+        planned. It does not depend on the order of candidates. Of equally good placements it is the one with fewest
+        sensors, then the cheapest; for the expectation it is chosen as by `placement.solve`.
 
     Raises
     ------
     SeipError
-        As `placement.solve`, or fewer sensors are allowed than the risk asks for.
+        Same as for `placement.solve`, or fewer sensors are allowed than the risk measure needs.
     """
     most = problem.most_sensors
     risk.require_sensors(most)
@@ -100,16 +101,17 @@ def solve_robust(
         foreseen = yield from foresee(problem, different, solver, clock.part(SCENARIO_SHARE * clock.left))
     slack = equal_within(problem, risk, len(different))
     placement = yield from _searched(problem, different, risk, slack, solver, clock.part(math.inf, MIN_SECONDS))
-    if foreseen is not None and risk.seen_by == 1:  # coverage by one look bounds that by two as well, but far above
+    # with several sensors per target the bound of single scenarios holds as well, but is far too large to be of use
+    if foreseen is not None and risk.seen_by == 1:
         placement = _with_foresight(problem, different, risk, slack, placement, foreseen)
     return replace(placement, seconds=clock.seconds)
 
 
 def equal_within(problem: PlacementProblem, risk: Risk, scenarios: int) -> float:
-    """Return by how much two values of T may differ and still be equal, as `placement.solve` compares coverage.
+    """Return the largest difference between equal values of T, consistent with `placement.solve`.
 
-    Where the weights have a common unit, T is a multiple of a share of it, and different multiples differ. Elsewhere
-    values are equal that differ by less than `TIE_TOLERANCE` of all weight.
+    If the weights have a common unit, T is a multiple of a share of that unit, and different multiples differ.
+    Otherwise values are equal if they differ by less than `TIE_TOLERANCE` of all weight.
     """
     tolerance = TIE_TOLERANCE * math.fsum(problem.weights)
     unit, whole = common_unit(problem.weights[problem.weights > 0])
@@ -120,12 +122,12 @@ def equal_within(problem: PlacementProblem, risk: Risk, scenarios: int) -> float
 def foresee(
     problem: PlacementProblem, scenarios: ScenarioVisibility, solver: str, clock: Clock
 ) -> Generator[Progress, None, tuple[Placement, ...]]:
-    """Solve each scenario by itself: no placement does better there.
+    """Find the best placement of each scenario by itself.
 
     Returns
     -------
     tuple of Placement
-        One for each scenario; one alone where all are the same.
+        One for each scenario; a single one if all scenarios are the same.
     """
     scenarios = _without_copies(scenarios)
     found = []
@@ -133,7 +135,7 @@ def foresee(
         here = Progress(scenario, len(scenarios), "solving each scenario by itself", counted=False)
         yield here
         alone = replace(problem, visible=scenarios.seen(scenario))
-        # what the quick ones leave goes to those that follow
+        # time that quick scenarios do not use is shared by those that follow
         part = clock.part(clock.left / (len(scenarios) - scenario), MIN_SECONDS)
         found.append((yield from within(here, solve_within(alone, solver, part))))
     return tuple(found)
@@ -147,7 +149,7 @@ def _with_foresight(
     placement: Placement,
     foreseen: Sequence[Placement],
 ) -> Placement:
-    """Lower the bound to what foresight could reach, and take a scenario's own placement where that is better."""
+    """Lower the bound by that of known scenarios, and replace the placement by one of theirs if that is better."""
     value, chosen = placement.objective, placement.chosen
     for other in foreseen:
         reached = risk.of(outcomes_of(problem, scenarios, risk, other.chosen))
@@ -168,9 +170,9 @@ def _with_foresight(
 
 
 def at_least(found: Placement, other: Placement, reached: float) -> Placement:
-    """Return the placement found, or another where that reaches more of the same objective.
+    """Return the placement found, or another one that reaches more of the same objective.
 
-    A search that ran out of time may have missed the placement that knows of no scenarios.
+    A search that ran out of time may be worse than the placement that was optimised without scenarios.
     """
     if reached <= found.objective * (1 + TIE_TOLERANCE):
         return found
@@ -192,13 +194,13 @@ def outcomes_of(problem: PlacementProblem, scenarios: ScenarioVisibility, risk: 
 
 
 def _without_copies(scenarios: ScenarioVisibility) -> ScenarioVisibility:
-    """Return one scenario where all are the same, so that without errors nothing is rounded otherwise."""
+    """Return a single scenario if all are the same, so that results without errors have no other rounding."""
     same = (scenarios.packed == scenarios.packed[:1]).all()
     return ScenarioVisibility(scenarios.packed[:1], scenarios.targets) if same else scenarios
 
 
 def _stacked(problem: PlacementProblem, scenarios: ScenarioVisibility, share: Float) -> PlacementProblem:
-    """Return the problem of all scenarios' targets, those of each weighted by its share; without those of share 0."""
+    """Return the problem of the targets of all scenarios with a share, weighted by the shares."""
     used = np.flatnonzero(share)
     visible = np.concatenate([scenarios.seen(scenario) for scenario in used], axis=1)
     return replace(problem, visible=visible, weights=np.concatenate([share[k] * problem.weights for k in used]))
@@ -209,10 +211,13 @@ def _searched(
 ) -> Generator[Progress, None, Placement]:
     """Find scenarios' weights with a small bound, then the best placement by branch and bound."""
     yield Progress(0, 0, "reducing the scenarios' targets")
+    # Candidates that no scenario needs are dropped first, for all shares: so indices mean the same in every later step.
     whole, _ = make_instance(_stacked(problem, scenarios, np.ones(len(scenarios))))
     game = FictitiousPlay(problem, scenarios, risk, whole, clock)
     start = yield from starting_choice(problem, whole, solver)
     chosen, share = yield from game.play(start)
+    # T is at most F in the instance of these shares. Branch and bound on F with T evaluated for every placement found
+    # gives the best T once no open node has a larger F.
     instance, unit = game.instance(share), game.unit(share)
     goal = (game.evaluate(chosen) - slack) * unit
     root = yield from lagrangian_bound(instance, goal, clock, iterations=FIRST_STEPS)
@@ -233,9 +238,9 @@ def _searched(
 def _bounded_by_goals(
     search: BestUnderRisk, instance: Instance, unit: float, root: tuple[Integer, Bound], clock: Clock
 ) -> Generator[Progress, None, tuple[bool, float]]:
-    """Run a branch and bound; where its bound hardly falls, lower it goal by goal, then go on with the time left.
+    """Run a branch and bound; if its bound hardly falls, lower it by goals, then continue with the time left.
 
-    F bounds T, so that a proof that no placement reaches a goal in F is one in T as well.
+    F bounds T, so that a proof that no placement reaches a goal in F holds for T as well.
 
     Returns
     -------
@@ -244,10 +249,10 @@ def _bounded_by_goals(
     float
         Bound on T.
     """
-    # where several sensors must see a target, bounds of branches are weak, and a short trial tells
+    # if several sensors must see a target, bounds of branches are weak: a short trial shows whether they close the gap
     share = BRANCHING_SHARE if instance.cover.concave else WEAK_BRANCHING_SHARE
     finished = yield from search.run(clock, share * clock.left)
-    keep, bound = root  # what can reach the first incumbent, which all that follow are among
+    keep, bound = root  # candidates of placements as good as the first incumbent, and so of all better ones
     value = search.value * unit
     closing = search.bound * unit - value <= (1 - MIN_CLOSED_SHARE) * (bound.value - value)
     if finished or closing or not np.isin(search.best, keep).all():
@@ -260,14 +265,14 @@ def _bounded_by_goals(
 
 
 class FictitiousPlay:
-    """Fictitious play for scenario weights with a small bound: placements answer the worst scenarios so far.
+    """Fictitious play for scenario weights with a small bound: each placement answers the worst scenarios so far.
 
     Parameters
     ----------
     whole : Instance
-        Of all scenarios: candidates that can matter, with their constraints.
+        Instance of all scenarios: the candidates that can matter, with their constraints.
     clock : Clock
-        Limits of the search, which evaluations count against.
+        Limits of the search; evaluations count as work.
     """
 
     def __init__(
@@ -281,7 +286,7 @@ class FictitiousPlay:
         self._cover = risk.cover(self._sensors)
 
     def evaluate(self, chosen: Integer) -> float:
-        """Return T of candidates of the whole instance."""
+        """Return T of chosen candidates of the whole instance."""
         self._clock.spend(8.0 * self._scenarios.packed[:, 0].size * len(chosen))
         seen = self._scenarios.seen_by_each(self._whole.original[chosen])
         return self._risk.of(self._risk.outcomes(seen, self._weight, self._sensors))
@@ -296,11 +301,14 @@ class FictitiousPlay:
         return replace(self._whole, visible=visible, weight=merged, cover=self._cover)
 
     def unit(self, share: Integer) -> float:
-        """Return by what T is to be multiplied to be compared with F."""
+        """Return the factor by which T is multiplied to be compared with F."""
         return float(share.sum()) * self._cover.unit / self._unit
 
     def play(self, start: Integer) -> Generator[Progress, None, tuple[Integer, Integer]]:
-        """Return the best placement met, and how often each scenario was among the worst, (K,) int64."""
+        """Return the best placement found, and how often each scenario was among the worst, (K,) int64."""
+        # A game between a chooser of placements and an opponent who chooses scenarios. In each round the opponent adds
+        # the worst scenarios for the last placement, and the chooser answers the shares so far. The shares approach the
+        # opponent's optimal ones, which give the smallest bound; any shares give a valid one.
         even = np.ones(len(self._scenarios), dtype=np.int64)
         instance = self.instance(even)
         chosen = yield from swap_search(instance, start)
@@ -308,6 +316,7 @@ class FictitiousPlay:
             chosen = yield from swap_search_from_pairs(instance, start, chosen, self._clock)
             chosen = yield from swap_search_by_risk(instance, self.evaluate, chosen)
         best, value = chosen, self.evaluate(chosen)
+        # the expectation: all scenarios have the same weight, and there is no game
         if self._risk.counted(len(even)) == len(even):
             return best, even
         share = np.zeros_like(even)

@@ -1,16 +1,16 @@
 r"""Best placement under risk: local searches and branch and bound on an objective bounded by a multi-cover.
 
-The bounding function counts what sees a target: with p in P (`risk`),
+The bounding function depends on the number of sensors that see a target: with p in P (`risk`),
 
 .. math::
     F(S) = \sum_k p_k \sum_j w_j\, φ(n_{jk}(S)) \ge T(S),
 
-φ being the value of a target by the number of sensors that see it (`placement.multi_cover`). A set S
-with :math:`T(S) \ge g` has :math:`F(S) \ge g` as well: branches that cannot bring F to the best T so
-far are cut (`placement.branch_and_bound`), and T itself is computed for every set that is left.
+where φ is the value of a target by that number (`placement.multi_cover`). A set S with :math:`T(S) \ge g` has
+:math:`F(S) \ge g` as well. So branches in which F cannot reach the best T so far are cut
+(`placement.branch_and_bound`), and T itself is computed for every set that is left.
 
-An instance is here one of all scenarios' targets, whose weights are whole numbers and whose objective
-value is F in whole units.
+An instance here has the targets of all scenarios. Its weights are whole numbers, and its objective value is F in whole
+units.
 """
 
 import math
@@ -27,18 +27,18 @@ from ..placement.reduced_problem import Instance
 from ..placement.search_limits import Clock
 
 STARTING_PAIRS, MAX_FIRST_CANDIDATES = 8, 100
-"""Starting pairs where a single sensor gains nothing, and candidates that may be the first of a pair."""
+"""Number of starting pairs if a single sensor gains nothing, and of candidates that may be the first of a pair."""
 
-SWAPS_TRIED = 24  # swaps of a sensor for which T is computed, those with the largest F
+SWAPS_TRIED = 24  # number of swaps of each sensor for which T is computed: those with the largest F
 
 
 def swap_search_from_pairs(
     instance: Instance, start: Integer, best: Integer, clock: Clock
 ) -> Generator[Progress, None, Integer]:
-    """Swap sensors from pairs that see most together, for part of the time; the best so far, if none is better.
+    """Swap sensors from the pairs that see most together, for part of the time; return the best placement.
 
-    One sensor alone adds nothing where a target must be seen twice: who is added first is a guess, and swaps of
-    single sensors do not lead from every guess to the best.
+    If targets must be seen twice, a single sensor adds nothing. The first one is then a guess, and swaps of single
+    sensors do not lead from every guess to the best placement.
     """
     time, value = clock.left, instance.value(best)
     for pair in _best_pairs(instance, start):
@@ -51,7 +51,7 @@ def swap_search_from_pairs(
 
 
 def _best_pairs(instance: Instance, start: Integer) -> list[list[int]]:
-    """Return pairs that can join the start, no candidate in two of them, those that see most together first."""
+    """Return pairs that can join the start, those that see most together first; no candidate is in two of them."""
     seen = instance.gains(instance.weight)
     seen[~addable(instance, start)] = 0.0
     first = np.argsort(-seen, kind="stable")[: min(MAX_FIRST_CANDIDATES, np.count_nonzero(seen))]
@@ -71,7 +71,7 @@ def _best_pairs(instance: Instance, start: Integer) -> list[list[int]]:
 def swap_search_by_risk(
     instance: Instance, evaluate: Callable[[Integer], float], chosen: Integer
 ) -> Generator[Progress, None, Integer]:
-    """Swap sensors for as long as T grows, trying of each sensor's swaps those with the largest F."""
+    """Swap sensors for as long as T grows; for each sensor, the swaps with the largest F are tried."""
     value = evaluate(chosen)
     while len(chosen) > 0:
         yield Progress(0, 0, "swapping sensors")
@@ -90,24 +90,26 @@ def swap_search_by_risk(
 
 
 class BestUnderRisk(Search):
-    """Finds the placement of largest T.
+    """Search for the placement of largest T.
 
     Parameters
     ----------
     unit : float
-        F in these units is what T is bounded by.
+        Unit of F: F divided by it bounds T.
     evaluate : callable
-        Returns T of candidates of the instance.
+        Function that returns T of candidates of the instance.
     chosen : (k,) int64
-        A placement to begin from.
+        Placement to begin from.
     slack : float
-        Values of T that differ by no more count as equal.
+        Largest difference between equal values of T.
     root : (n,) int64 and Bound
-        Candidates that a placement as good as ``chosen`` may contain, and a bound on what placements of these reach.
+        Candidates that a placement as good as ``chosen`` may contain, and an upper bound on the F of placements of
+        these.
 
     Attributes
     ----------
     best : (k,) int64
+        Best placement so far.
     value : float
         T of the best placement so far. Of equally good ones, which are those within ``slack`` of the largest T, it is
         the one with fewest sensors, then the cheapest, then the first in the order of candidates.
@@ -130,7 +132,7 @@ class BestUnderRisk(Search):
 
     @property
     def bound(self) -> float:
-        """No placement has a larger T."""
+        """Upper bound on the T of any placement."""
         return max(self.value, min(super().bound, self._highest) / self._unit)
 
     def _take(self, placement: Integer) -> float:
@@ -139,7 +141,9 @@ class BestUnderRisk(Search):
         return self.goal
 
     def _keep(self, placement: Integer, value: float) -> None:
-        """Keep the placements of which none other has both a larger T and a better rank; the best is among them."""
+        """Keep the Pareto front of placements in T and rank; the best placement is in it."""
+        # Of placements within the slack of the largest T the one of best rank is the result. As the largest T may still
+        # rise, a placement of better rank may drop out later: the next best ones must be kept until then.
         rank = self._rank(placement)
         if any(kept >= value and better <= rank for kept, better, _ in self._front):
             return

@@ -29,15 +29,15 @@ class Contender:
     Parameters
     ----------
     name : str
-        What it was optimised for.
+        Purpose for which it was optimised.
     planned : float
-        Share of the targets' weight that it covers as planned, by one look and without any failure.
+        Share of the targets' weight that it covers as planned, by at least one sensor and without failures.
     evaluated_by : Risk
-        Whose outcome the following are: coverage, or what is left of it after a loss, or what several sensors see.
+        Risk measure whose outcome is evaluated: coverage, coverage after a failure, or coverage by several sensors.
     undisturbed : float
-        The outcome for the poses as planned, as a share of the targets' weight.
+        Outcome for the poses as planned, as a share of the targets' weight.
     unseen : (n,) float64
-        The same in each unseen draw.
+        Outcome in each unseen draw.
     """
 
     name: str
@@ -65,13 +65,13 @@ class RobustStudy:
     Parameters
     ----------
     scenarios : Scenarios
-        Of pose errors, or nominal: then the one scenario is also what placements are evaluated on.
+        Scenarios of pose errors, or the nominal one, on which placements are then also evaluated.
     nominal : tuple of Contender
-        The placement chosen for the poses as planned, once for each way in which the others are evaluated.
+        Placement chosen for the poses as planned, once for each outcome by which the others are evaluated.
     robust : tuple of Contender
-        One for each risk.
+        Placement for each risk measure.
     total : float
-        Weight of all targets, the unit of placements' objectives.
+        Weight of all targets.
     """
 
     scenarios: Scenarios
@@ -80,7 +80,7 @@ class RobustStudy:
     total: float
 
     def beside(self, contender: Contender) -> Contender:
-        """Return the nominal optimum, evaluated as a contender is."""
+        """Return the nominal optimum, evaluated by the same outcome as a contender."""
         return next(nominal for nominal in self.nominal if nominal.evaluated_by == contender.evaluated_by)
 
     def price(self, contender: Contender) -> float:
@@ -88,11 +88,11 @@ class RobustStudy:
         return self.beside(contender).planned - contender.planned
 
     def saving(self, contender: Contender) -> IntervalEstimate:
-        """Estimate by how much its 5 % quantile over unseen draws exceeds the nominal optimum's."""
+        """Estimate the gain in the 5 % quantile over unseen draws against the nominal optimum."""
         return quantile_gain(contender.unseen, self.beside(contender).unseen, LOW_QUANTILE)
 
     def is_converged(self, contender: Contender) -> bool:
-        """Whether half of the unseen draws give the same estimates, within their intervals."""
+        """Return whether half of the unseen draws give the same estimates, within their intervals."""
         half = len(contender.unseen) // 2
         saved = quantile_gain(contender.unseen[:half], self.beside(contender).unseen[:half], LOW_QUANTILE)
         return saved.agrees_with(self.saving(contender))
@@ -110,9 +110,9 @@ def robust_study(
     Parameters
     ----------
     problem : PlacementProblem
-        Of all candidates of the site.
+        Problem of all candidates of the site.
     risks : sequence of Risk
-        A risk measure for each placement that is compared.
+        Risk measure of each placement to compare.
     """
     every = np.flatnonzero(problem.allowed)  # no rays are cast from poses that may not be chosen
     views = yield from _views(around, problem, scenarios, every)

@@ -23,9 +23,9 @@ class ScenarioVisibility:
     Parameters
     ----------
     packed : (n, s, ceil(t / 8)) uint8
-        Bits of V, as `numpy.packbits` packs them.
+        Bits of V, in the order of `numpy.packbits`.
     targets : int
-        t.
+        Number of targets, t.
     """
 
     packed: NDArray[np.uint8]
@@ -39,20 +39,20 @@ class ScenarioVisibility:
         return np.unpackbits(self.packed[number], axis=1, count=self.targets).view(bool)
 
     def seen_by_pose(self, pose: int) -> Boolean:
-        """Return what one pose sees in each scenario, (n, t) bool."""
+        """Return the targets that one pose sees in each scenario, (n, t) bool."""
         return np.unpackbits(self.packed[:, pose], axis=1, count=self.targets).view(bool)
 
     def seen_by_each(self, poses: Integer) -> NDArray[np.uint8]:
-        """Return what a few poses see in each scenario, (n, s, t) uint8."""
+        """Return the targets that some poses see in each scenario, (n, s, t) uint8."""
         return np.unpackbits(self.packed[:, poses], axis=2, count=self.targets)
 
     def seen_by_any(self, poses: Integer) -> Boolean:
-        """Return what any of a few poses sees in each scenario, (n, t) bool."""
+        """Return the targets that at least one of some poses sees in each scenario, (n, t) bool."""
         joined = np.bitwise_or.reduce(self.packed[:, poses], axis=1)
         return np.unpackbits(joined, axis=1, count=self.targets).view(bool)
 
     def spread_to(self, poses: Integer, number: int) -> ScenarioVisibility:
-        """Return views of that many poses, of which these are ``poses`` and the others see nothing."""
+        """Return the visibility of ``number`` poses: these become ``poses``, and the others see nothing."""
         packed = np.zeros((len(self), number, self.packed.shape[2]), dtype=np.uint8)
         packed[:, poses] = self.packed
         return ScenarioVisibility(packed, self.targets)
@@ -61,7 +61,7 @@ class ScenarioVisibility:
 def each_in_threads(
     compute: Callable[[T], None], items: Sequence[T], threads: int, message: str
 ) -> Generator[Progress, None, None]:
-    """Call a function for each item, several at once; what has not begun is dropped when the generator is closed."""
+    """Call a function for each item, several at once; closing the generator cancels calls that have not started."""
     pool = ThreadPoolExecutor(threads)
     try:
         for done, _ in enumerate(pool.map(compute, items)):

@@ -16,8 +16,8 @@ from ...sensing.traffic.bodies import fitted_body
 from ...sensing.traffic.trajectories import Snapshot, Trajectories
 
 WARM_UP = 2.0  # seconds from the first sample of a run to the first instant that is used
-BATCH_SECONDS = 12.0  # seconds of a run whose instants count as one draw, since the same queues block the view at them
-_MARGIN = 1e-3  # metres by which bounding boxes are larger than what they bound: ray casters compute in float32
+BATCH_SECONDS = 12.0  # seconds of a run whose instants count as one draw, since the same queues block the view
+_MARGIN = 1e-3  # metres by which bounding boxes are larger than their contents: ray casters compute in float32
 
 _CORNERS = np.array(np.meshgrid((0, 1), (0, 1), (0, 1), indexing="ij")).reshape(3, 8).T
 
@@ -29,8 +29,9 @@ class TrafficObstacles:
     Parameters
     ----------
     triangles : (n, 3, 3) float64, metres
-        Of their bodies, local site axes.
+        Corners of the bodies' triangles, local site axes.
     reflectivity : (n,) float64, 0 to 1
+        Reflectivity of each triangle.
     hulls : (k, 8, 3) float64, metres
         Corners of their bounding boxes.
     """
@@ -45,15 +46,16 @@ NO_TRAFFIC = TrafficObstacles(np.empty((0, 3, 3)), np.empty(0), np.empty((0, 8, 
 
 @dataclass(frozen=True, eq=False)
 class Instants:
-    """Some n instants of runs of traffic.
+    """A sample of n instants of runs of traffic.
 
     Parameters
     ----------
     runs : tuple of Trajectories
-        In the scene's local axes.
+        Trajectories in the scene's local axes.
     run : (n,) int64
-        Which of the runs.
+        Run of each instant.
     time : (n,) float64, seconds
+        Time of each instant.
     batch : (n,) int64
         Batch of time of each instant; instants of different batches are nearly independent.
     """
@@ -79,15 +81,15 @@ class Instants:
 
 
 def spread_instants(runs: Sequence[Trajectories], number: int, seed: int) -> Instants:
-    """Draw instants that are spread evenly: one anywhere in each of so many equal parts of the runs' time.
+    """Draw evenly spread instants: one at random in each of ``number`` equal parts of the runs' time.
 
     Raises
     ------
     SeipError
-        None is asked for, or a run is too short.
+        The number is less than 1, or a run is too short.
     """
     if number < 1:
-        raise SeipError(f"ask for one instant of traffic or more, not {number}")
+        raise SeipError(f"the number of instants of traffic must be at least 1, not {number}")
     begin = np.array([run.span[0] + WARM_UP for run in runs])
     lasts = np.array([run.span[1] for run in runs]) - begin
     if (lasts <= 0).any():
@@ -103,17 +105,17 @@ def spread_instants(runs: Sequence[Trajectories], number: int, seed: int) -> Ins
 
 
 def check_runs(runs: Sequence[Trajectories], region: BaseGeometry) -> None:
-    """Raise SeipError where a run has no road user in the region of interest: it is of another place."""
+    """Raise SeipError if a run has no road user in the region of interest: it then belongs to another site."""
     for run in runs:
         if not shapely.contains_xy(region, run.position[:, 0], run.position[:, 1]).any():
             raise SeipError(
-                f"nobody of {_name(run)} is ever in the region of interest: it is traffic of another place, or the "
-                "scene's seip_origin is not that of its map"
+                f"no road user of {_name(run)} is ever in the region of interest: use traffic of this site, or set the "
+                "scene's seip_origin to that of its map"
             )
 
 
 def obstacles_of(trajectories: Trajectories, snapshot: Snapshot) -> TrafficObstacles:
-    """Return the bodies of the road users of an instant, in place."""
+    """Return the bodies of the road users of an instant, at their poses."""
     if len(snapshot) == 0:
         return NO_TRAFFIC
     attitudes = rotations(snapshot.yaw, snapshot.pitch)

@@ -14,7 +14,7 @@ from .traffic_instants import WARM_UP
 INTERVAL = 0.2  # seconds between samples: a car at 50 km/h moves 2.8 m, less than its length
 
 _ALONG, _ACROSS = 12, 4
-"""Points of a footprint, evenly spread, each for its share: whole numbers of shares keep weights commensurable."""
+"""Numbers of evenly spread points of a footprint, all with the same share: whole numbers keep weights commensurable."""
 
 _SHARES = np.stack(
     np.meshgrid((np.arange(_ALONG) + 0.5) / _ALONG - 0.5, (np.arange(_ACROSS) + 0.5) / _ACROSS - 0.5), axis=-1
@@ -22,33 +22,33 @@ _SHARES = np.stack(
 
 
 def road_user_seconds(targets: Targets, runs: Sequence[Trajectories]) -> Generator[Progress, None, Float]:
-    """Find for how long road users are over each target, each road user counting alike whatever its size.
+    """Compute the time that road users spend over each target; each road user has the same weight whatever its size.
 
     Parameters
     ----------
     runs : sequence of Trajectories
-        In the scene's local axes; all of each but its first `WARM_UP` seconds.
+        Trajectories in the scene's local axes; the first `WARM_UP` seconds of each are left out.
 
     Yields
     ------
     Progress
-        After each run.
+        Progress after each run.
 
     Returns
     -------
     (t,) float64, seconds
-        A road user whose footprint lies half in a target's square is half there: they add up to the time that
-        all road users together spend over targets.
+        Time over each target. If half of a footprint is in a target's square, half of the time counts: the sum is the
+        time that all road users together spend over targets.
 
     Raises
     ------
     SeipError
-        Nobody is ever over a target.
+        No road user is ever over a target.
     """
     square = _Squares(targets)
     parts = np.zeros(len(targets), dtype=np.int64)
     for number, run in enumerate(runs):
-        yield Progress(number, len(runs), "watching where road users are")
+        yield Progress(number, len(runs), "adding up the time of road users")
         size = np.array([(user.length, user.width) for user in run.users])
         begin, end = run.span[0] + WARM_UP, run.span[1]
         for time in (begin + INTERVAL * (np.arange(max(round((end - begin) / INTERVAL), 0)) + 0.5)).tolist():
@@ -60,13 +60,13 @@ def road_user_seconds(targets: Targets, runs: Sequence[Trajectories]) -> Generat
             target = square.of(places.reshape(-1, 2))
             parts += np.bincount(target[target >= 0], minlength=len(targets))
     if not parts.any():
-        raise SeipError("no road user is ever over a target: the traffic is of another place, or too short")
-    yield Progress(len(runs), len(runs), "watching where road users are")
+        raise SeipError("no road user is ever over a target: use traffic of this site, or a longer run")
+    yield Progress(len(runs), len(runs), "adding up the time of road users")
     return parts * (INTERVAL / len(_SHARES))
 
 
 class _Squares:
-    """The squares of the targets' grid, to be found by what lies in them."""
+    """Index of the squares of the targets' grid, to look up points."""
 
     def __init__(self, targets: Targets) -> None:
         self._side = targets.spacing
@@ -76,7 +76,7 @@ class _Squares:
         self._target[column, row] = np.arange(len(targets))
 
     def of(self, places: Float) -> Integer:
-        """Return the target in whose square each place (n, 2) lies, (n,); -1 for none."""
+        """Return the target of the square that contains each point (n, 2), (n,); -1 for none."""
         column, row = self._cells(places)
         most = self._target.shape
         inside = (column >= 0) & (column < most[0]) & (row >= 0) & (row < most[1])

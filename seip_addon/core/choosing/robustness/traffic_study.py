@@ -1,8 +1,8 @@
-"""Coverage that traffic leaves of a placement, and what optimising for traffic regains.
+"""Coverage of placements in traffic, and the gain from optimising for traffic.
 
-Placements are optimised on some instants of traffic and evaluated at others, of other runs, by the share of time that
-each target is seen and by the mean share of the targets' weight. Instants near in time see the same queues: intervals
-come of the means of batches of time (`mean_over_time`).
+Placements are optimised on some instants of traffic and evaluated at instants of different runs, by the share of time
+for which each target is seen and by the mean share of the targets' weight. Instants close in time have the same queues,
+so that confidence intervals are computed from the means of batches of time (`mean_over_time`).
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from .visibility_in_traffic import LAYER_HEIGHT, TrafficLayer, visibility_in_tra
 
 NOTABLE_LOSS = 0.01  # share of the targets' weight whose loss in traffic is worth a warning
 IN_TRAFFIC = "in traffic"  # first words of a `traffic_message`, and of no other
-MOSTLY_SEEN_SHARE = 0.9  # share of time from which on a target counts as mostly seen
+MOSTLY_SEEN_SHARE = 0.9  # least share of time for which a target must be seen to be mostly seen
 
 MEAN = Risk()
 
 LAYER_NAMES: Mapping[TrafficLayer, str] = {"road": "road", "height": f"points {LAYER_HEIGHT:g} m above the road"}
-"""For messages and charts."""
+"""Names of the layers in messages and charts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +42,11 @@ class TrafficScenarios:
     Parameters
     ----------
     layer : {"road", "height"}
-        The layer to be seen.
+        Layer of the visibility.
     empty : (c, t) bool
-        On the empty road.
+        Visibility on the empty road.
     views : ScenarioVisibility
-        At each instant.
+        Visibility at each instant.
     """
 
     layer: TrafficLayer
@@ -61,13 +61,13 @@ class TrafficCoverage:
     Parameters
     ----------
     empty : float
-        Share of the targets' weight on the empty road.
+        Share of the targets' weight that is seen on the empty road.
     at : (n,) float64
         The same share at each instant.
     hidden_at : (n,) float64
-        Share of the weight that is seen on the empty road and not at each instant.
+        Share of the weight that is seen on the empty road but not at each instant.
     empty_targets : (t,) bool
-        Which targets on the empty road.
+        Targets that are seen on the empty road.
     time : (t,) float64
         Share of the instants at which each target is seen.
     batch : (n,) int64
@@ -88,7 +88,7 @@ class TrafficCoverage:
 
     @property
     def loss(self) -> IntervalEstimate:
-        """Coverage of the empty road minus that in traffic: hidden weight, less what returns from vehicles add."""
+        """Coverage of the empty road minus that in traffic: hidden weight less what returns from vehicles add."""
         return mean_over_time(self.empty - self.at, self.batch)
 
     @property
@@ -108,14 +108,14 @@ class TrafficCoverage:
 
 @dataclass(frozen=True, eq=False)
 class TrafficEvaluation:
-    """A placement with its coverage in traffic that it was not optimised on.
+    """A placement with its coverage in held-out traffic.
 
     Parameters
     ----------
     name : str
-        What it was optimised for.
+        Purpose for which it was optimised.
     seen : mapping of {"road", "height"} to TrafficCoverage
-        Of the targets, and of the points `LAYER_HEIGHT` metres above them.
+        Coverage of the targets, and of the points `LAYER_HEIGHT` metres above them.
     """
 
     name: str
@@ -130,7 +130,7 @@ class TrafficStudy:
     Parameters
     ----------
     layer : {"road", "height"}
-        The layer that both were optimised to see.
+        Layer for which both were optimised.
     chosen_at : int
         Number of instants that the traffic-aware placement was optimised on.
     road_users : float
@@ -148,14 +148,14 @@ class TrafficStudy:
         return self.traffic.seen[layer].more_than(self.empty.seen[layer])
 
     def is_converged(self) -> bool:
-        """Whether every other instant gives the same means as all, within their intervals."""
+        """Return whether every second instant gives the same means as all, within their intervals."""
         rows = [seen.at for placed in (self.empty, self.traffic) for seen in placed.seen.values()]
         rows.append(self.traffic.seen[self.layer].at - self.empty.seen[self.layer].at)
         batch = self.empty.seen[self.layer].batch
         return all(mean_over_time(row[::2], batch[::2]).agrees_with(mean_over_time(row, batch)) for row in rows)
 
     def messages(self) -> tuple[str, ...]:
-        """Return what optimising on traffic gains or loses, and warnings where traffic costs much."""
+        """Return messages on the gain or loss by optimising on traffic, and warnings if traffic costs much."""
         seen = f"of the {LAYER_NAMES[self.layer]} than the best placement for the empty road"
         gain = self.gain(self.layer)
         messages = [f"this placement sees {gain.as_change()} {seen}, in traffic that neither was chosen on"]
@@ -191,7 +191,7 @@ class TrafficStudy:
 def traffic_scenarios(
     around: Surroundings, problem: PlacementProblem, instants: Instants, layer: TrafficLayer = "road"
 ) -> Generator[Progress, None, TrafficScenarios]:
-    """Compute visibility at instants of traffic, for the candidates that may be chosen; the others see nothing."""
+    """Compute visibility at instants of traffic for the candidates that may be chosen; that of others is left false."""
     every = np.flatnonzero(problem.allowed)
     views = yield from visibility_in_traffic(around, every, [NO_TRAFFIC, *instants.obstacles()], layer)
     spread = views.spread_to(every, len(problem.visible))
@@ -211,11 +211,11 @@ def traffic_study(
     Parameters
     ----------
     problem : PlacementProblem
-        Of all candidates of the site; what they see is taken from the scenarios.
+        Problem of all candidates of the site; their visibility is taken from the scenarios.
     evaluation : Instants
-        Of runs that are not those of the scenarios.
+        Instants of runs other than those of the scenarios.
     risk : Risk
-        Measure over the instants that is maximised.
+        Risk measure over the instants to maximise.
     """
     problem = replace(problem, visible=scenarios.empty)
     empty = yield from solve(problem, limits)
@@ -253,14 +253,14 @@ def _seen(views: ScenarioVisibility, rows: Integer, weight: Float, batch: Intege
 def traffic_message(
     around: Surroundings, poses: Integer, weight: Float, instants: Instants
 ) -> Generator[Progress, None, str]:
-    """Describe how much of the road poses see in traffic, on average over time, and when it is empty.
+    """Return a message on the coverage of poses in traffic, on average over time, and on the empty road.
 
     Parameters
     ----------
     poses : (s,) int64
-        Among the site's candidates.
+        Indices among the site's candidates.
     weight : (t,) float64
-        Of the targets.
+        Weights of the targets.
     """
     obstacles = instants.obstacles()
     views = yield from visibility_in_traffic(around, poses, [NO_TRAFFIC, *obstacles], "road")

@@ -1,17 +1,17 @@
 r"""Visibility grids at instants of traffic, with vehicles as occluders.
 
-Two things are asked for, of all rays of a sensor's scan, each of which ends at the
-distance d on the first of the scene's triangles or of the bodies of road users:
+Each ray of a sensor's scan ends on the first triangle of the scene or of the bodies of road users. There are two
+layers:
 
-- ``road``: a return nearer than δ to the target, as on the empty road. A return from
-  a vehicle that stands on a target, or beside it, sees that place as one from the road does.
-- ``height``: a beam that comes nearer than δ to the point `LAYER_HEIGHT` metres above the
-  target before it ends, where the sensor detects what faces it. On the empty road nothing is
-  there to return it; whatever were there would. A vehicle adds nothing to this: where more stand less is seen.
+- ``road``: a target is seen by a return nearer than δ to it, as on the empty road. A return from a vehicle on a target,
+or
+  next to it, sees the target as a return from the road does.
+- ``height``: a target is seen by a beam that comes nearer than δ to the point `LAYER_HEIGHT` metres above it before the
+  beam ends, within the range at which the sensor detects a surface that faces it. On the empty road there is nothing to
+  return the beam there, but any object there would. Vehicles only hide: the more there are, the less is seen.
 
-The empty road is cast against once for a pose. At an instant only those rays are
-cast that pass through the bounding box of a road user, at the bodies alone, and a
-target's answer is looked at again only where one of its own rays was stopped.
+For each pose all rays are cast once against the empty road. At an instant, only the rays that pass through the bounding
+box of a road user are cast again, against the bodies only, and only targets with a stopped ray are evaluated again.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ from .traffic_instants import TrafficObstacles
 
 TrafficLayer = Literal["road", "height"]
 
-LAYER_HEIGHT = 1.5  # metres above its target at which a car has its roof, and a van or a truck its side
+LAYER_HEIGHT = 1.5  # metres above a target: the roof of a car, or the side of a van or a truck
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
-_POINTS_AT_ONCE = 128  # bounds that of the rays past points
-_CUBE_SLACK = 1e-6  # share by which a cube about a ball is larger, so that rounding leaves no ray out
+_POINTS_AT_ONCE = 128  # bounds the memory of the rays past points
+_CUBE_SLACK = 1e-6  # share by which the cube around a ball is enlarged, so that rounding leaves out no ray
 _CORNERS = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1), indexing="ij")).reshape(3, 8).T
 
 
@@ -54,21 +54,22 @@ def visibility_in_traffic(
     Parameters
     ----------
     poses : (s,) int64
-        Among the site's candidates.
+        Indices among the site's candidates.
     instants : sequence of TrafficObstacles
         Bodies of the vehicles present at each of n instants.
     layer : {"road", "height"}
-        The layer to be seen.
+        Layer for which visibility is computed.
 
     Yields
     ------
     Progress
-        After each pose.
+        Progress after each pose.
 
     Returns
     -------
     ScenarioVisibility
-        Of layer ``road``, the same as a full scan's with all triangles in one ray caster.
+        Visibility at each instant. For the layer ``road`` it is identical to that of full scans with all triangles in
+        one ray caster.
     """
     site, candidates = around.site, around.site.candidates
     engine = engine_name(around.engine)
@@ -84,7 +85,7 @@ def visibility_in_traffic(
         model, xyz, yaw = around.models[str(candidates.sensor[pose])], candidates.xyz[pose], candidates.yaw[pose]
         place = ScanPosition(caster, xyz, float(yaw), [model], around.sight, site.reflectivity)
         points, near, found, present = wanted, surfaces, index, vehicles
-        if candidates.tilt[pose] != 0:  # in the axes of the sensor, as visibility on the empty road
+        if candidates.tilt[pose] != 0:  # computed in the axes of the sensor, as visibility on the empty road is
             orientation = candidates.orientation(pose)
             present = [one.rotated(place, orientation) for one in vehicles]
             place, near = in_sensor_axes(place, orientation), rotated_surfaces(surfaces, xyz, orientation)
@@ -96,26 +97,28 @@ def visibility_in_traffic(
         for instant, vehicle in enumerate(present):
             packed[instant, number] = np.packbits(visibility.seen(static.blocked_by(vehicle)))
 
-    yield from each_in_threads(compute, range(len(poses)), caster.threads, "looking between vehicles")
+    yield from each_in_threads(compute, range(len(poses)), caster.threads, "computing visibility in traffic")
     return ScenarioVisibility(packed, len(wanted))
 
 
 @dataclass(frozen=True, eq=False)
 class _VehicleCaster:
-    """The road users of an instant, ready to be cast against."""
+    """Ray caster of the road users of an instant, with their reflectivity and bounding boxes."""
 
     caster: Caster
     reflectivity: Float
     hulls: Float
 
     def rotated(self, place: ScanPosition, orientation: Float) -> _VehicleCaster:
-        """Return them in the axes of the sensor at a place, which is so oriented."""
+        """Return the same in the axes of the sensor at a position, which has the given orientation."""
         there = in_sensor_axes(replace(place, caster=self.caster), orientation)
         return replace(self, caster=there.caster, hulls=(self.hulls - place.origin) @ orientation)
 
 
 def _vehicle_caster(around: Surroundings, present: TrafficObstacles) -> _VehicleCaster:
-    """Make a caster of bodies that rounds as one of the scene and the bodies together would."""
+    """Return a caster of the bodies with the same rounding as one of the scene and the bodies together."""
+    # Casters move all triangles to a common centre before they round them to float32. The scene's triangles are passed
+    # in for that centre, but only those of the bodies are kept.
     site = around.site
     everything = np.concatenate([site.triangles, present.triangles])
     bodies = np.arange(len(everything)) >= len(site.triangles)
@@ -125,14 +128,16 @@ def _vehicle_caster(around: Surroundings, present: TrafficObstacles) -> _Vehicle
 
 @dataclass(frozen=True, eq=False)
 class _BlockedRays:
-    """Rays that end on a road user, ascending; k of them.
+    """The k rays that end on a road user.
 
     Parameters
     ----------
     ray : (k,) int64
+        Numbers of the rays, ascending.
     distance : (k,) float64, metres
+        Distance at which each ray ends.
     returns : (k,) bool
-        Which of them return.
+        Whether each ray returns from there.
     """
 
     ray: Integer
@@ -141,13 +146,14 @@ class _BlockedRays:
 
 
 class _StaticScan:
-    """Ends of the rays of one pose on the empty road, of those that pass the box about the targets.
+    """Ends of the rays of one pose on the empty road, for the rays that pass the bounding box of the targets.
 
     Parameters
     ----------
     place : ScanPosition
-        Of one sensor.
+        Position of one sensor.
     wanted : (t, 3) float64, metres
+        Points that may be seen.
     """
 
     def __init__(self, place: ScanPosition, wanted: Float) -> None:
@@ -155,6 +161,8 @@ class _StaticScan:
         self._windows = BeamWindows(self.model)
         self._pattern = BeamPattern(self.model, place.yaw)
         self._orientation = level_orientation(place.yaw)
+        # A ray that passes no point nearer than δ sees none, with or without traffic: only those through the box of all
+        # points, enlarged by δ, are cast.
         low, high = wanted.min(axis=0) - place.settings.delta, wanted.max(axis=0) + place.settings.delta
         self._matters = np.zeros(self.rays, dtype=bool)
         self._matters[self.through(np.where(_CORNERS > 0, high, low)[None])[1]] = True
@@ -168,7 +176,7 @@ class _StaticScan:
 
     @property
     def reach(self) -> float:
-        """How far off something of usual reflectivity is detected that faces the sensor, metres."""
+        """Distance up to which a surface of default reflectivity that faces the sensor is detected, metres."""
         detected = self.model.law.reach(DEFAULT_REFLECTIVITY, self.place.settings.detection)
         return min(self.model.max_range, detected)
 
@@ -183,12 +191,14 @@ class _StaticScan:
 
     def nearest_to(self, points: Float) -> Integer:
         """Return a ray next to the direction of each point, (n,) int64."""
+        # the channel of nearest elevation, and of its azimuth steps the nearest; the last step at the border of the
+        # view
         x, y, z = ((points - self.place.origin) @ self._orientation).T
         order = np.argsort(self.model.elevations, kind="stable")
         between = (self.model.elevations[order][1:] + self.model.elevations[order][:-1]) / 2
         channel = order[np.searchsorted(between, np.arctan2(z, np.hypot(x, y)))]
         steps, size = self.model.azimuth_count, self.model.azimuth_step
-        middle = (steps - 1) / 2  # of the steps, to whose both sides half a turn lies
+        middle = (steps - 1) / 2  # differences are taken from the middle step, so that they wrap at the ends
         turn = np.arctan2(y, x) - self.model.azimuth_offsets[channel] - self.model.first_azimuth - middle * size
         step = np.rint(((turn + np.pi) % (2 * np.pi) - np.pi) / size + middle).astype(np.int64)
         nearest: Integer = channel * steps + np.clip(step, 0, steps - 1)
@@ -199,7 +209,10 @@ class _StaticScan:
         return self._pattern.directions(ray)
 
     def blocked_by(self, present: _VehicleCaster) -> _BlockedRays:
-        """Cast at road users with the rays that pass their boxes, and keep what they stop before its end."""
+        """Return the rays that road users stop before their end on the empty road."""
+        # Bodies are in a caster of their own. A ray ends at the nearer of the two hits, so that the full scan with
+        # traffic follows from the scan of the empty road and the few rays towards vehicles. Where both are equally far
+        # the road keeps the ray.
         towards = np.zeros(self.rays, dtype=bool)
         towards[self.through(present.hulls)[1]] = True
         ray = np.flatnonzero(towards & self._matters)
@@ -213,34 +226,45 @@ class _StaticScan:
 
 class _LayerVisibility(Protocol):
     def seen(self, stopped: _BlockedRays) -> Boolean:
-        """Return what is seen while road users stop some rays, (t,) bool."""
+        """Return the targets that are seen while road users stop some rays, (t,) bool."""
 
 
 class _RoadVisibility:
-    """Returns near targets; each is counted, so that those of stopped rays can be taken off."""
+    """Visibility of the layer ``road``: returns near each target are counted, and those of stopped rays subtracted."""
 
     def __init__(self, static: _StaticScan, index: TargetIndex, surfaces: NearSurfaces) -> None:
         self._static, self._index, self._surfaces, self._targets = static, index, surfaces, len(surfaces.xyz)
+        # All pairs of a returning ray and a target that it sees on the empty road are computed once. They are stored as
+        # lists of targets, one list after the other in order of rays (compressed sparse rows): `_target` has the
+        # targets, and those of ray r are at `_first[r]` up to `_first[r + 1]`. `_times` has the number of rays that see
+        # each target.
         returning = np.flatnonzero(static.counts)
         near = [
             self._near(part, static.distance[part])
             for part in np.array_split(returning, max(1, len(returning) // _RAYS_AT_ONCE))
         ]
         self._target = np.concatenate([target for _, target in near]).astype(np.int32)
+        # returning rays ascend, and pairs come in their order: so the counts by ray give the lists' beginnings
         many = np.bincount(np.concatenate([ray for ray, _ in near]), minlength=static.rays)
         self._first = np.concatenate([[0], np.cumsum(many)])
         self._times = np.bincount(self._target, minlength=self._targets)
 
     def seen(self, stopped: _BlockedRays) -> Boolean:
+        # A road user that stops a ray takes it away from all targets of its list. A target stays seen if more rays see
+        # it than were stopped: one left is enough, and which one does not matter. That needs no search for other rays,
+        # and its cost grows with the stopped rays, not with all rays or targets. The lists of the stopped rays are
+        # joined by index arithmetic: `lost` are the positions of their entries in `_target`.
         begin = self._first[stopped.ray]
         count = self._first[stopped.ray + 1] - begin
         lost = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
         seen: Boolean = self._times > np.bincount(self._target[lost], minlength=self._targets)
+        # The stopped rays that return from the road user may see targets near its surface: these are added.
         seen[self._near(stopped.ray[stopped.returns], stopped.distance[stopped.returns])[1]] = True
         return seen
 
     def _near(self, ray: Integer, distance: Float) -> tuple[Integer, Integer]:
-        """Pair rays that return with the targets that they see, rays in their order."""
+        """Return pairs of returning rays and the targets that they see, in the order of the rays."""
+        # the same two conditions as for full scans: nearer than δ, and strong enough for every surface that meets there
         static, directions = self._static, self._static.directions(ray)
         which, target = self._index.pairs_within_delta(static.place.origin + distance[:, None] * directions)
         strong = static.place.counting_at_borders(
@@ -250,10 +274,11 @@ class _RoadVisibility:
 
 
 class _HeightVisibility:
-    """Beams past points; for each point one that passes it on the empty road is known."""
+    """Visibility of the layer ``height``: for each point, one beam that passes it on the empty road (its witness)."""
 
     def __init__(self, static: _StaticScan, points: Float) -> None:
         self._static, self._points = static, points
+        # The ray next to a point's direction passes it in most cases. For the other points all rays nearby are tried.
         self._end = np.minimum(static.distance, static.reach)
         self._witness = static.nearest_to(points)
         self._seen = self._pass(self._witness, np.arange(len(points)))
@@ -261,6 +286,9 @@ class _HeightVisibility:
             self._seen[point], self._witness[point] = True, ray
 
     def seen(self, stopped: _BlockedRays) -> Boolean:
+        # Vehicles only shorten rays. So a point whose witness is not stopped is still seen, and one that was not seen
+        # before stays unseen. Only the points whose witness was stopped are tested: first whether the shortened ray
+        # still passes, then by all rays nearby. The ends on the empty road are restored for the next instant.
         usual = self._end[stopped.ray]
         self._end[stopped.ray] = stopped.distance
         seen = self._seen.copy()
@@ -273,7 +301,8 @@ class _HeightVisibility:
         return seen
 
     def _passing(self, points: Integer) -> Iterator[tuple[Integer, Integer]]:
-        """Try all rays past points, and return some points at a time with the rays that pass them."""
+        """Try all rays near points, and yield points with the rays that pass them, in batches."""
+        # the ball of radius δ about a point is within a cube, whose corners give the window of rays
         reach = self._static.place.settings.delta * (1 + _CUBE_SLACK)
         for part in np.array_split(points, max(1, -(-len(points) // _POINTS_AT_ONCE))):
             hull, ray = self._static.through(self._points[part][:, None] + reach * _CORNERS)
@@ -281,7 +310,8 @@ class _HeightVisibility:
             yield part[hull[passing]], ray[passing]
 
     def _pass(self, ray: Integer, point: Integer) -> Boolean:
-        """Return which rays come nearer than δ to points within the sensor's range and before they end, (n,)."""
+        """Return which rays come nearer than δ to points, within the sensor's range and before their ends, (n,)."""
+        # the point of the ray nearest to the target: the projection of the target, clipped to the part that is measured
         static, end = self._static, self._end[ray]
         towards = self._points[point] - static.place.origin
         ahead = (towards * static.directions(ray)).sum(axis=1)

@@ -18,7 +18,7 @@ from .scenario_visibility import ScenarioVisibility, each_in_threads
 def draws_for(
     around: Surroundings, poses: Integer, errors: PoseErrors, draws: int, seed: int
 ) -> tuple[PoseDraws, Boolean]:
-    """Draw errors of some of a site's poses, none of which ends inside an object; see `out_of_objects`."""
+    """Draw errors of some of a site's poses that put no sensor inside an object; see `out_of_objects`."""
     candidates = around.site.candidates
     drawn = draw_errors(errors, candidates.position[candidates.position_of[poses]], draws, seed)
     return out_of_objects(drawn, candidates.xyz[poses], around.objects)
@@ -27,19 +27,19 @@ def draws_for(
 def visibility_under_errors(
     around: Surroundings, poses: Integer, draws: PoseDraws
 ) -> Generator[Progress, None, ScenarioVisibility]:
-    """Compute visibility from poses under draws of errors; sensors of several types at one place share rays.
+    """Compute visibility from poses under draws of errors; sensors of several types at one position share rays.
 
     Parameters
     ----------
     poses : (s,) int64
-        Among the site's candidates.
+        Indices among the site's candidates.
     draws : PoseDraws
-        Of n draws for these poses; poses of one position must have equal errors.
+        Errors of these poses in n draws; poses at one position must have equal errors.
 
     Yields
     ------
     Progress
-        After each place of a draw.
+        Progress after each position of a draw.
     """
     site, models = around.site, around.models
     candidates = site.candidates
@@ -59,5 +59,5 @@ def visibility_under_errors(
         packed[draw, members] = np.packbits(seen, axis=1)
 
     works = [(draw, members) for draw in range(len(draws)) for members in together]
-    yield from each_in_threads(compute, works, caster.threads, "looking from poses as they may be")
+    yield from each_in_threads(compute, works, caster.threads, "computing visibility under pose errors")
     return ScenarioVisibility(packed, len(site.targets))

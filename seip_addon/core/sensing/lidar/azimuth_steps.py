@@ -1,4 +1,4 @@
-"""The azimuth steps of channels that lie in arcs."""
+"""Azimuth steps of channels within arcs."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ def steps_in_arcs(
     Parameters
     ----------
     azimuth : (k,) float64, radians
-        Of the middle of each arc, from step 0 of its channel.
+        Azimuth of the middle of each arc, from step 0 of its channel.
     half_width : (k,) float64, radians
-        An arc of half a turn or more to each side is the full circle.
+        Half the width of each arc; half a turn or more is the full circle.
     size : (k,) float64, radians
-        Of a step.
+        Size of a step.
     steps : (k,) int64
-        Of the channel.
+        Number of steps of the channel.
     all_round : (k,) bool
-        Whether step 0 follows the last one. If not, an arc over both ends of the field of view holds two rows.
+        Whether step 0 follows the last one. If not, an arc over both ends of the field of view has two rows.
 
     Returns
     -------
     arc : (n,) int64
         Arc of each row, ascending.
     first : (n,) int64
-        First step, possibly negative or beyond the revolution where the channel goes all round.
+        First step; it may be negative or beyond the revolution if the channel goes all round.
     width : (n,) int64
-        Number of steps, at least 1. No step is twice in the rows of an arc.
+        Number of steps, at least 1. Rows of one arc have no step in common.
     """
     arc = np.arange(len(azimuth))
     lowest, end = np.full(len(arc), -math.inf), np.full(len(arc), math.inf)

@@ -11,12 +11,11 @@ from .model import LidarModel
 
 
 class BeamPattern:
-    """The directions of a model's rays, computed alike whichever of them are asked for.
+    """Directions of a model's rays, with the same bits in every batch of rays.
 
-    Ray (channel c, step k) points at azimuth yaw + offset[c] + first_azimuth + k azimuth_step,
-    counter-clockwise from +x, and at elevation[c]. Sines and cosines are looked
-    up and turned by the addition theorem, because products and sums of float64
-    are the same bits in every batch and vectorised sines need not be.
+    Ray (channel c, step k) has the azimuth yaw + offset[c] + first_azimuth + k azimuth_step, counter-clockwise from +x,
+    and the elevation elevation[c]. Sines and cosines come from tables and the addition theorem: products and sums of
+    float64 have the same bits in every batch, which vectorised sines need not have.
 
     Parameters
     ----------
@@ -38,10 +37,12 @@ class BeamPattern:
         Parameters
         ----------
         rays : (n,) int64
+            Numbers of the rays.
 
         Returns
         -------
         (n, 3) float64
+            Unit vectors.
         """
         channel, step = np.divmod(rays, self.shape[1])
         cos, sin = self._step_cos[step], self._step_sin[step]
@@ -55,7 +56,7 @@ class BeamPattern:
 
 @functools.cache
 def _turns(steps: int, step: float, first: float) -> tuple[Float, Float]:
-    """Cosines and sines of so many steps of equal size, in radians, from a first azimuth on."""
+    """Return cosines and sines of ``steps`` azimuths at equal distances, in radians, from a first one on."""
     angle = first + step * np.arange(steps)
     return np.cos(angle), np.sin(angle)
 

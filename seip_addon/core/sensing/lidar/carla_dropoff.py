@@ -1,4 +1,4 @@
-"""Detection of a LiDAR's returns as CARLA's ray-cast LiDAR draws it, by intensity alone."""
+"""Detection of a LiDAR's returns as in CARLA's ray-cast LiDAR, which uses the intensity only."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ from ...limits import ATTENUATION, POSITIVE_SHARE, SHARE, Limits
 class CarlaDropoff:
     """The drop-off model of CARLA 0.9's ray-cast LiDAR, with a surface's reflectivity and angle in the intensity.
 
-    A return of at least ``intensity_limit`` is kept; below it the probability to be lost grows linearly to
-    ``zero_intensity`` at intensity 0. What is kept is lost in ``general`` of all cases.
+    A return of at least ``intensity_limit`` is kept. Below it, the probability of loss grows linearly to
+    ``zero_intensity`` at intensity 0. In addition, a share ``general`` of all returns is lost.
 
     Parameters
     ----------
     attenuation : float, 1/m
         a in the intensity I = ρ · |cos θ| · exp(−a · r).
     general, intensity_limit, zero_intensity : float, 0 to 1
+        General loss, least intensity without loss by intensity, and loss at intensity 0.
 
     Raises
     ------
@@ -51,11 +52,11 @@ class CarlaDropoff:
             raise SeipError(fault)
 
     def in_air(self, extinction: float) -> CarlaDropoff:
-        """Return the law in air that takes so much more light, in 1/m, on each way."""
+        """Return the law in air with additional extinction, in 1/m, on the way out and back."""
         return replace(self, attenuation=self.attenuation + 2.0 * extinction)
 
     def losing(self, share: float) -> CarlaDropoff:
-        """Return the law where so large a share of what is detected is lost."""
+        """Return the law with a share of the detected returns lost."""
         return replace(self, general=self.general + (1.0 - self.general) * share)
 
     def strength(self, distance: Float, reflected: Float) -> Float:
@@ -64,23 +65,23 @@ class CarlaDropoff:
         return intensity
 
     intensity = strength
-    """What the sensor reports of a return is what it is lost by."""
+    """Intensity that the sensor reports: the same quantity by which returns are lost."""
 
     def least_strength(self, probability: float, min_intensity: float) -> float:  # noqa: ARG002  # of the other law
-        """Return the I from which on a return counts: one that is asked for, as no probability is a sensor's here."""
+        """Return the least I of a return that counts: the given one, as this law has no probability of detection."""
         return min_intensity
 
     def farthest_on_planes(self, reflectivity: Float, height: Float, least: float) -> Float:
-        """Return the distance (n,) in metres beyond which no plane so far from the sensor has an I of ``least``."""
+        """Return the distance (n,) in metres beyond which no plane at distance ``height`` has an I of ``least``."""
         far: Float = reflectivity * height / least
         return far
 
     def reach(self, reflectivity: float, probability: float) -> float:  # noqa: ARG002  # of the other law
-        """Return the range up to which returns count in metres: any."""
+        """Return the range in metres up to which returns count: infinite."""
         return math.inf
 
     def chance(self, distance: Float, reflected: Float, deviation: Float | float | None = None) -> Float:  # noqa: ARG002
-        """Return how likely each return is not to be lost, (n,) float64; surfaces do not deviate in CARLA."""
+        """Return the probability that each return is not lost, (n,) float64; surfaces do not deviate in CARLA."""
         slope = self.zero_intensity / self.intensity_limit
         keep = np.minimum(1.0, slope * self.intensity(distance, reflected) + (1.0 - self.zero_intensity))
         chance: Float = (1.0 - self.general) * keep

@@ -1,4 +1,4 @@
-"""The catalogue of LiDAR models: TOML files, the shipped one and those that users add, and beams of single units."""
+"""Catalogue of LiDAR models: the shipped TOML file, TOML files of users, and calibration files of single units."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from .unit_files import is_unit_file, read_unit_file
 
 
 def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, LidarModel]:
-    """Read the shipped models and those of further files, later ones winning.
+    """Read the shipped models and those of further files, which replace earlier ones with the same key.
 
     Parameters
     ----------
     extra : iterable of path-like
-        TOML files in the form of the shipped ``catalogue.toml``, and calibration files of units (`unit_files`), whose
-        beams take the place of those of the model that ``KEY=`` before the path names, or else the product's name in
-        the file, or the file's name.
+        TOML files in the form of the shipped ``catalogue.toml``, and calibration files of units (`unit_files`). The
+        beams of a unit replace those of the model given by ``KEY=`` before the path, or by the product's name in the
+        file, or by the file's name.
 
     Returns
     -------
     dict of str to LidarModel
-        By catalogue key, in the order of the files.
+        Models by catalogue key, in the order of the files.
 
     Raises
     ------
     SeipError
-        A file cannot be read, or a model in it is at fault.
+        A file cannot be read, or a model in it is invalid.
     """
     shipped = resources.files(__package__).joinpath("catalogue.toml").read_text(encoding="utf-8")
     catalogue = _parse(shipped, "catalogue.toml")
@@ -58,7 +58,13 @@ def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, Li
 
 
 def find_models(catalogue: Mapping[str, LidarModel], keys: Sequence[str]) -> dict[str, LidarModel]:
-    """Pick models by key; an unknown key is an error that names close ones."""
+    """Return models by key.
+
+    Raises
+    ------
+    SeipError
+        A key is unknown; the message names similar ones.
+    """
     for key in keys:
         if key not in catalogue:
             close = difflib.get_close_matches(key, catalogue, n=3, cutoff=0.4) or list(catalogue)
@@ -67,7 +73,7 @@ def find_models(catalogue: Mapping[str, LidarModel], keys: Sequence[str]) -> dic
 
 
 def _unit(named: Path, catalogue: Mapping[str, LidarModel]) -> LidarModel:
-    """Return the model of a catalogue with the beams of a unit, named by its file or as ``KEY=path``."""
+    """Return a model of the catalogue with the beams of a unit, which is given as a path or as ``KEY=path``."""
     key, _, rest = str(named).partition("=")
     path = named if named.exists() or not rest else Path(rest)
     beams = read_unit_file(path)
@@ -134,7 +140,7 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
 
 
 def _keys(table: Mapping[str, Any], where: str) -> dict[str, Key]:
-    """Return the keys that a table may have, by how its beams are described."""
+    """Return the keys that a table may have, which depend on the form of its beams."""
     if "pattern" in table:
         strange = sorted(((_ROTATION | _EVEN | _UNEVEN).keys() - _ROSETTE.keys()) & table.keys())
         if strange:
@@ -146,7 +152,7 @@ def _keys(table: Mapping[str, Any], where: str) -> dict[str, Key]:
 
 
 def _rosette(values: dict[str, Any], where: str) -> Rosette:
-    """Take the figures of a rosette out of the values of a table, and put in what a model has in their place."""
+    """Replace the figures of a rosette in the values of a table by those of a model, and return the rosette."""
     figures = {name: values.pop(name) for name in _ROSETTE}
     time, view = figures["accumulation_s"], figures["horizontal_field_of_view_deg"]
     try:
@@ -171,7 +177,7 @@ def _dropoff(given: Mapping[str, float]) -> CarlaDropoff:
 
 
 def _range_equation(given: Mapping[str, Any], longest: float) -> tuple[RangeEquation, str, tuple[float, float]]:
-    """Return the law of published ranges or of a measurement, what of it is assumed, and its plausible gains."""
+    """Return the law from published ranges or a measurement, its assumptions, and its plausible gains."""
     if "detection_law" in given:
         if len(given) > 1:
             raise SeipError("give either detection_law, as measured, or detection_range_m and detection_probability")
@@ -248,18 +254,18 @@ CALIBRATED = (1.0, 1.0)
 SHEET_GAINS = (0.3, 2.3)
 """Gains that sweeps of one maker's sensors needed in addition to the ranges of their data sheets."""
 LONGEST_RANGE_GAINS = (0.3, 5.0)
-"""The same where a data sheet has only a longest range, taken to be that at 10 %: two sensors needed 2.3 and 4.9."""
+"""The same if a data sheet has only a longest range, assumed to be that at 10 %: two sensors needed 2.3 and 4.9."""
 
 _LAWS = (RangeEquation.model, CarlaDropoff.model)
 _SQRT_8 = math.sqrt(8.0)
-"""Ratio of the ranges at 80 and at 10 % reflectivity where power falls with 1/r² alone."""
+"""Ratio of the ranges at 80 and at 10 % reflectivity if power falls with 1/r² only."""
 
 _FIELDS = {
     "rotation_rate_hz": "rotation_rate",
     "range_noise_std_m": "range_noise_std",
     "range_noise_growth_per_m": "range_noise_growth",
 }
-"""Fields of a model that a catalogue calls by another name, with their units."""
+"""Fields of a model by their names in a catalogue, which include the unit."""
 
 _DROPOFF = {
     "attenuation_per_m": "attenuation",
@@ -303,7 +309,7 @@ _ROTATION = {
 }
 _EVEN = {"channels": Key(_channels), "field_of_view_deg": Key(_pair)}
 _UNEVEN = {"elevations_deg": Key(_numbers)}
-"""Beams at even elevations between two, or at elevations of their own."""
+"""Keys of beams at even elevations between two limits, and of beams at given elevations."""
 
 _ROSETTE = {
     "pattern": Key(_pattern),
@@ -313,5 +319,5 @@ _ROSETTE = {
     "horizontal_field_of_view_deg": Key(_number),
     "accumulation_s": Key(number(ACCUMULATION), 0.1),
 }
-"""Two prisms in place of channels that turn."""
-_VIEW_TOLERANCE = 0.1  # degrees: as data sheets round
+"""Keys of a rosette: two prisms instead of rotating channels."""
+_VIEW_TOLERANCE = 0.1  # degrees: the rounding of data sheets

@@ -22,55 +22,53 @@ DetectionLaw = RangeEquation | CarlaDropoff
 
 @dataclass(frozen=True, eq=False)
 class LidarModel:
-    """A LiDAR that turns all round, scans a limited horizontal field of view in columns, or draws a rosette.
+    """A LiDAR that rotates, scans a limited horizontal field of view in columns, or draws a rosette.
 
-    Each ray of a rosette is a channel of its own, with one azimuth step, in the order in which they go out: elevations,
-    azimuth offsets and field of view follow from the rosette, whatever is given.
+    Each ray of a rosette is a channel of its own with one azimuth step, in the order of emission. Its elevations,
+    azimuth offsets and field of view are computed from the rosette; given values are ignored.
 
     Parameters
     ----------
     key : str
         Name in the catalogue.
     name, manufacturer : str
-        For people.
+        Names to display.
     source : str
-        Document that the figures are from.
+        Document with the figures.
     elevations : (c,) float64, radians
-        Elevation of each channel above the sensor's horizontal plane, in the
-        order in which they are published.
+        Elevation of each channel above the sensor's horizontal plane, in the published order.
     min_range, max_range : float, metres
-        A return nearer or farther than these is none.
+        Limits of the distances that are measured.
     points_per_second : float
-        Single returns, all channels together.
+        Rate of single returns of all channels together.
     rotation_rate : float, hertz
-        Revolutions per second at which the sensor is used; frames where its field of view is limited. The rays of a
-        rosette's frame are all that it sends in that time.
+        Revolutions per second, or frames per second if the field of view is limited. A frame of a rosette has all rays
+        that are emitted in that time.
     price_range : tuple of two floats, US dollars
         Lowest and highest price.
     price_source : str
-        Where the price is from.
+        Source of the price.
     azimuth_offsets : (c,) float64, radians
-        What each channel's azimuth is ahead of the head's, counter-clockwise.
-        Zeros when not given.
+        Azimuth of each channel relative to the head's, counter-clockwise; zeros by default.
     field_of_view : float, radians
-        Horizontal, symmetrical about azimuth zero: 2π for a sensor that turns all round.
+        Horizontal field of view, symmetrical about azimuth zero: 2π for a sensor that rotates.
     clockwise : bool
-        Whether it turns clockwise, seen from above. That changes when an azimuth is looked along, and nothing else.
+        Whether it rotates clockwise, seen from above. That only changes the time at which each azimuth is scanned.
     range_noise_std : float, metres
         Standard deviation of the range noise (Gaussian) near the sensor.
     range_noise_growth : float, 1/m
-        What is added to it for each square metre of r².
+        Growth of the standard deviation with r².
     law : RangeEquation or CarlaDropoff
-        By which returns are detected.
+        Law by which returns are detected.
     calibration : str
-        Sweep that the law was calibrated on; empty where it is derived from a data sheet.
+        Sweep on which the law was calibrated; empty if it is derived from a data sheet.
     gains : (float, float)
-        Lowest and highest plausible gain: power received, as a multiple of what the law says. Both are 1 for a
-        calibrated law, and for one that counts every return.
+        Lowest and highest plausible gain: received power as a multiple of that in the law. Both are 1 for a calibrated
+        law, and for one that counts every return.
     assumed_beams, assumed_law : str
-        What of its beams, and of its law, no document says; empty where all is published.
+        Assumptions about the beams and about the law that no document confirms; empty if all is published.
     rosette : Rosette, optional
-        Of a sensor whose pattern does not repeat.
+        Prisms of a sensor whose pattern does not repeat.
     """
 
     key: str
@@ -128,7 +126,7 @@ class LidarModel:
 
     @property
     def all_round(self) -> bool:
-        """Whether its field of view is the full circle: step 0 follows the last one."""
+        """Whether the field of view is the full circle, so that step 0 follows the last one."""
         return self.field_of_view == math.tau
 
     @property
@@ -144,7 +142,7 @@ class LidarModel:
     def faces(self, vectors: Float) -> Boolean:
         """Return which vectors (n, 3) in the sensor's axes lie within its horizontal field of view, (n,) bool.
 
-        That of a rosette is a circle about its axis.
+        The field of view of a rosette is a circle about its axis.
         """
         x, y, z = vectors.T
         across = y if self.rosette is None else np.hypot(y, z)
@@ -158,7 +156,7 @@ class LidarModel:
 
     @property
     def assumed(self) -> str:
-        """What of it no document says."""
+        """Assumptions about beams and law that no document confirms."""
         return "; ".join(filter(None, (self.assumed_beams, self.assumed_law)))
 
     def range_noise(self, distance: Float) -> Float:
@@ -167,19 +165,19 @@ class LidarModel:
 
     @property
     def beams_key(self) -> str:
-        """Digest of the directions of its beams."""
+        """Digest of the directions of the beams."""
         steps = (float(self.azimuth_count), self.field_of_view)
         return hashlib.sha256(np.concatenate([self.elevations, self.azimuth_offsets, steps]).tobytes()).hexdigest()[:16]
 
     def at(self, time: float) -> LidarModel:
-        """Return the sensor with the directions of the frame that begins at a time in seconds; only a rosette's move.
+        """Return the sensor with the directions of the frame that begins at a time in seconds; only a rosette's change.
 
-        A rosette goes on where the frame before ended.
+        A rosette continues where the previous frame ended.
         """
         return self if self.rosette is None else replace(self, rosette=self.rosette.later(time))
 
     def delay(self, ray: Integer) -> Float:
-        """Return when rays (n,) int64 go out after the beginning of the revolution or frame, (n,) float64, seconds."""
+        """Return the time of rays (n,) int64 after the beginning of the revolution or frame, (n,) float64, seconds."""
         if self.rosette is not None:
             return ray / self.points_per_second
         steps = self.azimuth_count
@@ -190,7 +188,7 @@ class LidarModel:
 
     @property
     def evidence(self) -> str:
-        """What its law of detection rests on, for people."""
+        """Evidence for the law of detection, as text."""
         if isinstance(self.law, CarlaDropoff):
             return "every return in range counts (CARLA's model)"
         if self.calibration:
@@ -199,13 +197,13 @@ class LidarModel:
         return f"derived from a data sheet; plausible gains {low:g} to {high:g}"
 
     def amplified(self, gain: float) -> LidarModel:
-        """Return the sensor with a gain: ``gain`` times the power received. A law without power stays."""
+        """Return the sensor with ``gain`` times the received power; a law without power does not change."""
         if gain == 1.0 or isinstance(self.law, CarlaDropoff):
             return self
         return replace(self, law=self.law.amplified(gain))
 
     def in_air(self, extinction: float) -> LidarModel:
-        """Return the sensor in air that takes so much more light, in 1/m, on each way."""
+        """Return the sensor in air with additional extinction, in 1/m, on the way out and back."""
         return replace(self, law=self.law.in_air(extinction))
 
 

@@ -1,6 +1,6 @@
 r"""Detection of a LiDAR's returns by the range equation.
 
-Of a diffuse (Lambertian) surface that fills the beam a LiDAR receives, but for a constant of the sensor, the power
+From a diffuse (Lambertian) surface that fills the beam, a LiDAR receives the power, up to a constant of the sensor,
 
 .. math::
 
@@ -13,13 +13,12 @@ Of a diffuse (Lambertian) surface that fills the beam a LiDAR receives, but for 
     P = c \, Φ\left(\frac{\ln p - m}{s}\right).
 
 ρ is the reflectivity of the surface, θ the angle of incidence, α the extinction of the air, r the range and Φ the
-normal distribution. c is below 1 because some returns are lost whatever their power; s is the spread of ln p about
-what reflectivity and angle tell of it. m follows from the data sheet: from the range at which a surface of 10 % is
-detected.
+normal distribution. c is below 1 because some returns are lost whatever their power; s is the standard deviation of ln
+p about the value from reflectivity and angle. m is computed from the data sheet: from the range at which a surface of
+10 % is detected.
 
-Most of the spread is the surface's own and the same for every ray that meets it at the same place: of the variance
-s² a share `SURFACE_SHARE` is that of surfaces. Given how far, in standard deviations z, a place deviates from what
-its material promises,
+Most of the spread belongs to the surface and is the same for every ray that meets it at the same point: a share
+`SURFACE_SHARE` of the variance s² is that of surfaces. If a point deviates from its material by z standard deviations,
 
 .. math::
 
@@ -44,18 +43,18 @@ from .carla_dropoff import CarlaDropoff
 
 CEILING = 0.985
 SPREAD = 0.9
-"""c and s where nothing is known of the sensor: sweeps of three makes have c of 0.98 to 1.00 and s of 0.5 to 1.3."""
+"""c and s of sensors without a measurement: sweeps of three makes have c of 0.98 to 1.00 and s of 0.5 to 1.3."""
 
 SURFACE_SHARE = 0.95
-"""q: with it the fate of a ray on a road is as much the same from sweep to sweep as in real sweeps."""
+"""q, chosen so that detection of a ray on a road is as repeatable from sweep to sweep as in real sweeps."""
 
 MAKER_PROBABILITY = 0.9
-"""Probability of detection that the ranges of data sheets have where they name none."""
+"""Probability of detection for ranges of data sheets that state none."""
 
 DROPOFF_REFLECTIVITY = 0.2
-"""Of the surfaces, between asphalt and walls, for which `RangeEquation.as_dropoff` is right."""
+"""Reflectivity, between asphalt and walls, for which `RangeEquation.as_dropoff` is correct."""
 
-LEAST_RATIO = 1.3  # of the ranges at 80 and at 10 %: less of it leaves 1/400 of the light to the air
+LEAST_RATIO = 1.3  # least ratio of the ranges at 80 and at 10 %; with less, the air leaves 1/400 of the light
 
 _TINY = 1e-300
 _STANDARD = NormalDist()
@@ -63,7 +62,7 @@ _STANDARD = NormalDist()
 
 @dataclass(frozen=True)
 class RangeEquation:
-    """How likely a LiDAR detects the return of a surface.
+    """Probability that a LiDAR detects the return from a surface.
 
     Parameters
     ----------
@@ -136,7 +135,7 @@ class RangeEquation:
         return replace(law, threshold=at_least - math.log(law.least_strength(probability)))
 
     def in_air(self, extinction: float) -> RangeEquation:
-        """Return the law in air that takes so much more light, in 1/m, on each way."""
+        """Return the law in air with additional extinction, in 1/m, on the way out and back."""
         return replace(self, extinction=self.extinction + extinction)
 
     def amplified(self, gain: float) -> RangeEquation:
@@ -144,43 +143,45 @@ class RangeEquation:
         return replace(self, threshold=self.threshold - math.log(gain))
 
     def losing(self, share: float) -> RangeEquation:
-        """Return the law where so large a share of what is detected is lost, less than all."""
+        """Return the law with a share, below 1, of the detected returns lost."""
         return replace(self, ceiling=self.ceiling * (1.0 - share))
 
     def as_dropoff(self) -> CarlaDropoff:
-        """Return the drop-off that loses as much of a surface of `DROPOFF_REFLECTIVITY` at two ranges.
+        """Return the drop-off with the same losses at two ranges, for a surface of `DROPOFF_REFLECTIVITY`.
 
-        They are those at which 0.9 and 0.5 of the ceiling are detected of a surface that faces the sensor; CARLA's
-        intensity exp(−a · r) knows neither reflectivity nor angle.
+        At these ranges 0.9 and 0.5 of the ceiling are detected from a surface that faces the sensor. CARLA's intensity
+        exp(−a · r) depends on neither reflectivity nor angle.
         """
         near, far = (self.reach(DROPOFF_REFLECTIVITY, share * self.ceiling) for share in (0.9, 0.5))
         attenuation = math.log(0.9 / 0.5) / (far - near)
         return CarlaDropoff(attenuation, 1.0 - self.ceiling, min(1.0, math.exp(-attenuation * near) / 0.9), 1.0)
 
     def strength(self, distance: Float, reflected: Float) -> Float:
-        """Return p in 1/m² of hits: 0 where they are infinitely far, infinite at no distance.
+        """Return p in 1/m² of hits: 0 at infinite distance, infinite at distance zero.
 
         Parameters
         ----------
         distance : (n,) float64, metres
+            Distance of each hit.
         reflected : (n,) float64
             ρ · |cos θ|.
 
         Returns
         -------
         (n,) float64
+            Power of each return.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
             power: Float = self.intensity(distance, reflected) / distance**2
         return np.where(np.isnan(power), 0.0, power)
 
     def intensity(self, distance: Float, reflected: Float) -> Float:
-        """Return what sensors report of returns: power but for 1/r², as makers calibrate it; (n,)."""
+        """Return the intensity that sensors report, (n,): power without the factor 1/r², as makers calibrate it."""
         intensity: Float = reflected * np.exp(-2.0 * self.extinction * distance)
         return intensity
 
     def least_strength(self, probability: float, min_intensity: float = 0.0) -> float:  # noqa: ARG002  # the other law's
-        """Return p in 1/m² from which on a return is detected with a probability or more.
+        """Return the least p, in 1/m², of a return that is detected with a given probability.
 
         Raises
         ------
@@ -200,7 +201,7 @@ class RangeEquation:
         Parameters
         ----------
         height : (n,) float64, metres
-            Of the sensor above each plane: cos θ is height / r there, so that p falls with r³.
+            Height of the sensor above each plane: cos θ is height / r there, so that p falls with r³.
         """
         strength = reflectivity * height / least
         far: Float = np.cbrt(strength)
@@ -219,11 +220,11 @@ class RangeEquation:
         Parameters
         ----------
         distance : (n,) float64, metres
-            Infinite on a miss, which is never detected.
+            Distance of each hit; infinite on a miss, which is never detected.
         reflected : (n,) float64
             ρ · |cos θ|.
         deviation : (n,) float64, optional
-            Standard deviations that surfaces there deviate; the mean over all surfaces if not given.
+            Deviation of the surface at each hit, in standard deviations; by default the mean over all surfaces is used.
         """
         with np.errstate(divide="ignore"):
             power = np.log(self.strength(distance, reflected))
@@ -239,11 +240,11 @@ class RangeEquation:
         return self._reach(reflectivity / self.least_strength(probability), 2)
 
     def reach_on_level(self, reflectivity: float, probability: float, height: float) -> float:
-        """Return the range in metres up to which a level surface so far below the sensor is detected."""
+        """Return the range in metres up to which a level surface ``height`` metres below the sensor is detected."""
         return max(self._reach(reflectivity * height / self.least_strength(probability), 3), 0.0)
 
     def _reach(self, strength: float, power: int) -> float:
-        """Solve strength · exp(−2αr) = rⁿ by halving."""
+        """Solve strength · exp(−2αr) = rⁿ by bisection."""
         near, far = 0.0, float(strength ** (1.0 / power))
         if self.extinction == 0.0:
             return far

@@ -22,13 +22,13 @@ class BeamRings:
     Parameters
     ----------
     rings : (n, 2, 3) float64, metres
-        Pieces of the rings on the road, or of the line that a rosette draws there in a frame.
+        Segments of the rings on the road, or of the line that a rosette draws there in a frame.
     wide : (n,) bool
-        Whether the next ring inwards is farther away than asked: what is there may lie between two rings. Of a rosette:
-        whether it is beyond where that is so.
+        Whether the distance to the next inner ring is larger than the given gap, so that a target may lie between the
+        two. For a rosette: whether the segment is beyond the radius without gaps.
     cone : (m, 2, 3) float64, metres
         Beams of the lowest and the highest channel, from the sensor to the road or to the end of its range, at a few
-        azimuths; first and last are those of a limited field of view. Of a rosette: beams at the rim.
+        azimuths; the first and the last are the borders of a limited field of view. For a rosette: beams at the rim.
     """
 
     rings: Float
@@ -46,11 +46,11 @@ def beam_rings(
     place : (3,) float64, metres
         Optical centre.
     axes : (3, 3) float64
-        Columns are the sensor's x, y and z axis.
+        The sensor's x, y and z axis as columns.
     ground : float, metres
         Height of the road.
     gap : float, metres
-        Distance of neighbouring rings up to which they are dense: twice δ.
+        Largest distance between rings that leaves no gap: twice δ.
     resolved : float, metres
         Radius up to which a rosette leaves no gaps.
     """
@@ -86,7 +86,7 @@ def _rosette_lines(model: LidarModel, place: Float, axes: Float, ground: float, 
 
 
 def _on_road(model: LidarModel, place: Float, beams: Float, ground: float) -> tuple[Float, Boolean]:
-    """Return where beams (…, 3) meet a flat road, and which do within the sensor's range."""
+    """Return the points where beams (…, 3) meet a flat road, and whether each is within the sensor's range."""
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = (ground - place[2]) / beams[..., 2]
     meets = (reach > model.min_range) & (reach <= model.max_range)
@@ -96,7 +96,7 @@ def _on_road(model: LidarModel, place: Float, beams: Float, ground: float) -> tu
 def _directions(model: LidarModel) -> Float:
     """Return unit directions (channels, `RING_AZIMUTHS` + 1, 3) in the sensor's axes, the lowest channel first.
 
-    The last azimuth is the first again where the model looks all round.
+    If the model rotates, the last azimuth equals the first.
     """
     span = model.azimuth_count if model.all_round else model.azimuth_count - 1
     steps = np.arange(RING_AZIMUTHS + 1) * span // RING_AZIMUTHS % model.azimuth_count

@@ -1,17 +1,17 @@
 r"""The pattern of a beam through two rotating wedge prisms, which hardly ever repeats: a rosette.
 
-The beam comes along the axis and enters the first prism through its flat face, which is square to the axis, leaves it
-through its oblique face, enters the second prism through its oblique face and leaves it through its flat one: of the
-four ways to mount the Mid-40's prisms [1]_ the one with its field of view. Each ray is traced from face to face [2]_.
-The normals of the oblique faces, along the beam, are off the axis by the wedge angles, on sides that lie opposite where
-the prisms deflect the same way. At each face light of direction d bends by Snell's law, with the normal n along it and
-the ratio μ of the refractive indices before and behind the face:
+The beam comes along the axis. It enters the first prism through its flat face, which is perpendicular to the axis, and
+leaves it through its oblique face; it enters the second prism through its oblique face and leaves it through its flat
+one. Of the four ways to mount the Mid-40's prisms [1]_ this one gives its field of view. Each ray is traced from face
+to face [2]_. The normals of the oblique faces, along the beam, differ from the axis by the wedge angles, in opposite
+directions when the prisms deflect the same way. At each face, light of direction d is refracted by Snell's law, with
+the normal n along it and the ratio μ of the refractive indices before and behind the face:
 
 .. math::
 
     d' = μ d + \left(\sqrt{1 - μ^2 (1 - c^2)} - μ c\right) n, \quad c = d · n
 
-Thin prisms deflect by (index − 1) times their wedge angle each, and the two deflections add up as vectors that turn.
+Thin prisms deflect by (index − 1) times their wedge angle each, and the two deflections add up as rotating vectors.
 
 .. [1] Liu, Zhang and Hong 2022, "Low-cost retina-like robotic lidars based on incommensurable scanning", IEEE/ASME
    Transactions on Mechatronics 27(1), arXiv:2006.11034.
@@ -38,14 +38,14 @@ class Rosette:
     Parameters
     ----------
     rates : tuple of two floats, hertz
-        Of the prisms in the order in which the beam meets them: positive ones turn counter-clockwise as seen by whom
-        the beam meets, from +y to +z.
+        Rates of the prisms in the order in which the beam meets them. Positive ones rotate counter-clockwise, from +y
+        to +z, as seen against the beam.
     wedges : tuple of two floats, radians
         Angles between the faces of each prism.
     index : float
         Refractive index of both prisms.
     begin : float, seconds
-        When the first ray goes out; at time 0 both prisms deflect towards +y.
+        Time of the first ray; at time 0 both prisms deflect towards +y.
 
     Raises
     ------
@@ -82,22 +82,22 @@ class Rosette:
 
     @property
     def reach(self) -> float:
-        """How far off the axis the beam gets, radians: where both prisms deflect the same way."""
+        """Largest angle between the beam and the axis, radians: when both prisms deflect the same way."""
         along, left, _ = self._through(np.zeros(1), np.zeros(1))[0]
         return math.atan2(left, along)
 
     def later(self, seconds: float) -> Rosette:
-        """Return the rosette that begins so much later."""
+        """Return the rosette that begins ``seconds`` later."""
         return replace(self, begin=self.begin + seconds)
 
     def directions(self, delay: Float) -> Float:
-        """Return unit directions (n, 3), x along the axis, of rays that go out at delays (n,), in seconds."""
+        """Return unit directions (n, 3), x along the axis, of rays emitted at delays (n,), in seconds."""
         time = self.begin + delay
         one, other = (math.tau * (rate * time % 1.0) for rate in self.rates)
         return self._through(one, other)
 
     def _through(self, one: Float, other: Float) -> Float:
-        """Return directions (n, 3) behind prisms turned by angles (n,); not a number where no light gets through."""
+        """Return directions (n, 3) behind prisms rotated by angles (n,); NaN where no light passes."""
         level = np.zeros_like(one)
         flat = np.stack([level + 1.0, level, level], axis=-1)
         first, second = _tilted(one, -self.wedges[0]), _tilted(other, self.wedges[1])
@@ -112,12 +112,12 @@ def refracted(directions: Float, normals: Float, ratio: float) -> Float:
     directions, normals : (n, 3) float64
         Unit vectors, the normals along the light.
     ratio : float
-        Of the refractive index before the faces to that behind them.
+        Ratio of the refractive index before the faces to that behind them.
 
     Returns
     -------
     (n, 3) float64
-        Not a number where a face reflects all light.
+        Unit vectors; NaN where a face reflects all light.
     """
     cosine = (directions * normals).sum(axis=-1, keepdims=True)
     with np.errstate(invalid="ignore"):
@@ -127,6 +127,6 @@ def refracted(directions: Float, normals: Float, ratio: float) -> Float:
 
 
 def _tilted(angle: Float, wedge: float) -> Float:
-    """Return normals (n, 3) of oblique faces turned by angles (n,)."""
+    """Return normals (n, 3) of oblique faces rotated by angles (n,)."""
     along, aside = np.full_like(angle, math.cos(wedge)), math.sin(wedge)
     return np.stack([along, aside * np.cos(angle), aside * np.sin(angle)], axis=-1)

@@ -1,8 +1,8 @@
-"""Deviation of surfaces from what their material promises, patch by patch.
+"""Deviation of surfaces from the reflectivity of their material, patch by patch.
 
-Whether a ray returns is not drawn anew each time: a place on a road or a car that fails a LiDAR once mostly fails it in
-the next sweep too, and so do its neighbours. Each place deviates by a standard normal number that follows from a seed
-and the place alone: the sum of a number for each of some cubic lattices that the place lies in.
+Whether a ray returns is not independent between sweeps: a point on a road or a car that gives no return once mostly
+gives none in the next sweep either, and neither do its neighbours. So each point has a standard normal deviation that
+depends only on a seed and on the point: the sum of one number for its cube in each of several cubic lattices.
 """
 
 from __future__ import annotations
@@ -17,30 +17,36 @@ from .noisy_returns import normal
 
 PATCH_SIZES = (1.0, 16.0)
 PATCH_VARIANCES = (0.65, 0.35)
-"""Edges of the lattices' cubes in metres, and their shares of the variance: fitted to how alike the fates of
-neighbouring rays on roads are, at 20 to 100 m, and to how far sectors of 10° differ there."""
+"""Edges of the lattices' cubes in metres, and their shares of the variance.
+
+They are fitted to real sweeps: to the correlation of neighbouring rays on roads at 20 to 100 m, and to the differences
+between sectors of 10° there.
+"""
 
 PHASE = (3.0 - math.sqrt(5.0)) / 2.0
-"""Where the lattices begin, in edges: at no round coordinate, lest rounding share the hits on a level road at height 0,
-or on a wall, out to the cubes on either side."""
+"""Offset of the lattices, in edges.
+
+It is not a round number: otherwise rounding would distribute the hits on a level road at height 0, or on a wall, over
+the cubes on both sides.
+"""
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
 
 def surface_deviation(xyz: Float, seed: tuple[int, ...]) -> Float:
-    """Return by how many standard deviations the surface deviates at points.
+    """Return the deviation of a surface at points, in standard deviations.
 
     Parameters
     ----------
     xyz : (n, 3) float64, metres
-        In axes that the surface rests in.
+        Points in axes in which the surface does not move.
     seed : tuple of int
-        Other ones make other surfaces.
+        Seed of the surface.
 
     Returns
     -------
     (n,) float64
-        Of normal distribution; the same for all points of a patch.
+        Normally distributed deviations, the same for all points of a patch.
     """
     total = np.zeros(len(xyz))
     for number, (size, variance) in enumerate(zip(PATCH_SIZES, PATCH_VARIANCES, strict=True)):
@@ -55,7 +61,7 @@ def surface_deviation(xyz: Float, seed: tuple[int, ...]) -> Float:
 
 
 def _mixed(bits: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Return 64 bits each of which depends on all given ones (splitmix64; Steele, Lea and Flood 2014)."""
+    """Return 64 bits, each of which depends on all given ones (splitmix64; Steele, Lea and Flood 2014)."""
     with np.errstate(over="ignore"):
         bits = bits + _GOLDEN
         bits = (bits ^ (bits >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

@@ -1,8 +1,8 @@
-"""Calibration files of single units: the beams of one sensor as its maker measured them.
+"""Calibration files of single units: the beams of one sensor as measured by its maker.
 
-Read are Ouster's metadata (JSON, flat and nested), Velodyne's calibration (XML and the YAML of its ROS driver) and the
-angle corrections of Hesai and RoboSense (CSV). Ouster, Hesai and RoboSense count azimuth clockwise as seen from above,
-Velodyne's corrections are subtracted from a clockwise azimuth; here offsets are counter-clockwise.
+The formats are Ouster's metadata (JSON, flat and nested), Velodyne's calibration (XML and the YAML of its ROS driver)
+and the angle corrections of Hesai and RoboSense (CSV). Azimuths of Ouster, Hesai and RoboSense are clockwise as seen
+from above, and Velodyne's corrections are subtracted from a clockwise azimuth. Offsets here are counter-clockwise.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from ...limits import BEAM_ELEVATION, DEGREES, UNIT_BEAMS
 from .model import LidarModel
 
 MAX_BYTES = 4_000_000
-"""Size of a file that is read at most: those of makers have 60 kB."""
+"""Largest size of a file; those of makers have 60 kB."""
 
-_LEAST_APART = 1e-6  # degrees between beams that are not the same one
+_LEAST_APART = 1e-6  # least difference in degrees between two different beams
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +39,13 @@ class UnitBeams:
     Parameters
     ----------
     elevations, azimuth_offsets : (c,) float64, degrees
-        The latter counter-clockwise.
+        Angles of each beam; azimuth offsets are counter-clockwise.
     product : str
-        The maker's name of the product, where the file has it.
+        Product name in the file, or "".
     columns : int, optional
         Azimuth steps in a revolution.
     rotation_rate : float, hertz, optional
+        Revolutions per second.
     """
 
     elevations: Float
@@ -74,17 +75,17 @@ class UnitBeams:
 
     @property
     def key(self) -> str:
-        """Key of the catalogue that the product's name tells, such as os1_128 of OS-1-128; else empty."""
+        """Catalogue key for the product's name, such as os1_128 for OS-1-128, or ""."""
         known = re.match(r"OS-?(\d)-(\d{1,3})(?:-|$)", self.product)
         return f"os{known[1]}_{known[2]}" if known else ""
 
     def as_model(self, base: LidarModel, source: str) -> LidarModel:
-        """Return a model with these beams, and columns and rate where they are known.
+        """Return a model with these beams, and with columns and rate if these are known.
 
         Raises
         ------
         SeipError
-            The model draws a rosette or has another number of channels, or columns or rate are out of range.
+            The model draws a rosette or has a different number of channels, or columns or rate are out of range.
         """
         if base.rosette is not None:
             raise SeipError(
@@ -110,7 +111,7 @@ class UnitBeams:
 
 
 def is_unit_file(path: Path) -> bool:
-    """Return whether a file is one of a unit, by its suffix."""
+    """Return whether a file is a calibration file of a unit, by its suffix."""
     return path.suffix.lower() in _READERS
 
 
@@ -120,7 +121,7 @@ def read_unit_file(path: Path) -> UnitBeams:
     Raises
     ------
     SeipError
-        The file cannot be read, is too large, or is none of the known formats.
+        The file cannot be read, is too large, or has an unknown format.
     """
     try:
         with path.open("rb") as file:
@@ -207,14 +208,14 @@ def _velodyne_yaml(text: str) -> UnitBeams:
 
 
 def _yaml_lasers(text: str) -> Iterator[dict[str, str]]:
-    """Yield the maps below ``lasers``: the part of YAML that these files are written in, and no other.
+    """Yield the maps below ``lasers``; only the subset of YAML that these files use is supported.
 
-    They are the items of a list, each a map between braces or one of a line for each key.
+    The maps are the items of a list, written between braces or with one line for each key.
     """
     lines = [bare for line in text.splitlines() if (bare := re.sub(r"(^|\s)#.*", "", line).rstrip())]
     if "lasers:" not in lines:
         raise ValueError("has no line 'lasers:'")
-    told = re.search(r"^num_lasers:\s*(\S+)\s*$", text, re.MULTILINE)
+    stated = re.search(r"^num_lasers:\s*(\S+)\s*$", text, re.MULTILINE)
     below = itertools.takewhile(lambda line: line[0] in " -", lines[lines.index("lasers:") + 1 :])
     items: list[list[str]] = []
     for line in below:
@@ -224,8 +225,8 @@ def _yaml_lasers(text: str) -> Iterator[dict[str, str]]:
             items[-1].append(line.strip())
         else:
             raise ValueError(f"has {line.strip()[:40]!r} before the first of its lasers")
-    if told and told[1] != str(len(items)):
-        raise ValueError(f"has {len(items)} lasers where num_lasers is {told[1][:20]}")
+    if stated and stated[1] != str(len(items)):
+        raise ValueError(f"has {len(items)} lasers where num_lasers is {stated[1][:20]}")
     for item in items:
         whole = " ".join(item)
         parts = whole[1:-1].split(",") if whole.startswith("{") and whole.endswith("}") else item
@@ -259,7 +260,7 @@ def _column(header: Sequence[str], name: str) -> int:
 
 def _numbered(rows: Iterable[Sequence[str]], elevation: int, azimuth: int) -> Iterator[tuple[int, list[float]]]:
     for row in rows:
-        if not any(row[1:]):  # a digest of the file closes some
+        if not any(row[1:]):  # some files end with a digest
             continue
         if len(row) <= max(elevation, azimuth):
             raise ValueError(f"has a row of {len(row)} fields: {','.join(row)[:40]!r}")

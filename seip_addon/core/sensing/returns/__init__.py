@@ -1,1 +1,1 @@
-"""Expected returns of LiDARs on road users: bodies, where they stand, and the grid of poses × road users."""
+"""Expected returns of LiDARs from road users: bodies, positions, and the grid of poses × road users."""

@@ -12,14 +12,15 @@ BodyName = Literal["car", "cyclist", "pedestrian"]
 
 @dataclass(frozen=True)
 class Panel:
-    """An upright panel that stands on the road, faces the sensor and returns light as a road user does.
+    """An upright panel that stands on the road, faces the sensor and returns light like a road user.
 
-    Where a road user heads is not known before traffic is. A panel has the mean silhouette over all headings.
+    The heading of a road user is not known without traffic. A panel has the mean silhouette over all headings.
 
     Parameters
     ----------
     width, height : float, metres
-        The width is the area of the silhouette, seen from the side and averaged over all headings, over the height.
+        Size of the panel. The width is the area of the silhouette, seen from the side and averaged over all headings,
+        divided by the height.
     reflected : float, 0 to 1
         Mean over the silhouette of reflectivity times cosine of the angle of incidence.
     """
@@ -37,4 +38,4 @@ PANELS: Mapping[BodyName, Panel] = MappingProxyType(
     }
 )
 """Panels of the road users that SUMO simulates by default: a car of 5.0 × 1.8 × 1.5 m, a person of 0.22 × 0.48 × 1.72 m
-and a bicycle of 1.6 × 0.65 × 1.7 m, with the bodies, materials and paint of 50 % that scans have (`traffic.bodies`)."""
+and a bicycle of 1.6 × 0.65 × 1.7 m, with the bodies and materials of scans and paint of 50 % (`traffic.bodies`)."""

@@ -12,10 +12,10 @@ law, unless the ray is stopped before by the static scene, at a horizontal dista
 .. math::
     R = \sum_{\text{free rays on the panel}} P(r, ρ \cos ε).
 
-Rays of one channel have one elevation, so that P is the same for all rays of a channel on a panel, and the rays of a
-channel on a panel are neighbours. Rays are cast once for all panels, and only those that meet some panel. How many are
-free follows from the smallest distance among neighbours, which a sparse table gives (Bender and Farach-Colton 2000):
-rays are counted one by one only where that is below d.
+All rays of a channel have the same elevation, so that P is the same for all rays of a channel on a panel, and these
+rays are neighbours. Rays that meet some panel are cast once for all panels. The number of free rays follows from the
+smallest distance among neighbours, which a sparse table gives (Bender and Farach-Colton 2000): if it is at least d, all
+are free; only otherwise are rays counted one by one.
 """
 
 from __future__ import annotations
@@ -34,23 +34,25 @@ from ..visibility.visibility_model import is_upright, yaw_of
 from .bodies import PANELS
 from .road_users import BODIES, RoadUsers
 
-_PAIRS_AT_ONCE = 1 << 21  # of rays and panels; bounds the memory where rays have no neighbours
+_PAIRS_AT_ONCE = 1 << 21  # pairs of rays and panels in a batch; bounds the memory if rays have no neighbours
 
 
 @dataclass(frozen=True, eq=False)
 class PanelRows:
-    """Panels as a sensor at the origin meets them; m panels.
+    """The m panels as seen from a sensor at the origin.
 
     Parameters
     ----------
     distance : (m,) float64, metres
         Horizontal distance, at least half the width.
     azimuth : (m,) float64, radians
+        Azimuth of the panel's centre line.
     half : (m,) float64, radians
-        Half the width of the panel, seen from the sensor.
+        Half the angular width of the panel.
     low, high : (m,) float64
         Tangent of the elevation of its lower and upper edge.
     reflected : (m,) float64
+        Reflectivity times cosine of incidence; see `Panel`.
     """
 
     distance: Float
@@ -62,7 +64,7 @@ class PanelRows:
 
     @classmethod
     def seen_from(cls, origin: Float, users: RoadUsers) -> PanelRows:
-        """Return the panels of road users as a sensor at ``origin`` (3,) meets them."""
+        """Return the panels of road users as seen from a sensor at ``origin`` (3,)."""
         panels = [PANELS[name] for name in BODIES]
         width, height, reflected = (
             np.array([getattr(panel, name) for panel in panels])[users.body]
@@ -82,7 +84,7 @@ def expected_returns(
     Parameters
     ----------
     caster : Caster
-        Of the static scene.
+        Ray caster of the static scene.
     origin : (3,) float64, metres
     orientation : (3, 3) float64
         Rotation from the sensor's axes to the site's.
@@ -106,12 +108,12 @@ def upright_returns(
     Parameters
     ----------
     caster : Caster
-        Of the static scene.
+        Ray caster of the static scene.
     origin : (3,) float64, metres
     yaw : float, radians
         Direction of azimuth zero.
     model : LidarModel
-        With channels: not a rosette.
+        Sensor with channels, not with a rosette.
 
     Returns
     -------
@@ -200,7 +202,7 @@ def _channels_on(panels: PanelRows, tangent: Float) -> tuple[Integer, Integer]:
     Parameters
     ----------
     tangent : (c,) float64
-        Of the channels' elevations, ascending.
+        Tangents of the channels' elevations, ascending.
     """
     first = np.searchsorted(tangent, panels.low, "left")
     count = np.maximum(np.searchsorted(tangent, panels.high, "right") - first, 0)
@@ -209,8 +211,10 @@ def _channels_on(panels: PanelRows, tangent: Float) -> tuple[Integer, Integer]:
 
 
 def _wanted(row: Integer, first: Integer, count: Integer, rows: int, steps: int) -> Boolean:
-    """Return which azimuth steps of which channels meet some panel, (rows, steps) bool."""
-    width = 2 * steps + 1  # runs may pass the last step
+    """Return the azimuth steps of each channel that meet some panel, (rows, steps) bool."""
+    # Each run adds 1 at its first step and takes it off behind its last: running sums are above 0 within runs. Runs
+    # that pass the last step go on in a second turn, which is joined with the first.
+    width = 2 * steps + 1
     size = rows * width
     change = np.bincount(row * width + first, minlength=size) - np.bincount(row * width + first + count, minlength=size)
     met = np.cumsum(change.reshape(rows, width), axis=1)[:, : 2 * steps] > 0
@@ -219,16 +223,20 @@ def _wanted(row: Integer, first: Integer, count: Integer, rows: int, steps: int)
 
 
 def _at_least(values: Float, row: Integer, first: Integer, count: Integer, least: Float) -> Integer:
-    """Return how many of ``count`` neighbouring values of a row are at least ``least``, (k,) int64.
+    """Return the number of values that are at least ``least`` among ``count`` neighbours in a row, (k,) int64.
 
     Parameters
     ----------
     values : (rows, n) float64
+        Rows of values.
     row, first, count, least : (k,)
-        ``first + count`` is at most n, and ``count`` at least 1.
+        Row, first column, number of neighbours and limit of each query; ``first + count`` is at most n.
     """
+    # Sparse table: the minimum of 2^e neighbours is that of two overlapping or adjacent ranges of half the size. Any
+    # run is covered by two ranges of the largest power of two within it, one from its beginning and one to its end.
+    # Most runs are free as a whole, and need no counting.
     smallest = np.empty(len(row))
-    power = np.frexp(count.astype(np.float64))[1] - 1  # of two, the largest up to the count
+    power = np.frexp(count.astype(np.float64))[1] - 1  # exponent of the largest power of two up to the count
     table = values
     for exponent in range(int(power.max()) + 1):
         if exponent:
@@ -253,10 +261,11 @@ def _rays_on(panels: PanelRows, azimuth: Float, rise: Float) -> tuple[Integer, I
     Parameters
     ----------
     azimuth : (n,) float64, radians
-        Of the rays, ascending, from -π to π.
+        Azimuths of the rays, ascending, from -π to π.
     rise : (n,) float64
-        Tangent of their elevation.
+        Tangents of their elevations.
     """
+    # Panels near ±π need rays of both ends: three copies of the azimuths, a turn apart, make every panel one slice.
     around = np.concatenate([azimuth - math.tau, azimuth, azimuth + math.tau])
     first = np.searchsorted(around, panels.azimuth - panels.half, "left")
     count = np.searchsorted(around, panels.azimuth + panels.half, "right") - first

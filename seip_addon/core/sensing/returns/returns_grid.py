@@ -78,6 +78,7 @@ def returns_key(site: Site, users: RoadUsers, models: Mapping[str, LidarModel], 
     Parameters
     ----------
     engine : {"bvh", "embree"}
+        Ray-casting engine.
     """
     candidates = site.candidates
     used = find_models(models, np.unique(candidates.sensor).tolist())
@@ -102,15 +103,16 @@ def compute_returns(
     Parameters
     ----------
     models : mapping of str to LidarModel
-        Must contain the sensor types of all candidates.
+        Sensor types by catalogue key, those of all candidates included.
     engine : {"auto", "bvh", "embree"}
+        Ray-casting engine.
     threads : int, optional
         Maximum number of threads.
 
     Returns
     -------
     ReturnsGrid
-        The same bits whatever the number of threads.
+        Grid with the same bits for any number of threads.
 
     Raises
     ------
@@ -143,7 +145,7 @@ def stored_returns(
     engine: Engine = "auto",
     threads: int | None = None,
 ) -> Generator[Progress, None, ReturnsGrid]:
-    """Return the grid of a file if it follows from the same inputs; otherwise compute it and write the file.
+    """Return the grid of a file if it was computed from the same inputs; otherwise compute it and write the file.
 
     Parameters
     ----------

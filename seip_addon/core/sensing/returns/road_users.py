@@ -1,4 +1,4 @@
-"""Road users that a site may hold: which bodies stand where."""
+"""Possible road users of a site: bodies and positions."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from ...site.targets import generate_targets
 from .bodies import PANELS
 
 BODIES = tuple(PANELS)
-KERB_DISTANCE = 0.5  # metres from the edge of the pavement at which pedestrians wait
-FARTHEST_EDGE = 4.0  # metres from the carriageway up to which an edge is one: parking and cycle lanes lie between
-SPACING = 2.0  # metres between neighbouring road users: less than a car is long
+KERB_DISTANCE = 0.5  # metres from the edge of the pavement to waiting pedestrians
+FARTHEST_EDGE = 4.0  # metres from the carriageway to the farthest pavement's edge: parking and cycle lanes lie between
+SPACING = 2.0  # metres between neighbouring road users: less than the length of a car
 
 
 @dataclass(frozen=True, eq=False)
 class RoadUsers:
-    """Road users at m places: each place on the carriageway has every body, each on a pavement's edge a pedestrian.
+    """Road users at m points: all bodies at each point of the carriageway, a pedestrian at each of a pavement's edge.
 
     Parameters
     ----------
@@ -40,6 +40,7 @@ class RoadUsers:
     crossings : tuple of str
         Names of the crossings.
     spacing : float, metres
+        Distance between neighbouring road users.
     """
 
     xyz: Float
@@ -73,7 +74,7 @@ def road_users(geometry: SceneGeometry, spacing: float = SPACING) -> RoadUsers:
     Raises
     ------
     SeipError
-        As for `generate_targets`.
+        Same as for `generate_targets`.
     """
     road = joined(geometry.roads)
     on_road = generate_targets(geometry.region, road, spacing, geometry.weighted_regions)
@@ -99,7 +100,7 @@ def road_users(geometry: SceneGeometry, spacing: float = SPACING) -> RoadUsers:
 
 
 def _pavement_edge(geometry: SceneGeometry, road: BaseGeometry, spacing: float) -> Float:
-    """Return points at the pavements' edges towards the carriageway, evenly spaced, (e, 3) float64."""
+    """Return evenly spaced points at the pavements' edges towards the carriageway, (e, 3) float64."""
     pavement = geometry.candidate_areas
     line = pavement.buffer(-KERB_DISTANCE).boundary.intersection(road.buffer(FARTHEST_EDGE))
     parts = [part for part in shapely.get_parts(line) if part.length > 0]
@@ -112,7 +113,7 @@ def _pavement_edge(geometry: SceneGeometry, road: BaseGeometry, spacing: float) 
     plan = shapely.get_coordinates(points)
     height = surface_height(plan, joined((*geometry.ground, *geometry.roads)))
     there = np.isfinite(height)
-    # A micrometre of rounding takes off what the map's far origin left of noise.
+    # rounding to a micrometre removes the numerical noise of a distant map origin
     edge: Float = np.round(np.column_stack([plan[there], height[there]]), 6)
     ordered: Float = edge[np.lexsort(edge.T[::-1])]
     return ordered

@@ -12,9 +12,9 @@ from ..lidar.model import LidarModel
 
 
 class BeamWindows:
-    """Finds the rays of a model that pass through the convex hulls of points, and few that do not.
+    """Index of a model's rays by direction, to find those that pass through convex hulls of points.
 
-    A ray is ``channel * azimuth_count + step``, as in `BeamPattern`.
+    A ray has the number ``channel * azimuth_count + step``, as in `BeamPattern`.
     """
 
     def __init__(self, model: LidarModel) -> None:
@@ -25,7 +25,7 @@ class BeamWindows:
         self._size, self._all_round = model.azimuth_step, model.all_round
 
     def rays_towards(self, points: Float) -> tuple[Integer, Integer]:
-        """Find rays.
+        """Find all rays that pass through hulls, and few that do not.
 
         Parameters
         ----------
@@ -35,10 +35,12 @@ class BeamWindows:
         Returns
         -------
         hull : (p,) int64
-            Ascending.
+            Hull of each pair, ascending.
         ray : (p,) int64
-            Each once for each hull.
+            Ray of each pair.
         """
+        # A hull lies in an arc of azimuths and in a range of slopes. Every channel within these slopes is paired with
+        # the hull, and of its azimuth steps those within the arc are taken. Channels differ in the azimuth of step 0.
         middle, half, near = _azimuths(points)
         hull, channel = self._channels_at(points, near)
         arc, first, count = steps_in_arcs(
@@ -48,39 +50,46 @@ class BeamWindows:
             np.full(len(hull), self._steps),
             np.full(len(hull), self._all_round),
         )
+        # An arc may run over step 0 of an all-round channel: its steps wrap. The rows of a hull in a channel have no
+        # step in common, so that no ray comes twice for a hull.
         steps = _counted(first, count) % self._steps
         return np.repeat(hull[arc], count), np.repeat(channel[arc] * self._steps, count) + steps
 
     def _channels_at(self, points: Float, near: Float) -> tuple[Integer, Integer]:
-        """Pairs of hulls and of channels that somewhere over the hull's distances are at its height."""
+        """Return pairs of hulls and channels that are within the hull's heights somewhere over its distances."""
+        # The slope to an edge of a given height is most extreme at the near or at the far side, by the sign of the
+        # height. In order of slope, the channels between the two are one slice, found by bisection.
         bottom, top = points[:, :, 2].min(axis=1), points[:, :, 2].max(axis=1)
         far = np.hypot(points[:, :, 0], points[:, :, 1]).max(axis=1)
-        with np.errstate(divide="ignore"):  # nought metres away everything is straight above or below
+        with np.errstate(divide="ignore"):  # at distance zero everything is straight above or below
             least = bottom / np.where(bottom < 0, near, far)
             most = top / np.where(top > 0, near, far)
         low = np.searchsorted(self._slope, least)
         count = np.maximum(np.searchsorted(self._slope, most, side="right") - low, 0)
+        # hulls out of range are left out: no ray towards them can hit anything in them
         count[near > self._reach] = 0
         return np.repeat(np.arange(len(points)), count), self._channel[_counted(low, count)]
 
 
 def _azimuths(points: Float) -> tuple[Float, Float, Float]:
-    """Middle and half of the arc in which each hull is seen, and a bound to its distance in plan, (k,) each.
+    """Return middle and half width of each hull's arc, and a lower bound on its distance in plan, (k,) each.
 
-    Seen from outside, a hull's arc is that of its points, less than half a
-    turn. Seen from within, its points lie on all sides, and at least half a turn apart.
+    Seen from outside, a hull's arc is that of its points and less than half a turn. Seen from inside, its points lie on
+    all sides, at least half a turn apart.
     """
+    # Azimuths are measured from that of the points' mean, so that the arc does not cross ±π when seen from outside.
     x, y = points[:, :, 0], points[:, :, 1]
     centre = np.arctan2(y.mean(axis=1), x.mean(axis=1))
     turn = (np.arctan2(y, x) - centre[:, None] + math.pi) % (2 * math.pi) - math.pi
     low, high = turn.min(axis=1), turn.max(axis=1)
     middle, half = centre + (low + high) / 2, (high - low) / 2
+    # every point is at least this far along the middle of the arc, and so is the hull; from inside the distance is zero
     along = x * np.cos(middle)[:, None] + y * np.sin(middle)[:, None]
     within = half >= math.pi / 2
     return middle, np.where(within, math.pi, half), np.where(within, 0.0, np.maximum(along.min(axis=1), 0.0))
 
 
 def _counted(first: Integer, count: Integer) -> Integer:
-    """Return first, first + 1, … for each pair of a first number and a count, one after the other."""
+    """Return the concatenated ranges of ``count`` whole numbers from each ``first`` on."""
     numbers: Integer = np.arange(count.sum()) + np.repeat(first - (np.cumsum(count) - count), count)
     return numbers

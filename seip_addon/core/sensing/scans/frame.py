@@ -1,4 +1,4 @@
-"""One frame: the merged cloud of all sensors, and the road users of that instant."""
+"""One frame: the merged point cloud of all sensors, and the road users of that instant."""
 
 from __future__ import annotations
 
@@ -36,34 +36,36 @@ _LABELS = {
 FILE = ArrayFile("seip.frame", 3, "frame of scans", "simulate it again", _POINTS | _LABELS, compressed=False)
 
 STATIC_INSTANCE = -1
-"""The instance of a point that is on no road user."""
+"""Instance of points that are not on a road user."""
 
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """The road users of one frame, all of them, seen or not; k boxes.
+    """All road users of one frame, seen or not; k boxes.
 
-    They are those of the frame's time; with a rolling shutter each is at the mean time of its own returns, without
-    any halfway through the frame.
+    Boxes are at their poses at the frame's time. With a rolling shutter each is at the mean time of its own returns, or
+    halfway through the frame if it has none.
 
     Parameters
     ----------
     user : (k,) int64
-        Index into the trajectories' road users; what the points' ``instance`` refers to.
+        Index into the trajectories' road users; the points' ``instance`` refers to it.
     category : (k,) str
+        Category of each road user.
     centre : (k, 3) float64, metres
-        Middle of the box, local site axes.
+        Centre of the box, local site axes.
     size : (k, 3) float64, metres
         Length, width, height.
     yaw, pitch : (k,) float64, radians
         Yaw counter-clockwise from +x, in [-π, π); pitch nose up positive.
     speed : (k,) float64, metres per second
+        Speed of each road user.
     points : (k, s) int64
-        Returns from it, by sensor.
+        Number of returns from each road user, by sensor.
     visibility : (k,) float64, 0 to 1
-        Of the rays of all sensors that would meet it with nothing else there, the share that does.
+        Share of the rays of all sensors that meet the road user, of those that would meet it in an empty scene.
     inside : (k,) bool
-        Whether the middle of the box is in the region of interest in plan.
+        Whether the centre of the box is in the region of interest in plan.
     """
 
     user: Integer
@@ -89,19 +91,20 @@ class Frame:
     Parameters
     ----------
     time : float, seconds
-        Of the simulation, at which the revolution begins.
+        Time of the simulation at which the revolution begins.
     points : (n, 3) float32, metres
-        Local site axes.
+        Points in local site axes.
     sensor : (n,) int16
         Number of the sensor, in the order of the manifest.
     delay : (n,) float32, seconds
-        Of each point after ``time``; zero unless the shutter rolls.
+        Time of each point after ``time``; zero without a rolling shutter.
     intensity : (n,) float32, 0 to 1
+        Intensity of each return.
     instance : (n,) int32
-        Road user that returned it, `STATIC_INSTANCE` for none.
+        Road user that each point is on, or `STATIC_INSTANCE`.
     foreground : (n,) bool
-        Whether it is nearer than the range of the same ray in the empty scene, by more than the noise: what a sensor
-        that knows the background of its site keeps.
+        Whether the point is nearer than the same ray's hit in the empty scene, by more than the noise: the points that
+        remain after background subtraction.
     """
 
     time: float
@@ -129,12 +132,12 @@ class Frame:
         Raises
         ------
         SeipError
-            The file is not there, damaged, or something else.
+            The file is missing, damaged or not a frame.
         """
         with FILE.reading(path) as (header, arrays):
             labels = Labels(**{part.name: arrays[f"labels.{part.name}"] for part in fields(Labels)})
             frame = cls(time=float(header["time"]), labels=labels, **{name: arrays[name] for name in _POINTS})
-            frame._check()  # its own
+            frame._check()
             return frame
 
     def _check(self) -> None:
@@ -145,13 +148,13 @@ class Frame:
         if (np.diff(labels.user) <= 0).any():
             raise ContentError("road users are labelled twice")
         if not np.isin(self.instance[self.instance != STATIC_INSTANCE], labels.user).all():
-            raise ContentError("points lie on road users without a label")
+            raise ContentError("points are on road users without a label")
         if len(self) and int(self.sensor.max()) >= labels.points.shape[1]:
-            raise ContentError("points are from sensors that the labels do not count")
+            raise ContentError("points are from sensors that the labels do not have")
         hits = self.instance != STATIC_INSTANCE
         counted = np.zeros_like(labels.points)
         np.add.at(counted, (np.searchsorted(labels.user, self.instance[hits]), self.sensor[hits]), 1)
         if len(labels) and (counted != labels.points).any():
-            raise ContentError("the labels count other points than there are")
+            raise ContentError("the numbers of points in the labels are not those of the points")
         if fault := limits.TIME.fault(self.time):
             raise ContentError(f"its time {fault}")

@@ -12,19 +12,20 @@ from ..traffic.trajectories import Snapshot, Trajectories
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """One road user's way during a revolution: straight from each of s samples to the next.
+    """Motion of one road user during a revolution, linear between s samples.
 
     Parameters
     ----------
     user : int
         Index into the trajectories' road users.
     delay : (s,) float64, seconds
-        After the beginning of the revolution, increasing; one sample alone means that it stays.
+        Time of each sample after the beginning of the revolution, increasing; a single sample if it stands still.
     position : (s, 3) float64, metres
-        Middle of the underside, local site axes.
+        Centre of the underside, local site axes.
     yaw, pitch : (s,) float64, radians
+        Angles at the samples.
     attitude : (s, 3, 3) float64
-        Rotations from its own axes to the site's.
+        Rotations from the road user's axes to the site's.
     """
 
     user: int
@@ -36,11 +37,12 @@ class Motion:
 
     @property
     def is_still(self) -> bool:
-        """Whether it is at one place in one attitude all the time."""
+        """Whether the road user stands still for the whole revolution."""
         return len(self.delay) == 1
 
     def same_as(self, other: Motion | None) -> bool:
-        """Whether both stay, at one place and in one attitude."""
+        """Return whether both stand still, at the same position and attitude."""
+        # exactly equal: cached hits are used again only where computing them again would give the same bits
         if other is None or not (self.is_still and other.is_still):
             return False
         return all(
@@ -55,6 +57,7 @@ class Motion:
 
     def at(self, delay: Float) -> tuple[Float, Float]:
         """Return positions (n, 3) and rotations (n, 3, 3) at delays (n,) in seconds."""
+        # angles are interpolated and rotations made from them: interpolated matrices would not be rotations
         position = np.stack([np.interp(delay, self.delay, part) for part in self.position.T], axis=1)
         yaw, pitch = (np.interp(delay, self.delay, angle) for angle in (self.yaw, self.pitch))
         return position, rotations(yaw, pitch)
@@ -69,26 +72,29 @@ def rotations(yaw: Float, pitch: Float) -> Float:
 
 
 def still(snapshot: Snapshot) -> list[Motion]:
-    """Return the road users of an instant, as if they stayed there."""
-    nought, attitude = np.zeros(1), rotations(snapshot.yaw, snapshot.pitch)
+    """Return motions in which the road users of an instant stand still: without a rolling shutter."""
+    no_delay, attitude = np.zeros(1), rotations(snapshot.yaw, snapshot.pitch)
     each = [(int(user), slice(row, row + 1)) for row, user in enumerate(snapshot.user)]
     return [
-        Motion(user, nought, snapshot.position[row], snapshot.yaw[row], snapshot.pitch[row], attitude[row])
+        Motion(user, no_delay, snapshot.position[row], snapshot.yaw[row], snapshot.pitch[row], attitude[row])
         for user, row in each
     ]
 
 
 def moving(trajectories: Trajectories, snapshot: Snapshot, duration: float) -> list[Motion]:
-    """Return the way of an instant's road users from then on, for so many seconds.
+    """Return the motion of the road users present at a snapshot over ``duration`` seconds: for a rolling shutter.
 
-    Whose samples end earlier stays where the last one is.
+    Road users whose samples end earlier keep their last pose.
     """
-    return [_way(trajectories, int(user), snapshot.time, duration) for user in snapshot.user]
+    return [_motion(trajectories, int(user), snapshot.time, duration) for user in snapshot.user]
 
 
-def _way(trajectories: Trajectories, user: int, begin: float, duration: float) -> Motion:
+def _motion(trajectories: Trajectories, user: int, begin: float, duration: float) -> Motion:
+    """Return the motion of one road user from a time on."""
     own = slice(int(trajectories.first[user]), int(trajectories.first[user + 1]))
     known = trajectories.time[own]
+    # The trajectory is linear between its samples. With those within the revolution as knots, and both ends added, the
+    # motion is the same function, and not an approximation of it.
     between = known[(known > begin) & (known < begin + duration)]
     times = np.concatenate([[begin], between, [begin + duration]])
 
@@ -97,6 +103,7 @@ def _way(trajectories: Trajectories, user: int, begin: float, duration: float) -
 
     position = np.stack([of(part) for part in trajectories.position.T], axis=1)
     yaw, pitch = of(trajectories.yaw), of(trajectories.pitch)
+    # Parked and waiting road users become still motions, whose hits the scanner can cache.
     values = np.column_stack([position, yaw, pitch])
     if (values == values[0]).all():
         times, position, yaw, pitch = times[:1], position[:1], yaw[:1], pitch[:1]

@@ -1,4 +1,4 @@
-"""A folder of frames: ``frames/000123.npz`` and ``manifest.json``, which says what they follow from."""
+"""A folder of frames: ``frames/000123.npz``, and ``manifest.json`` with the inputs of the run."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .static_scene import StaticScene
 
 SCHEMA = "seip-run/1"
 MANIFEST, FRAMES = "manifest.json", "frames"
-PLACEMENT = "placement.json"  # by which a folder is one of a placement
+PLACEMENT = "placement.json"  # a folder with this file is that of a placement
 
 Record = dict[str, Any]
 
@@ -41,16 +41,17 @@ class Run:
     origin : (3,) float64, metres
         Map coordinates of the local origin.
     trajectories : Trajectories
-        In local axes.
+        Trajectories in local axes.
     bodies : sequence of Body
-        Of each road user.
+        Body of each road user.
     times : (n,) float64, seconds
+        Times of the frames.
     settings : ScanSettings
-        With the engine's own name, not ``auto``.
+        Settings of the scans, with the engine's name instead of ``auto``.
     versions : mapping of str to str
-        Of this program and what it stands on.
+        Versions of this program and of its dependencies.
     geo_reference : GeoReference
-        Where on the Earth the map is; frames do not follow from it, datasets may.
+        Position of the map on the Earth; frames do not depend on it, datasets may.
     """
 
     static: StaticScene
@@ -65,7 +66,7 @@ class Run:
 
     @property
     def key(self) -> str:
-        """Digest of everything: runs of the same key have the same frames."""
+        """Digest of all inputs: runs with the same key have the same frames."""
         trajectories = self.trajectories
         users = json.dumps([asdict(user) for user in trajectories.users])
         motion = [getattr(trajectories, name) for name in ("first", "time", "position", "yaw", "pitch", "speed")]
@@ -83,7 +84,7 @@ class Run:
         )
 
     def record(self, frames: Sequence[Mapping[str, Any]] = ()) -> Record:
-        """Return what the manifest holds."""
+        """Return the contents of the manifest."""
         return {
             "schema": SCHEMA,
             "key": self.key,
@@ -99,19 +100,19 @@ class Run:
 
 
 def write_run(folder: Path, run: Run, simulation: Simulation) -> Generator[Progress, None, Record]:
-    """Write the frames of a run that are not there yet, and then the manifest that names all.
+    """Write the missing frames of a run, and then the manifest that lists all.
 
     Parameters
     ----------
     folder : path
-        New, empty, or with this run's frames, as an earlier start left them.
+        Folder that is new, empty, or contains frames of this run from an interrupted start.
     simulation : Simulation
-        Of the run.
+        Simulation of the run.
 
     Yields
     ------
     Progress
-        Frames done, of all.
+        Number of frames done.
 
     Returns
     -------
@@ -121,7 +122,7 @@ def write_run(folder: Path, run: Run, simulation: Simulation) -> Generator[Progr
     Raises
     ------
     SeipError
-        The folder holds something else, or cannot be written.
+        The folder contains something else, or cannot be written.
     """
     check_run_folder(folder, run)
     if not (folder / MANIFEST).exists():
@@ -143,23 +144,22 @@ def write_run(folder: Path, run: Run, simulation: Simulation) -> Generator[Progr
 
 
 def check_run_folder(folder: Path, run: Run) -> None:
-    """Raise SeipError where a folder holds something other than frames of this run."""
+    """Raise SeipError if a folder contains something other than frames of this run."""
     check_no_placement(folder)
     if (folder / MANIFEST).exists():
         if load_manifest(folder)["key"] != run.key:
             raise SeipError(
-                f"{folder} holds a run of another scene, traffic or settings: name another folder, or delete that one"
+                f"{folder} contains a run with a different scene, traffic or settings: choose another folder, or "
+                "delete that one"
             )
     elif (folder / FRAMES).exists():
-        raise SeipError(
-            f"{folder} holds frames without a {MANIFEST} that says whose: delete them, or name another folder"
-        )
+        raise SeipError(f"{folder} contains frames without a {MANIFEST}: delete them, or choose another folder")
 
 
 def check_no_placement(folder: Path) -> None:
-    """Raise SeipError where a folder holds a placement, whose files those of a run would mix with."""
+    """Raise SeipError if a folder contains a placement, whose files would be mixed with those of a run."""
     if (folder / PLACEMENT).exists():
-        raise SeipError(f"{folder} holds a placement, which a run is not written to: name another folder")
+        raise SeipError(f"{folder} contains a placement, and a run needs a folder of its own: choose another one")
 
 
 def load_manifest(folder: Path) -> Record:
@@ -168,7 +168,7 @@ def load_manifest(folder: Path) -> Record:
     Raises
     ------
     SeipError
-        There is none, or it is damaged or of another version.
+        The manifest is missing, damaged or of another version.
     """
     path = folder / MANIFEST
     try:
@@ -176,18 +176,18 @@ def load_manifest(folder: Path) -> Record:
         known = record["schema"] == SCHEMA
         whole = known and _is_whole(record)
     except FileNotFoundError as error:
-        raise SeipError(f"{folder} holds no run of scans: make one with headless/simulate.py") from error
+        raise SeipError(f"{folder} does not contain a run of scans: make one with seip simulate") from error
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise SeipError(f"{path} is damaged: delete the folder and simulate again") from error
     if not known:
-        raise SeipError(f"{path} is not of this version: delete the folder and simulate again")
+        raise SeipError(f"{path} was written by another version: delete the folder and simulate again")
     if not whole:
         raise SeipError(f"{path} is damaged: delete the folder and simulate again")
     return dict(record)
 
 
 def _is_whole(record: Record) -> bool:
-    """Return whether a manifest has what is read of it, and its frames are counted from 0."""
+    """Return whether a manifest has all entries that are read, in their limits, and its frames are numbered from 0."""
     sensors = np.array([sensor["local_m"] for sensor in record["sensors"]], dtype=np.float64)
     texts = [record["key"], record["trajectories"]["source"], *(sensor["sensor"] for sensor in record["sensors"])]
     texts += [frame["sha256"] for frame in record["frames"]]
@@ -234,12 +234,12 @@ def load_frames(folder: Path) -> Iterator[tuple[str, Frame]]:
 
 
 def frame_path(folder: Path, number: int) -> Path:
-    """Return where a frame is kept."""
+    """Return the path of a frame."""
     return folder / FRAMES / f"{number:06d}.npz"
 
 
 def content_hash(frame: Frame) -> str:
-    """Return the digest of a frame's values, whatever the file looks like."""
+    """Return the digest of a frame's values, which does not depend on how the file is written."""
     own = [getattr(frame, part.name) for part in fields(Frame) if part.name != "labels"]
     return digest(*own, *(getattr(frame.labels, part.name) for part in fields(Labels)))
 
@@ -269,7 +269,7 @@ def _sensor_record(sensor: MountedSensor) -> Record:
 
 
 def _listed(record: Mapping[str, Any]) -> Record:
-    """Return a record as JSON gives it back: lists in place of tuples."""
+    """Return a record with lists in place of tuples, as JSON reads it back."""
     return {name: list(value) if isinstance(value, tuple) else value for name, value in record.items()}
 
 
@@ -279,7 +279,7 @@ def _fields(model: LidarModel) -> list[tuple[str, Any]]:
 
 
 def _parts(model: LidarModel) -> list[Any]:
-    """Return the figures that scans follow from, not the words for people."""
+    """Return the figures of a model that scans depend on, without names and sources."""
     unused = {"name", "manufacturer", "source", "price_source", "assumed_beams", "assumed_law"}
     return [
         repr(value) if name in {"law", "rosette"} else value for name, value in _fields(model) if name not in unused

@@ -1,7 +1,7 @@
 """Scans of one sensor: cached static returns, and returns of traffic.
 
-What moves is cast against in its own axes, in which its shape never changes, and only by the rays that pass through
-its bounding box. A ray ends at the nearest of what it meets.
+Rays are cast against each road user in its own axes, in which its shape never changes, and only those rays that pass
+through its bounding box. A ray ends at the nearest hit.
 """
 
 from __future__ import annotations
@@ -26,19 +26,20 @@ from .sensor import MountedSensor
 
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of the static scan
 _MARGIN = 1e-3
-"""Metres by which bounding boxes are larger than what they bound: engines compute in float32."""
-_MAX_LEVEL_SLOPE = 1e-12  # a ray of less slope than this is off by less than the margin at any range
+"""Metres by which bounding boxes are larger than their contents: engines compute in float32."""
+_MAX_LEVEL_SLOPE = 1e-12  # replacing a smaller slope by this moves a ray by less than the margin at any range
 _CORNERS = np.array(np.meshgrid((0, 1), (0, 1), (0, 1), indexing="ij")).reshape(3, 8).T
 
 
 class ReflectiveSurface:
-    """Triangles that rays are cast against, and how they reflect.
+    """Triangles that rays are cast against, with their reflectivity.
 
     Parameters
     ----------
     caster : RayCaster
-        Of the triangles.
+        Ray caster of the triangles.
     reflectivity : (n,) float64, 0 to 1
+        Reflectivity of each triangle.
     """
 
     def __init__(self, caster: RayCaster, reflectivity: Float) -> None:
@@ -49,7 +50,7 @@ class ReflectiveSurface:
         self._normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
 
     def reflected(self, directions: Float, triangle: Integer) -> Float:
-        """Return reflectivity times cosine (n,) where rays, with directions in the triangles' axes, meet triangles."""
+        """Return reflectivity times cosine of incidence (n,) at hits, with directions in the triangles' axes."""
         cos_incidence = np.einsum("ni,ni->n", self._normal[triangle], directions)
         reflected: Float = np.abs(cos_incidence) * self._reflectivity[triangle]
         return reflected
@@ -61,6 +62,7 @@ class BodySurface(ReflectiveSurface):
     Parameters
     ----------
     reflectivity : (n,) float64, 0 to 1
+        Reflectivity of each triangle.
     """
 
     def __init__(self, caster: RayCaster, reflectivity: Float) -> None:
@@ -69,32 +71,43 @@ class BodySurface(ReflectiveSurface):
         self.low, self.high = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
 
     def hull(self, motion: Motion) -> Float:
-        """Return points (8 s, 3) whose convex hull holds the bounding box during all of a motion, in site axes.
+        """Return points (8 s, 3) whose convex hull contains the bounding box during a whole motion, in site axes.
 
-        Between two samples a corner leaves its chord by an eighth of its greatest
-        acceleration times the time squared at most; angles change evenly.
+        Between two samples, a corner departs from the straight line by at most an eighth of its largest acceleration
+        times the time squared; angles change at a constant rate.
         """
         size = self.high - self.low
         corners = self.low + _CORNERS * size
-        turned = np.abs(np.diff(motion.yaw)) + np.abs(np.diff(motion.pitch))
-        bulge = np.linalg.norm(corners, axis=1).max() * turned.max(initial=0.0) ** 2 / 8
+        # Positions are interpolated along straight lines, so that boxes that do not turn stay within the hull of the
+        # samples. A box that turns by an angle moves its corners on arcs: at a radius r and a constant rate the
+        # acceleration times the time squared is r times the angle squared. The box is enlarged by an eighth of that on
+        # every side, with the largest angle between two samples; yaw and pitch together turn by no more than their sum.
+        angle = np.abs(np.diff(motion.yaw)) + np.abs(np.diff(motion.pitch))
+        bulge = np.linalg.norm(corners, axis=1).max() * angle.max(initial=0.0) ** 2 / 8
         corners += (2 * _CORNERS - 1) * bulge
         placed: Float = motion.position[:, None] + corners @ motion.attitude.transpose(0, 2, 1)
         return placed.reshape(-1, 3)
 
     def may_hit(self, origin: Float, directions: Float, reach: float) -> Boolean:
-        """Return which rays pass through the bounding box within so many metres, by its slabs (Kay and Kajiya 1986).
+        """Return which rays pass through the bounding box within a range, by its slabs (Kay and Kajiya 1986).
 
         Parameters
         ----------
         origin : (3, 1) or (3, n) float64, metres
+            Start of the rays, in the road user's axes.
         directions : (3, n) float64
+            Unit vectors in the road user's axes.
         reach : float, metres
+            Range of the rays.
 
         Returns
         -------
         (n,) bool
+            Whether each ray passes.
         """
+        # A box is the intersection of three slabs. Along a ray each slab is an interval of distances; the ray passes
+        # the box if the three intervals have a distance in common, ahead of the sensor and within range. Arrays have
+        # the three axes first, so that each step is one pass over contiguous memory.
         slowness = 1.0 / np.where(np.abs(directions) < _MAX_LEVEL_SLOPE, _MAX_LEVEL_SLOPE, directions)
         one, other = (self.low[:, None] - origin) * slowness, (self.high[:, None] - origin) * slowness
         enter = np.minimum(one, other).max(axis=0)
@@ -109,10 +122,12 @@ class MovingTraffic:
 
     Parameters
     ----------
+    motions : sequence of Motion
+        Motion of each road user.
     shapes : sequence of BodySurface
-        Of each, in the same order.
+        Shape of each road user, in the same order.
     hulls : (k, m, 3) float64, metres
-        Points about each way, in site axes.
+        Points whose convex hull contains each motion, in site axes.
     """
 
     motions: Sequence[Motion]
@@ -121,8 +136,10 @@ class MovingTraffic:
 
     @classmethod
     def of(cls, motions: Sequence[Motion], shapes: Sequence[BodySurface]) -> MovingTraffic:
-        """Bound the ways of road users, given the shape of each."""
+        """Return the motions with their hulls, given the shape of each road user."""
         hulls = [shape.hull(motion) for motion, shape in zip(motions, shapes, strict=True)]
+        # Motions have different numbers of samples. Shorter hulls repeat their last point, which changes no convex
+        # hull, so that all fit into one array.
         most = max(map(len, hulls), default=0)
         even = [np.concatenate([hull, np.repeat(hull[-1:], most - len(hull), axis=0)]) for hull in hulls]
         return cls(motions, shapes, np.array(even).reshape(len(hulls), most, 3))
@@ -135,18 +152,19 @@ class Scan:
     Parameters
     ----------
     distance : (r,) float64, metres
-        Infinite on a miss.
+        Distance of the hit; infinite on a miss.
     empty : (r,) float64, metres
-        The distance without traffic.
+        Distance without traffic.
     intensity : (r,) float64, 0 to 1
+        Intensity of the return.
     chance : (r,) float32
-        That the ray's return is not lost.
+        Probability that the return is not lost.
     instance : (r,) int32
-        Road user, or `STATIC_INSTANCE`.
+        Road user that was hit, or `STATIC_INSTANCE`.
     unoccluded : (u,) int64
-        For each of the trajectories' road users, how many rays would return from it with nothing else there.
+        For each of the trajectories' road users, the number of rays that would return from it in an empty scene.
     visible : (u,) int64
-        How many of these do.
+        Number of rays that do return from it.
     """
 
     distance: Float
@@ -160,7 +178,7 @@ class Scan:
 
 @dataclass(frozen=True, eq=False)
 class _Hits:
-    """Hits of rays; n of them, with the product of reflectivity and cosine, and the chance to return."""
+    """Hits of n rays, with the product of reflectivity and cosine, and the probability of a return."""
 
     ray: Integer
     distance: Float
@@ -169,25 +187,25 @@ class _Hits:
 
 
 class Scanner:
-    """Makes the scans of one sensor.
+    """Simulator of the scans of one sensor.
 
     Parameters
     ----------
     ground : ReflectiveSurface
-        All that stands still, in site axes.
+        Static scene, in site axes.
     seed : int
-        Of how surfaces deviate from their materials.
+        Seed of the deviations of surfaces from their materials.
 
     Attributes
     ----------
     directions : (r, 3) float64
-        Of the rays, in site axes.
+        Directions of the rays, in site axes.
     coarse_directions : (r, 3) float32
-        The same, for points: 1e-5 m at 200 m.
+        The same for computing points: the error is 1e-5 m at 200 m.
     delay : (r,) float64, seconds
-        After the beginning of the revolution at which each ray goes out.
+        Time of each ray after the beginning of the revolution.
     threads : int
-        How many scanners may scan at once to advantage.
+        Useful number of scanners that scan at once.
     """
 
     def __init__(self, sensor: MountedSensor, ground: ReflectiveSurface, seed: int) -> None:
@@ -203,14 +221,15 @@ class Scanner:
         return other
 
     def aim(self, time: float) -> None:
-        """Turn the rays to where they are in the frame that begins at a time in seconds; only a rosette's move."""
+        """Set the rays to their directions in the frame that begins at a time in seconds; only a rosette's change."""
+        # the cached static scan is valid for one pattern only
         model = self.sensor.model.at(time)
         if model.rosette != self._model.rosette:
             self._model = model
             self._cast_at_ground()
 
     def _cast_at_ground(self) -> None:
-        """Cast all rays against what stands still."""
+        """Cast all rays against the static scene, and keep the result for all frames of this pattern."""
         sensor, rays = self.sensor, np.arange(len(self.delay))
         self._windows = BeamWindows(self._model)
         self.directions: Float = BeamPattern(self._model).directions(rays) @ sensor.orientation.T
@@ -223,19 +242,23 @@ class Scanner:
             hits = self._cast(self._ground, sensor.xyz, self.directions[part], rays[part])
             self._distance[hits.ray], self._chance[hits.ray] = hits.distance, hits.chance
             self._intensity[hits.ray] = self._model.law.intensity(hits.distance, hits.reflected)
+        # stationary road users were hit by the rays of the earlier pattern: these hits are no longer valid
         self._still_hits: dict[int, tuple[Motion, _Hits]] = {}
 
     @property
     def sees_nothing(self) -> bool:
-        """Whether no ray ends on anything that stands still."""
+        """Whether no ray hits the static scene."""
         return not np.isfinite(self._distance).any()
 
     def scan(self, traffic: MovingTraffic, users: int) -> Scan:
-        """Return what the rays, as they are aimed, end on with traffic that is one of so many road users."""
+        """Return the scan of a revolution with traffic; ``users`` is the number of the trajectories' road users."""
+        # The static scan comes first; every road user then replaces the rays that it stops sooner. The nearest hit
+        # remains, whatever the order of the road users.
         distance, intensity, chance = self._distance.copy(), self._intensity.copy(), self._chance.copy()
         instance = np.full(len(distance), STATIC_INSTANCE, dtype=np.int32)
         unoccluded = np.zeros(users, dtype=np.int64)
         for motion, hits in self._hits(traffic):
+            # counted before the comparison: hits of this road user in a scene without others
             unoccluded[motion.user] = self.in_range(hits.distance).sum()
             nearest = hits.distance < distance[hits.ray]
             ray = hits.ray[nearest]
@@ -250,14 +273,16 @@ class Scanner:
         return (distance >= self._model.min_range) & (distance <= self._model.max_range)
 
     def _hits(self, traffic: MovingTraffic) -> Iterator[tuple[Motion, _Hits]]:
-        """Return what the rays meet of each road user if nothing else is there; of one that stood still, as before."""
-        stood, self._still_hits = self._still_hits, {}
+        """Yield each road user's hits, ignoring the rest of the scene; those of stationary ones are cached."""
+        # The cache holds the road users of the last revolution only, so that it does not grow with the run.
+        cached, self._still_hits = self._still_hits, {}
         if not traffic.motions:
             return
+        # the rays towards all hulls at once; they come sorted by hull, so that each road user's rays are one slice
         hull, ray = self._windows.rays_towards((traffic.hulls - self.sensor.xyz) @ self.sensor.orientation)
         first = np.searchsorted(hull, np.arange(len(traffic.motions) + 1))
         for number, (motion, shape) in enumerate(zip(traffic.motions, traffic.shapes, strict=True)):
-            before, hits = stood.get(motion.user, (None, None))
+            before, hits = cached.get(motion.user, (None, None))
             if hits is None or not motion.same_as(before):
                 hits = self._cast_at(shape, motion, ray[first[number] : first[number + 1]])
             if motion.is_still:
@@ -266,6 +291,10 @@ class Scanner:
 
     def _cast_at(self, shape: BodySurface, motion: Motion, ray: Integer) -> _Hits:
         """Cast rays against one road user, in its axes."""
+        # Its ray caster is built once, in its own axes: in place of the body, the rays are moved. If it stands still,
+        # all rays have one transformation. Otherwise (rolling shutter) each ray has its own: that of the pose at the
+        # time when the ray goes out. So a passing car is seen by each azimuth where it is at that moment, and its
+        # points are sheared as those of a spinning sensor are.
         directions = self.directions.take(ray, axis=0)
         if motion.is_still:
             origin = motion.attitude[0].T @ (self.sensor.xyz - motion.position[0])[:, None]
@@ -274,16 +303,18 @@ class Scanner:
             position, attitude = motion.at(self.delay[ray])
             origin = np.einsum("ni,nij->jn", self.sensor.xyz - position, attitude)
             directions = np.einsum("ni,nij->jn", directions, attitude)
+        # the hull covers the whole revolution; the box at each ray's own time is much smaller
         passing = np.flatnonzero(shape.may_hit(origin, directions, self._model.max_range))
         start = origin[:, 0] if motion.is_still else origin[:, passing].T
         return self._cast(shape, start, directions[:, passing].T, ray[passing], motion.user + 1)
 
     def _cast(self, surface: ReflectiveSurface, origin: Float, directions: Float, ray: Integer, of: int = 0) -> _Hits:
-        """Cast rays at a surface in its axes; ``of`` is 0 for what stands still, else a road user's number and 1."""
+        """Cast rays at a surface in its axes; ``of`` is 0 for the static scene, else a road user's number plus 1."""
         distance, triangle = surface.caster.cast(origin, directions, self._model.max_range)
         hit = np.flatnonzero(triangle >= 0)
         distance, directions = distance[hit], directions[hit]
         reflected = surface.reflected(directions, triangle[hit])
+        # Deviations from the material belong to places on the surface: computed in its own axes, they move with it
         deviation = None
         if isinstance(self._model.law, RangeEquation):
             start = origin if origin.ndim == 1 else origin[hit]
@@ -292,5 +323,5 @@ class Scanner:
 
 
 def returns_by_user(instance: NDArray[np.int32], users: int) -> Integer:
-    """Return how many of some returns are from each of so many road users, (u,)."""
+    """Return the number of returns from each of ``users`` road users, (u,)."""
     return np.bincount(instance[instance != STATIC_INSTANCE], minlength=users)

@@ -11,7 +11,7 @@ from ...errors import SeipError
 from ..lidar.model import LidarModel
 
 _ORTHONORMAL_TOLERANCE = 1e-6
-"""How far an orientation's columns may be from unit vectors at right angles."""
+"""Largest deviation of an orientation's columns from orthonormal vectors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +34,12 @@ class MountedSensor:
     orientation: Float
 
     def __post_init__(self) -> None:
-        turn = self.orientation
-        rigid = np.allclose(turn.T @ turn, np.eye(3), rtol=0, atol=_ORTHONORMAL_TOLERANCE) and np.linalg.det(turn) > 0
+        axes = self.orientation
+        rigid = np.allclose(axes.T @ axes, np.eye(3), rtol=0, atol=_ORTHONORMAL_TOLERANCE) and np.linalg.det(axes) > 0
         if not (rigid and np.isfinite(self.xyz).all()):
-            raise SeipError(f"sensor {self.label!r} has no place, or is not turned but mirrored or skewed: set it anew")
+            raise SeipError(
+                f"sensor {self.label!r} has an invalid position, or is mirrored or skewed: reset its transform"
+            )
 
 
 def level_orientation(yaw: float) -> Float:

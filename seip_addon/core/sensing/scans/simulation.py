@@ -34,16 +34,17 @@ class ScanSettings:
     Parameters
     ----------
     seed : int
-        Of noise and lost returns, 0 or more.
+        Seed of noise and lost returns, 0 or more.
     noise : bool
-        Whether ranges are noisy and returns get lost, as the sensors' models say.
+        Whether ranges are noisy and returns get lost, according to the sensors' models.
     rolling_shutter : bool
-        Whether each azimuth is looked along at its own time (`Scanner.delay`) while the traffic moves. Each road user's
-        box is then where it is at the mean time of its returns of all sensors, and without returns halfway through the
-        frame. Else a revolution takes no time.
+        Whether the traffic moves during a revolution: each azimuth is scanned at its own time (`Scanner.delay`). Each
+        road user's box is then at the mean time of its returns of all sensors, or halfway through the frame if it has
+        none. Otherwise a revolution takes no time.
     engine : {"auto", "bvh", "embree"}
+        Ray-casting engine.
     weather, reflectivity : tuple of str
-        What scene and sensors were made with, in words, for the record.
+        Descriptions of the weather and the reflectivities used, for the record.
     """
 
     seed: int = setting(0, "seed of noise and lost returns", minimum=0)
@@ -55,12 +56,12 @@ class ScanSettings:
 
 
 class Simulation:
-    """The sensors of a scene and its traffic, ready to be scanned at any time.
+    """The sensors of a scene and its traffic, ready for scans at any time.
 
     Parameters
     ----------
     shapes : sequence of BodySurface
-        Of each road user.
+        Shape of each road user.
     """
 
     def __init__(
@@ -89,28 +90,28 @@ class Simulation:
     def warnings(self) -> tuple[str, ...]:
         """Warnings about the scans."""
         blind = tuple(
-            f"{scanner.sensor.label} sees nothing of the scene: no ray of it meets anything within its range; "
-            "look whether it hangs where it should"
+            f"{scanner.sensor.label} sees nothing of the scene: none of its rays hits anything within its range; "
+            "check its position and orientation"
             for scanner in self.scanners
             if scanner.sees_nothing
         )
         return self._static.warnings + blind
 
     def frame(self, number: int, time: float) -> Frame:
-        """Return what all sensors measure in the revolution that begins at a time.
+        """Return the measurements of all sensors in the revolution that begins at a time.
 
         Parameters
         ----------
         number : int
-            Of the frame: noise and losses follow from it, the seed, the traffic and the sensor's number, and from
-            nothing else.
+            Number of the frame. Noise and losses depend only on it, the seed, the traffic and the sensor's number.
         time : float, seconds
+            Beginning of the revolution.
         """
         snapshot = self._trajectories.at(time)
         return self.measure(number, snapshot, self.scans(snapshot))
 
     def measure(self, number: int, snapshot: Snapshot, scans: Sequence[Scan]) -> Frame:
-        """Return what the sensors make of their scans at an instant: noisy and incomplete, with labels."""
+        """Return the frame of scans at an instant, with noise, lost returns and labels."""
         for scanner in self.scanners:
             scanner.aim(snapshot.time)
         parts = [
@@ -124,7 +125,7 @@ class Simulation:
         return Frame(time=snapshot.time, labels=self._labels(snapshot, scans, returns), **merged)
 
     def scans(self, snapshot: Snapshot) -> list[Scan]:
-        """Return what the rays of each sensor end on, without noise or losses."""
+        """Return the scan of each sensor, without noise and lost returns."""
         motions = self._motions(snapshot)
         traffic = MovingTraffic.of(motions, [self._shapes[motion.user] for motion in motions])
 
@@ -140,13 +141,15 @@ class Simulation:
         return moving(self._trajectories, snapshot, self._revolution) if rolling else still(snapshot)
 
     def _when_seen(self, snapshot: Snapshot, instance: NDArray[np.int32], delay: NDArray[np.float32]) -> Snapshot:
-        """Return each road user where it is at the mean time of its returns, or without any halfway through the frame.
+        """Return each road user at the mean time of its returns, or halfway through the frame if it has none.
 
         Parameters
         ----------
         instance, delay : (n,) array
-            Of the points of all sensors, as in `Frame`.
+            Road user and time of the points of all sensors, as in `Frame`.
         """
+        # Points of a moving road user are sheared by its motion during the revolution. A box at the beginning of the
+        # frame would be ahead of or behind them; at their mean time it is centred on them.
         of_traffic = instance != STATIC_INSTANCE
         most = len(self._trajectories)
         count = np.bincount(instance[of_traffic], minlength=most)
@@ -161,13 +164,14 @@ class Simulation:
     def _random(self, sensor: int, frame: int) -> np.random.Generator | None:
         if not self._settings.noise:
             return None
-        # The traffic's digest is in it: else what stands still would be measured alike in frames of two runs.
+        # It includes the digest of the traffic: otherwise static surfaces would have the same noise in frames of two
+        # runs.
         entropy = [self._settings.seed, int(self._trajectories.key, 16)]
         seed = np.random.SeedSequence(entropy, spawn_key=(sensor, frame))
         return np.random.Generator(np.random.SFC64(seed))
 
     def _labels(self, snapshot: Snapshot, scans: Sequence[Scan], returns: Integer) -> Labels:
-        """Return the labels of road users at their places, given the returns (u, s) of each of all from each sensor."""
+        """Return the labels of the present road users, given the returns (u, s) of all by sensor."""
         users = [self._trajectories.users[number] for number in snapshot.user]
         size = np.array([(user.length, user.width, user.height) for user in users]).reshape(-1, 3)
         up = rotations(snapshot.yaw, snapshot.pitch)[:, :, 2]
@@ -200,31 +204,31 @@ def prepare(
     Parameters
     ----------
     trajectories : Trajectories
-        In the scene's local axes.
+        Trajectories in the scene's local axes.
     bodies : sequence of Body
-        Of each road user. Those who share an array of triangles share its tree.
+        Body of each road user. Bodies with the same array of triangles share a ray caster.
 
     Yields
     ------
     Progress
-        Sensors done, of all.
+        Number of sensors done.
 
     Raises
     ------
     SeipError
-        There is no sensor, or the seed is below nought.
+        There is no sensor, or the seed is negative.
     """
     if not sensors:
-        raise SeipError("there is no sensor to scan with: place some first, with headless/place.py")
+        raise SeipError("there is no sensor to scan with: place some first, with seip place")
     if settings.seed < 0:
-        raise SeipError(f"the seed must be a whole number from 0, not {settings.seed}")
+        raise SeipError(f"the seed must be a whole number of at least 0, not {settings.seed}")
     shapes = body_surfaces(bodies, settings.engine)
     ground = ReflectiveSurface(make_ray_caster(static.triangles, settings.engine), static.reflectivity)
     scanners = []
     for number, sensor in enumerate(sensors):
-        yield Progress(number, len(sensors), "what stands still")
+        yield Progress(number, len(sensors), "scanning the static scene")
         scanners.append(Scanner(sensor, ground, settings.seed))
-    yield Progress(len(sensors), len(sensors), "what stands still")
+    yield Progress(len(sensors), len(sensors), "scanning the static scene")
     return Simulation(static, scanners, trajectories, shapes, settings)
 
 
@@ -248,44 +252,49 @@ def frame_times(
     Parameters
     ----------
     start : float, seconds, optional
-        Of the simulation; its first sample if not given.
+        Time of the first frame; by default that of the first sample.
     duration : float, seconds, optional
-        To the last sample if not given.
+        Time from the first to the last frame; by default up to the last sample.
     rate : float, hertz, optional
-        That of the slowest sensor if not given, and no more than that.
+        Rate of frames, no higher than that of the slowest sensor, which is the default.
 
     Raises
     ------
     SeipError
-        The times are not among the trajectories', or sensors do not turn so quickly.
+        The times are outside the trajectories, or the rate is higher than that of a sensor.
     """
     begin, end = trajectories.span
     slowest = min(sensors, key=lambda sensor: sensor.model.rotation_rate)
     fastest = slowest.model.rotation_rate
     rate = fastest if rate is None else rate
     if not 0 < rate <= fastest * (1 + 1e-9):
-        raise SeipError(f"{slowest.label} turns {fastest:g} times a second: ask for a rate from 0 to {fastest:g} Hz")
+        raise SeipError(
+            f"{slowest.label} rotates {fastest:g} times a second: choose a rate above 0 and up to {fastest:g} Hz"
+        )
     start = begin if start is None else start
     duration = end - start if duration is None else duration
     if not (begin <= start <= end and 0 <= duration <= end - start + _TIME_TOLERANCE):
-        raise SeipError(f"the traffic is known from {begin:g} s to {end:g} s: choose start and duration within that")
+        raise SeipError(f"the traffic lasts from {begin:g} s to {end:g} s: choose start and duration within that")
     count = math.floor(duration * rate + _TIME_TOLERANCE) + 1
     if not FRAMES.allow(count):
-        raise SeipError(f"{duration:g} s at {rate:g} Hz are {count:,} frames, and a run has {FRAMES}: ask for less")
+        raise SeipError(
+            f"{duration:g} s at {rate:g} Hz are {count:,} frames, but a run must have {FRAMES}: choose a shorter "
+            "duration or a lower rate"
+        )
     return start + np.arange(count) / rate
 
 
 FOREGROUND_SIGMAS, FOREGROUND_MARGIN = 3.0, 0.05
-"""By how many standard deviations of the range noise, and metres, foreground is nearer than the background."""
+"""Standard deviations of the range noise, and metres, by which foreground must be nearer than the background."""
 
 _TIME_TOLERANCE = 1e-6
-"""Seconds, and shares of a frame, by which times may be off for being decimal fractions."""
+"""Seconds, and shares of a frame: tolerance for times that are decimal fractions."""
 
 
 def _returns(
     scanner: Scanner, scan: Scan, number: int, random: np.random.Generator | None, *, rolling: bool
 ) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a `Frame` for one sensor's scan, noisy and incomplete where a generator is given."""
+    """Return the arrays of a `Frame` for one sensor's scan, with noise and lost returns if a generator is given."""
     sensor = scanner.sensor
     if random is None:
         ray = np.flatnonzero(scanner.in_range(scan.distance))

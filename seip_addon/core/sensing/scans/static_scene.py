@@ -17,19 +17,20 @@ from .sensor import MountedSensor
 
 @dataclass(frozen=True, eq=False)
 class StaticScene:
-    """The surfaces that rays end on whatever the traffic does; n triangles.
+    """Static surfaces of a scene; n triangles.
 
     Parameters
     ----------
     triangles : (n, 3, 3) float64, metres
-        Local site axes.
+        Corners in local site axes.
     reflectivity : (n,) float64, 0 to 1
+        Reflectivity of each triangle.
     region : shapely geometry
         Region of interest in plan.
     warnings : tuple of str
-        What was left out of it.
+        Warnings about objects that were left out.
     attribution : tuple of str
-        Credits that the sources of the scene demand.
+        Credits that the sources of the scene require.
     """
 
     triangles: Float
@@ -39,7 +40,7 @@ class StaticScene:
     attribution: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Have GEOS index the region before threads share it: it does so with the second point, without a lock."""
+        """Make GEOS index the region before threads share it: it does so at the second point, without a lock."""
         if not self.region.is_empty:
             point = self.region.representative_point()
             shapely.contains_xy(self.region, [point.x, point.x], [point.y, point.y])
@@ -55,7 +56,7 @@ def static_scene(geometry: SceneGeometry, sensors: Sequence[MountedSensor] = ())
     Parameters
     ----------
     sensors : sequence of MountedSensor
-        What lies beyond the range of all of them is left out; nothing is where none are given.
+        Sensors; objects beyond the range of all of them are left out. Without sensors nothing is left out.
     """
     warnings: tuple[str, ...] = ()
     if sensors:

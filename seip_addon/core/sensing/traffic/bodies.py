@@ -12,46 +12,47 @@ from ...errors import SeipError
 from .trajectories import CATEGORIES, RoadUser, bent
 
 MESHES = Path(__file__).parent / "body_meshes"
-"""Wavefront OBJ files, ``CATEGORY.obj`` or ``CATEGORY.MODEL.obj``; the README there says what they may hold."""
+"""Folder of Wavefront OBJ files, ``CATEGORY.obj`` or ``CATEGORY.MODEL.obj``; its README describes their contents."""
 
 REFLECTIVITY: Mapping[str, float] = {
-    "glass": 0.05,  # nearly all goes through or is mirrored away
+    "glass": 0.05,  # nearly all light is transmitted or reflected like in a mirror
     "tyre": 0.05,
     "trim": 0.08,
     "rim": 0.45,
     "frame": 0.35,
     "headlamp": 0.60,
-    "tail lamp": 0.60,  # its reflectors send back what comes
+    "tail lamp": 0.60,  # it has retroreflectors
     "cargo box": 0.65,
     "skin": 0.50,
     "hair": 0.20,
     "trousers": 0.25,
 }
-"""Share of near infrared (905 nm) that each material sends back, assumed; paint and clothes have the road user's."""
+"""Assumed reflectivity of each material in the near infrared (905 nm); paint and clothes have that of the road user."""
 
 PAINT_COLOURS = (
     *((0.12, "black"), (0.24, "blue"), (0.34, "green"), (0.44, "red"), (0.56, "grey"), (0.70, "silver")),
     (1.00, "white"),
 )
-"""Up to which reflectivity paint and clothes are shown in which colour."""
+"""Colours of paint and clothes, each with the largest reflectivity that it is shown for."""
 
-KEPT_BODIES = 4096  # bodies that memory keeps for road users of one size, shape and paint
+KEPT_BODIES = 4096  # size of the cache of bodies by size, shape and paint
 
-PAINTED_MATERIALS = ("paint", "cloth")  # have the road user's reflectivity; in a body a colour follows: ``paint red``
+PAINTED_MATERIALS = ("paint", "cloth")  # with the road user's reflectivity; bodies add the colour: ``paint red``
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
     """The surface of a road user in its own axes; n triangles.
 
-    The origin is the middle of the underside; x points forward, y left, z up.
+    The origin is the centre of the underside; x points forward, y left, z up.
     Arrays are shared between road users of one size and cannot be written.
 
     Parameters
     ----------
     triangles : (n, 3, 3) float64, metres
-        Corners counter-clockwise seen from outside; closed parts that may reach into each other.
+        Corners, counter-clockwise as seen from outside; the closed parts of a body may intersect.
     reflectivity : (n,) float64, 0 to 1
+        Reflectivity of each triangle.
     material : (n,) str
         Keys of `scene.materials.COLOURS`.
     """
@@ -73,7 +74,7 @@ def fitted_body(user: RoadUser) -> Body:
     Raises
     ------
     SeipError
-        There is no such category, or no such size.
+        The category or the size is invalid.
     """
     if user.category not in CATEGORIES:
         raise SeipError(
@@ -106,9 +107,10 @@ def _painted(category: str, size: tuple[float, ...], shape: tuple[float, ...], p
 
 @functools.lru_cache(KEPT_BODIES)
 def _shaped(category: str, size: tuple[float, ...], shape: tuple[float, ...]) -> tuple[Float, Text]:
-    """Return the mesh of the model nearest in size, bent to a shape and stretched over the middle of its underside.
+    """Return the mesh of the model nearest in size, bent to a shape and scaled to the size.
 
-    The nearest is that whose length, width and height have to be stretched least, by the sum of squared logarithms.
+    The nearest model is the one whose length, width and height have to be scaled least, by the sum of squared
+    logarithms.
     """
     triangles, material = min(
         _models(category), key=lambda model: float((np.log(size / np.ptp(model[0], axis=(0, 1))) ** 2).sum())
@@ -128,7 +130,7 @@ def _models(category: str) -> list[tuple[Float, Text]]:
     """Return the triangles (n, 3, 3) and materials (n,) of every model of a category."""
     paths = sorted(path for path in MESHES.glob("*.obj") if path.name.split(".")[0] == category)
     if not paths:
-        raise SeipError(f"{MESHES} holds no mesh of a {category}; install the add-on again")
+        raise SeipError(f"{MESHES} has no mesh of a {category}; install the add-on again")
     return [read_mesh(path) for path in paths]
 
 
@@ -138,12 +140,14 @@ def read_mesh(path: Path) -> tuple[Float, Text]:
     Returns
     -------
     triangles : (n, 3, 3) float64, metres
+        Corners of the triangles.
     material : (n,) str
+        Material of each triangle.
 
     Raises
     ------
     SeipError
-        It is no mesh of triangles with a length, width and height, or names an unknown material.
+        The file is not a mesh of triangles with a length, width and height, or has an unknown material.
     """
     vertices: list[list[float]] = []
     faces: list[list[int]] = []
@@ -163,7 +167,7 @@ def read_mesh(path: Path) -> tuple[Float, Text]:
             raise SeipError(f"{path.name}: not all faces are triangles; export it triangulated")
         triangles = np.array(vertices)[np.array(faces)]
     except (OSError, ValueError, IndexError) as error:
-        raise SeipError(f"{path.name} is no Wavefront OBJ mesh ({error}); export it again") from error
+        raise SeipError(f"{path.name} is not a Wavefront OBJ mesh ({error}); export it again") from error
     if not (np.isfinite(triangles).all() and np.ptp(triangles, axis=(0, 1)).min() > 0.0):
         raise SeipError(f"{path.name} has no length, width and height; correct its vertices")
     unknown = set(material) - REFLECTIVITY.keys() - set(PAINTED_MATERIALS)

@@ -1,8 +1,8 @@
-"""SUMO's floating car data (FCD): where each road user was at each step of a simulation.
+"""SUMO's floating car data (FCD): the position of each road user at each step of a simulation.
 
-A vehicle's position is the middle of its front bumper, its angle is counted clockwise from north in degrees, and
-coordinates are those of the network: the map's plus the network's offset (SUMO's documentation, "FCDOutput"). A
-person's position is taken as the person's middle, as SUMO draws it.
+A vehicle's position is the centre of its front bumper, its angle is clockwise from north in degrees, and coordinates
+are those of the network: the map's plus the network's offset (SUMO's documentation, "FCDOutput"). A person's position
+is taken as the person's centre, as SUMO draws it.
 """
 
 import csv
@@ -27,8 +27,8 @@ from ...storage.xml_stream import Attributes, opened, quoted, read_tags, short
 from .trajectories import RoadUser, Trajectories
 from .vehicle_types import CAR, PERSON, VehicleType
 
-_MAX_NAMED = 5  # as many road users a message names; the others it counts
-_LINES_PER_REPORT = 20_000  # of csv between two reports of progress
+_MAX_NAMED = 5  # largest number of road users named in a message, which gives the number of the others
+_LINES_PER_REPORT = 20_000  # lines of csv between two reports of progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,20 +38,21 @@ class FloatingCarData:
     Parameters
     ----------
     names, types : tuple of str
-        Id and vehicle type of each; the type is empty where the file does not say.
+        Id and vehicle type of each road user; the type is "" if the file has none.
     person : (u,) bool
-        Whether it walks.
+        Whether each is a person on foot.
     first : (u + 1,) int64
         Samples of road user i are ``first[i]`` up to ``first[i + 1]``, one or more.
     time : (n,) float64, seconds
-        Strictly increasing for each road user.
+        Time of each sample, strictly increasing for each road user.
     position : (n, 3) float64, metres
-        Of the front bumper, or of the person, in map coordinates; z is NaN where the file does not say.
+        Position of the front bumper, or of the person, in map coordinates; z is NaN if the file has none.
     yaw : (n,) float64, radians
-        Counter-clockwise from +x, unwrapped.
+        Heading counter-clockwise from +x, unwrapped.
     speed : (n,) float64, metres per second
+        Speed at each sample.
     elsewhere : int
-        Further road users in the file that never come into the bounds.
+        Number of further road users in the file that are never within the bounds.
     """
 
     names: tuple[str, ...]
@@ -76,21 +77,21 @@ class Extent(NamedTuple):
 def read_floating_car_data(
     path: str | os.PathLike[str], net_offset: Float | None = None, window: Extent | None = None
 ) -> Generator[Progress, None, FloatingCarData]:
-    """Read floating car data, as XML or as csv (in either of SUMO's namings), packed with gzip or not.
+    """Read floating car data as XML or csv (with either of SUMO's column names), with or without gzip.
 
     Parameters
     ----------
     path : path-like
-        ``.xml`` or ``.csv``, perhaps with ``.gz``.
+        File that ends with ``.xml`` or ``.csv``, optionally followed by ``.gz``.
     net_offset : (2,) float64, metres, optional
-        Of the network: map = network − offset.
+        Offset of the network: map = network − offset.
     window : Extent, optional
-        What lies outside is not kept in memory.
+        Part of the file to keep in memory.
 
     Raises
     ------
     SeipError
-        The file cannot be read, is something else or unfinished, its times run backwards, or a number makes no sense.
+        The file cannot be read, has other contents or is incomplete, its times decrease, or a number is invalid.
     """
     rows = _Rows(Path(path).name, np.zeros(2) if net_offset is None else net_offset, window or Extent())
     suffixes = [suffix.lower() for suffix in Path(path).suffixes if suffix.lower() != ".gz"]
@@ -109,18 +110,18 @@ def read_trajectories(
     Parameters
     ----------
     types : mapping of str to VehicleType
-        As `read_vehicle_types` returns them.
+        Vehicle types by id, from `read_vehicle_types`.
     origin : (3,) float64, metres
         Map coordinates of the local origin.
     source : str
-        What the trajectories come from, for people.
+        Source of the trajectories, for messages.
 
     Returns
     -------
     trajectories : Trajectories
-        Not on the road yet: pitch is zero, and heights are those of the file, NaN where it does not say.
+        Trajectories that are not fitted to the road yet: pitch is zero, and heights are those of the file or NaN.
     warnings : tuple of str
-        Which road users have no size.
+        Warning about road users without a size.
 
     Raises
     ------
@@ -158,7 +159,7 @@ def read_trajectories(
 
 
 def listed(names: Sequence[str]) -> str:
-    """Return the first few names, and how many more there are."""
+    """Return the first few names, and the number of the others."""
     more = len(names) - _MAX_NAMED
     return ", ".join(short(name) for name in names[:_MAX_NAMED]) + (f" and {more} more" if more > 0 else "")
 
@@ -169,13 +170,14 @@ def unwrapped(yaw: Float, first: Integer) -> Float:
     Parameters
     ----------
     yaw : (n,) float64, radians
+        Headings.
     first : (u + 1,) int64
-        Where the samples of each road user begin.
+        Index of the first sample of each road user.
 
     Returns
     -------
     (n,) float64, radians
-        The first heading of each road user is as it was.
+        Unwrapped headings; the first one of each road user does not change.
     """
     if not len(yaw):
         return yaw
@@ -187,7 +189,7 @@ def unwrapped(yaw: Float, first: Integer) -> Float:
 
 
 class _Rows:
-    """Rows of a file as they come, in columns that stay small."""
+    """Reader of the rows of a file, which are stored in compact columns."""
 
     def __init__(self, file: str, net_offset: Float, window: Extent) -> None:
         self._file = file
@@ -202,7 +204,7 @@ class _Rows:
         self._columns = [array("d") for _ in range(6)]
 
     def take(self, tag: str, attributes: Attributes) -> None:
-        """Take an element of the XML file."""
+        """Read an element of the XML file."""
         if tag == "timestep":
             self.begin(attributes.get("time", ""))
         elif tag in ("vehicle", "person") and self._steps:
@@ -214,13 +216,13 @@ class _Rows:
         if time < self._time:
             raise SeipError(
                 f"{self._file}: times run backwards, {time:g} s comes after {self._time:g} s; "
-                "it must be the record of one simulation, in its order"
+                "use the output of a single simulation, in its order"
             )
         self._time = time
         self._steps += 1
 
     def add(self, row: Attributes, *, walks: bool) -> None:
-        """Add where a road user is."""
+        """Add the position of a road user."""
         if not self._window.begin <= self._time <= self._window.end:
             return
         name = row.get("id", "")
@@ -250,7 +252,9 @@ class _Rows:
     def gathered(self) -> FloatingCarData:
         """Return the rows by road user, in the order in which these appear."""
         if not self._steps:
-            raise SeipError(f"{self._file} is no floating car data: it has no time steps; name SUMO's --fcd-output")
+            raise SeipError(
+                f"{self._file} is not floating car data: it has no time steps; use the output of SUMO's --fcd-output"
+            )
         user = np.frombuffer(self._user, dtype=np.int64)
         order = np.argsort(user, kind="stable")
         user = user[order]
@@ -261,8 +265,8 @@ class _Rows:
         if twice.any():
             number = int(np.flatnonzero(twice)[0])
             raise SeipError(
-                f"{self._file}: road user {quoted(names[user[number]])} is there twice at {time[number]:g} s; "
-                "it must be the record of one simulation"
+                f"{self._file}: road user {quoted(names[user[number]])} appears twice at {time[number]:g} s; "
+                "use the output of a single simulation"
             )
         first = np.searchsorted(user, np.arange(len(names) + 1))
         return FloatingCarData(
@@ -284,7 +288,7 @@ class _Rows:
             value = math.nan
         if not abs(value) <= most:
             known = f" at {self._time:g} s" if math.isfinite(self._time) else ""
-            fault = f"is beyond {most:g}" if math.isfinite(value) else "is no number"
+            fault = f"is beyond {most:g}" if math.isfinite(value) else "is not a number"
             raise SeipError(
                 f"{self._file}: {what}={quoted(text)} of {quoted(where)}{known} {fault}; write the file again"
             )
@@ -300,8 +304,8 @@ def _read_csv(path: str | os.PathLike[str], rows: _Rows) -> Generator[Progress, 
             columns = next(csv.reader([header.strip()], delimiter=";" if ";" in header else ","), [])
             if "timestep_time" not in columns:
                 raise SeipError(
-                    f"{Path(path).name} is no floating car data: it has no column timestep_time; "
-                    "name what SUMO's --fcd-output or its xml2csv wrote"
+                    f"{Path(path).name} is not floating car data: it has no column timestep_time; "
+                    "use the output of SUMO's --fcd-output or of its xml2csv"
                 )
             for number, cells in enumerate(table):
                 if len(cells) not in {0, len(columns)}:  # a blank line has none
@@ -314,11 +318,11 @@ def _read_csv(path: str | os.PathLike[str], rows: _Rows) -> Generator[Progress, 
                 if number % _LINES_PER_REPORT == 0:
                     yield progress()
         except (UnicodeDecodeError, csv.Error) as error:
-            raise SeipError(f"{Path(path).name} is no csv table ({error}); write it again") from error
+            raise SeipError(f"{Path(path).name} is not a csv table ({error}); write it again") from error
 
 
 def _take_line(cells: Attributes, rows: _Rows) -> None:
-    """Take a line of the table: SUMO writes persons as vehicles without a lane, xml2csv in columns of their own."""
+    """Read a line of the table: SUMO writes persons as vehicles without a lane, xml2csv in separate columns."""
     rows.begin(cells["timestep_time"])
     if cells.get("person_id"):
         rows.add(_part(cells, "person_"), walks=True)
@@ -332,7 +336,7 @@ def _part(cells: Attributes, prefix: str) -> Attributes:
 
 
 def _paint(name: str) -> float:
-    """Return the reflectivity of a road user's paint: any from dark to white, always the same for the same name."""
+    """Return the reflectivity of a road user's paint, from dark to white; it depends on the name only."""
     share = int(digest(name)[:8], 16) / 0xFFFFFFFF
     return round(0.1 + 0.7 * share, 3)
 

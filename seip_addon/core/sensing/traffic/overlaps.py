@@ -10,7 +10,7 @@ from ...arrays import Float, Integer
 from ...progress import Progress
 from .trajectories import Snapshot, Trajectories
 
-MIN_OVERLAP = 0.02  # square metres of two footprints in one place below which they only touch
+MIN_OVERLAP = 0.02  # square metres; smaller overlaps of two footprints are only contact
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,8 +22,9 @@ class Overlaps:
     pair : (k, 2) int64
         Indices of road users, the smaller first.
     area : (k,) float64, square metres
-        The largest overlap of their footprints at any of the instants.
+        Largest overlap of their footprints at any of the instants.
     time : (k,) float64, seconds
+        Time of the largest overlap.
     """
 
     pair: Integer
@@ -47,12 +48,12 @@ def footprints(trajectories: Trajectories, snapshot: Snapshot) -> Float:
 
 
 def find_overlaps(trajectories: Trajectories, interval: float = 0.2) -> Generator[Progress, None, Overlaps]:
-    """Find road users that are in one place, looking every ``interval`` seconds.
+    """Find road users that overlap, at instants ``interval`` seconds apart.
 
     Returns
     -------
     Overlaps
-        In the order of the pairs.
+        Overlaps in the order of the pairs.
     """
     begin, end = trajectories.span
     instants = np.arange(begin, end + interval / 2.0, interval)
@@ -77,11 +78,12 @@ def find_overlaps(trajectories: Trajectories, interval: float = 0.2) -> Generato
 
 
 def without_overlaps(trajectories: Trajectories) -> Generator[Progress, None, tuple[Trajectories, tuple[str, ...]]]:
-    """Remove road users until no two overlap: first the one that overlaps most others, then the shortest present.
+    """Remove road users until no two overlap, each time the one with most overlaps, and among these the shortest stay.
 
     Returns
     -------
     trajectories : Trajectories
+        Trajectories of the others.
     names : tuple of str
         Names of the road users removed.
     """

@@ -1,19 +1,19 @@
-"""Which road users are parked, and where two runs have them in the same place."""
+"""Parked road users of runs, and parking bays that two runs share."""
 
 import numpy as np
 
 from ...arrays import Boolean
 from .trajectories import Trajectories
 
-MOST_DRIFT = 0.5  # metres along an axis that who is parked moves at most in a run
+MOST_DRIFT = 0.5  # largest movement of a parked road user along an axis during a run, metres
 
 _TIME_TOLERANCE = 1e-6  # seconds
 
 
 def parked_users(trajectories: Trajectories) -> Boolean:
-    """Return which road users stand from the first sample of a run to its last, (u,) bool.
+    """Return which road users stand still from the first sample of a run to the last, (u,) bool.
 
-    Who waits at a traffic light drives before or after that, in runs that are longer than a red light.
+    Road users at a traffic light move before or after it, in runs that are longer than a red light.
     """
     begin, end = trajectories.span
     first, last = trajectories.first[:-1], trajectories.first[1:] - 1
@@ -27,9 +27,9 @@ def parked_users(trajectories: Trajectories) -> Boolean:
 
 
 def shared_bays(one: Trajectories, other: Trajectories, radius: float) -> float:
-    """Return the share of the parked of a run that stand within so many metres of a parked one of another.
+    """Return the share of a run's parked road users within a radius, metres in plan, of a parked one of another run.
 
-    In plan; of the two runs the larger share, and nought where one of them has none.
+    It is the larger share of the two runs, and zero if one of them has no parked road users.
     """
     places = [run.position[run.first[:-1]][parked_users(run), :2] for run in (one, other)]
     if not all(map(len, places)):

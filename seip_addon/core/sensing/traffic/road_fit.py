@@ -16,40 +16,41 @@ from .smooth_walks import out_of_reach
 from .trajectories import LoadedTraffic, RoadUser, Trajectories
 
 ROAD_TOLERANCE = 1.0
-"""Metres in plan that the middle of a road user may be beside the road and still counts as on it.
+"""Largest distance in plan, metres, between the centre of a road user that is on the road and the road.
 
-As far as that a bus of 12 m, which simulations move like a rod on its lane, cuts a tight corner.
+A bus of 12 m, which simulations move like a rod on its lane, cuts a tight corner by up to this distance.
 """
 
-MAX_SAMPLES = 2_000  # of trajectories, by which they are told from those of another site
-WHEELBASE_SHARE = 0.6  # of the length of a vehicle: its pitch is that of the road between two axles this far apart
-MAX_GAP = 2.5  # sampling intervals; between samples further apart than this a road user was somewhere else
+MAX_SAMPLES = 2_000  # largest number of samples used to recognise traffic of another site
+WHEELBASE_SHARE = 0.6  # wheelbase as a share of a vehicle's length: its pitch is that of the road between the axles
+MAX_GAP = 2.5  # sampling intervals; if samples are farther apart, the road user was elsewhere in between
 
 _DIGITS = {"time": 3, "position": 3, "yaw": 4, "pitch": 4, "speed": 2}
-"""Of what is kept: a millimetre and a ten-thousandth of a radian, as fine as simulations write."""
+"""Decimal places of each array: a millimetre and a ten-thousandth of a radian, the precision of simulations."""
 
 
 def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> LoadedTraffic:
     """Fit road users to the road of a scene, leaving out samples off the road.
 
-    Vehicles stand on the roads, pedestrians on roads and pavements. Where surfaces lie above one another the one that
-    is nearest to the height in the trajectories counts, and the highest where they say none. A road user who leaves
-    the road or the scene and comes back, or whom the simulation puts somewhere else, is another one then: NAME/2.
+    Vehicles stand on roads, pedestrians on roads and pavements. If surfaces lie above one another, the one nearest to
+    the height in the trajectories is used, or the highest if there is no height. A road user who leaves the road or the
+    scene and comes back, or whom the simulation moves elsewhere, becomes another road user: NAME/2.
 
     Parameters
     ----------
     trajectories : Trajectories
-        Their heights may be NaN.
+        Trajectories whose heights may be NaN.
 
     Returns
     -------
     LoadedTraffic
-        In the local axes of the scene, to the millimetre, with pitches.
+        Trajectories in the local axes of the scene, rounded to the millimetre, with pitches.
 
     Raises
     ------
     SeipError
-        Nobody comes near the region of interest, or most who do are off the road there: it is another map's traffic.
+        No road user comes near the region of interest, or most of those who do are off the road: the traffic belongs to
+        another map.
     """
     local = trajectories.moved_to(geometry.origin)
     roads = _RoadSurface(joined(geometry.roads))
@@ -78,18 +79,18 @@ def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> LoadedTr
 def share_on_road(local: Trajectories, geometry: SceneGeometry) -> float:
     """Return the share of vehicle samples that are on the road of the scene, 0 to 1.
 
-    Samples are those near the region of interest; where no vehicle comes near it, those within the extent of the roads.
-    On the road is within `ROAD_TOLERANCE` in plan and in height.
+    Samples are those near the region of interest or, if no vehicle comes near it, those within the extent of the roads.
+    A sample within `ROAD_TOLERANCE` of the road, in plan and in height, is on it.
 
     Parameters
     ----------
     local : Trajectories
-        In the local axes of the scene.
+        Trajectories in the local axes of the scene.
 
     Returns
     -------
     float
-        Of at most `MAX_SAMPLES` samples, spread evenly; 1 without vehicles, and 0 where all of them are elsewhere.
+        Share among at most `MAX_SAMPLES` evenly spread samples; 1 without vehicles, and 0 if all of them are elsewhere.
     """
     user = np.repeat(np.arange(len(local)), np.diff(local.first))
     drives = np.array([each.category != "pedestrian" for each in local.users], dtype=np.bool_)[user]
@@ -130,7 +131,7 @@ class _RoadSurface:
 
 
 def _nearest_heights(count: int, point: Integer, heights: Float, hint: Float) -> Float:
-    """Of the heights found at points return for each the one nearest to its hint, or the highest where that is NaN."""
+    """Return for each point the height that is nearest to its hint, or the highest if the hint is NaN."""
     wanted = np.where(np.isnan(hint[point]), np.inf, hint[point])
     badness = np.where(np.isinf(wanted), -heights, np.abs(heights - wanted))
     order = np.lexsort((badness, point))
@@ -141,7 +142,7 @@ def _nearest_heights(count: int, point: Integer, heights: Float, hint: Float) ->
 
 
 def _pitch(height: Callable[[Float, Float], Float], plan: Float, z: Float, yaw: Float, length: Float) -> Float:
-    """Return the slope of the road between the axles, radians; where one of them is off the road, up to the middle."""
+    """Return the slope of the road between the axles, radians; the middle replaces an axle that is off the road."""
     half = WHEELBASE_SHARE / 2.0 * length
     ahead = half[:, None] * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
     front, rear = height(plan + ahead, z), height(plan - ahead, z)
@@ -152,7 +153,7 @@ def _pitch(height: Callable[[Float, Float], Float], plan: Float, z: Float, yaw: 
 
 
 def _off_the_road(local: Trajectories, user: Integer, near: Boolean, on_road: Boolean) -> tuple[str, ...]:
-    """Return warnings on road users off the road near the region; raise SeipError where most are."""
+    """Return warnings about road users off the road near the region; raise SeipError if most are."""
     count = len(local)
     seen = np.bincount(user[near], minlength=count)
     off = np.bincount(user[near & ~on_road], minlength=count)
@@ -209,7 +210,7 @@ def _without_gaps(trajectories: Trajectories, user: Integer, keep: Boolean) -> T
 
 
 def _longest_gap(trajectories: Trajectories) -> float:
-    """Return how many seconds may lie between two samples of one stay."""
+    """Return the longest time in seconds between two samples of one stay."""
     steps = np.delete(np.diff(trajectories.time), trajectories.first[1:-1] - 1)
     return MAX_GAP * float(np.median(steps)) if len(steps) else 0.0
 

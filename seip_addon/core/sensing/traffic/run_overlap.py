@@ -10,12 +10,12 @@ from ...arrays import Float
 from ...errors import SeipError
 from .trajectories import Trajectories
 
-MATCH_RADIUS = 1.0  # metres in plan within which two vehicles are in one place
+MATCH_RADIUS = 1.0  # metres in plan within which two vehicles are at the same place
 
 MAX_OVERLAP = 0.5
-"""Share of the vehicles beyond which two runs are held to be copies. Independent runs queue in the same places."""
+"""Share of the vehicles above which two runs are treated as copies. Independent runs have queues in the same places."""
 
-MOST_NAMED = 6  # pairs of runs that are named each; of more the range and the closest are said
+MOST_NAMED = 6  # largest number of pairs of runs that a message lists; for more it gives the range and the closest pair
 
 _INTERVAL = 1.0
 _SAME_TIME = 1e-3
@@ -28,11 +28,11 @@ class VehiclePositions:
     Parameters
     ----------
     name : str
-        Of the run, for messages.
+        Name of the run, for messages.
     time : (n,) float64, seconds
-        Ascending.
+        Times of the instants, ascending.
     xy : sequence of (k, 2) float64, metres
-        At each instant, in plan.
+        Positions in plan at each instant.
     """
 
     name: str
@@ -41,7 +41,7 @@ class VehiclePositions:
 
 
 def vehicle_positions(name: str, trajectories: Trajectories) -> VehiclePositions:
-    """Return where the vehicles of a run are at every full second; pedestrians are none."""
+    """Return the positions of the vehicles of a run, without pedestrians, at every full second."""
     begin, end = trajectories.span
     time = np.arange(np.ceil(begin / _INTERVAL), end / _INTERVAL + _SAME_TIME) * _INTERVAL
     rolls = np.array([user.category != "pedestrian" for user in trajectories.users], dtype=bool)
@@ -50,15 +50,15 @@ def vehicle_positions(name: str, trajectories: Trajectories) -> VehiclePositions
 
 
 def overlap_of(one: VehiclePositions, other: VehiclePositions) -> float | None:
-    """Return the share of the vehicles of a run that are within `MATCH_RADIUS` of one of the other at the same instant.
+    """Return the share of vehicles of a run within `MATCH_RADIUS` of one of the other run at the same instant.
 
-    Instants are the same by the clock, or as long after the first: the larger share counts,
-    and of the two runs that which has more of its vehicles in the other.
+    Instants are compared by time, and by time since the first instant. The result is the larger share of both
+    comparisons and of both runs.
 
     Returns
     -------
     float or None
-        None where the runs have no instant in common.
+        The share, or None if the runs have no instant in common.
     """
     if not len(one.time) or not len(other.time):
         return None
@@ -67,7 +67,7 @@ def overlap_of(one: VehiclePositions, other: VehiclePositions) -> float | None:
 
 
 def _aligned(one: VehiclePositions, other: VehiclePositions, shift: float) -> float | None:
-    """Return the share where the clock of the one is behind by so many seconds."""
+    """Return the share if the time of the first run is shifted by some seconds."""
     wanted = one.time + shift
     after = np.clip(np.searchsorted(other.time, wanted - _SAME_TIME), 0, len(other.time) - 1)
     both = np.flatnonzero(np.abs(other.time[after] - wanted) <= _SAME_TIME)
@@ -92,26 +92,27 @@ def _near(xy: Float, others: Float) -> int:
 
 
 def require_independent(pairs: Iterable[tuple[VehiclePositions, VehiclePositions]]) -> str:
-    """Return a sentence on how much the runs of each pair overlap.
+    """Return a message on the overlap of the runs of each pair.
 
     Raises
     ------
     SeipError
         A pair overlaps by more than `MAX_OVERLAP`.
     """
-    said, shares = [], []
+    messages, shares = [], []
     for one, other in pairs:
         share = overlap_of(one, other)
         if share is not None and share > MAX_OVERLAP:
             raise SeipError(
                 f"{one.name} and {other.name} are nearly the same traffic: {share:.0%} of the vehicles of one are "
-                f"within {MATCH_RADIUS:g} m of one of the other at the same instant, and {MAX_OVERLAP:.0%} is the most "
-                "for runs that are to be independent: name runs that were simulated with other demand and other seeds"
+                f"within {MATCH_RADIUS:g} m of one of the other at the same instant, and independent runs must be "
+                f"below {MAX_OVERLAP:.0%}: use runs that were simulated with different demand and different seeds"
             )
-        said.append(f"{one.name} and {other.name} {'cannot be told' if share is None else format(share, '.0%')}")
+        messages.append(f"{one.name} and {other.name} {'unknown' if share is None else format(share, '.0%')}")
         shares.append(-1.0 if share is None else share)
-    if len(said) > MOST_NAMED:
+    if len(messages) > MOST_NAMED:
         known = [share for share in shares if share >= 0.0] or [0.0]
-        said = [f"{min(known):.0%} to {max(known):.0%} in {len(said)} pairs, most of {said[int(np.argmax(shares))]}"]
+        closest = messages[int(np.argmax(shares))]
+        messages = [f"{min(known):.0%} to {max(known):.0%} in {len(messages)} pairs, most for {closest}"]
     measure = f"vehicles of one run within {MATCH_RADIUS:g} m of one of another at the same instant"
-    return f"runs of traffic are independent (below {MAX_OVERLAP:.0%}): {measure}: {', '.join(said)}"
+    return f"runs of traffic are independent (below {MAX_OVERLAP:.0%}): {measure}: {', '.join(messages)}"

@@ -1,4 +1,4 @@
-"""Smoothing of SUMO's pedestrians, who leap by a metre or two where a crossing begins, and turn on the spot."""
+"""Smoothing of SUMO's pedestrians, who jump by a metre or two at the beginning of a crossing, and turn on the spot."""
 
 from dataclasses import replace
 
@@ -8,14 +8,14 @@ from ...arrays import Boolean, Float
 from .trajectories import Trajectories
 
 WINDOW_SECONDS = 1.8  # seconds over which a pedestrian's position and heading are averaged
-MAX_LEAP = 4.0  # metres beyond what its speed explains: who moves further between two samples was put elsewhere
+MAX_LEAP = 4.0  # metres beyond what the speed explains; after a longer step a road user was moved elsewhere
 
 
 def out_of_reach(trajectories: Trajectories) -> Boolean:
-    """Return whether each of the n samples but the first, (n - 1,) bool, is out of reach from the one before.
+    """Return whether each of the n samples except the first, (n - 1,) bool, is out of reach from the one before.
 
-    The speeds at both are believed up to half as much again. The first sample of a road user is compared with the last
-    of the one before, which means nothing.
+    Speeds up to 1.5 times those at the two samples are possible. The first sample of a road user is compared with the
+    last one of the road user before; that result has no meaning.
     """
     step = np.hypot(*np.diff(trajectories.position[:, :2], axis=0).T)
     speed = np.maximum(trajectories.speed[1:], trajectories.speed[:-1])
@@ -26,7 +26,7 @@ def out_of_reach(trajectories: Trajectories) -> Boolean:
 def smooth_walks(trajectories: Trajectories) -> Trajectories:
     """Return the trajectories with pedestrians' positions in plan and headings averaged over `WINDOW_SECONDS`.
 
-    At the ends of a walk, and where a pedestrian was put somewhere else, the window shrinks to what is there.
+    At the ends of a walk, and where a pedestrian was moved elsewhere, the window is shortened to the available samples.
     """
     position, yaw = trajectories.position.copy(), trajectories.yaw.copy()
     leaps = np.flatnonzero(out_of_reach(trajectories)) + 1
@@ -41,7 +41,7 @@ def smooth_walks(trajectories: Trajectories) -> Trajectories:
 
 
 def _averaged(values: Float, reach: int) -> Float:
-    """Return the mean (n, d) of each row and as many on either side: ``reach``, or as many as there are on both."""
+    """Return the mean (n, d) of each row and ``reach`` rows on either side, or fewer where one side has fewer."""
     count = len(values)
     number = np.arange(count)
     reach_here = np.minimum(np.minimum(number, count - 1 - number), reach)

@@ -1,4 +1,4 @@
-"""Traffic for a scene, out of a user's files: trajectories, or SUMO's floating car data put on the road."""
+"""Traffic for a scene from a user's files: trajectories, or SUMO's floating car data fitted to the road."""
 
 import math
 from collections import Counter
@@ -19,8 +19,8 @@ from .sumo_files import read_net_offset
 from .trajectories import CATEGORIES, LoadedTraffic, Trajectories
 from .vehicle_types import read_vehicle_types
 
-MAX_REGION_DISTANCE = 500.0  # metres from the region beyond which traffic is another place's
-MIN_ON_ROAD = 0.98  # share of vehicle positions on the road below which traffic is another site's
+MAX_REGION_DISTANCE = 500.0  # metres from the region beyond which traffic belongs to another site
+MIN_ON_ROAD = 0.98  # share of vehicle positions on the road below which traffic belongs to another site
 ROAD_MARGIN = 20.0  # metres beyond the road of the scene within which traffic is read
 OVERLAP_INTERVAL = 1.0  # seconds between the instants that are searched for overlapping road users
 
@@ -36,9 +36,9 @@ class TrafficFiles:
     routes : tuple of path
         Files with the vehicle types, for floating car data.
     net : path, optional
-        The ``.net.xml``, which knows the offset from the map.
+        The ``.net.xml``, which contains the offset from the map.
     begin, end : float, seconds
-        What lies outside is left out of floating car data.
+        Time span of floating car data to read.
     """
 
     path: Path
@@ -49,7 +49,7 @@ class TrafficFiles:
 
     @property
     def trajectories(self) -> bool:
-        """Whether they are trajectories already."""
+        """Whether the files are trajectories already."""
         return self.path.suffix.lower() == ".npz"
 
 
@@ -59,7 +59,7 @@ def load_traffic(files: TrafficFiles, geometry: SceneGeometry) -> Generator[Prog
     Raises
     ------
     SeipError
-        A file cannot be read, or is of another place.
+        A file cannot be read, or belongs to another site.
     """
     if files.trajectories:
         yield Progress(0, 0, "trajectories")
@@ -97,14 +97,14 @@ def require_own_traffic(trajectories: Trajectories, geometry: SceneGeometry, nam
     Parameters
     ----------
     trajectories : Trajectories
-        In the scene's local axes.
+        Trajectories in the scene's local axes.
     name : str
-        Of the traffic, for messages.
+        Name of the traffic, for messages.
 
     Raises
     ------
     SeipError
-        Too many are off the road: it is traffic of another site, or the scene has changed since.
+        Too many vehicles are off the road: the traffic belongs to another site, or the scene has changed.
     """
     share = share_on_road(trajectories, geometry)
     if share < MIN_ON_ROAD:
@@ -117,14 +117,14 @@ def require_own_traffic(trajectories: Trajectories, geometry: SceneGeometry, nam
 def read_sumo(
     files: TrafficFiles, window: Extent, geometry: SceneGeometry, source: str
 ) -> Generator[Progress, None, LoadedTraffic]:
-    """Read floating car data with the sizes of its vehicles; not put on the road yet.
+    """Read floating car data with the sizes of its vehicles, without fitting it to the road.
 
     Parameters
     ----------
     geometry : SceneGeometry
-        Of the scene, for its origin and its map's header: SUMO counts the offset there as part of the network's own.
+        Geometry of the scene, for its origin and its map's header; SUMO includes the header's offset in the network's.
     source : str
-        What the trajectories come from, for people.
+        Source of the trajectories, for messages.
     """
     offset = (
         None if files.net is None else read_net_offset(files.net) + np.array(geometry.geo_reference.header_offset[:2])
@@ -135,27 +135,24 @@ def read_sumo(
 
 
 def overlap_warnings(trajectories: Trajectories) -> Generator[Progress, None, tuple[str, ...]]:
-    """Return a sentence where road users stand in one another."""
+    """Return a warning if road users overlap."""
     overlaps = yield from find_overlaps(trajectories, OVERLAP_INTERVAL)
     if not len(overlaps):
         return ()
     worst = int(overlaps.area.argmax())
     one, other = (trajectories.users[number].name for number in overlaps.pair[worst])
-    stand = counted(len(overlaps), "pair of road users stands", "pairs of road users stand")
-    sentence = (
-        f"{stand} in one another; {one} and {other} share {overlaps.area[worst]:.1f} m² at {overlaps.time[worst]:g} s"
-    )
-    return (sentence,)
+    pairs = counted(len(overlaps), "pair of road users overlaps", "pairs of road users overlap")
+    return (f"{pairs}; {one} and {other} share {overlaps.area[worst]:.1f} m² at {overlaps.time[worst]:g} s",)
 
 
 def road_bounds(geometry: SceneGeometry, margin: float) -> tuple[float, float, float, float]:
-    """Return the rectangle of the scene's road, and so many metres around it, in map coordinates."""
+    """Return the bounding rectangle of the scene's road with a margin in metres, in map coordinates."""
     road = joined(geometry.roads)[:, :, :2].reshape(-1, 2) + geometry.origin[:2]
     (left, low), (right, high) = road.min(axis=0) - margin, road.max(axis=0) + margin
     return float(left), float(low), float(right), float(high)
 
 
 def describe_categories(trajectories: Trajectories) -> str:
-    """Return how many road users there are of each category."""
+    """Return the number of road users of each category, as text."""
     counts = Counter(user.category for user in trajectories.users)
     return ", ".join(f"{counts[category]} {category}" for category in CATEGORIES if counts[category])

@@ -1,4 +1,4 @@
-"""What all files of SUMO have in common."""
+"""Offset of SUMO networks from their map."""
 
 import os
 from pathlib import Path
@@ -17,7 +17,7 @@ def read_net_offset(path: str | os.PathLike[str]) -> Float:
     Raises
     ------
     SeipError
-        The file cannot be read, or is no SUMO network.
+        The file cannot be read, or is not a SUMO network.
     """
     found: list[str] = []
 
@@ -31,6 +31,6 @@ def read_net_offset(path: str | os.PathLike[str]) -> Float:
     try:
         x, y = (float(number) for number in found[0].split(","))
     except (IndexError, ValueError) as error:
-        raise SeipError(f"{Path(path).name} is no SUMO network: it says no netOffset; name a .net.xml") from error
+        raise SeipError(f"{Path(path).name} is not a SUMO network: it has no netOffset; name a .net.xml") from error
     MAP_COORDINATE.require([x, y], Path(path).name, "netOffset", "name a .net.xml that netconvert wrote")
     return np.array([x, y])

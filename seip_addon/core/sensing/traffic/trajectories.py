@@ -16,8 +16,8 @@ from ...arrays import Float, Integer
 from ...storage.array_file import ArrayFile, ArrayRule, ContentError
 from ...storage.files import digest
 
-MAX_BEND = 0.6  # of the lines of a body along one axis
-MAX_EXTENT = 1e6  # metres from one sample to another at most, along each axis
+MAX_BEND = 0.6  # largest bend of the lines of a body along one axis
+MAX_EXTENT = 1e6  # largest distance between two samples along each axis, metres
 
 _ARRAYS = {
     "origin": ArrayRule("f8", (3,), limits.MAP_COORDINATE),
@@ -32,7 +32,7 @@ FILE = ArrayFile(
     "seip.trajectories", 2, "file of trajectories", "import or simulate them again", _ARRAYS, undigested=True
 )
 
-CATEGORIES = ("car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian")  # of road users
+CATEGORIES = ("car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian")  # categories of road users
 
 
 @dataclass(frozen=True)
@@ -42,15 +42,16 @@ class RoadUser:
     Parameters
     ----------
     name : str
-        Its id in the simulation.
+        Id in the simulation.
     category : str
         One of `CATEGORIES`.
     length, width, height : float, metres
+        Dimensions.
     paint : float, 0 to 1
-        Reflectivity of its painted parts, or of its clothes.
+        Reflectivity of the painted parts, or of the clothes.
     shape : (4,) float
-        How the lines of its body differ from those of its model: see `bent`. First two for the length, then two for
-        the height; the absolute values of each two add up to `MAX_BEND` at most.
+        Differences of the body's lines from those of the model, see `bent`: two numbers for the length and two for the
+        height. The absolute values of each pair add up to at most `MAX_BEND`.
     """
 
     name: str
@@ -63,16 +64,16 @@ class RoadUser:
 
 
 def bent(share: Float, shift: float, spread: float) -> Float:
-    """Return shares, 0 to 1, of a length moved along it: a cubic that keeps both ends and the order of all.
+    """Return shares, 0 to 1, of a length after a cubic shift along it, which keeps both ends and the order.
 
-    Its slope is 1 − |shift| − |spread| at least.
+    The slope of the cubic is at least 1 − |shift| − |spread|.
 
     Parameters
     ----------
     shift : float
-        Moves all shares forward, the middle by a quarter of this.
+        Shift of all shares forward; the middle moves by a quarter of this.
     spread : float
-        Moves shares below the middle back and those above it forward.
+        Shift of shares below the middle backward, and of those above it forward.
     """
     middle = 2.0 * share - 1.0
     moved: Float = share + share * (1.0 - share) * (shift + spread * middle)
@@ -86,15 +87,17 @@ class Snapshot:
     Parameters
     ----------
     time : float, seconds
+        Time of the instant.
     user : (k,) int64
         Index into the trajectories' road users, ascending.
     position : (k, 3) float64, metres
-        Middle of each road user's underside, on the road, local site axes.
+        Centre of each road user's underside, on the road, local site axes.
     yaw : (k,) float64, radians
-        Of its heading, counter-clockwise from +x.
+        Heading, counter-clockwise from +x.
     pitch : (k,) float64, radians
-        Of the road under it, nose up positive.
+        Pitch of the road under each road user, nose up positive.
     speed : (k,) float64, metres per second
+        Speed of each road user.
     """
 
     time: float
@@ -119,16 +122,17 @@ class Trajectories:
     first : (u + 1,) int64
         Samples of road user i are ``first[i]`` up to ``first[i + 1]``, one or more.
     time : (n,) float64, seconds
-        Strictly increasing for each road user.
+        Time of each sample, strictly increasing for each road user.
     position : (n, 3) float64, metres
-        Middle of the underside, on the road, local site axes.
+        Centre of the underside, on the road, local site axes.
     yaw : (n,) float64, radians
-        Counter-clockwise from +x and unwrapped: neighbouring samples never differ by more than π.
+        Heading counter-clockwise from +x, unwrapped: neighbouring samples never differ by more than π.
     pitch : (n,) float64, radians
-        Nose up positive.
+        Pitch, nose up positive.
     speed : (n,) float64, metres per second
+        Speed at each sample.
     source : str
-        What they were made from, for people: the file or the simulation and its seed.
+        Source for messages: the file, or the simulation and its seed.
     """
 
     users: tuple[RoadUser, ...]
@@ -146,7 +150,7 @@ class Trajectories:
 
     @cached_property
     def key(self) -> str:
-        """Digest of who moves how, whatever the road users and the source are called."""
+        """Digest of sizes and motion, which does not depend on the names of the road users and of the source."""
         sizes = [_look(user) for user in self.users]
         return digest(repr(sizes), self.first, self.time, self.position, self.yaw, self.pitch, self.speed)
 

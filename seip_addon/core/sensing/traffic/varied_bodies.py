@@ -11,10 +11,10 @@ from ...progress import Progress
 from .overlaps import find_overlaps
 from .trajectories import CATEGORIES, RoadUser, Trajectories
 
-CORRELATION = 0.5  # of any two dimensions of one kind of road user
-REACH = 2.0  # standard deviations from the mean that a drawn dimension lies at most
-MAX_CHANGE = 0.5  # share by which `resized` changes a dimension at most
-_HALVINGS = 3  # times that a growth which makes road users overlap is halved before it is given up
+CORRELATION = 0.5  # correlation of any two dimensions of one kind of road user
+REACH = 2.0  # largest distance of a drawn dimension from the mean, in standard deviations
+MAX_CHANGE = 0.5  # largest share by which `resized` changes a dimension
+_HALVINGS = 3  # number of times that a growth which causes an overlap is halved before it is dropped
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class BodyKind:
     Parameters
     ----------
     length, width, height : (mean, standard deviation), metres
-        Of normal distributions that are cut off `REACH` standard deviations from the mean.
+        Normal distribution of each dimension, cut off `REACH` standard deviations from the mean.
     """
 
     share: float
@@ -73,29 +73,28 @@ KINDS: Mapping[str, Mapping[str, BodyKind]] = {
         "child": BodyKind(0.12, (0.36, 0.04), (0.44, 0.03), (1.32, 0.09)),
     },
 }
-"""Spread of what drives and walks in European cities, riders included; by published dimensions of common models.
+"""Dimensions of vehicles and pedestrians in European cities, riders included, from published data of common models.
 
-Articulated vehicles are none of them: their bodies bend, and those here do not.
+Articulated vehicles are left out: their bodies bend, and those here do not.
 """
 
 SHAPES: Mapping[str, tuple[float, float, float, float]] = dict.fromkeys(CATEGORIES, (0.10, 0.06, 0.10, 0.06)) | {
     "car": (0.24, 0.10, 0.14, 0.08),
     "van": (0.20, 0.10, 0.12, 0.08),
 }
-"""Absolute value of each number of a shape at most: the foot of a car's windscreen lies up to 0.2 m elsewhere."""
+"""Largest absolute value of each number of a shape; it moves the foot of a car's windscreen by up to 0.2 m."""
 
 
 def varied(trajectories: Trajectories, seed: int) -> Generator[Progress, None, Trajectories]:
     """Give each road user a size and a shape of its own, drawn from `KINDS` and `SHAPES`.
 
-    One that is longer than any kind of its category keeps its size. One that
-    would run into another grows by less, down to its own size, so that in dense
-    traffic sizes are somewhat below those of the table.
+    A road user that is longer than any kind of its category keeps its size. One that would overlap another grows less,
+    or not at all, so that in dense traffic sizes are somewhat below those of the table.
 
     Parameters
     ----------
     seed : int, 0 or above
-        The same bodies for the same trajectories and seed.
+        Seed of the bodies.
     """
     random = _generator(seed)
     drawn = [_size_within_kinds(user, random) for user in trajectories.users]
@@ -103,7 +102,7 @@ def varied(trajectories: Trajectories, seed: int) -> Generator[Progress, None, T
 
 
 def shaped(trajectories: Trajectories, seed: int) -> Trajectories:
-    """Give each road user a shape of its own, and leave its size."""
+    """Give each road user a shape of its own, without changing its size."""
     random = _generator(seed, 1)
     return replace(
         trajectories,
@@ -114,9 +113,8 @@ def shaped(trajectories: Trajectories, seed: int) -> Trajectories:
 def resized(trajectories: Trajectories, change: float, seed: int) -> Generator[Progress, None, Trajectories]:
     """Multiply each dimension of each road user by a factor of its own, uniform from 1 − ``change`` to 1 + ``change``.
 
-    One that would run into another grows by less. A larger change of the same
-    seed changes each dimension the same way, and more; other traffic has other
-    factors.
+    A road user that would overlap another grows less. With the same seed, a larger change modifies each dimension in
+    the same direction, and more. Different traffic has different factors.
 
     Raises
     ------
@@ -131,17 +129,17 @@ def resized(trajectories: Trajectories, change: float, seed: int) -> Generator[P
 
 
 def with_sizes(trajectories: Trajectories, wanted: Float) -> Generator[Progress, None, Trajectories]:
-    """Give each road user a size; one that would run into another grows by less, down to its own size.
+    """Give each road user a size; one that would overlap another grows less, or not at all.
 
     Parameters
     ----------
     wanted : (u, 3) float64, metres
-        Length, width and height of each.
+        Length, width and height of each road user.
 
     Returns
     -------
     Trajectories
-        In which no two overlap that did not before.
+        Trajectories in which no two road users overlap that did not before.
     """
     users = trajectories.users
     own = np.array([_size(user) for user in users])

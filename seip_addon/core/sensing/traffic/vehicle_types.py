@@ -21,6 +21,7 @@ class VehicleType:
     category : str
         One of `seip_addon.core.sensing.traffic.CATEGORIES`.
     length, width, height : float, metres
+        Dimensions.
     """
 
     category: str
@@ -29,8 +30,8 @@ class VehicleType:
     height: float
 
 
-CAR = VehicleType("car", 5.0, 1.8, 1.5)  # what SUMO drives where nothing else is said
-PERSON = VehicleType("pedestrian", 0.215, 0.478, 1.719)  # what SUMO lets walk where nothing else is said
+CAR = VehicleType("car", 5.0, 1.8, 1.5)  # SUMO's default vehicle
+PERSON = VehicleType("pedestrian", 0.215, 0.478, 1.719)  # SUMO's default person
 
 _CLASSES = {
     "pedestrian": PERSON,
@@ -47,7 +48,7 @@ _CLASSES = {
     "coach": VehicleType("bus", 14.0, 2.6, 4.0),
     "tram": VehicleType("bus", 22.0, 2.4, 3.2),
 }
-"""Sizes that a vClass brings with it (SUMO's "Vehicle Type Parameter Defaults"); all others are cars."""
+"""Default sizes by vClass (SUMO's "Vehicle Type Parameter Defaults"); all other classes are cars."""
 
 _SHAPES_OF = {
     "pedestrian": ("pedestrian",),
@@ -58,7 +59,7 @@ _SHAPES_OF = {
     "truck": ("firebrigade", "truck", "truck/semitrailer", "truck/trailer"),
     "bus": ("bus", "bus/coach", "bus/flexible", "bus/trolley"),
 }
-"""Values of guiShape, which says more than the vClass where both are given, by category."""
+"""Values of guiShape by category; guiShape takes precedence over the vClass."""
 
 _SHAPES = {shape: category for category, shapes in _SHAPES_OF.items() for shape in shapes}
 
@@ -68,7 +69,7 @@ BUILT_IN = {
     "DEFAULT_PEDTYPE": PERSON,
     "DEFAULT_BIKETYPE": _CLASSES["bicycle"],
 }
-"""Types that SUMO knows without a file."""
+"""Types that SUMO defines without a file."""
 
 
 def read_vehicle_types(paths: Sequence[str | os.PathLike[str]]) -> Generator[Progress, None, dict[str, VehicleType]]:
@@ -77,17 +78,17 @@ def read_vehicle_types(paths: Sequence[str | os.PathLike[str]]) -> Generator[Pro
     Parameters
     ----------
     paths : sequence of path-like
-        XML, may be packed with gzip.
+        XML files, with or without gzip.
 
     Returns
     -------
     dict of str to VehicleType
-        By id, SUMO's own among them. What a type does not say is as in SUMO: by its vClass.
+        Types by id, SUMO's own included. Missing values are SUMO's defaults for the vClass.
 
     Raises
     ------
     SeipError
-        A file cannot be read, or a size in it makes no sense.
+        A file cannot be read, or contains an invalid size.
     """
     types = dict(BUILT_IN)
     for path in paths:
@@ -121,5 +122,5 @@ def _size(attributes: Attributes, what: str, usual: float, file: str) -> float:
         size = math.nan
     if not ROAD_USER_SIZE.allow(size):
         kind = quoted(attributes.get("id", ""))
-        raise SeipError(f"{file}: {what}={quoted(text)} of vType {kind} is no size in metres; correct it")
+        raise SeipError(f"{file}: {what}={quoted(text)} of vType {kind} is not a valid size in metres; correct it")
     return size

@@ -1,28 +1,25 @@
 r"""Beam culling: the rays of a scan that can return from near a target.
 
-Returns within δ of a target lie in its patch: an upright cylinder of radius δ
-about it, between the heights at which there is anything (`near_surfaces`). A
-channel of slope σ = tan φ is between these heights only at distances r in plan
-from r₁ to r₂, and the part of that annulus inside the cylinder, whose axis is L
-away, is an arc of azimuths about the target's. By the law of cosines its
-half-width is
+Returns within δ of a target lie in its patch: an upright cylinder of radius δ about it, between the heights at which
+there are surfaces (`near_surfaces`). A channel of slope σ = tan φ is between these heights only at distances r in plan
+from r₁ to r₂. The part of that annulus inside the cylinder, whose axis is at the distance L, is an arc of azimuths
+about the target's. By the law of cosines its half-width is
 
 .. math::
 
     Δ = \arccos \frac{L^2 + r^2 - δ^2}{2 L r},
     \quad r = \operatorname{clip}\left(\sqrt{L^2 - δ^2}, r_1, r_2\right)
 
-That is a first bound, quick for all targets. The second takes each surface about
-a target by itself: the disc that the ball of radius δ cuts out of its plane has a
-cylinder and heights of its own, and a beam that meets the plane n·x = k at a
-distance r from the sensor does so where
+That is a first bound, quick to compute for all targets. The second bound treats each surface near a target separately:
+the disc that the ball of radius δ cuts out of its plane has a cylinder and heights of its own, and a beam meets the
+plane n·x = k at a distance r in plan where
 
 .. math::
 
     n_{xy} \cos(a - a_n) + n_z σ = k / r,
 
-a being the beam's azimuth and n_xy and a_n length and azimuth of the normal in
-plan. With r₁ ≤ r ≤ r₂ that leaves two arcs, one on each side of a_n.
+Here a is the beam's azimuth, and n_xy and a_n are length and azimuth of the normal in plan. With r₁ ≤ r ≤ r₂ that
+leaves two arcs, one on each side of a_n.
 """
 
 from __future__ import annotations
@@ -39,24 +36,25 @@ from ..lidar.model import DetectionLaw, LidarModel
 from .near_surfaces import NearSurfaces
 from .settings import VisibilitySettings
 
-_MARGIN = 1e-9  # radians; a ray too many costs a cast, a ray too few a wrong grid
+_MARGIN = 1e-9  # radians; one ray too many costs a cast, one too few makes the grid wrong
 
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Patches: where returns near targets can lie, as seen from one position.
+    """Patches: regions in which returns near targets can lie, as seen from one position.
 
     Parameters
     ----------
     target : (p,) int64
         Target of each patch, ascending.
     azimuth : (p,) float64, radians
-        Of the cylinder's axis, counter-clockwise from +x.
+        Azimuth of the cylinder's axis, counter-clockwise from +x.
     distance : (p,) float64, metres
-        Of the axis in plan.
+        Distance of the axis in plan.
     radius : (p,) float64, metres
+        Radius of the cylinder.
     bottom, top : (p,) float64, metres
-        Heights relative to the place; bottom > top where no return is possible.
+        Heights relative to the position; bottom > top where no return is possible.
     """
 
     target: Integer
@@ -69,16 +67,18 @@ class Patches:
 
 @dataclass(frozen=True, eq=False)
 class Planes:
-    """The planes in which returns of patches lie, as seen from one place.
+    """The planes in which returns of patches lie, as seen from one position.
 
     Parameters
     ----------
     normal : (p, 3) float64
-        Unit normals, which point away from the place.
+        Unit normals, which point away from the position.
     distance : (p,) float64, metres
+        Distance of each plane from the position.
     reflectivity : (p,) float64, 0 to 1
+        Reflectivity of each surface.
     tolerance : float, metres
-        How far returns may lie off their plane.
+        Largest distance of returns from their plane.
     """
 
     normal: Float
@@ -89,28 +89,30 @@ class Planes:
 
 @dataclass(frozen=True, eq=False)
 class Beams:
-    """The channels of all sensors at one place, one after the other.
+    """The channels of all sensors at one position, one after the other.
 
     Parameters
     ----------
     sensor : (c,) int64
         Number of the sensor that has the channel.
     elevation : (c,) float64, radians
+        Elevation of the channel.
     zero : (c,) float64, radians
         Azimuth of step 0.
     steps : (c,) int64
         Azimuth steps of a revolution or frame.
     size : (c,) float64, radians
-        Of a step.
+        Size of a step.
     all_round : (c,) bool
         Whether step 0 follows the last one.
     first_ray : (c,) int64
         Number of the ray at step 0. Rays of the same direction have the same number.
     min_range, max_range : (c,) float64, metres
+        Range of the sensor.
     rays : int
-        How many numbers there are.
+        Number of different rays.
     least : tuple of (law, float)
-        Of each sensor, by which law how strong a return must be; see `VisibilitySettings.least_strength`.
+        Detection law and least strength of a return for each sensor; see `VisibilitySettings.least_strength`.
     """
 
     sensor: Integer
@@ -127,15 +129,17 @@ class Beams:
 
     @classmethod
     def of(cls, models: Sequence[LidarModel], yaw: float, settings: VisibilitySettings) -> Beams:
-        """Join the channels of models that look along the same yaw.
+        """Join the channels of models that have the same yaw.
 
-        Channels coincide whose elevation, azimuth offset, number of steps and field of view are the same.
+        Channels with the same elevation, azimuth offset, number of steps and field of view have the same rays.
         """
         channels = [model.channels for model in models]
         elevation = np.concatenate([model.elevations for model in models])
         offset = np.concatenate([model.azimuth_offsets for model in models])
         steps = np.repeat([model.azimuth_count for model in models], channels)
         view = np.repeat([model.field_of_view for model in models], channels)
+        # Sensors of one family differ in range or sensitivity and have the same beams. Numbering rays by distinct
+        # channels lets such sensors share each cast ray.
         kinds, kind = np.unique(np.column_stack([elevation, offset, steps, view]), axis=0, return_inverse=True)
         end = np.cumsum(kinds[:, 2].astype(np.int64))
         return cls(
@@ -153,14 +157,16 @@ class Beams:
         )
 
     def reach(self, sensor: int, planes: Planes) -> Float:
-        r"""Return how far a sensor's returns off planes can be to count, (p,) float64, metres.
+        r"""Return the distance up to which returns from planes are strong enough for a sensor, (p,) float64, metres.
 
-        Of a plane at the distance k, a return at the distance d lies off it by the tolerance ε at most. A ray that
-        meets the plane at r has the cosine k / r, so that d differs from r by a share x = ε / k at most.
+        A return lies off its plane, at the distance k, by at most the tolerance ε. A ray that meets the plane at r has
+        the cosine k / r, so that the distance of the return differs from r by at most the share x = ε / k.
         """
         law, least = self.least[sensor]
         if least == 0:
             return np.full(len(planes.distance), np.inf)
+        # A plane nearer than the tolerance gives x = 1 and an infinite reach: nothing is culled there. A quotient
+        # without a value (0/0, inf - inf) is also taken as infinite. Errors are only allowed on this side.
         share = planes.tolerance / np.maximum(planes.distance, planes.tolerance)
         with np.errstate(divide="ignore", invalid="ignore"):
             slack = (1 + share) / (1 - share) * (1 + _MARGIN)
@@ -179,13 +185,13 @@ class NearRays:
     patch : (k,) int64
         Patch of each bundle.
     channel : (k,) int64
-        Of the beams.
+        Channel of each bundle, as in `Beams`.
     first : (k,) int64
-        First azimuth step; where the channel goes all round possibly negative or beyond the revolution.
+        First azimuth step; it may be negative or beyond the revolution if the channel goes all round.
     width : (k,) int64
         Number of steps, at least 1.
     miss : (k,) float64, metres
-        How far before or behind the middle of the patch the channel comes down.
+        Distance in plan between the middle of the patch and the middle of the channel's part in it.
     """
 
     target: Integer
@@ -213,8 +219,9 @@ class NearRays:
         Parameters
         ----------
         sensor : (c,) int64
-            Which sensor has which channel.
+            Sensor of each channel.
         """
+        # grouped minimum: one number for each pair of sensor and target; of equal bundles the first is taken
         number = sensor[self.channel] * (self.target.max(initial=0) + 1) + self.target
         least = np.full(number.max(initial=0) + 1, np.inf)
         np.minimum.at(least, number, self.miss)
@@ -222,7 +229,8 @@ class NearRays:
         return self.pick(best[np.unique(number[best], return_index=True)[1]])
 
     def beside_middle(self) -> tuple[NearRays, Integer]:
-        """Return what is left and right of the middle rays, and of which bundle each is a part."""
+        """Return the halves to the left and right of the middle rays, and the bundle of which each is a part."""
+        # bundles of one ray have no halves and end here; those of two have one
         before = (self.width - 1) // 2
         after = self.width - 1 - before
         right, left = np.flatnonzero(before), np.flatnonzero(after)
@@ -234,13 +242,16 @@ class NearRays:
 
 
 def may_return(origin: Float, surfaces: NearSurfaces, beams: Beams) -> Boolean:
-    """Return of which targets returns can be strong enough for a sensor, (models, t) bool: for few others.
+    """Return the targets from which returns can be strong enough for each sensor, (models, t) bool.
+
+    It is true for all of these, and for few others.
 
     Parameters
     ----------
     origin : (3,) float64, metres
+        Position of the sensors.
     beams : Beams
-        Of the sensors there.
+        Channels of the sensors.
     """
     may = np.zeros((len(beams.least), len(surfaces.xyz)), dtype=bool)
     if not any(least > 0 for _, least in beams.least):
@@ -253,7 +264,7 @@ def may_return(origin: Float, surfaces: NearSurfaces, beams: Beams) -> Boolean:
 
 
 def target_patches(origin: Float, surfaces: NearSurfaces, wanted: Boolean) -> Patches:
-    """Return the patches of wanted targets as seen from a place; see `disc_patches`."""
+    """Return the patches of the wanted targets as seen from a position; see `disc_patches`."""
     target = np.flatnonzero(wanted)
     azimuth, distance = _polar(surfaces.xyz[target] - origin)
     radius = np.full(len(distance), surfaces.radius)
@@ -263,12 +274,14 @@ def target_patches(origin: Float, surfaces: NearSurfaces, wanted: Boolean) -> Pa
 
 
 def disc_patches(origin: Float, surfaces: NearSurfaces, wanted: Boolean) -> tuple[Patches, Planes]:
-    """Return a patch for each surface about wanted targets, as seen from a place.
+    """Return a patch for each surface near the wanted targets, as seen from a position.
 
     Parameters
     ----------
     origin : (3,) float64, metres
+        Position of the sensors.
     wanted : (t,) bool
+        Targets to return patches for.
     """
     discs = surfaces.discs
     pick = np.flatnonzero(wanted[discs.target])
@@ -287,15 +300,16 @@ def near_rays(beams: Beams, patches: Patches, planes: Planes | None = None) -> N
     Parameters
     ----------
     patches : Patches
-        As seen from the sensors.
+        Patches as seen from the sensors.
     planes : Planes, optional
-        Of the patches, where they are known.
+        Plane of each patch, for the tighter bound.
 
     Returns
     -------
     NearRays
-        All that can, and few that cannot.
+        All rays that can return from a patch, and few that cannot.
     """
+    # Strength first: it shortens distances, from which the arcs on the plane follow.
     arcs = _arcs(beams, patches)
     if planes is not None:
         arcs = _cut_by_planes(_cut_by_strength(arcs, beams, planes), planes)
@@ -314,7 +328,7 @@ def near_rays(beams: Beams, patches: Patches, planes: Planes | None = None) -> N
 
 @dataclass(frozen=True, eq=False)
 class _Arcs:
-    """Azimuths about ``azimuth`` and distances in plan at which a channel is within a patch, all (k,)."""
+    """Arcs in which a channel is within a patch: azimuths about ``azimuth``, and distances in plan; arrays (k,)."""
 
     patch: Integer
     channel: Integer
@@ -329,19 +343,27 @@ class _Arcs:
 
 
 def _arcs(beams: Beams, patches: Patches) -> _Arcs:
+    """Return the arcs of all pairs of patch and channel that can meet."""
     patch, channel = _channels_at(beams, patches)
     slope, distance, radius = np.tan(beams.elevation)[channel], patches.distance[patch], patches.radius[patch]
     begin, end = _between_heights(slope, patches.bottom[patch], patches.top[patch])
-    begin = np.fmax(begin, np.maximum(distance - radius, 0.0)) + 0.0  # of 0.0 and -0.0 the greater may be either
+    # fmax and fmin ignore NaN, the value of level beams within the heights: for these only the cylinder limits r.
+    # Adding 0.0 makes -0.0 positive, as either may be taken as the greater of both, and the sign matters in quotients
+    # below.
+    begin = np.fmax(begin, np.maximum(distance - radius, 0.0)) + 0.0
     end = np.fmin(end, distance + radius)
     half_width = _half_width(distance, begin, end, radius)
+    # The range is measured along the ray, from `begin` at least to the far end at the greatest depth at most: both
+    # tests keep an arc if any of it may be within range.
     depth = np.maximum(np.abs(patches.bottom), np.abs(patches.top))[patch]
     in_range = (begin <= beams.max_range[channel]) & (np.hypot(end, depth) >= beams.min_range[channel])
     return _Arcs(patch, channel, slope, begin, end, patches.azimuth[patch], half_width).pick((begin <= end) & in_range)
 
 
 def _channels_at(beams: Beams, patches: Patches) -> tuple[Integer, Integer]:
-    """Return pairs of patches and of channels that somewhere in the cylinder are at the patch's height."""
+    """Return pairs of patches and of channels that are at the patch's heights somewhere in the cylinder."""
+    # The slopes from the sensor to the patch's edges, each at the side of the cylinder where it is most extreme.
+    # Channels between these slopes are one slice of all channels sorted by elevation.
     near = np.maximum(patches.distance - patches.radius, 0.0)
     far = patches.distance + patches.radius
     with np.errstate(divide="ignore"):
@@ -356,7 +378,7 @@ def _channels_at(beams: Beams, patches: Patches) -> tuple[Integer, Integer]:
 
 
 def _between_heights(slope: Float, bottom: Float, top: Float) -> tuple[Float, Float]:
-    """Distances in plan at which a beam enters and leaves heights; NaN where it always is between them."""
+    """Return the distances in plan at which a beam enters and leaves heights; NaN where it is always between them."""
     slope = slope + 0.0  # the slope of a level beam may be -0.0, whose quotients have the wrong sign
     with np.errstate(divide="ignore", invalid="ignore"):
         at_bottom, at_top = bottom / slope, top / slope
@@ -364,7 +386,9 @@ def _between_heights(slope: Float, bottom: Float, top: Float) -> tuple[Float, Fl
 
 
 def _half_width(distance: Float, begin: Float, end: Float, radius: Float) -> Float:
-    """Half the arc of an annulus within a circle; π from within the circle."""
+    """Return half the arc of an annulus within a circle; π from within the circle."""
+    # Seen from outside, a circle is widest at the tangent length √(L² - δ²). If the annulus does not contain that, the
+    # arc is widest at the end of the annulus that is nearer to it.
     widest = np.clip(np.sqrt(np.maximum(distance**2 - radius**2, 0.0)), begin, end)
     outside = distance > radius
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -373,7 +397,8 @@ def _half_width(distance: Float, begin: Float, end: Float, radius: Float) -> Flo
 
 
 def _cut_by_strength(arcs: _Arcs, beams: Beams, planes: Planes) -> _Arcs:
-    """Leave of each arc what is near enough for a return to be strong enough."""
+    """Return the part of each arc that is near enough for a return to be strong enough."""
+    # the reach is along the ray, the ends of arcs are in plan: their ratio is √(1 + σ²)
     sensor = beams.sensor[arcs.channel]
     end = arcs.end
     for number, (_, least) in enumerate(beams.least):
@@ -384,9 +409,14 @@ def _cut_by_strength(arcs: _Arcs, beams: Beams, planes: Planes) -> _Arcs:
 
 
 def _cut_by_planes(arcs: _Arcs, planes: Planes) -> _Arcs:
-    """Leave of each arc what can meet the patch's plane: all of it, or a part on each side of the normal."""
+    """Return the part of each arc that can meet the patch's plane: all of it, or a part on each side of the normal."""
+    # From n_xy cos(a - a_n) + n_z σ = k / r with r in [begin, end] and k within the tolerance: cos(a - a_n) lies
+    # between (k_min / end - n_z σ) / n_xy and (k_max / begin - n_z σ) / n_xy. For a negative k_min the smallest
+    # quotient is at the smallest r. arccos falls, so that the lower limit gives the outer angle from a_n, the upper one
+    # the inner.
     distance, normal = planes.distance[arcs.patch], planes.normal[arcs.patch]
     direction, level = _polar(normal)
+    # level planes have no azimuth: the bound keeps the division finite, and the clipped cosines leave all or nothing
     level = np.maximum(level, _MARGIN)
     nearest, farthest = distance - planes.tolerance, distance + planes.tolerance
     climb = normal[:, 2] * arcs.slope
@@ -396,12 +426,14 @@ def _cut_by_planes(arcs: _Arcs, planes: Planes) -> _Arcs:
     outer = np.arccos(np.clip((least - climb) / level, -1, 1)) + _MARGIN
     inner = np.arccos(np.clip((most - climb) / level, -1, 1)) - _MARGIN
     half_width = (outer - inner) / 2
-    # an arc so wide that a part could meet it beyond both of its ends is left whole
+    # A part so wide that it could reach the arc across both of its ends would be cut at one of them only: such arcs are
+    # kept whole, which costs rays but loses none. An arc that no azimuth fits is dropped.
     whole = (half_width > math.pi / 2 - _MARGIN) | (half_width + arcs.half_width >= math.pi)
     possible = ((most - climb) >= -level) & ((least - climb) <= level)
     parts = [arcs.pick(whole & possible)]
     for side in (-1, 1):
         middle = direction + side * (outer + inner) / 2
+        # the two intervals of azimuths are intersected relative to the arc's middle, within ±π
         apart = (middle - arcs.azimuth + math.pi) % (2 * math.pi) - math.pi
         right = np.maximum(apart - half_width, -arcs.half_width)
         left = np.minimum(apart + half_width, arcs.half_width)
@@ -411,11 +443,11 @@ def _cut_by_planes(arcs: _Arcs, planes: Planes) -> _Arcs:
 
 
 def _polar(xyz: Float) -> tuple[Float, Float]:
-    """Azimuth and length in plan of vectors (n, 3)."""
+    """Return azimuth and length in plan of vectors (n, 3)."""
     return np.arctan2(xyz[:, 1], xyz[:, 0]), np.hypot(xyz[:, 0], xyz[:, 1])
 
 
 def counted(first: Integer, count: Integer) -> Integer:
-    """Return first, first + 1, … for each pair of a first number and a count, one after the other."""
+    """Return the concatenated ranges of ``count`` whole numbers from each ``first`` on."""
     numbers: Integer = np.arange(count.sum()) + np.repeat(first - (np.cumsum(count) - count), count)
     return numbers

@@ -31,7 +31,7 @@ class Rows:
     packed : (k, ceil(t / 8)) uint8
         Visibility of t targets from each pose, packed along axis 1 by `numpy.packbits`.
     rays : int
-        How many rays were cast for it.
+        Number of rays cast for these rows.
     """
 
     packed: NDArray[np.uint8]
@@ -41,13 +41,14 @@ class Rows:
 def compute_rows(
     model: VisibilityModel, candidates: Candidates, models: Mapping[str, LidarModel], poses: Integer
 ) -> Rows:
-    """Compute which targets some candidate poses see.
+    """Compute the targets that some candidate poses see.
 
     Parameters
     ----------
     models : mapping of str to LidarModel
-        At least those that the candidates name.
+        Sensor types by catalogue key, those of all candidates included.
     poses : (k,) int64
+        Indices of the poses.
     """
     packed = np.zeros((len(poses), (model.targets + 7) // 8), dtype=np.uint8)
     rays = 0
@@ -74,7 +75,7 @@ def sharing_rays(xyz: Float, yaw: Float, tilt: Float) -> list[Integer]:
     Returns
     -------
     list of (k,) int64
-        In the order of their first poses.
+        Indices of the poses of each group, in the order of their first poses.
     """
     _, first, place = np.unique(np.column_stack([xyz, yaw, tilt]), axis=0, return_index=True, return_inverse=True)
     rank = np.argsort(np.argsort(first))[place.ravel()]
@@ -90,7 +91,7 @@ def chunks_of(site: Site) -> list[Integer]:
 
 
 class Checkpoint(Protocol):
-    """Storage in which finished chunks outlive an interruption."""
+    """Storage that keeps finished chunks after an interruption."""
 
     def load(self, number: int) -> Rows | None:
         """Return a stored chunk, or None."""
@@ -109,14 +110,14 @@ def compute_chunks(
     chunks : sequence of (k,) int64
         Candidate poses.
     submit : callable
-        Starts the work on one chunk.
+        Function that starts the work on one chunk.
     checkpoint : Checkpoint, optional
-        Chunks in it are not computed again; those that are finished are added.
+        Storage of finished chunks. Chunks in it are not computed again; new ones are added.
 
     Returns
     -------
     list of Rows
-        One for each chunk.
+        Rows of each chunk.
     """
     loaded = {number: checkpoint.load(number) for number in range(len(chunks))} if checkpoint else {}
     rows = {number: found for number, found in loaded.items() if found and len(found.packed) == len(chunks[number])}
@@ -132,20 +133,22 @@ def collect(
     what: str,
     keep: Callable[[int, Result], None] | None = None,
 ) -> Generator[Progress, None, None]:
-    """Compute the chunks without a result, and add theirs; closing the generator cancels what has not begun.
+    """Compute the chunks that have no result yet and add their results.
+
+    Closing the generator cancels chunks that have not started.
 
     Parameters
     ----------
     chunks : sequence of (k,) int64
         Candidate poses.
     submit : callable
-        Starts the work on one chunk.
+        Function that starts the work on one chunk.
     results : dict of int to result
-        By the number of the chunk; those of this call are added.
+        Results by the number of the chunk; those of this call are added.
     what : str
-        What progress is called.
+        Name of the work in progress messages.
     keep : callable, optional
-        Called with each number and result as soon as it is there.
+        Function that is called with the number and the result of each chunk as soon as it is finished.
     """
     total = sum(map(len, chunks))
     done = sum(len(chunks[number]) for number in results)

@@ -1,9 +1,8 @@
 """Estimate of a visibility grid's run time and memory, from its first candidates.
 
-What comes before the first ray is done and timed; then a few places drawn by lot
-are looked from, on as many threads as the whole would run on. Their pace is that
-of the whole: places differ by the rays that reach targets and by what stands about
-them, both of which the lot averages out.
+The work before the first ray is done and timed. Then a random sample of positions is computed, on the number of threads
+that the whole grid would use. Positions differ by the number of rays that reach targets and by their surroundings; the
+sample averages over both, so that its speed is that of the whole grid.
 """
 
 from __future__ import annotations
@@ -31,9 +30,9 @@ SAMPLING_SECONDS = 0.8
 """Seconds for sampled positions beyond the first of each thread."""
 
 _BYTES_PER_TRIANGLE = {"embree": 750, "bvh": 1100}
-"""At the peak, while the ray caster is built; measured on a street of a million triangles."""
+"""Peak memory, while the ray caster is built; measured on a street of a million triangles."""
 _BYTES_PER_RAY_AND_POSITION = 160
-"""Of a place under way: directions, points, triangles and the bundles beside them."""
+"""Memory of a position in work: directions, points, triangles and bundles."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +42,13 @@ class Estimate:
     Parameters
     ----------
     places, poses, targets, triangles : int
-        Places are poses that differ in more than the sensor; triangles those that rays are cast against.
+        Numbers of each. Poses at one place differ only in the sensor; triangles are those that rays are cast against.
     rays : int
-        How many will be cast.
+        Number of rays to cast.
+    seconds : float
+        Run time.
     memory : int, bytes
-        In addition to what the scene itself takes.
+        Memory in addition to that of the scene.
     """
 
     places: int
@@ -67,28 +68,31 @@ def estimate_visibility(
     threads: int | None = None,
     seed: int = 0,
 ) -> Generator[Progress, None, Estimate]:
-    """Estimate what `compute_visibility` will take.
+    """Estimate the run time and memory of `compute_visibility`.
 
     Parameters
     ----------
     engine : {"auto", "bvh", "embree"}
+        Ray-casting engine.
     threads : int, optional
-        How many work at once at most.
+        Maximum number of threads.
     seed : int
-        Of the lot that draws the sample.
+        Seed of the random sample.
 
     Yields
     ------
     Progress
+        Progress of the sample.
 
     Returns
     -------
     Estimate
+        Run time, memory and numbers of rays.
 
     Raises
     ------
     SeipError
-        As for `compute_visibility`.
+        Same as for `compute_visibility`.
     """
     yield Progress(0, 2, "triangles for the estimate", counted=False)
     began = time.perf_counter()
@@ -117,12 +121,10 @@ def estimate_visibility(
 
 
 def _spread_lot(count: int, seed: int) -> list[int]:
-    """Return numbers below a count in an order drawn by lot, the first few of which are spread evenly over them all.
+    """Return the numbers below a count in a random order of which every beginning is spread evenly.
 
-    Places are in the order of positions, heights and tilts, so that an even sample has near and far ones, high and low
-    ones, upright and tilted ones.
-    Multiples of the golden ratio modulo 1 are spread so, from
-    whatever start.
+    Places are in the order of positions, heights and tilts, so that an even sample has near and far, high and low,
+    upright and tilted ones. Multiples of the golden ratio modulo 1 are spread evenly from any start.
     """
     start = np.random.default_rng(seed).random()
     spread = (start + np.arange(2 * count) * ((math.sqrt(5) - 1) / 2)) % 1.0
@@ -139,9 +141,9 @@ class _Sample:
 def _compute_from(
     drawn: Sequence[Integer], submit: Callable[[Integer], Future[Rows]]
 ) -> Generator[Progress, None, _Sample]:
-    """Compute visibility from the first of some positions, then from as many more as there is time for.
+    """Compute visibility from the first few positions, then from others in the time that is left.
 
-    The second batch alone counts where it is the larger one: the first pays for what later places find ready.
+    If the second batch is the larger one, only it is used: the first one includes work that is done once.
     """
     first = yield from _timed(drawn[:_FIRST_POSITIONS], submit)
     more = math.floor(SAMPLING_SECONDS / first.seconds * first.places)
@@ -151,7 +153,7 @@ def _compute_from(
     return (yield from _timed(rest, submit))
 
 
-_FIRST_POSITIONS = 4  # places: at least one for each thread
+_FIRST_POSITIONS = 4  # at least one position for each thread
 
 
 def _timed(some: Sequence[Integer], submit: Callable[[Integer], Future[Rows]]) -> Generator[Progress, None, _Sample]:

@@ -23,7 +23,7 @@ from .visibility_model import VisibilityModel
 Submit = Callable[[Integer], Future[Rows]]
 """Submits the pose indices of a chunk, (n,) int64; the future holds their rows of the grid."""
 
-_RAYS_BETWEEN_CHECKS = 1 << 15  # at most a tenth of a second's work
+_RAYS_BETWEEN_CHECKS = 1 << 15  # no more than a tenth of a second's work
 _CONNECT_TIMEOUT = 20  # seconds
 
 
@@ -34,6 +34,7 @@ class VisibilityTask:
     Parameters
     ----------
     engine : {"bvh", "embree"}
+        Ray-casting engine.
     keep : (n,) bool
         Triangles of the site that can affect the grid; rays are cast against these only.
     """
@@ -61,7 +62,7 @@ def thread_executor(task: VisibilityTask, threads: int | None = None) -> Iterato
     Parameters
     ----------
     threads : int, optional
-        Maximum number of threads; by default as many as the ray caster can use.
+        Maximum number of threads; by default the number that the ray caster can use.
     """
     stop = threading.Event()
     caster = StoppableCaster(task.ray_caster(), stop)
@@ -80,9 +81,9 @@ class StoppableCaster:
     Parameters
     ----------
     caster : RayCaster
-        Casts each batch.
+        Ray caster for each batch.
     stop : Event
-        Once set, casting raises `CancelledError`.
+        Event after which casting raises `CancelledError`.
     """
 
     def __init__(self, caster: RayCaster, stop: threading.Event) -> None:
@@ -114,7 +115,7 @@ def dask_executor(task: VisibilityTask, address: str) -> Iterator[Submit]:
     Raises
     ------
     SeipError
-        Dask is not installed, the scheduler does not answer or has no workers, or several workers died over one chunk.
+        Dask is not installed, the scheduler does not answer or has no workers, or several workers died on one chunk.
     """
     try:
         import dask  # noqa: PLC0415 - an extra that need not be installed
@@ -135,7 +136,9 @@ def dask_executor(task: VisibilityTask, address: str) -> Iterator[Submit]:
         raise SeipError(f"no Dask scheduler answers at {address}; start one, or check the address") from error
     with client:
         if not client.scheduler_info()["workers"]:
-            raise SeipError(f"the Dask scheduler at {address} has no workers; start some where this package is")
+            raise SeipError(
+                f"the Dask scheduler at {address} has no workers; start some where this package is installed"
+            )
         try:
             with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1TB"}):
                 # submitted, not scattered: the scheduler recomputes it when the worker that holds it dies
@@ -143,7 +146,9 @@ def dask_executor(task: VisibilityTask, address: str) -> Iterator[Submit]:
             with client.get_executor(pure=False) as executor:
                 yield lambda poses: executor.submit(_compute_on_worker, shared_task, poses)
         except KilledWorker as error:
-            raise SeipError(f"workers of {address} died over one chunk of the work: {error}") from error
+            raise SeipError(
+                f"several workers of {address} died on one chunk of the work ({error}); give them more memory"
+            ) from error
 
 
 def _identity(task: VisibilityTask) -> VisibilityTask:

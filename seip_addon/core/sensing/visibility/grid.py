@@ -1,16 +1,16 @@
 """The visibility grid: candidates × targets.
 
-V_ij = 1 if and only if a return of candidate i's full scan lies nearer than δ
-to target j and has at least the minimum intensity, where one is set.
+V_ij = 1 if and only if a return of candidate i's full scan lies nearer than δ to target j and has at least the minimum
+intensity, if one is set.
 
-The result equals that of full scans, but only rays that can affect it are cast
-(`scanning`), against triangles that can affect it (`needed_triangles`).
+The result equals that of full scans, but only rays that can affect it are cast (`scanning`), against triangles that can
+affect it (`needed_triangles`).
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -52,9 +52,9 @@ class VisibilityGrid:
     Parameters
     ----------
     packed : (c, ceil(t / 8)) uint8
-        Bits of V, one row per pose, as `numpy.packbits` packs them.
+        Bits of V, one row per pose, in the order of `numpy.packbits`.
     shape : tuple of int
-        c and t.
+        Numbers of poses and targets, c and t.
     key : str
         Digest of all inputs; see `visibility_key`.
     parameters : dict
@@ -71,14 +71,18 @@ class VisibilityGrid:
         """V as (c, t) bool."""
         return np.unpackbits(self.packed, axis=1, count=self.shape[1]).astype(bool)
 
+    def rows(self, poses: Integer | Sequence[int]) -> Boolean:
+        """Return the rows of V for some poses, (n, t) bool, without unpacking the others."""
+        packed = self.packed[np.asarray(poses, dtype=np.int64)]
+        return np.unpackbits(packed, axis=1, count=self.shape[1]).astype(bool)
+
     def sees(self, pose: int) -> Boolean:
         """Return the targets that a pose sees, (t,) bool."""
         return np.unpackbits(self.packed[pose], count=self.shape[1]).astype(bool)
 
     def times_seen(self, poses: Integer) -> Integer:
         """Return the number of the given poses that see each target, (t,) int64."""
-        rows = np.unpackbits(self.packed[poses], axis=1, count=self.shape[1])
-        times: Integer = rows.sum(axis=0, dtype=np.int64)
+        times: Integer = self.rows(poses).sum(axis=0, dtype=np.int64)
         return times
 
     def coverage(self, poses: Integer, weight: Float | None = None) -> float:
@@ -87,6 +91,7 @@ class VisibilityGrid:
         Parameters
         ----------
         poses : (n,) int64
+            Indices of the poses.
         weight : (t,) float64, optional
             Weights of the targets; equal by default.
         """
@@ -120,7 +125,7 @@ class VisibilityGrid:
 def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, engine: str) -> str:
     """Return the digest of all inputs of a grid, including the source code but not names.
 
-    A stored grid with this key need not be computed again. ``engine`` is ``bvh`` or ``embree``.
+    A stored grid with this key can be used again. ``engine`` is ``bvh`` or ``embree``.
     """
     used = _used_models(site, models)
     model_index = np.array([list(used).index(key) for key in site.candidates.sensor], dtype=np.int64)
@@ -150,12 +155,12 @@ def compute_visibility(  # noqa: PLR0913, PLR0917  # the inputs, and how to comp
     scheduler: str | None = None,
     threads: int | None = None,
 ) -> Generator[Progress, None, VisibilityGrid]:
-    """Compute which targets each candidate pose sees, casting only rays that can affect the grid.
+    """Compute the targets that each candidate pose sees, casting only rays that can affect the grid.
 
     Parameters
     ----------
     models : mapping of str to LidarModel
-        Must contain the sensor types of all candidates.
+        Sensor types by catalogue key, those of all candidates included.
     engine : {"auto", "bvh", "embree"}
         Ray-casting engine.
     checkpoint : Checkpoint, optional
@@ -168,7 +173,7 @@ def compute_visibility(  # noqa: PLR0913, PLR0917  # the inputs, and how to comp
     Yields
     ------
     Progress
-        Ten times a second, and after each chunk.
+        Progress ten times a second, and after each chunk.
 
     Returns
     -------
@@ -239,9 +244,9 @@ def _used_models(site: Site, models: Mapping[str, LidarModel]) -> dict[str, Lida
 
 def _check_site(site: Site) -> None:
     if len(site.candidates) == 0:
-        raise SeipError("there is no candidate pose to compute visibility for")
+        raise SeipError("there is no candidate pose to compute visibility for: add poles or candidate areas")
     if len(site.targets) == 0:
-        raise SeipError("there is no target to be seen")
+        raise SeipError("there is no target to be seen: let the region of interest overlap the roads")
     arrays = {
         "target": site.targets.xyz,
         "candidate": site.candidates.xyz,

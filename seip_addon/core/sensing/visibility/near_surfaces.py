@@ -1,11 +1,9 @@
 """Surfaces within δ of each target, and the heights that they span.
 
-A return within δ of a target lies on a triangle that meets the ball of radius δ
-about it. The triangle's plane, at the signed distance h from the target, cuts a
-disc of radius ρ = √(δ² − h²) out of the ball, whose height reaches ρ·√(1 − n_z²)
-up and down from its centre, n being the unit normal. On a road that is a slab a
-few centimetres thick, instead of a ball: what makes rays that pass over a target
-drop out of the reckoning. All this depends on neither pose nor sensor.
+A return within δ of a target lies on a triangle that meets the ball of radius δ about it. The triangle's plane, at the
+signed distance h from the target, cuts a disc of radius ρ = √(δ² − h²) out of the ball. With the unit normal n, the
+disc reaches ρ·√(1 − n_z²) above and below its centre. On a road that is a slab a few centimetres thick instead of a
+ball, so that rays passing over a target can be ruled out. All this depends on neither pose nor sensor.
 """
 
 from __future__ import annotations
@@ -32,16 +30,17 @@ class Cuts:
     Parameters
     ----------
     target : (k,) int64
-        Ascending.
+        Target of each disc, ascending.
     corners : (k, 3, 3) float64, metres
-        Of the triangle.
+        Corners of the triangle.
     normal : (k, 3) float64
-        Unit normals.
+        Unit normals of the triangle.
     middle : (k, 3) float64, metres
-        Of the disc.
+        Centre of the disc.
     radius : (k,) float64, metres
+        Radius of the disc.
     reflectivity : (k,) float64, 0 to 1
-        Of the triangle.
+        Reflectivity of the triangle.
     """
 
     target: Integer
@@ -56,7 +55,8 @@ class Cuts:
         return Cuts(*(getattr(self, field.name)[which] for field in fields(self)))
 
     def holds(self, points: Float, margin: float) -> Boolean:
-        """Return which points (k, 3) lie on their triangle, but for a margin in metres; (k,) bool."""
+        """Return which points (k, 3) lie on their triangle, within a margin in metres; (k,) bool."""
+        # near the plane, and for each side not farther outside than the margin; `outward` has the length of the edge
         there: Boolean = np.abs(((points - self.corners[:, 0]) * self.normal).sum(axis=1)) <= margin
         for side in range(3):
             edge = self.corners[:, (side + 1) % 3] - self.corners[:, side]
@@ -65,20 +65,25 @@ class Cuts:
         return there
 
     def bounds(self, tolerance: float) -> Discs:
-        """Bound in plan and in height what lies both in the disc and in the triangle."""
+        """Return bounds, in plan and in height, on the intersection of disc and triangle."""
+        # In height: the intersection of the two intervals, that of the tilted disc and that of the corners.
         middle = self.middle
         a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]
         half = self.radius * np.sqrt(np.maximum(1 - self.normal[:, 2] ** 2, 0.0))
-        # The tolerance comes before any comparison: on a level face both heights are one but for rounding.
+        # The tolerance is added before the two are compared: on a level face both intervals are a single height, except
+        # for rounding, and without it the face might be lost.
         low = np.maximum(middle[:, 2] - half, np.minimum(np.minimum(a[:, 2], b[:, 2]), c[:, 2])) - tolerance
         high = np.minimum(middle[:, 2] + half, np.maximum(np.maximum(a[:, 2], b[:, 2]), c[:, 2])) + tolerance
-        # In plan a small or steep triangle lies in a circle about its centroid that is narrower than the disc.
+        # In plan: the disc's own circle, or the one about the triangle's centroid through its farthest corner if that
+        # is smaller, as for small or steep triangles. Either contains the intersection, and a smaller circle lets fewer
+        # rays pass.
         centroid = (a + b + c) / 3
         x, y = ((self.corners - centroid[:, None])[:, :, axis] for axis in (0, 1))
         apart = x * x + y * y
         reach = np.sqrt(np.maximum(np.maximum(apart[:, 0], apart[:, 1]), apart[:, 2]))
         centre = np.where((reach < self.radius)[:, None], centroid, middle)
         radius = np.minimum(reach, self.radius)
+        # where the intervals of height do not meet, triangle and disc do not either
         both = low <= high
         return Discs(
             target=self.target[both],
@@ -94,23 +99,24 @@ class Cuts:
 
 @dataclass(frozen=True, eq=False)
 class Discs:
-    """Circles about the intersections of balls of radius δ about targets with triangles.
+    """Bounding cylinders of the intersections of triangles with balls of radius δ about targets.
 
     Parameters
     ----------
     target : (k,) int64
-        Ascending.
+        Target of each, ascending.
     centre : (k, 3) float64, metres
-        On the triangle's plane.
+        Centre in plan, on the triangle's plane.
     normal : (k, 3) float64
-        Unit normals.
+        Unit normals of the triangles.
     radius : (k,) float64, metres
-        In plan.
+        Radius in plan.
     low, high : (k,) float64, metres
-        Heights between which the triangle and the disc both lie.
+        Heights between which the intersection lies.
     reflectivity : (k,) float64, 0 to 1
+        Reflectivity of the triangles.
     cuts : Cuts
-        What they are about.
+        Discs from which these were computed.
     """
 
     target: Integer
@@ -130,15 +136,15 @@ class NearSurfaces:
     Parameters
     ----------
     xyz : (t, 3) float64, metres
-        The targets.
+        Targets.
     low, high : (t,) float64, metres
-        Heights between which surfaces lie within δ; low > high where there is none.
+        Heights between which there are surfaces within δ of each target; low > high if there is none.
     radius : float, metres
-        δ and the tolerance: such returns are nearer than this in plan.
+        δ plus the tolerance: returns that see a target are nearer than this in plan.
     discs : Discs
-        The surfaces one by one.
+        Each of the surfaces.
     tolerance : float, metres
-        How far a ray caster's returns may lie off the surfaces. It is in all heights and radii.
+        Largest distance of a ray caster's returns from the surfaces. All heights and radii include it.
     """
 
     xyz: Float
@@ -157,10 +163,13 @@ def near_surfaces(
     Parameters
     ----------
     triangles : (n, 3, 3) float64, metres
+        Corners of the scene's triangles.
     targets : (t, 3) float64, metres
+        Positions of the targets.
     delta : float, metres
+        δ, the distance within which a return sees a target.
     reflectivity : (n,) float64 or float, 0 to 1
-        Of the triangles.
+        Reflectivity of the triangles.
 
     Returns
     -------
@@ -169,11 +178,14 @@ def near_surfaces(
     reflects = np.broadcast_to(np.asarray(reflectivity, dtype=np.float64), len(triangles))
     tolerance = caster_tolerance(triangles)
     radius = delta + tolerance
+    # A spatial index of the triangles' boxes in plan gives the pairs of target and triangle that may meet; the exact
+    # test follows in `_cut`. Targets are processed in batches, as pairs take more memory than either.
     in_plan = shapely.STRtree(shapely.box(*triangles[:, :, :2].min(axis=1).T, *triangles[:, :, :2].max(axis=1).T))
     parts = []
     for begin in range(0, len(targets), _TARGETS_AT_ONCE):
         xy = targets[begin : begin + _TARGETS_AT_ONCE, :2]
         near, triangle = in_plan.query(shapely.box(*(xy - radius).T, *(xy + radius).T))
+        # sorted by target, on which the slices in `ScanPosition.counting_at_borders` rely
         order = np.argsort(near, kind="stable")
         target = near[order] + begin
         parts.append(_cut(triangles[triangle[order]], targets[target], target, radius, reflects[triangle[order]]))
@@ -187,26 +199,27 @@ def rotated_surfaces(surfaces: NearSurfaces, origin: Float, orientation: Float) 
     Parameters
     ----------
     surfaces : NearSurfaces
-        In the site's axes.
+        Surfaces in the site's axes.
     origin : (3,) float64, metres
-        The sensor's.
+        Position of the sensor.
     orientation : (3, 3) float64
         Rotation from the sensor's axes to the site's.
     """
     cuts, tolerance = surfaces.discs.cuts, surfaces.tolerance
-    turned_cuts = replace(
+    # The pairs of triangles and targets stay the same; only bounds in plan and height depend on the axes.
+    rotated_cuts = replace(
         cuts,
-        # as one list of points: for each triangle by itself the product is many times slower
+        # as one list of points: a separate product for each triangle is many times slower
         corners=((cuts.corners - origin).reshape(-1, 3) @ orientation).reshape(-1, 3, 3),
         normal=cuts.normal @ orientation,
         middle=(cuts.middle - origin) @ orientation,
     )
     targets = rotated(surfaces.xyz - origin, orientation.T)
-    return _about(targets, surfaces.radius, turned_cuts.bounds(tolerance), tolerance)
+    return _about(targets, surfaces.radius, rotated_cuts.bounds(tolerance), tolerance)
 
 
 def _about(targets: Float, radius: float, discs: Discs, tolerance: float) -> NearSurfaces:
-    """Put discs about their targets."""
+    """Return the surfaces, with the joint heights of the discs of each target."""
     low, high = np.full(len(targets), np.inf), np.full(len(targets), -np.inf)
     np.minimum.at(low, discs.target, discs.low)
     np.maximum.at(high, discs.target, discs.high)
@@ -214,7 +227,7 @@ def _about(targets: Float, radius: float, discs: Discs, tolerance: float) -> Nea
 
 
 def caster_tolerance(triangles: Float) -> float:
-    """Return how far a float32 ray caster's returns may lie off the triangles, in metres, generously."""
+    """Return a generous bound on the distance of a float32 ray caster's returns from the triangles, in metres."""
     if len(triangles) == 0:
         return _MIN_TOLERANCE
     points = triangles.reshape(-1, 3)
@@ -223,7 +236,9 @@ def caster_tolerance(triangles: Float) -> float:
 
 
 def _cut(corners: Float, centre: Float, target: Integer, ball: float, reflectivity: Float) -> Cuts:
-    """Cut triangles with balls, pair by pair. Pairs that just miss each other near a corner may be among them."""
+    """Cut triangles with balls, pair by pair; the result may contain pairs that just miss each other near a corner."""
+    # A disc and a triangle in the same plane: the disc meets the triangle only if its centre is no farther outside any
+    # side than its radius. That is necessary, and near a corner not sufficient.
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1)
     normal /= np.where(length > 0, length, 1.0)[:, None]

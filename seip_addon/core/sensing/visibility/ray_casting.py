@@ -1,7 +1,7 @@
 """Ray casting against static triangles, behind one interface.
 
-Blender's BVH tree exists within Blender's Python alone and is imported where
-its caster is made. Embree (embreex) is used when it is installed.
+Blender's BVH tree exists only within Blender's Python and is imported where its caster is made. Embree (embreex) is
+used if it is installed.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from ...errors import SeipError
 
 Engine = Literal["auto", "bvh", "embree"]
 
-# Rays are cast a little farther than asked for and cut off afterwards, in float64: a hit at the very end of one ray
-# is then the same as on a longer ray.
+# Rays are cast a little beyond their range and cut off afterwards, in float64: a hit at the very end of one ray is then
+# the same as on a longer ray.
 _EXCESS = 1 + 1e-6
 
 _MAX_NEEDLE_HEIGHT = 1 / 300
 """Height over longest side below which Embree's float32 distances are off by centimetres, though its hits are right."""
 
 MAX_THREADS = min(4, os.cpu_count() or 1)
-"""That cast at once to advantage: the work between casts holds Python's lock for a part of the time."""
+"""Largest useful number of threads that cast: the work between casts holds Python's lock part of the time."""
 
 
 class RayCaster(Protocol):
@@ -40,11 +40,11 @@ class RayCaster(Protocol):
     Attributes
     ----------
     name : str
-        Of the engine, ``bvh`` or ``embree``.
+        Name of the engine, ``bvh`` or ``embree``.
     triangles : (n, 3, 3) float64, metres
-        As they were given, so that hits index them.
+        All given triangles, which hits index.
     threads : int
-        How many threads may cast at once to advantage.
+        Useful number of threads that cast at once.
     """
 
     @property
@@ -57,7 +57,7 @@ class RayCaster(Protocol):
 
     @property
     def threads(self) -> int:
-        """Number of threads that may cast at once to advantage."""
+        """Useful number of threads that cast at once."""
 
     def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
         """Cast rays from one point, or each from a point of its own.
@@ -65,23 +65,23 @@ class RayCaster(Protocol):
         Parameters
         ----------
         origin : (3,) or (n, 3) float64, metres
+            Start of the rays.
         directions : (n, 3) float64
             Unit vectors.
         max_range : float, metres
-            What is farther away is not hit.
+            Largest distance of a hit.
 
         Returns
         -------
         distance : (n,) float64, metres
-            To the first triangle; infinite on a miss. A ray's result does not
-            depend on the rays that are cast with it.
+            Distance to the first triangle; infinite on a miss. A ray's result does not depend on the other rays.
         triangle : (n,) int64
-            Its index; -1 on a miss.
+            Index of that triangle; -1 on a miss.
         """
 
 
 def engine_name(engine: Engine) -> Engine:
-    """Return ``bvh`` or ``embree``; for ``auto`` Embree where it is installed, else Blender's BVH tree."""
+    """Return ``bvh`` or ``embree``; ``auto`` is Embree if it is installed, otherwise Blender's BVH tree."""
     if engine == "auto":
         return "embree" if importlib.util.find_spec("embreex") else "bvh"
     return engine
@@ -95,33 +95,34 @@ def make_ray_caster(triangles: Float, engine: Engine = "auto", keep: Boolean | N
     triangles : (n, 3, 3) float64, metres
     engine : {"auto", "bvh", "embree"}
     keep : (n,) bool, optional
-        Which of them stop rays; all if not given. What a ray that meets these alone
-        hits, and how far away, is the same bits whatever else is kept.
+        Triangles that stop rays; all by default. For a ray that meets only triangles of a subset, the result is
+        identical whichever others are kept.
 
     Raises
     ------
     SeipError
-        A coordinate is not finite, or the engine is not there.
+        A coordinate is not finite, or the engine is not available.
     """
     name = engine_name(engine)
     if name == "embree":
         return EmbreeRayCaster(triangles, keep)
     if name == "bvh":
         return BvhRayCaster(triangles, keep)
-    raise SeipError(f"no ray-casting engine '{engine}'; choose auto, bvh or embree")
+    raise SeipError(f"unknown ray-casting engine '{engine}'; choose auto, bvh or embree")
 
 
-_FACE, _DISTANCE = operator.itemgetter(2), operator.itemgetter(3)  # of what Blender's tree returns
+_FACE, _DISTANCE = operator.itemgetter(2), operator.itemgetter(3)  # items of a result of Blender's tree
 
 
 class BvhRayCaster:
-    """Casts rays with ``mathutils.bvhtree``.
+    """Ray caster with ``mathutils.bvhtree``.
 
     Parameters
     ----------
     triangles : (n, 3, 3) float64, metres
+        Corners of the triangles.
     keep : (n,) bool, optional
-        Which of them stop rays.
+        Triangles that stop rays; all by default.
     """
 
     name = "bvh"
@@ -129,14 +130,14 @@ class BvhRayCaster:
 
     def __init__(self, triangles: Float, keep: Boolean | None = None) -> None:
         try:
-            from mathutils.bvhtree import BVHTree  # noqa: PLC0415 - exists within Blender's Python alone
+            from mathutils.bvhtree import BVHTree  # noqa: PLC0415 - exists only within Blender's Python
         except ImportError as error:
             raise SeipError(
                 "the ray-casting engine bvh needs Blender's Python: run within Blender, or import bpy first"
             ) from error
         self.triangles = triangles
         self._index, self._centre, corners = _rebased(triangles, keep)
-        with _no_garbage_collection():  # else it walks the growing lists again and again
+        with _no_garbage_collection():  # otherwise it walks the growing lists repeatedly
             points = corners.reshape(-1, 3).tolist()
             faces = np.arange(len(points)).reshape(-1, 3).tolist()
             self._tree = BVHTree.FromPolygons(points, faces, all_triangles=True)
@@ -154,13 +155,14 @@ class BvhRayCaster:
 
 
 class EmbreeRayCaster:
-    """Casts rays with Embree, through embreex.
+    """Ray caster with Embree, through embreex.
 
     Parameters
     ----------
     triangles : (n, 3, 3) float64, metres
+        Corners of the triangles.
     keep : (n,) bool, optional
-        Which of them stop rays.
+        Triangles that stop rays; all by default.
     """
 
     name = "embree"
@@ -178,7 +180,7 @@ class EmbreeRayCaster:
         self._mesh = TriangleMesh(self._scene, corners.astype(np.float32)) if len(corners) else None
         self._needle = _needles(corners)
         self._any_needle = bool(self._needle.any())
-        self.cast(self._centre, np.array([[0.0, 0.0, 1.0]]), 1.0)  # builds the tree, before threads may ask for it
+        self.cast(self._centre, np.array([[0.0, 0.0, 1.0]]), 1.0)  # builds the tree before several threads use it
 
     def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
         """Cast rays; see `RayCaster.cast`."""
@@ -199,8 +201,8 @@ class EmbreeRayCaster:
 def _embree_device() -> object:
     """Return the one Embree device of all casters.
 
-    Each device holds one of the some thousand keys of thread-local storage that a process has; Embree crashes where
-    there is none left.
+    Each device uses one of the roughly thousand keys of thread-local storage of a process; Embree crashes when none is
+    left.
     """
     from embreex.rtcore import EmbreeDevice  # noqa: PLC0415 - an extra that need not be installed
 
@@ -208,18 +210,19 @@ def _embree_device() -> object:
 
 
 def _rebased(triangles: Float, keep: Boolean | None) -> tuple[Integer, Float, Float]:
-    """Pick the triangles that are kept and have an area, and move them to the common centre of all.
+    """Select the triangles that are kept and have an area, and move them to the common centre of all.
 
-    Both engines compute in float32, which is off by metres at map coordinates. The
-    centre does not depend on what is kept, so that the rounding does not either.
+    Both engines compute in float32, whose error is metres at map coordinates. The centre does not depend on the
+    selection, so that the rounding does not either.
 
     Returns
     -------
     index : (k,) int64
-        Of the picked triangles.
+        Indices of the selected triangles.
     centre : (3,) float64, metres
+        Centre of the bounding box of all triangles.
     corners : (k, 3, 3) float64, metres
-        The picked triangles, less the centre.
+        Corners of the selected triangles relative to the centre.
     """
     if triangles.ndim != 3 or triangles.shape[1:] != (3, 3):
         raise SeipError(f"triangles must be an array of n x 3 corners x 3 coordinates, not {triangles.shape}")
@@ -237,7 +240,7 @@ def _rebased(triangles: Float, keep: Boolean | None) -> tuple[Integer, Float, Fl
 
 
 def _needles(corners: Float) -> Boolean:
-    """Return which triangles are far lower than they are long, (n,) bool."""
+    """Return which triangles have a height far below the length of their longest side, (n,) bool."""
     sides = corners - np.roll(corners, 1, axis=1)
     longest = np.linalg.norm(sides, axis=2).max(axis=1, initial=0.0)
     twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
@@ -258,7 +261,7 @@ def _to_plane(start: Float, directions: Float, corners: Float) -> Float:
 
 
 def _result(distance: Float, face: Integer, index: Integer, max_range: float) -> tuple[Float, Integer]:
-    """Turn an engine's faces into indices of the given triangles, and what lies too far into misses."""
+    """Return hits as indices of the given triangles, with hits beyond the range as misses."""
     hit = (face >= 0) & (distance <= max_range)
     triangle = np.full(len(face), -1, dtype=np.int64)
     triangle[hit] = index[face[hit]]

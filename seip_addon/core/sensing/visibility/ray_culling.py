@@ -1,7 +1,7 @@
-"""Ray culling: which of a list of rays of any directions can return from near a target.
+"""Ray culling: the rays of a list with arbitrary directions that can return from near a target.
 
-Returns within δ of a target lie in its patch (`beam_culling`), which takes up a range of azimuths and one of elevations
-as seen from the sensor. Both are cut into cells; what lies in no cell that some patch reaches cannot return from it.
+Returns within δ of a target lie in its patch (`beam_culling`), which spans a range of azimuths and one of elevations as
+seen from the sensor. Both are divided into cells; a ray in a cell that no patch reaches cannot return from a patch.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ...arrays import Float, Integer
 from .beam_culling import Patches
 
 _AZIMUTHS, _ELEVATIONS = 720, 360  # cells of half a degree: about as far apart as rays are
-_MARGIN = 1e-6  # of a cell
+_MARGIN = 1e-6  # part of a cell
 
 
 def rays_near(patches: Patches, azimuth: Float, elevation: Float, max_range: float) -> Integer:
@@ -23,16 +23,20 @@ def rays_near(patches: Patches, azimuth: Float, elevation: Float, max_range: flo
     Parameters
     ----------
     patches : Patches
-        As seen from the sensor.
+        Patches as seen from the sensor.
     azimuth, elevation : (n,) float64, radians
-        Of the rays.
+        Directions of the rays.
     max_range : float, metres
+        Range of the sensor.
 
     Returns
     -------
     (k,) int64
-        Numbers of the rays, ascending: all that can, and few that cannot.
+        Numbers of the rays, ascending: all that can return from a patch, and few that cannot.
     """
+    # Elevations of a patch: a lower edge below the sensor is steepest at the near side of the cylinder, one above it
+    # flattest at the far side; likewise for the upper edge. Azimuths: the tangents to the cylinder, or all around from
+    # within it.
     near = np.maximum(patches.distance - patches.radius, 0.0)
     some = (patches.bottom <= patches.top) & (near <= max_range)
     near, far = near[some], (patches.distance + patches.radius)[some]
@@ -43,6 +47,9 @@ def rays_near(patches: Patches, azimuth: Float, elevation: Float, max_range: flo
         half = np.arcsin(np.minimum(patches.radius / patches.distance, 1.0))[some]
     half = np.where(near > 0, half, math.pi)
 
+    # Each patch adds 1 to all cells of its rectangle. With +1 and -1 at the rectangle's four corners, running sums
+    # along both axes give the number of rectangles over each cell, whatever their size. Azimuths take two turns, so
+    # that rectangles across azimuth zero stay whole; both turns are added up at the end.
     first_row, end_row = _row(lowest, -_MARGIN), _row(highest, _MARGIN) + 1
     first = np.floor(_turns(patches.azimuth[some] - half) - _MARGIN).astype(np.int64)
     end = np.floor(_turns(patches.azimuth[some] + half) + _MARGIN).astype(np.int64) + 1

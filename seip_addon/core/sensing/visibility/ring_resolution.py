@@ -1,13 +1,12 @@
-"""Warnings where rings are too far apart for δ and the grid spacing.
+"""Warnings about rings that are too far apart for δ and the grid spacing.
 
-On a level road h below the sensor the channel of elevation -φ draws a ring of
-radius h / tan φ. Where neighbouring rings are more than 2δ apart, targets
-between them count as unseen although nothing stands before them. A sensor that is
-tilted by θ draws the ring of elevation -φ - θ on the side that it looks to, and that
-of -φ + θ, which lies farther from the next, on the other.
+On a level road h below the sensor, the channel of elevation -φ draws a ring of radius h / tan φ. Where neighbouring
+rings are more than 2δ apart, targets between them are not seen although nothing hides them. A sensor tilted by θ draws
+the ring of elevation -φ - θ in the direction of the tilt, and in the opposite direction that of -φ + θ, where rings are
+farther apart.
 
-A rosette draws a line that leaves gaps of any shape. For points of a level road within its field of view it is tried
-whether a ray of a frame ends within δ of them.
+A rosette draws a line whose gaps can have any shape. Points of a level road within its field of view are tested for a
+ray of a frame that ends within δ of them.
 """
 
 from __future__ import annotations
@@ -29,17 +28,17 @@ from .target_index import TargetIndex
 
 
 def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings) -> tuple[str, ...]:
-    """Return warnings where rings are too far apart: coverage there depends on beams, not on line of sight.
+    """Return warnings about rings too far apart: there, coverage depends on beams, not on line of sight.
 
     Parameters
     ----------
     models : mapping of str to LidarModel
-        At least those that the candidates name.
+        Sensor types by catalogue key, those of all candidates included.
 
     Returns
     -------
     tuple of str
-        One sentence for each sensor type that is concerned, and one if targets are too far apart for δ.
+        One warning for each sensor type with such rings, and one if targets are too far apart for δ.
     """
     poses = site.candidates
     warnings = []
@@ -56,19 +55,19 @@ def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: 
         if beyond:
             warnings.append(
                 f"{key}: beyond {', '.join(beyond)} neighbouring rings on a level road are more than "
-                f"2δ = {2 * settings.delta:g} m apart, so road between them counts as unseen though nothing hides it"
+                f"2δ = {2 * settings.delta:g} m apart, so the road between them is not seen although nothing hides it"
             )
         warnings += _of_tilted(model, site, of_type & ~upright, settings.delta, reach)
     if settings.delta < site.targets.spacing / math.sqrt(2):
         warnings.append(
-            f"targets are {site.targets.spacing:g} m apart and δ is {settings.delta:g} m: road between them "
-            f"lies within δ of none; take a δ of at least {site.targets.spacing / math.sqrt(2):.2g} m or a finer grid"
+            f"targets are {site.targets.spacing:g} m apart and δ is {settings.delta:g} m: some of the road is not "
+            f"within δ of any target; use a δ of at least {site.targets.spacing / math.sqrt(2):.2g} m or a finer grid"
         )
     return tuple(warnings)
 
 
 def _of_rosette(model: LidarModel, site: Site, of_type: Boolean, delta: float, reach: float) -> list[str]:
-    """Return a warning on the radius from which the rosettes of a type leave gaps that are too wide for δ."""
+    """Return a warning on the radius beyond which the rosettes of a type leave gaps that are too wide for δ."""
     poses = site.candidates
     height = np.round(poses.height, 2)
     beyond = []
@@ -77,15 +76,15 @@ def _of_rosette(model: LidarModel, site: Site, of_type: Boolean, delta: float, r
         limit = min(unresolved_from(model, float(level), delta, reach, float(tilt)) for tilt in tilts)
         if limit < reach:
             beyond.append(f"{limit:.0f} m (at {level:g} m height)")
-    sentence = (
-        f"{model.key}: from {', '.join(beyond)} on a frame of {1 / model.rotation_rate:g} s leaves level road in view "
-        f"more than δ = {delta:g} m from all of its rays, so road between them counts as unseen though nothing hides it"
+    warning = (
+        f"{model.key}: beyond {', '.join(beyond)} parts of a level road in view are more than δ = {delta:g} m from all "
+        f"rays of a frame of {1 / model.rotation_rate:g} s, so they are not seen although nothing hides them"
     )
-    return [sentence] if beyond else []
+    return [warning] if beyond else []
 
 
 def _of_tilted(model: LidarModel, site: Site, tilted: Boolean, delta: float, reach: float) -> list[str]:
-    """Return a warning on the radius from which the tilted sensors of a type do not resolve δ."""
+    """Return a warning on the radius beyond which the tilted sensors of a type do not resolve δ."""
     poses = site.candidates
     height = np.round(poses.height, 2)
     beyond = []
@@ -94,32 +93,32 @@ def _of_tilted(model: LidarModel, site: Site, tilted: Boolean, delta: float, rea
         limit = min(unresolved_from(model, float(level), delta, reach, float(tilt)) for tilt in tilts)
         if limit < reach:
             beyond.append(f"{limit:.0f} m (at {level:g} m height)")
-    sentence = (
-        f"{model.key}: where it is tilted, beyond {', '.join(beyond)} neighbouring rings on a level road before it are "
-        f"more than 2δ = {2 * delta:g} m apart, and behind it sooner, so road between them counts as "
-        "unseen though nothing hides it"
+    warning = (
+        f"{model.key}: if tilted, beyond {', '.join(beyond)} neighbouring rings on a level road in front of it are "
+        f"more than 2δ = {2 * delta:g} m apart, and behind it at a shorter distance, so the road between them is not "
+        "seen although nothing hides it"
     )
-    return [sentence] if beyond else []
+    return [warning] if beyond else []
 
 
 def unresolved_from(model: LidarModel, height: float, delta: float, reach: float, tilt: float = 0.0) -> float:
-    """Return the radius from which some neighbouring returns on a level road are more than 2δ apart.
+    """Return the radius beyond which some neighbouring returns on a level road are more than 2δ apart.
 
-    Of a rosette: from which some of the road in view has no return of a frame within δ.
+    For a rosette it is the radius beyond which some of the road in view has no return of a frame within δ.
 
     Parameters
     ----------
     height : float, metres
-        Of the sensor above the road.
+        Height of the sensor above the road.
     delta, reach : float, metres
-        Nothing is looked for beyond ``reach``.
+        δ, and the radius up to which the road is examined.
     tilt : float, radians
-        Of the sensor, towards where it is looked for.
+        Tilt of the sensor; the road is examined in the direction of the tilt.
 
     Returns
     -------
     float, metres
-        ``reach`` if all is resolved.
+        The radius, or ``reach`` if all of the road is resolved.
     """
     if model.rosette is not None:
         return _first_gap(model, height, delta, min(reach, model.max_range), tilt)
@@ -135,13 +134,13 @@ def unresolved_from(model: LidarModel, height: float, delta: float, reach: float
 @lru_cache(maxsize=256)
 def _first_gap(model: LidarModel, height: float, delta: float, reach: float, tilt: float) -> float:
     """Return the radius of the nearest point of a level road in view of a rosette that has no ray within δ, metres."""
-    turned = orientation(0.0, tilt)
-    beams = BeamPattern(model).directions(np.arange(model.channels)) @ turned.T
+    axes = orientation(0.0, tilt)
+    beams = BeamPattern(model).directions(np.arange(model.channels)) @ axes.T
     down = beams[beams[:, 2] < 0]
     hits = np.column_stack([down[:, :2] * (-height / down[:, 2:]), np.zeros(len(down))])
     radius, azimuth = np.meshgrid(np.linspace(0.0, reach, _RADII + 1)[1:], np.linspace(-math.pi, math.pi, _AZIMUTHS))
     road = np.column_stack([(radius * np.cos(azimuth)).ravel(), (radius * np.sin(azimuth)).ravel()])
-    seen_from = np.column_stack([road, np.full(len(road), -height)]) @ turned
+    seen_from = np.column_stack([road, np.full(len(road), -height)]) @ axes
     road = road[model.faces(seen_from) & (np.linalg.norm(seen_from, axis=1) <= reach)]
     if not len(road):
         return reach
@@ -152,9 +151,9 @@ def _first_gap(model: LidarModel, height: float, delta: float, reach: float, til
 
 
 _RADII, _AZIMUTHS = 300, 361
-"""Points of a level road at which the gaps of a rosette are looked for."""
+"""Numbers of radii and azimuths at which a level road is tested for gaps of a rosette."""
 
 
 def _farthest(poses: Float, targets: Float) -> float:
-    """Largest distance in plan between some pose and some target."""
+    """Return the largest distance in plan between a pose and a target."""
     return max(float(np.hypot(*(targets[:, :2] - pose[:2]).T).max()) for pose in poses)

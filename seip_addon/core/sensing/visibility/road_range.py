@@ -1,7 +1,7 @@
-"""Range of LiDARs on the road of a site: up to where its returns are detected.
+"""Range of LiDARs on the road of a site: the distance up to which its returns are detected.
 
-At a distance r a sensor h above a level road meets it at an angle whose cosine is h / r, so that the power of its
-return falls with r³: far sooner than that of a wall.
+At a distance r, a sensor h above a level road meets it at an angle whose cosine is h / r. So the power of the return
+falls with r³, faster than that of a wall.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from ..lidar.range_equation import RangeEquation
 from .settings import VisibilitySettings
 
 NEARLY_ALL = 0.01
-"""Share of the targets beyond its range from which on a sensor type is named in a warning."""
+"""Least share of the targets beyond the range of a sensor type for a warning."""
 
 
 def road_reflectivity(roads: Sequence[Mesh]) -> float:
-    """Return the reflectivity of most of the road: half of its area reflects less, half more."""
+    """Return the median reflectivity of the road by area."""
     corners, share = ordered_surfaces(roads)
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     order = np.argsort(share, kind="stable")
@@ -38,9 +38,9 @@ def road_range(model: LidarModel, reflectivity: float, height: float, settings: 
     Parameters
     ----------
     reflectivity : float, 0 to 1
-        Of the road.
+        Reflectivity of the road.
     height : float, metres
-        Of the sensor above it.
+        Height of the sensor above the road.
     """
     if not isinstance(model.law, RangeEquation):
         return model.max_range
@@ -50,14 +50,14 @@ def road_range(model: LidarModel, reflectivity: float, height: float, settings: 
 def range_warnings(
     site: Site, models: Mapping[str, LidarModel], reflectivity: float, settings: VisibilitySettings
 ) -> tuple[str, ...]:
-    """Say of each sensor type which share of the region lies beyond its range on this road.
+    """Return warnings about sensor types whose range on this road leaves out a share of the region.
 
     Parameters
     ----------
     models : mapping of str to LidarModel
-        At least those that the candidates name.
+        Sensor types by catalogue key, those of all candidates included.
     reflectivity : float, 0 to 1
-        Of the road.
+        Reflectivity of the road.
     """
     poses, warnings = site.candidates, []
     for key, model in find_models(models, np.unique(poses.sensor).tolist()).items():
@@ -82,7 +82,7 @@ def _beyond_message(share: float) -> str:
 
 
 def _share_beyond(site: Site, xyz: Float, reach: Float) -> float:
-    """Return the share of targets that no sensor at (n, 3) has within its reach (n,)."""
+    """Return the share of targets that are out of reach (n,) of all sensors at positions (n, 3)."""
     targets = site.targets.xyz
     near = np.zeros(len(targets), dtype=bool)
     points = shapely.points(targets[:, :2])

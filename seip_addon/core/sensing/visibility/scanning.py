@@ -1,13 +1,14 @@
 """Scans of the sensors at one position, full or lazy.
 
-A target is seen if some return of the scan lies nearer than δ to it, and is strong enough. Where surfaces meet within
-the tolerance of the ray caster, the return of each of them must be: which of them stopped the ray is chance. So
+A target is seen if some return of the scan lies nearer than δ to it and is strong enough. Where surfaces meet within
+the tolerance of the ray caster, it is chance which of them stops the ray; the return must then be strong enough from
+each of them. The same result as that of full scans is found with few rays:
 
-1. only rays are cast that can return from near a target (`beam_culling`);
-2. of these first, for each sensor and target, the one that should end nearest to it;
-3. then, for what is still unseen, bundles of neighbouring rays, each aimed at one surface about one target. A bundle
-   goes when its target is seen, or when the triangle that stopped a ray beside it is proven to stop all of it
-   (`occlusion`). Of each other bundle the middle ray is cast, and the halves beside it are bundles anew.
+1. Only rays that can return from near a target are cast (`beam_culling`).
+2. For each sensor and target, the first is the one that should end nearest to the target.
+3. For targets not seen yet, bundles of neighbouring rays follow, each aimed at one surface near one target. A bundle is
+   dropped when its target is seen, or when the triangle that stopped a ray next to it is proven to stop all of its rays
+   (`occlusion`). Otherwise its middle ray is cast, and the two halves become new bundles.
 
 No ray is cast twice, neither for two targets nor for two sensors that share it.
 
@@ -37,7 +38,7 @@ _RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
 
 
 class Corners(Protocol):
-    """Triangles whose corners can be asked for."""
+    """Triangles that can be indexed."""
 
     def __getitem__(self, which: Integer, /) -> Float:
         """Return corners, (k, 3, 3) float64, metres."""
@@ -56,16 +57,18 @@ class Caster(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class ScanPosition:
-    """Position of the sensors whose scans are wanted, and which of their returns count.
+    """Position of the sensors to scan from, with the conditions on their returns.
 
     Parameters
     ----------
     origin : (3,) float64, metres
+        Optical centre of the sensors.
     yaw : float, radians
+        Direction of azimuth zero.
     models : sequence of LidarModel
-        Whose scans from here are wanted.
+        Sensors at this position.
     reflectivity : (n,) float64, 0 to 1
-        Of the caster's triangles.
+        Reflectivity of the caster's triangles.
     """
 
     caster: Caster
@@ -76,10 +79,11 @@ class ScanPosition:
     reflectivity: Float
 
     def counting(self, model: LidarModel, directions: Float, distance: Float, triangle: Integer) -> Boolean:
-        """Return which of a sensor's hits count as returns: within its range and strong enough, (n,) bool."""
+        """Return which of a sensor's hits are returns: within its range and strong enough, (n,) bool."""
         counts = (distance >= model.min_range) & (distance <= model.max_range)
         least = self.settings.least_strength(model)
         if least > 0:
+            # strength depends on distance and on reflectivity times the cosine of the angle of incidence
             met = triangle[counts]
             corners = self.caster.triangles[met]
             normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -91,15 +95,16 @@ class ScanPosition:
     def counting_at_borders(
         self, model: LidarModel, surfaces: NearSurfaces, directions: Float, distance: Float, target: Integer
     ) -> Boolean:
-        """Return which of a sensor's returns from near targets are strong enough off every surface that meets there.
+        """Return which of a sensor's returns from near targets are strong enough for every surface that meets there.
 
         Parameters
         ----------
         surfaces : NearSurfaces
-            About the targets.
+            Surfaces near the targets.
         directions, distance : (n, 3) and (n,) float64
-            Of rays that return, each from nearer than δ to its target.
+            Direction and length of rays that return, each from nearer than δ to its target.
         target : (n,) int64
+            Target of each ray.
 
         Returns
         -------
@@ -109,38 +114,44 @@ class ScanPosition:
         strong = np.ones(len(target), dtype=bool)
         if least == 0:
             return strong
+        # Cuts are sorted by target: those of a ray's target are one slice. Each ray is paired with each cut of it, and
+        # the pairs are kept where the ray ends on the cut's triangle, within the tolerance of the caster.
         first = np.searchsorted(cuts.target, target)
         count = np.searchsorted(cuts.target, target, side="right") - first
         ray, cut = np.repeat(np.arange(len(target)), count), counted(first, count)
         there = cuts.pick(cut).holds((self.origin + distance[:, None] * directions)[ray], surfaces.tolerance)
         ray, cut = ray[there], cut[there]
+        # Where surfaces meet it is chance which of their triangles the caster reports. With the weakest of all surfaces
+        # deciding, that does not matter.
         reflected = cuts.reflectivity[cut] * np.abs((cuts.normal[cut] * directions[ray]).sum(axis=1))
         strong[ray[model.law.strength(distance[ray], reflected) < least]] = False
         return strong
 
 
 def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
-    """Find which targets are seen, casting only rays that can matter.
+    """Find the targets that are seen, casting only rays that can affect the result.
 
     Parameters
     ----------
     surfaces : NearSurfaces
-        About the targets, for the settings' δ.
+        Surfaces near the targets, for the settings' δ.
 
     Returns
     -------
     seen : (models, t) bool
-        The same, bit for bit, as `seen_by_all_rays`.
+        Visibility, identical to that of `seen_by_all_rays`.
     cast : int
         Number of rays.
     """
-    turning = [model for model in position.models if model.rosette is None]
-    if len(turning) == len(position.models):
+    # Bundles need rows of neighbouring rays. The rays of a rosette are not in rows: of these, each one that can return
+    # from near some target is cast.
+    with_channels = [model for model in position.models if model.rosette is None]
+    if len(with_channels) == len(position.models):
         return _seen_by_channels(position, surfaces)
     seen, cast = np.zeros((len(position.models), len(surfaces.xyz)), dtype=bool), 0
-    if turning:
+    if with_channels:
         of_these = np.array([model.rosette is None for model in position.models])
-        seen[of_these], cast = _seen_by_channels(replace(position, models=turning), surfaces)
+        seen[of_these], cast = _seen_by_channels(replace(position, models=with_channels), surfaces)
     index = TargetIndex(surfaces.xyz, position.settings.delta)
     patches = target_patches(position.origin, surfaces, np.ones(len(surfaces.xyz), dtype=bool))
     for number, model in enumerate(position.models):
@@ -152,27 +163,34 @@ def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
 
 
 def _seen_by_channels(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
-    """Find which targets sensors see whose rays are the azimuth steps of channels; see `seen_by_near_rays`."""
+    """Find the targets seen by sensors whose rays are the azimuth steps of channels; see `seen_by_near_rays`."""
     beams = Beams.of(position.models, position.yaw, position.settings)
     returns = _Returns(position, beams, surfaces)
     seen = np.zeros((len(position.models), len(surfaces.xyz)), dtype=bool)
 
-    hopeful = may_return(position.origin, surfaces, beams)
-    first = near_rays(beams, target_patches(position.origin, surfaces, hopeful.any(axis=0)))
-    first = first.pick(hopeful[beams.sensor[first.channel], first.target]).likeliest(beams.sensor)
+    # First the likeliest ray for each sensor and target: most targets that can be seen are seen by it, and need no
+    # more. Patches of whole targets are enough for that choice.
+    possible = may_return(position.origin, surfaces, beams)
+    first = near_rays(beams, target_patches(position.origin, surfaces, possible.any(axis=0)))
+    first = first.pick(possible[beams.sensor[first.channel], first.target]).likeliest(beams.sensor)
     sees, triangle = returns.see(first)
     seen[beams.sensor[first.channel], first.target] = sees
+    # A target without any ray at this stage has no bundles later either: those are subsets of the same rays.
     unseen = np.zeros(len(surfaces.xyz), dtype=bool)
     unseen[first.target[~sees]] = True
     blocker = np.full(seen.shape, -1)
     blocker[beams.sensor[first.channel], first.target] = triangle
 
-    # every round keeps, beside each bundle, the triangle that stopped the last ray cast for it
+    # Then the bundles for the rest, by the tighter patches of single surfaces. Each bundle carries the triangle that
+    # stopped the last ray cast for it: this is the likeliest one to stop all of it.
     patches, planes = disc_patches(position.origin, surfaces, unseen)
     bundles = near_rays(beams, patches, planes)
-    open_still = hopeful & ~seen
-    bundles = bundles.pick(np.flatnonzero(open_still[beams.sensor[bundles.channel], bundles.target]))
+    still_open = possible & ~seen
+    bundles = bundles.pick(np.flatnonzero(still_open[beams.sensor[bundles.channel], bundles.target]))
     triangle = blocker[beams.sensor[bundles.channel], bundles.target]
+    # Each round splits bundles in halves, so that the rounds are few: the logarithm of the widest one. All middle rays
+    # of a round are cast together, which the casters need to be fast. The loop ends when every ray of every bundle is
+    # cast, proven to be stopped, or of no use since its target is seen. So nothing is missed.
     while len(bundles):
         stopped = (triangle >= 0) & (bundles.width > 1)  # a single ray is cast as quickly as it is proven stopped
         corners = position.caster.triangles[triangle[stopped]]
@@ -180,6 +198,8 @@ def _seen_by_channels(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
         bundles = bundles.pick(~stopped)
         sees, triangle = returns.see(bundles)
         seen[beams.sensor[bundles.channel[sees]], bundles.target[sees]] = True
+        # Another bundle of the same sensor may have seen the target in this round: looking at `seen` drops its bundles
+        # too. Halves inherit the triangle that stopped the middle ray between them.
         unseen = np.flatnonzero(~seen[beams.sensor[bundles.channel], bundles.target])
         bundles, part_of = bundles.pick(unseen).beside_middle()
         triangle = triangle[unseen][part_of]
@@ -187,7 +207,7 @@ def _seen_by_channels(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
 
 
 def seen_by_all_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
-    """Find which targets are seen by casting every ray of every sensor: the reference."""
+    """Find the targets that are seen by casting every ray of every sensor: the reference."""
     index = TargetIndex(surfaces.xyz, position.settings.delta)
     rays = [np.arange(model.channels * model.azimuth_count) for model in position.models]
     seen = [
@@ -199,20 +219,21 @@ def seen_by_all_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Bo
 def _seen_by_rays(
     position: ScanPosition, model: LidarModel, rays: Integer, surfaces: NearSurfaces, index: TargetIndex
 ) -> Boolean:
-    """Return which targets a sensor sees by casting rays of it, (t,) bool.
+    """Return the targets that a sensor sees with the given rays, (t,) bool.
 
     Parameters
     ----------
     rays : (n,) int64
-        As in `BeamPattern`.
+        Numbers of the rays, as in `BeamPattern`.
     index : TargetIndex
-        Of the targets.
+        Index of the targets.
     """
     pattern = BeamPattern(model, position.yaw)
     seen = np.zeros(len(surfaces.xyz), dtype=bool)
     for begin in range(0, len(rays), _RAYS_AT_ONCE):
         directions = pattern.directions(rays[begin : begin + _RAYS_AT_ONCE])
         distance, triangle = position.caster.cast(position.origin, directions, model.max_range)
+        # A return may see several targets, and the strength at borders depends on the target's surfaces: pairs of both
         counts = position.counting(model, directions, distance, triangle)
         directions, distance = directions[counts], distance[counts]
         ray, target = index.pairs_within_delta(_points(position.origin, directions, distance))
@@ -222,20 +243,21 @@ def _seen_by_rays(
 
 
 class _Returns:
-    """The returns of all sensors at one position, each ray cast when it is first asked for.
+    """The returns of all sensors at one position, each ray cast when it is first needed.
 
     Parameters
     ----------
     beams : Beams
-        Of the position.
+        Channels of the sensors at the position.
     """
 
     def __init__(self, position: ScanPosition, beams: Beams, surfaces: NearSurfaces) -> None:
         self._position, self._beams, self._surfaces = position, beams, surfaces
         self._patterns = [BeamPattern(model, position.yaw) for model in position.models]
         self._first_channel = np.searchsorted(beams.sensor, np.arange(len(position.models)))
+        # Sensors may share rays, so that each is cast to the longest range of all; `counting` applies their own ranges.
         self._reach = max(model.max_range for model in position.models)
-        self._row = np.zeros(beams.rays, dtype=np.int32)  # of each ray in the arrays below; row 0: not cast
+        self._row = np.zeros(beams.rays, dtype=np.int32)  # row of each ray in the arrays below; row 0: not cast yet
         self._direction = np.zeros((1, 3))
         self._distance = np.full(1, np.inf)
         self._point = np.full((1, 3), np.inf)
@@ -247,18 +269,21 @@ class _Returns:
         return len(self._distance) - 1
 
     def see(self, bundles: NearRays) -> tuple[Boolean, Integer]:
-        """Tell which bundles' middle rays return from nearer than δ to their targets, strongly enough.
+        """Find the bundles whose middle rays return from nearer than δ to their targets, strongly enough.
 
         Returns
         -------
         sees : (k,) bool
+            Whether the middle ray of each bundle sees the bundle's target.
         triangle : (k,) int64
-            That stops the ray; -1 for none.
+            Triangle that stops the ray; -1 for none.
         """
+        # all-round bundles may run over step 0, where steps are negative or beyond the last one
         row = self._rows(bundles.channel, bundles.middle % self._beams.steps[bundles.channel])
         gap = self._point[row] - self._surfaces.xyz[bundles.target]
         sees = is_within(squared_length(gap), self._position.settings.delta)
         triangle = self._triangle[row]
+        # the few rays that end near their target are also checked for range and strength, by the law of each sensor
         near = np.flatnonzero(sees)
         for number, model in enumerate(self._position.models):
             own = near[self._beams.sensor[bundles.channel[near]] == number]
@@ -271,11 +296,13 @@ class _Returns:
         return sees, triangle
 
     def _rows(self, channel: Integer, step: Integer) -> Integer:
-        """Rows of rays in the arrays, after casting those that are new."""
+        """Return the rows of rays in the arrays, after casting those that are new."""
         ray = self._beams.first_ray[channel] + step
         fresh = np.flatnonzero(self._row[ray] == 0)
         if len(fresh):
-            self._row[ray[fresh]] = np.arange(len(fresh))  # of bundles with the same ray the last one stands for all
+            # Bundles may share a ray, which must be cast once. Each writes its number to the ray's entry, where the
+            # last one remains: only the bundle that finds its own number there casts the ray.
+            self._row[ray[fresh]] = np.arange(len(fresh))
             fresh = fresh[self._row[ray[fresh]] == np.arange(len(fresh))]
             directions = self._directions(channel[fresh], step[fresh])
             distance, triangle = self._position.caster.cast(self._position.origin, directions, self._reach)
@@ -288,6 +315,7 @@ class _Returns:
         return rows
 
     def _directions(self, channel: Integer, step: Integer) -> Float:
+        """Return the directions of rays, (n, 3) float64, from the function that full scans use, so that bits agree."""
         directions = np.empty((len(channel), 3))
         for number, pattern in enumerate(self._patterns):
             own = np.flatnonzero(self._beams.sensor[channel] == number)
@@ -297,7 +325,7 @@ class _Returns:
 
 
 def _points(origin: Float, directions: Float, distance: Float) -> Float:
-    """End points of rays; infinitely far on a miss."""
+    """Return the end points of rays; infinite on a miss."""
     far = np.isinf(distance)
     points: Float = origin + np.where(far, 0.0, distance)[:, None] * directions
     points[far] = np.inf

@@ -1,4 +1,4 @@
-"""Settings of visibility: when a target counts as seen."""
+"""Settings of visibility: conditions under which a target is seen."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from ...settings import setting
 from ..lidar.model import LidarModel
 
 MAX_DELTA = 100.0
-"""Metres; a larger δ is taken for a typing error."""
+"""Metres; a larger δ is assumed to be a typing error."""
 
 
 @dataclass(frozen=True)
 class VisibilitySettings:
-    """When a target counts as seen.
+    """Conditions under which a return sees a target.
 
     Parameters
     ----------
     delta : float, metres
-        A return nearer than this to a target sees it.
+        δ: the return is nearer than this to the target.
     min_intensity : float, 0 to 1
-        Least intensity of such a return from sensors of CARLA's model. At 0 every return counts.
+        Least intensity of the return, for sensors of CARLA's model; 0 for no condition.
     detection : float, above 0 and below 1
-        Least probability with which such a return is detected, from sensors of the range equation.
+        Least probability of detection of the return, for sensors of the range equation.
     """
 
     delta: float = setting(1.0, "distance from a target within which a return sees it", unit="m", maximum=MAX_DELTA)
@@ -44,12 +44,12 @@ class VisibilitySettings:
             raise SeipError(f"the least probability of detection must lie between 0 and 1, not {self.detection}")
 
     def least_strength(self, model: LidarModel) -> float:
-        """Return the strength from which on a return of a sensor counts; every return does where it is 0.
+        """Return the least strength of a return that sees; 0 for no condition.
 
         Raises
         ------
         SeipError
-            The sensor detects nothing with such a probability.
+            The sensor detects nothing with that probability.
         """
         try:
             return model.law.least_strength(self.detection, self.min_intensity)

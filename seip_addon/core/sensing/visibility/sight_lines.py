@@ -1,4 +1,4 @@
-"""Sight lines of one sensor, and the targets in range that it does not see, by why it does not."""
+"""Sight lines of one sensor, and the targets in range that it does not see, by reason."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ..lidar.model import LidarModel
 from .ray_casting import Engine, engine_name, make_ray_caster
 
 MAX_LINES = 1500
-"""Limit on the lines drawn: of more targets a sample is taken."""
+"""Largest number of lines; if there are more targets, a random sample is drawn."""
 SAMPLE_SEED = 0
 POSE_DISTANCE = 0.01
-"""Metres that a sensor may be from a candidate pose and still hang there: Blender's numbers are single precision."""
+"""Metres; a sensor no farther than this from a candidate pose is at that pose: Blender uses single precision."""
 SAME_TURN = 5e-5
-"""Difference of cosines up to which two orientations are the same."""
+"""Largest difference of matrix entries between equal orientations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,16 +31,16 @@ class SightLines:
     eye : (3,) float64, metres
         Optical centre, local site axes.
     ends : (n, 3) float64, metres
-        Targets that it sees, a sample of `MAX_LINES` where there are more.
+        Targets that the sensor sees, or a sample of `MAX_LINES` of them.
     seen : int
-        How many it sees.
+        Number of targets that it sees.
     in_range : int
-        How many are within its range and its horizontal field of view.
+        Number of targets within its range and its horizontal field of view.
     hidden : (m, 4, 3) float64, metres
-        Squares of those that something hides from it.
+        Squares of the targets in range that something hides from it.
     missed : (k, 4, 3) float64, metres
-        Squares of those in its view that it does not see: they lie between its rings, outside its vertical field of
-        view, or return too little light.
+        Squares of the other targets in range that it does not see: they lie between its rings or outside its vertical
+        field of view, or return too little light.
     """
 
     eye: Float
@@ -54,18 +54,18 @@ class SightLines:
 def sight_lines(
     site: Site, pose: int, model: LidarModel, row: Boolean, delta: float, engine: Engine = "auto"
 ) -> SightLines:
-    """Return what a pose sees, and what it does not.
+    """Return the sight lines of a pose, and the targets that it does not see.
 
-    Something hides a target if the ray to it ends at a distance of δ or more before it.
+    A target is hidden if the ray to it ends at a distance of δ or more in front of it.
 
     Parameters
     ----------
     pose : int
         Index among the site's candidates.
     row : (t,) bool
-        Which targets it sees: its row of the visibility grid.
+        Row of the pose in the visibility grid.
     delta : float, metres
-        Within which a return is a target's, as for the grid.
+        δ, the distance within which a return sees a target.
     """
     targets = site.targets
     eye = site.candidates.xyz[pose]
@@ -90,21 +90,22 @@ def sight_lines(
 
 
 def pose_at(candidates: Candidates, sensor: str, xyz: Float, orientation: Float) -> int | None:
-    """Return the candidate pose of a sensor type at a position and orientation, None where there is none.
+    """Return the candidate pose of a sensor type at a position and orientation, or None.
 
     Parameters
     ----------
     sensor : str
-        Its catalogue key.
+        Catalogue key of the sensor type.
     xyz : (3,) float64, metres
+        Position of the sensor.
     orientation : (3, 3) float64
         Rotation from the sensor's axes to the site's.
     """
     same = np.flatnonzero(candidates.sensor == sensor)
     away = np.linalg.norm(candidates.xyz[same] - xyz, axis=1)
     near = same[np.argsort(away, kind="stable")][: np.count_nonzero(away <= POSE_DISTANCE)]
-    turned_alike = (np.abs(candidates.orientation(int(pose)) - orientation).max() <= SAME_TURN for pose in near)
-    return next((int(pose) for pose, alike in zip(near, turned_alike, strict=True) if alike), None)
+    differences = (np.abs(candidates.orientation(int(pose)) - orientation).max() for pose in near)
+    return next((int(pose) for pose, apart in zip(near, differences, strict=True) if apart <= SAME_TURN), None)
 
 
 def _sample(numbers: Integer) -> Integer:

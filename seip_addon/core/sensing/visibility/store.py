@@ -32,14 +32,14 @@ _CHUNK = ArrayFile(
 
 
 class CheckpointFolder:
-    """Finished chunks of a grid in the making, in a folder beside its file.
+    """Finished chunks of an incomplete grid, in a folder next to its file.
 
     Parameters
     ----------
     path : path
-        The grid's file.
+        File of the grid.
     key : str
-        The grid's key. Chunks of another are removed.
+        Key of the grid. Chunks with a different key are removed.
     """
 
     def __init__(self, path: Path, key: str) -> None:
@@ -47,10 +47,10 @@ class CheckpointFolder:
         self._prefix = key[:16]
         for other in self._folder.glob("*.npz"):
             if not other.name.startswith(self._prefix):
-                other.unlink(missing_ok=True)  # another process may be at it too
+                other.unlink(missing_ok=True)  # another process may remove it at the same time
 
     def load(self, number: int) -> Rows | None:
-        """Return a chunk, or None where there is none that can be used."""
+        """Return a chunk, or None if there is no usable one."""
         try:
             with _CHUNK.reading(self._file(number)) as (_, arrays):
                 return Rows(arrays["packed"], int(arrays["rays"]))
@@ -62,14 +62,14 @@ class CheckpointFolder:
         _CHUNK.save(self._file(number), {}, {"packed": rows.packed, "rays": np.array(rows.rays)})
 
     def remove(self) -> None:
-        """Remove the folder, once the grid is whole."""
-        shutil.rmtree(self._folder, ignore_errors=True)  # another process may have, or be at it too
+        """Remove the folder after the grid is complete."""
+        shutil.rmtree(self._folder, ignore_errors=True)  # another process may remove it at the same time
 
     def _file(self, number: int) -> Path:
         return self._folder / f"{self._prefix}-{number:06d}.npz"
 
 
-def stored_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who does the work
+def stored_visibility(  # noqa: PLR0913, PLR0917  # the inputs of the grid, and how to compute it
     path: Path,
     site: Site,
     models: Mapping[str, LidarModel],
@@ -78,30 +78,31 @@ def stored_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who 
     scheduler: str | None = None,
     threads: int | None = None,
 ) -> Generator[Progress, None, VisibilityGrid]:
-    """Return the grid of a file where it follows from the same inputs; else compute it and write the file.
+    """Return the grid of a file if it was computed from the same inputs; otherwise compute it and write the file.
 
-    What was finished before an interruption is kept beside the file and not computed again.
+    Chunks finished before an interruption are kept next to the file and not computed again.
 
     Parameters
     ----------
     path : path
-        The grid's file, read and written.
+        File of the grid, read and written.
     engine : {"auto", "bvh", "embree"}
-        What casts the rays.
+        Ray-casting engine.
     scheduler : str, optional
-        Address of a Dask scheduler whose workers do the work.
+        Address of a Dask scheduler whose workers compute the chunks; by default this process does.
     threads : int, optional
-        How many of this process work at once at most.
+        Maximum number of threads in this process.
 
     Returns
     -------
     VisibilityGrid
+        Grid for these inputs.
     """
     key = visibility_key(site, models, settings, engine_name(engine))
     stored = _load(path)
     checkpoint = CheckpointFolder(path, key)
     if stored is not None and stored.key == key and stored.shape == (len(site.candidates), len(site.targets)):
-        checkpoint.remove()  # what is left of a process that was killed between writing the grid and this
+        checkpoint.remove()  # left by a process that was killed after it had written the grid
         yield Progress(len(site.candidates), len(site.candidates), "visibility, from an earlier run")
         return stored
     grid = yield from compute_visibility(site, models, settings, engine, checkpoint, scheduler, threads)
@@ -111,7 +112,7 @@ def stored_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who 
 
 
 def _load(path: Path) -> VisibilityGrid | None:
-    """Return the grid of a file, or None where there is none that can be used again."""
+    """Return the grid of a file, or None if there is no usable one."""
     try:
         return VisibilityGrid.load(path)
     except SeipError:
@@ -125,19 +126,19 @@ class GridFolder:
         self._path = path
 
     def megabytes(self) -> float:
-        """Return the size of all grids; quick while none comes or goes, so that a panel may ask at each drawing."""
+        """Return the size of all grids; it is cached while the folder does not change, for panels that draw often."""
         try:
             return _megabytes(self._path, self._path.stat().st_mtime_ns)
         except OSError:  # there is no such folder
             return 0.0
 
     def empty(self) -> int:
-        """Delete all grids and pieces of grids, and return how many there were.
+        """Delete all grids and chunks of grids, and return their number.
 
         Raises
         ------
         SeipError
-            One cannot be deleted.
+            A file or folder cannot be deleted.
         """
         entries = _grids(self._path)
         for entry in entries:

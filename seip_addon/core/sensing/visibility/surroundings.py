@@ -1,4 +1,4 @@
-"""A site with all that visibility from other poses than its candidates needs."""
+"""Inputs of visibility from poses that are not candidates of a site."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,10 +17,11 @@ class Surroundings:
     Parameters
     ----------
     models : mapping of str to LidarModel
-        At least those that the candidates name.
+        Sensor types by catalogue key, those of all candidates included.
     objects : sequence of Mesh
-        The scene's occluders: no sensor is inside one.
+        The scene's occluders, which must not contain a sensor.
     engine : {"auto", "bvh", "embree"}
+        Ray-casting engine.
     """
 
     site: Site

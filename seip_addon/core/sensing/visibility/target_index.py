@@ -12,13 +12,13 @@ _MAX_CELLS_PER_SIDE = 2000
 
 
 def squared_length(gap: Float) -> Float:
-    """Squared lengths of vectors, (n,) from (n, 3); sums are of the same order everywhere, to the last digit."""
+    """Return squared lengths of vectors, (n,) from (n, 3), always summed in the same order, so that bits agree."""
     squared: Float = gap[:, 0] ** 2 + gap[:, 1] ** 2 + gap[:, 2] ** 2
     return squared
 
 
 def is_within(squared_distance: Float, delta: float) -> Boolean:
-    """Return whether returns at squared distances from targets see them: they are nearer than δ, not just as near."""
+    """Return whether returns at squared distances from targets see them: whether they are nearer than δ."""
     near: Boolean = squared_distance < delta**2
     return near
 
@@ -26,14 +26,15 @@ def is_within(squared_distance: Float, delta: float) -> Boolean:
 class TargetIndex:
     """Targets in the cells of a square grid in plan, at least δ wide.
 
-    A point within δ of a target lies in the target's cell or in one of the
-    eight about it. Cells are numbered row by row, so that three neighbours in
-    a row are one slice of the sorted targets.
+    A point within δ of a target lies in the target's cell or in one of the eight around it. Cells are numbered row by
+    row, so that three neighbours in a row are one slice of the sorted targets.
 
     Parameters
     ----------
     xyz : (t, 3) float64, metres
+        Positions of the targets.
     delta : float, metres
+        δ, the distance within which a return sees a target.
     """
 
     def __init__(self, xyz: Float, delta: float) -> None:
@@ -60,7 +61,7 @@ class TargetIndex:
         Returns
         -------
         (k,) int64
-            Their indices, ascending.
+            Indices of these targets, ascending.
         """
         near = np.zeros(len(self._order), dtype=bool)
         for _, slot in self._near(points):
@@ -77,14 +78,14 @@ class TargetIndex:
         Returns
         -------
         point, target : (p,) int64
-            Points ascending.
+            Indices of the pairs, points ascending.
         """
         point, slot = (np.concatenate(part) for part in zip(*self._near(points), strict=True))
         order = np.argsort(point, kind="stable")
         return point[order], self._order[slot[order]]
 
     def _near(self, points: Float) -> Iterator[tuple[Integer, Integer]]:
-        """Pairs of points and of places among the sorted targets, for each row of cells about the points."""
+        """Yield pairs of points and of indices into the sorted targets, for each row of cells around the points."""
         column, row = self._cells(points)
         inside = (column >= 1) & (column < self._columns - 1) & (row >= 1) & (row < self._rows - 1)
         which = np.flatnonzero(inside)

@@ -1,8 +1,7 @@
-"""Visibility model: which targets sensors at arbitrary positions and orientations see.
+"""Visibility of targets from sensors at arbitrary positions and orientations.
 
-What an upright sensor sees is computed in the site's axes. For any other all is
-computed in the sensor's own axes, where its channels are cones about z as those
-of an upright one are; only rays go out in the site's.
+For an upright sensor, visibility is computed in the site's axes. For any other sensor it is computed in the sensor's
+own axes, in which its channels are cones about z, like those of an upright one; only rays are cast in the site's axes.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from .scanning import Caster, ScanPosition, seen_by_all_rays, seen_by_near_rays
 from .settings import VisibilitySettings
 
 _MAX_LEVEL_ANGLE = 1e-6
-"""Radians that an upright sensor's axis may be off: Blender turns objects in single precision."""
+"""Radians by which the axis of an upright sensor may deviate: Blender rotates objects in single precision."""
 
 
 class VisibilityModel:
@@ -35,7 +34,7 @@ class VisibilityModel:
     Parameters
     ----------
     caster : RayCaster
-        Of the site's triangles.
+        Ray caster of the site's triangles.
     """
 
     def __init__(self, site: Site, settings: VisibilitySettings, caster: RayCaster) -> None:
@@ -48,12 +47,12 @@ class VisibilityModel:
         return len(self._surfaces.xyz)
 
     def see(self, model: LidarModel, xyz: Float, orientation: Float) -> Boolean:
-        """Compute which targets one sensor sees, (t,) bool; see `see_all`."""
+        """Compute the targets that one sensor sees, (t,) bool; see `see_all`."""
         only: Boolean = self.see_all([model], xyz, orientation)[0][0]
         return only
 
     def see_all(self, models: Sequence[LidarModel], xyz: Float, orientation: Float) -> tuple[Boolean, int]:
-        """Compute which targets sensors of several models see from one position; they share rays.
+        """Compute the targets that sensors of several models see from one position; they share rays.
 
         Parameters
         ----------
@@ -65,6 +64,7 @@ class VisibilityModel:
         Returns
         -------
         seen : (models, t) bool
+            Visibility of each target from each sensor.
         cast : int
             Number of rays.
         """
@@ -74,7 +74,7 @@ class VisibilityModel:
         return seen_by_near_rays(position, rotated_surfaces(self._surfaces, xyz, orientation))
 
     def see_upright(self, models: Sequence[LidarModel], xyz: Float, yaw: float) -> tuple[Boolean, int]:
-        """Compute which targets upright sensors see whose azimuth zero points to a yaw in radians; see `see_all`."""
+        """Compute the targets that upright sensors of a given yaw, in radians, see; see `see_all`."""
         return seen_by_near_rays(self._position(models, xyz, yaw), self._surfaces)
 
     def _position(self, models: Sequence[LidarModel], xyz: Float, yaw: float) -> ScanPosition:
@@ -87,14 +87,14 @@ def visibility_model(site: Site, settings: VisibilitySettings, engine: Engine = 
 
 
 def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, surfaces: NearSurfaces) -> tuple[Boolean, int]:
-    """Find which targets sensors see that are tilted by an angle (radians), by casting every ray: the reference."""
+    """Find the targets that sensors tilted by an angle (radians) see, by casting every ray: the reference."""
     if tilt == 0:
         return seen_by_all_rays(position, surfaces)
     orientation = orientation_of(position.yaw, tilt)
     if is_upright(orientation):
         return seen_by_all_rays(replace(position, yaw=yaw_of(orientation)), surfaces)
-    turned = rotated_surfaces(surfaces, position.origin, orientation)
-    return seen_by_all_rays(in_sensor_axes(position, orientation), turned)
+    in_axes = rotated_surfaces(surfaces, position.origin, orientation)
+    return seen_by_all_rays(in_sensor_axes(position, orientation), in_axes)
 
 
 def is_upright(orientation: Float) -> bool:
@@ -108,7 +108,7 @@ def yaw_of(orientation: Float) -> float:
 
 
 def in_sensor_axes(position: ScanPosition, orientation: Float) -> ScanPosition:
-    """Return a position in the axes of its sensors, which are so oriented."""
+    """Return a position in the axes of its sensors, which have the given orientation."""
     caster = _RotatedCaster(position.caster, position.origin, orientation)
     return replace(position, caster=caster, origin=np.zeros(3), yaw=0.0)
 

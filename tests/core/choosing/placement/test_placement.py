@@ -55,7 +55,7 @@ def test_two_suffice_where_four_are_asked_for() -> None:
     placement = finish(solve(row_problem(halves, count=4)))
     assert placement.chosen.tolist() == [0, 1]
     assert placement.status == "optimal"
-    assert any("asked for 4 sensors, 2 suffice" in note for note in placement.notes)
+    assert any("2 of 4 sensors suffice" in note for note in placement.notes)
 
 
 def test_of_equal_placements_the_cheapest_then_the_most_doubly_seen() -> None:
@@ -256,7 +256,7 @@ def test_a_program_out_of_time_is_not_called_infeasible(monkeypatch: pytest.Monk
         return Outcome(None, np.inf, finished=False)
 
     monkeypatch.setattr(integer_program.CoverProgram, "maximise", unfinished)
-    with pytest.raises(SeipError, match="too short to tell whether the mandatory places"):
+    with pytest.raises(SeipError, match="did not find out within 20 s whether the mandatory places"):
         finish(solve(row_problem(halves, mandatory=first_two)))
 
 
@@ -317,14 +317,14 @@ first_two = np.array([[1, 0, 0, 0], [0, 1, 0, 0]], bool)
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"count": 0}, "asked for 0 sensors; ask for at least 1"),
-        ({"count": 5}, "asked for 5 sensors, but there are 4 positions"),
-        ({"count": 4, "forbidden": np.array([True, False, False, False])}, "there are 3 positions"),
+        ({"count": 0}, "the number of sensors is 0; it must be at least 1"),
+        ({"count": 5}, "5 sensors are requested, but there are only 4 positions"),
+        ({"count": 4, "forbidden": np.array([True, False, False, False])}, "there are only 3 positions"),
         ({"budget": 5000.0}, "budget of 5000 is below the cheapest sensor, which costs 6000"),
         ({"budget": float("nan")}, "below the cheapest sensor"),
         ({"weights": np.array([1.0, -1.0, 1.0, 1.0])}, "every weight must be"),
         ({"weights": np.array([1.0, np.nan, 1.0, 1.0])}, "every weight must be"),
-        ({"weights": np.zeros(4)}, "every target weighs 0"),
+        ({"weights": np.zeros(4)}, "the weight of every target is 0"),
         ({"prices": np.array([1.0, np.inf, 1.0, 1.0])}, "every price must be"),
         ({"forbidden": np.ones(4, bool)}, "every candidate is forbidden"),
         ({"xyz": np.full((4, 3), np.nan)}, "coordinates are not finite"),
@@ -335,7 +335,7 @@ first_two = np.array([[1, 0, 0, 0], [0, 1, 0, 0]], bool)
             "B must carry a sensor, but every candidate there is forbidden",
         ),
         ({"visible": np.zeros((4, 4), bool)}, "no candidate sees any target"),
-        ({"mandatory": first_two, "count": 1}, "cannot all carry a sensor with 1 sensors; ask for at least 2"),
+        ({"mandatory": first_two, "count": 1}, "cannot all carry a sensor with 1 sensors; allow at least 2"),
         ({"mandatory": first_two, "budget": 6000.0}, "within the budget of 6000; raise it to at least 12000"),
         ({"mandatory": first_two, "min_distance": 15.0}, "at least 15 m apart; lower the minimum distance"),
         ({"mandatory": first_two, "positions": np.zeros(4, np.int64)}, "compete for the same positions"),

@@ -229,9 +229,9 @@ def test_instants_are_spread_over_all_runs_and_follow_from_the_seed():
 def test_traffic_that_is_of_no_use_is_refused():
     here = parked((0.0, 0.0, 0.0, 0.0, 0.0))
     check_runs([here], SITE.region)
-    with pytest.raises(SeipError, match="traffic of another place"):
+    with pytest.raises(SeipError, match="is ever in the region of interest"):
         check_runs([here, parked((5000.0, 0.0, 0.0, 0.0, 0.0))], SITE.region)
     with pytest.raises(SeipError, match="simulate more traffic"):
         spread_instants([here, make_trajectories([(0.0, 0, 0, 0, 0, 0), (1.5, 1, 0, 0, 0, 0)])], 4, 0)
-    with pytest.raises(SeipError, match="ask for one instant"):
+    with pytest.raises(SeipError, match="the number of instants of traffic must be at least 1"):
         spread_instants([here], 0, 0)

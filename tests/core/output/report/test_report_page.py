@@ -173,7 +173,7 @@ def test_figures_agree_with_the_grid(folder):
         ),
         (Objective(coverage=0.5), {}, r"reaches the required coverage at a lower price: this is proven\."),
         (Objective(count=3), {"status": "feasible", "bound": np.inf, "gap": np.inf}, "how much better is not known"),
-        (Objective(count=3), {"status": MOVED, "bound": np.nan, "gap": np.inf}, "nothing is proven of it"),
+        (Objective(count=3), {"status": MOVED, "bound": np.nan, "gap": np.inf}, "without proof of optimality"),
         (
             Objective(count=3),
             {

@@ -531,10 +531,10 @@ def test_times_are_those_of_the_slowest_sensor() -> None:
     np.testing.assert_allclose(frame_times(cars, sensors), np.arange(51) / 5)
     np.testing.assert_allclose(frame_times(cars, sensors[:1], start=2.3, duration=0.3), [2.3, 2.4, 2.5, 2.6])
     np.testing.assert_allclose(frame_times(cars, sensors, start=9.0, rate=1.0), [9.0, 10.0])
-    with pytest.raises(SeipError, match="S2 turns 5 times"):
+    with pytest.raises(SeipError, match="S2 rotates 5 times"):
         frame_times(cars, sensors, rate=10.0)
     for wrong in ({"start": -1.0}, {"start": 11.0}, {"start": 5.0, "duration": 6.0}, {"duration": -1.0}):
-        with pytest.raises(SeipError, match="known from 0 s to 10 s"):
+        with pytest.raises(SeipError, match="lasts from 0 s to 10 s"):
             frame_times(cars, sensors, **wrong)
 
 

@@ -142,10 +142,10 @@ def test_a_mesh_is_read_as_blender_writes_it(tmp_path):
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl paint\nf 1 2 3\n", "has no length, width and height"),
         (TETRAHEDRON.format(material="chrome"), "unknown material 'chrome'; known are cargo box"),
         (TETRAHEDRON.format(material="paint") + "f 1 2 3 4\n", "not all faces are triangles"),
-        (TETRAHEDRON.format(material="paint") + "f 1 2 9\n", "is no Wavefront OBJ mesh"),
-        (TETRAHEDRON.format(material="paint").replace("0 0 1", "0 0 x"), "is no Wavefront OBJ mesh"),
+        (TETRAHEDRON.format(material="paint") + "f 1 2 9\n", "is not a Wavefront OBJ mesh"),
+        (TETRAHEDRON.format(material="paint").replace("0 0 1", "0 0 x"), "is not a Wavefront OBJ mesh"),
         (TETRAHEDRON.format(material="paint").replace("0 0 1", "0 0 nan"), "has no length, width and height"),
-        ("", "is no Wavefront OBJ mesh"),
+        ("", "is not a Wavefront OBJ mesh"),
     ],
 )
 def test_no_mesh_of_a_body_is_one_sentence(tmp_path, text, message):

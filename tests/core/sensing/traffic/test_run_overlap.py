@@ -58,7 +58,7 @@ def test_of_many_pairs_the_range_and_the_closest_are_said():
     runs = [vehicle_positions(path.stem, Trajectories.load(path)) for path in paths]
     said = require_independent(combinations(runs, 2))
     closest = max(combinations(runs, 2), key=lambda pair: overlap_of(*pair))
-    assert f"in 10 pairs, most of {closest[0].name} and {closest[1].name} {overlap_of(*closest):.0%}" in said
+    assert f"in 10 pairs, most for {closest[0].name} and {closest[1].name} {overlap_of(*closest):.0%}" in said
     assert said.count(" and ") == 1
 
 
@@ -80,4 +80,4 @@ def test_runs_without_a_common_instant_cannot_be_told():
     brief = make_trajectories([(0.2, 0.0, 0.0, 0.0, 0.0, 0.0), (0.8, 5.0, 0.0, 0.0, 0.0, 0.0)])
     assert shares(brief, RUN) == [None]
     said = require_independent([(vehicle_positions("a", brief), vehicle_positions("b", RUN))])
-    assert said.endswith("a and b cannot be told")
+    assert said.endswith("a and b unknown")

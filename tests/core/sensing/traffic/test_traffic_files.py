@@ -123,11 +123,11 @@ BOMB = '<!DOCTYPE f [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><fcd-export><timest
     [
         ("f.xml", one(ROW, (0.2, 0.1)), "times run backwards, 0.1 s comes after 0.2 s"),
         ("f.csv", "timestep_time;vehicle_id\n3;\n1;\n", "times run backwards, 1 s comes after 3 s"),
-        ("f.xml", one(ROW, (0.2, 0.2)), "'a' is there twice at 0.2 s"),
-        ("f.xml", one(ROW.replace('x="1"', 'x="nan"')), "x='nan' of 'a' at 0 s is no number"),
-        ("f.xml", one(ROW.replace('angle="0"', "")), "angle='' of 'a' at 0 s is no number"),
-        ("f.xml", one(ROW, ("soon",)), "time='soon' of 'a time step' is no number"),
-        ("f.xml", "<routes/>", "no floating car data"),
+        ("f.xml", one(ROW, (0.2, 0.2)), "'a' appears twice at 0.2 s"),
+        ("f.xml", one(ROW.replace('x="1"', 'x="nan"')), "x='nan' of 'a' at 0 s is not a number"),
+        ("f.xml", one(ROW.replace('angle="0"', "")), "angle='' of 'a' at 0 s is not a number"),
+        ("f.xml", one(ROW, ("soon",)), "time='soon' of 'a time step' is not a number"),
+        ("f.xml", "<routes/>", "not floating car data"),
         ("f.xml", FCD[:-30], "unfinished XML"),
         ("f.xml", "hello", "broken or unfinished XML"),
         ("f.xml", BOMB, "declares a document type"),
@@ -136,7 +136,7 @@ BOMB = '<!DOCTYPE f [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><fcd-export><timest
         ("f.csv", NATIVE_CSV[:-20], "line 6 has 6 cells under 10 columns"),
         ("f.csv", NATIVE_CSV.replace("0.20;a", '0.20;"a'), "line 6 has 2 cells under 10 columns"),
         ("f.csv", NATIVE_CSV.replace("0.20;a", "0.20;" + 50_000 * "a").replace("112.0", "x"), "aaa…' at 0.2 s is no"),
-        ("f.xml", one(ROW.replace('x="1"', f'x="{50_000 * "1"}x"')), "111…' of 'a' at 0 s is no number"),
+        ("f.xml", one(ROW.replace('x="1"', f'x="{50_000 * "1"}x"')), "111…' of 'a' at 0 s is not a number"),
         ("f.xml", one(ROW.replace('x="1"', 'x="1e300"')), "x='1e300' of 'a' at 0 s is beyond 1e+08"),
         ("f.xml", one(ROW, ("1e300",)), "time='1e300' of 'a time step' is beyond"),
         ("f.xml", FCD.replace("UTF-8", "klingon"), "encoding that cannot be read"),
@@ -159,7 +159,7 @@ def test_blank_lines_of_a_table_say_nothing(tmp_path):
 
 def test_a_long_name_is_cut_in_sentences(tmp_path):
     path = written(tmp_path, "r.xml", f'<routes><vType id="{50_000 * "t"}" length="0"/></routes>')
-    with pytest.raises(SeipError, match="is no size") as caught:
+    with pytest.raises(SeipError, match="is not a valid size") as caught:
         finish(read_vehicle_types([path]))
     assert len(str(caught.value)) < 300
     assert len(listed([50_000 * "a"])) < 100
@@ -175,14 +175,14 @@ def test_damaged_or_missing_files_get_one_sentence(tmp_path):
     with pytest.raises(SeipError, match="cannot read"):
         read(tmp_path)
     (tmp_path / "f.csv").write_bytes(b"timestep_time;vehicle_id\n\xff\xff;a\n")
-    with pytest.raises(SeipError, match="no csv table"):
+    with pytest.raises(SeipError, match="not a csv table"):
         read(tmp_path / "f.csv")
 
 
 @pytest.mark.parametrize("size", ["0", "-1", "long", "nan", "1e9"])
 def test_a_senseless_size_is_refused(tmp_path, size):
     path = written(tmp_path, "r.xml", f'<routes><vType id="t" length="{size}"/></routes>')
-    with pytest.raises(SeipError, match="of vType 't' is no size"):
+    with pytest.raises(SeipError, match="of vType 't' is not a valid size"):
         finish(read_vehicle_types([path]))
 
 

@@ -344,10 +344,10 @@ def test_the_warning_of_rings_tells_upright_from_tilted_sensors():
     some = replace(site.candidates, tilt=np.where(np.arange(len(site.candidates)) % 2, 0.2, 0.0))
     both = resolution_warnings(replace(site, candidates=some), models, SIGHT)
     assert both[0] == upright[0]
-    assert both[1].startswith("type1: where it is tilted, beyond ")
+    assert both[1].startswith("type1: if tilted, beyond ")
     only = resolution_warnings(tilted(site, 0.0, 0.2), models, SIGHT)
     assert len(only) == 1
-    assert only[0].startswith("type1: where it is tilted")
+    assert only[0].startswith("type1: if tilted")
 
 
 def test_rings_before_a_tilted_sensor_are_where_its_rays_meet_the_road():
