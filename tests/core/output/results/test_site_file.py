@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from tests.core.report.report_folder import make_folder
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.site_file import FILE, load_site_file
 from tests.builders.npz_by_hand import contents
+from tests.core.output.report.report_folder import make_folder
 
 
 def _set(name, value):
