@@ -81,8 +81,8 @@ def test_junctions_of_an_extract_are_listed_by_their_streets(scene, extract):
     with pytest.raises(RuntimeError, match="Choose a junction, or give latitude and longitude"):
         bpy.ops.seip.build_site()
     site.position = "somewhere"
-    assert "is no place" in site.wrong_position()
-    with pytest.raises(RuntimeError, match="'somewhere' is no place: give latitude and longitude"):
+    assert "is not a position" in site.wrong_position()
+    with pytest.raises(RuntimeError, match="'somewhere' is not a position: give latitude and longitude"):
         bpy.ops.seip.build_site()
     site.position = "52.5, 13.4"
     assert site.asked().near_latlon == (52.5, 13.4)

@@ -93,12 +93,12 @@ def parsed_position(text: str) -> tuple[float, float]:
     """
     found = _POSITION.fullmatch(text)
     if found is None:
-        raise SeipError(f"{text!r} is no place: give latitude and longitude in degrees, like 52.47391, 13.44048")
+        raise SeipError(f"{text!r} is not a position: give latitude and longitude in degrees, like 52.47391, 13.44048")
     latitude, longitude = float(found[1]), float(found[2])
     if abs(latitude) > MAX_LATITUDE or abs(longitude) > 180.0:
         raise SeipError(
-            f"{text!r} is no place for streets: the latitude comes first, up to {MAX_LATITUDE:g} degrees, then the "
-            "longitude, up to 180"
+            f"{text!r} is not a position with streets: give the latitude first, up to {MAX_LATITUDE:g} degrees, then "
+            "the longitude, up to 180"
         )
     return latitude, longitude
 

@@ -100,8 +100,8 @@ class PlacementProgram:
     @property
     def price_scale(self) -> float:
         """Factor that scales the highest price to 10,000, far above the solvers' absolute tolerances."""
-        dearest = float(self._rules.price.max(initial=0.0))
-        return 1e4 / dearest if dearest > 0 else 1.0
+        highest = float(self._rules.price.max(initial=0.0))
+        return 1e4 / highest if highest > 0 else 1.0
 
     def number_among(self, candidates: Integer, factors: Float | None = None) -> Expression:
         """Return the (weighted) number of sensors among some candidates."""

@@ -91,7 +91,7 @@ def _parse(content: str, file: str) -> dict[str, LidarModel]:
 def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - whatever the file holds
     where = f"LiDAR '{key}' in {file}"
     if not isinstance(table, dict):
-        raise SeipError(f"{where} is no table; write [{key}] and its values below it")
+        raise SeipError(f"{where} is not a table; write [{key}] and its values below it")
     values = read_table(table, where, _keys(table, where))
     rosette = _rosette(values, where) if "pattern" in values else None
     if "channels" in values:
@@ -109,7 +109,7 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
     strange = [name for name in own if name not in (_DROPOFF if kind == CarlaDropoff.model else _DETECTION)]
     if strange:
         raise SeipError(
-            f'{where}: {strange[0]} is no figure of the model "{kind}": leave it out, or name the other model'
+            f'{where}: {strange[0]} is not a figure of the model "{kind}": leave it out, or name the other model'
         )
     try:
         calibration, gains = given.pop("calibration", ""), given.pop("gain_band", None)
@@ -144,7 +144,7 @@ def _keys(table: Mapping[str, Any], where: str) -> dict[str, Key]:
     if "pattern" in table:
         strange = sorted(((_ROTATION | _EVEN | _UNEVEN).keys() - _ROSETTE.keys()) & table.keys())
         if strange:
-            raise SeipError(f"{where}: {strange[0]} is no figure of a rosette: leave it out, or leave out pattern")
+            raise SeipError(f"{where}: {strange[0]} is not a figure of a rosette: leave it out, or leave out pattern")
         return _KEYS | _ROSETTE
     if "elevations_deg" in table and _EVEN.keys() & table.keys():
         raise SeipError(f"{where}: give either elevations_deg or {', '.join(_EVEN)}")

@@ -73,7 +73,7 @@ class RangeEquation:
     ceiling : float, above 0 to 1
         c.
     extinction : float, 1/m
-        α, 0 or more: of clear air, where data sheets were measured, next to nothing.
+        α, 0 or more; that of clear air, in which data sheets are measured, is nearly zero.
 
     Raises
     ------
@@ -113,10 +113,10 @@ class RangeEquation:
         Parameters
         ----------
         at_10, at_80 : float, metres
-            Ranges at which surfaces of 10 and 80 % reflectivity that face the sensor are detected. Where the longer one
-            is more than √8 times the other, which no extinction explains, the range at 10 % counts.
+            Ranges at which surfaces of 10 and 80 % reflectivity that face the sensor are detected. If the longer one is
+            more than √8 times the other, which no extinction explains, only the range at 10 % is used.
         probability : float
-            With which they are, below the ceiling.
+            Probability of detection at these ranges, below the ceiling.
 
         Raises
         ------

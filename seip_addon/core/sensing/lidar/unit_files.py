@@ -130,7 +130,7 @@ def read_unit_file(path: Path) -> UnitBeams:
     except (OSError, UnicodeDecodeError) as error:
         raise SeipError(f"cannot read the calibration {path}: {error}") from error
     if len(content) > MAX_BYTES:
-        raise SeipError(f"{path} has over {MAX_BYTES / 1e6:g} MB: it is no calibration of a LiDAR")
+        raise SeipError(f"{path} has over {MAX_BYTES / 1e6:g} MB: it is not a calibration of a LiDAR")
     try:
         return _READERS[path.suffix.lower()](text)
     except DefusedXmlException as error:
@@ -145,7 +145,7 @@ def _ouster(text: str) -> UnitBeams:
     try:
         content = _object(json.loads(text), "content")
     except json.JSONDecodeError as error:
-        raise ValueError(f"is no valid JSON: {error}") from error
+        raise ValueError(f"is not valid JSON: {error}") from error
     nested = "beam_intrinsics" in content
     if nested and "beam_altitude_angles" in content:
         raise ValueError("has beam_altitude_angles both at the top and in beam_intrinsics")
@@ -173,7 +173,7 @@ def _ouster(text: str) -> UnitBeams:
 
 def _object(value: object, name: str) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise ValueError(f"has a {name} that is no object")  # noqa: TRY004 -- of the file, not of a caller
+        raise ValueError(f"has a {name} that is not an object")  # noqa: TRY004 -- of the file, not of a caller
     return value
 
 
@@ -288,14 +288,14 @@ def _number(value: object, name: str) -> float:
     except ValueError:
         number = math.nan
     if not abs(number) <= 1e6:
-        raise ValueError(f"has {str(value)[:20]!r} for {name}, which is no sensible number")
+        raise ValueError(f"has {str(value)[:20]!r} for {name}, which is not a sensible number")
     return number
 
 
 def _whole(value: object, name: str) -> int:
     number = _number(value, name)
     if number != int(number) or number < 0:
-        raise ValueError(f"has {str(value)[:20]!r} for {name}, which is no whole number from 0 on")
+        raise ValueError(f"has {str(value)[:20]!r} for {name}, which is not a whole number of at least 0")
     return int(number)
 
 

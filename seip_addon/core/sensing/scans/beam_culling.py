@@ -85,6 +85,7 @@ def _azimuths(points: Float) -> tuple[Float, Float, Float]:
     middle, half = centre + (low + high) / 2, (high - low) / 2
     # every point is at least this far along the middle of the arc, and so is the hull; from inside the distance is zero
     along = x * np.cos(middle)[:, None] + y * np.sin(middle)[:, None]
+    # an arc of half a turn or more means that the sensor is inside the hull, which then lies in all directions
     within = half >= math.pi / 2
     return middle, np.where(within, math.pi, half), np.where(within, 0.0, np.maximum(along.min(axis=1), 0.0))
 

@@ -160,16 +160,17 @@ class Trajectories:
         return float(self.time.min()), float(self.time.max())
 
     def at(self, time: float) -> Snapshot:
-        """Return who is on the road at an instant, between two samples on the straight line from one to the other.
+        """Return the road users present at an instant, with positions interpolated linearly between samples.
 
         Parameters
         ----------
         time : float, seconds
+            Time of the instant.
 
         Returns
         -------
         Snapshot
-            Of the road users whose first sample is not later and whose last is not earlier.
+            Road users whose first sample is not later and whose last is not earlier.
         """
         begin, end = self.time[self.first[:-1]], self.time[self.first[1:] - 1]
         user = np.flatnonzero((begin <= time) & (time <= end))
@@ -212,7 +213,7 @@ class Trajectories:
         Raises
         ------
         SeipError
-            The file is not there, damaged, or something else.
+            The file is missing, damaged or not a file of trajectories.
         """
         with FILE.reading(path) as (header, arrays):
             users = tuple(_from_record(user) for user in header["users"])
@@ -224,20 +225,20 @@ class Trajectories:
 
 @dataclass(frozen=True, eq=False)
 class LoadedTraffic:
-    """Trajectories, and what a user should know before trusting them (one sentence each)."""
+    """Trajectories with warnings about them."""
 
     trajectories: Trajectories
     warnings: tuple[str, ...]
 
 
 def _look(user: RoadUser) -> tuple[object, ...]:
-    """Return what a road user looks like, its shape where that is not its model's own."""
+    """Return the appearance of a road user, with its shape if that differs from the model's."""
     look = (user.category, user.length, user.width, user.height, user.paint)
     return (*look, user.shape) if any(user.shape) else look
 
 
 def _as_record(user: RoadUser) -> dict[str, Any]:
-    """Return a road user for a header; its shape where that is not its model's own."""
+    """Return a road user for a header, with its shape if that differs from the model's."""
     record = asdict(user)
     if not any(user.shape):
         del record["shape"]
@@ -249,7 +250,7 @@ def _from_record(record: dict[str, Any]) -> RoadUser:
 
 
 def _check_users(users: tuple[RoadUser, ...]) -> None:
-    """Raise `ContentError` where a road user is none."""
+    """Raise `ContentError` if a road user is invalid."""
     for user in users:
         sizes = (user.length, user.width, user.height)
         if not isinstance(user.name, str) or user.category not in CATEGORIES:
@@ -269,7 +270,7 @@ def is_shape(values: Sequence[object]) -> bool:
 
 
 def _check_samples(read: Trajectories) -> None:
-    """Raise `ContentError` where samples contradict each other or the road users."""
+    """Raise `ContentError` if samples contradict each other or the road users."""
     count, first = len(read.time), read.first
     if not len(read.users) or len(first) != len(read.users) + 1:
         raise ContentError(f"it names {len(read.users)} road users and has the samples of {len(first) - 1}")
@@ -282,7 +283,7 @@ def _check_samples(read: Trajectories) -> None:
         user = int(np.searchsorted(first, np.flatnonzero(late)[0], side="right")) - 1
         raise ContentError(f"the times of road user {read.users[user].name[:40]!r} do not ascend")
     if (within & (np.abs(np.diff(read.yaw)) > math.pi + _TURN_TOLERANCE)).any():
-        raise ContentError("a heading leaps by more than half a turn")
+        raise ContentError("a heading changes by more than half a turn between two samples")
     begin, end = read.span
     if not limits.DURATION.allow(end - begin):
         raise ContentError(f"it lasts {end - begin:g} s")
@@ -291,4 +292,4 @@ def _check_samples(read: Trajectories) -> None:
         raise ContentError(f"its road users are up to {widest / 1e3:,.0f} km apart")
 
 
-_TURN_TOLERANCE = 1e-3  # radians by which rounding may widen a turn
+_TURN_TOLERANCE = 1e-3  # largest error of a turn by rounding, radians

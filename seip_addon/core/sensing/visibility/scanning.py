@@ -192,6 +192,8 @@ def _seen_by_channels(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
     # of a round are cast together, which the casters need to be fast. The loop ends when every ray of every bundle is
     # cast, proven to be stopped, or of no use since its target is seen. So nothing is missed.
     while len(bundles):
+        # Proven before anything is cast: on a scene with large occluders one triangle may stop a whole bundle, at
+        # the price of a few products. Bundles without a triangle (their last ray met nothing) cannot be proven.
         stopped = (triangle >= 0) & (bundles.width > 1)  # a single ray is cast as quickly as it is proven stopped
         corners = position.caster.triangles[triangle[stopped]]
         stopped[stopped] = stopped_by(position.origin, corners, beams, bundles.pick(stopped), planes)

@@ -77,13 +77,13 @@ def test_a_place_is_read_as_people_copy_it(text, place):
 
 @pytest.mark.parametrize("text", ["", "52.5", "here", "52,5, 13,4", "1e400, 2", "nan, 1"])
 def test_what_is_no_place_is_refused(text):
-    with pytest.raises(SeipError, match="is no place: give latitude and longitude"):
+    with pytest.raises(SeipError, match="is not a position: give latitude and longitude"):
         parsed_position(text)
 
 
 @pytest.mark.parametrize("text", ["89.0, 10", "115.86, -31.95", "10, 181"])
 def test_a_place_without_streets_is_refused(text):
-    with pytest.raises(SeipError, match="the latitude comes first"):
+    with pytest.raises(SeipError, match="give the latitude first"):
         parsed_position(text)
 
 
