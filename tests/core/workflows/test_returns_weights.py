@@ -1,0 +1,42 @@
+"""Weights of road users in the criterion of returns."""
+
+import numpy as np
+import pytest
+
+from seip_addon.core.choosing.placement.objective import Objective
+from seip_addon.core.sensing.returns.road_users import RoadUsers
+from seip_addon.core.workflows.returns import CROSSING_SHARE, user_weights
+
+
+def users(bodies, crossings, weight=None):
+    count = len(bodies)
+    weight = np.ones(count) if weight is None else np.array(weight)
+    return RoadUsers(np.zeros((count, 3)), np.array(bodies), weight, weight > 1, np.array(crossings), ("zebra",), 2.0)
+
+
+def test_each_kind_has_its_share_and_half_of_the_pedestrians_is_on_crossings():
+    some = users([0, 0, 0, 1, 2, 2, 2, 2], [-1, -1, -1, -1, -1, -1, -1, 0])
+    weights = user_weights(some, Objective(count=1, shares=(1.0, 2.0, 3.0)))
+    assert weights.mean() == pytest.approx(1.0)
+    by_kind = [weights[some.body == body].sum() for body in range(3)]
+    np.testing.assert_allclose(by_kind, np.array([1.0, 2.0, 3.0]) / 6.0 * len(some))
+    assert weights[some.crossing >= 0].sum() == pytest.approx(CROSSING_SHARE * by_kind[2])
+    assert np.ptp(weights[4:7]) == 0
+
+
+def test_pedestrians_keep_their_share_where_there_is_no_crossing():
+    some = users([0, 1, 2, 2], [-1, -1, -1, -1])
+    weights = user_weights(some, Objective(count=1))
+    np.testing.assert_allclose(weights, np.array([1, 1, 0.5, 0.5]) * 4 / 3)
+
+
+def test_weights_of_regions_multiply_those_of_kinds():
+    some = users([0, 0, 1, 2], [-1, -1, -1, -1], [1.0, 2.0, 1.0, 1.0])
+    plain, weighted = (user_weights(some, Objective(count=1, central_weight=w)) for w in (None, "scene"))
+    np.testing.assert_allclose(weighted / plain, [1, 2, 1, 1])
+
+
+def test_a_share_of_zero_leaves_a_kind_out():
+    some = users([0, 1, 2, 2], [-1, -1, -1, 0])
+    weights = user_weights(some, Objective(count=1, shares=(1.0, 0.0, 0.0)))
+    assert (weights > 0).tolist() == [True, False, False, False]
