@@ -20,14 +20,14 @@ VERBS = {
 
 def main() -> None:
     """Run the command that the first argument names, with the arguments after it."""
-    asked = sys.argv[1] if len(sys.argv) > 1 else "--help"
-    if asked in {"-h", "--help"}:
+    request = sys.argv[1] if len(sys.argv) > 1 else "--help"
+    if request in {"-h", "--help"}:
         sys.stdout.write(_usage())
         return
-    if asked not in VERBS:
-        sys.exit(f"error: there is no command {asked!r}: seip --help lists the commands")
+    if request not in VERBS:
+        sys.exit(f"error: there is no command {request!r}: seip --help lists the commands")
     del sys.argv[1]
-    runpy.run_module(f"headless.{asked.replace('-', '_')}", run_name="__main__", alter_sys=True)
+    runpy.run_module(f"headless.{request.replace('-', '_')}", run_name="__main__", alter_sys=True)
 
 
 def _usage() -> str:

@@ -25,9 +25,9 @@ from seip_addon.core.progress import finish
 from seip_addon.core.site.obstruction import NO_OBSTACLES_MESSAGE
 from seip_addon.core.site.sources import count_sources, source_lines
 from seip_addon.core.storage.files import locked_file
-from seip_addon.core.workflows.site_building import AskedSite, build_site, save_map
-from seip_addon.core.world.citymodel.at_place import AskedBuildings
-from seip_addon.core.world.elevation.at_place import AskedTerrain
+from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
+from seip_addon.core.world.citymodel.at_place import BuildingsRequest
+from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.streetscape.mesh_place import mesh_place
 from seip_addon.scene.blend_file import check_name, new_file, save_blend
 from seip_addon.scene.build import build_scene
@@ -36,35 +36,35 @@ from seip_addon.scene.imported import UP_AXES, check_mesh, import_mesh
 
 def main(argv: list[str]) -> None:
     """Read the source, model the site and save it."""
-    asked = _parser().parse_args(argv)
-    check_name(asked.output)
-    with locked_file(asked.output):
-        _build(asked)
+    request = _parser().parse_args(argv)
+    check_name(request.output)
+    with locked_file(request.output):
+        _build(request)
 
 
-def _build(asked: argparse.Namespace) -> None:
-    map_path = asked.output.with_suffix(".xodr")
-    for path in (asked.output, map_path):
+def _build(request: argparse.Namespace) -> None:
+    map_path = request.output.with_suffix(".xodr")
+    for path in (request.output, map_path):
         if path.is_dir():
             raise SeipError(f"{path} is a folder, and a file of that name would be written; choose another name")
-    up, origins = asked.mesh_up, asked.mesh_origin
-    if len(asked.mesh) != len(origins):
+    up, origins = request.mesh_up, request.mesh_origin
+    if len(request.mesh) != len(origins):
         raise SeipError("give each --mesh its own --mesh-origin LAT LON [HEADING], in their order")
-    for path in asked.mesh:
+    for path in request.mesh:
         check_mesh(path, up)
     with runtime.progress_bar() as report:
-        built = finish(build_site(asked.source, _asked_site(asked), map_path), report)
+        built = finish(build_site(request.source, _asked_site(request), map_path), report)
         model = built.model
         scene = new_file()
         finish(build_scene(scene, model, built.map_name), report)
-        places = [mesh_place(model, given, path.name) for path, given in zip(asked.mesh, origins, strict=True)]
+        places = [mesh_place(model, given, path.name) for path, given in zip(request.mesh, origins, strict=True)]
         meshes = [
-            row for path, place in zip(asked.mesh, places, strict=True) for row in import_mesh(scene, path, place, up)
+            row for path, place in zip(request.mesh, places, strict=True) for row in import_mesh(scene, path, place, up)
         ]
     save_map(built, map_path)
-    save_blend(asked.output)
+    save_blend(request.output)
     if any(one.boxes for one in built.merging):
-        chart = asked.output.with_suffix(".boxes.png")
+        chart = request.output.with_suffix(".boxes.png")
         save_merging_chart(chart, built.merging)
         runtime.print_line(f"{chart}: boxes of the survey, and which share of lines of sight they change")
     for note in model.notes:
@@ -74,15 +74,15 @@ def _build(asked: argparse.Namespace) -> None:
         runtime.print_line(line)
     x, y, z = model.origin + 0.0  # no negative zero
     runtime.print_line(
-        f"{asked.output}: {model.name}, {counted(len(model.parts), 'object')}, "
+        f"{request.output}: {model.name}, {counted(len(model.parts), 'object')}, "
         f"region of interest {model.region.area:.0f} m², local origin at map ({x:.0f}, {y:.0f}, {z:.0f})"
     )
     if built.map_text is not None:
         runtime.print_line(f"{map_path}: the map of its streets, to simulate traffic on")
 
 
-def _asked_site(options: argparse.Namespace) -> AskedSite:
-    return AskedSite(
+def _asked_site(options: argparse.Namespace) -> SiteRequest:
+    return SiteRequest(
         near=None if options.near is None else tuple(options.near),
         near_latlon=None if options.near_latlon is None else tuple(options.near_latlon),
         junction=tuple(options.junction),
@@ -92,19 +92,19 @@ def _asked_site(options: argparse.Namespace) -> AskedSite:
         site=options.site,
         osm=options.osm,
         buildings=_asked_buildings(options),
-        terrain=None if options.terrain is None else AskedTerrain(options.terrain, options.terrain_epsg),
+        terrain=None if options.terrain is None else TerrainRequest(options.terrain, options.terrain_epsg),
         service=options.service_roads,
         left_hand=None if options.traffic_keeps is None else options.traffic_keeps == "left",
     )
 
 
-def _asked_buildings(options: argparse.Namespace) -> AskedBuildings | None:
+def _asked_buildings(options: argparse.Namespace) -> BuildingsRequest | None:
     if options.buildings is None:
         if options.buildings_epsg is not None or options.buildings_origin is not None:
             raise SeipError("--buildings-epsg and --buildings-origin say where a model lies: name it by --buildings")
         return None
     origin = None if options.buildings_origin is None else tuple(options.buildings_origin)
-    return AskedBuildings(options.buildings, options.buildings_epsg, origin)
+    return BuildingsRequest(options.buildings, options.buildings_epsg, origin)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -679,7 +679,7 @@ def _cities(folder: Path) -> list[bytes]:
 def _read_city(path: Path, _: bytes) -> None:
     from seip_addon.core.geometry.geo_reference import GeoReference  # noqa: PLC0415
     from seip_addon.core.progress import finish  # noqa: PLC0415
-    from seip_addon.core.world.citymodel.at_place import AskedBuildings, with_city_model  # noqa: PLC0415
+    from seip_addon.core.world.citymodel.at_place import BuildingsRequest, with_city_model  # noqa: PLC0415
     from seip_addon.core.world.citymodel.cityjson import read_city_model  # noqa: PLC0415
     from seip_addon.core.world.streetscape.description import SiteDescription  # noqa: PLC0415
     from tests.builders.city_text import origin_at  # noqa: PLC0415
@@ -689,7 +689,7 @@ def _read_city(path: Path, _: bytes) -> None:
     place = GeoReference("+proj=utm +zone=33 +datum=WGS84", (x, y, 0.0, 0.0))
     with np.errstate(all="raise", under="ignore"):
         described, _ = finish(
-            with_city_model(SiteDescription(), AskedBuildings(path), place, shapely.box(-100, -100, 100, 100))
+            with_city_model(SiteDescription(), BuildingsRequest(path), place, shapely.box(-100, -100, 100, 100))
         )
     require_physical([one.solid.vertices for one in described.solids], "buildings", most=1e5)
 

@@ -59,17 +59,17 @@ class SEIP_OT_detect(LongWork[str], bpy.types.Operator):
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, str]:
         """Save the scene as it is, for the process that detects."""
-        asked, python = scene.seip.detection, preferences.detecting_python()
+        request, python = scene.seip.detection, preferences.detecting_python()
         if python is None:
             raise SeipError(NO_PYTHON)
         job = DetectionJob(
             python,
-            tuple(found_runs(runs_folder(asked.runs))),
-            absolute(asked.detector) if asked.detector else None,
+            tuple(found_runs(runs_folder(request.runs))),
+            absolute(request.detector) if request.detector else None,
             preferences.catalogue_files(),
             scene.seip.survey.weather(),
         )
-        self._folder = output_folder(asked.folder, "the figures")
+        self._folder = output_folder(request.folder, "the figures")
         self._sensors = sensors_key(scene)
         return started(_detected(job, self._folder))
 

@@ -292,7 +292,7 @@ class SEIP_OT_evaluate_sensors(ForPlacement, LongWork[SceneState], bpy.types.Ope
         mounted = read_sensors(scene, preferences.catalogue(), hidden=True)
         return _evaluated(
             scene_survey.with_grid_of_placement(scene),
-            parsed_record(scene.seip.result.record).asked.goal,
+            parsed_record(scene.seip.result.record).request.goal,
             mounted,
             position_names(scene),
         )

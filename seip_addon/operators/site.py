@@ -16,7 +16,7 @@ from ..core.site.check import Problem, SiteCheck, check_site
 from ..core.site.roles import Role
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
-from ..core.workflows.site_building import AskedSite, BuiltSite, build_site
+from ..core.workflows.site_building import BuiltSite, SiteRequest, build_site
 from ..core.workflows.site_places import SitePlaces, site_places
 from ..core.workflows.survey import SurveySettings, lay_out
 from ..core.world.streetscape.description import DESCRIPTION_SUFFIX
@@ -137,7 +137,7 @@ class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
         """Take what was chosen."""
         site = scene.seip.site
-        return build_site(Path(bpy.path.abspath(site.source)), site.asked())
+        return build_site(Path(bpy.path.abspath(site.source)), site.request())
 
 
 class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
@@ -154,7 +154,7 @@ class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
 
     def prepare(self, _scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
         """Take the example's description, which says all."""
-        return build_site(EXAMPLE, AskedSite())
+        return build_site(EXAMPLE, SiteRequest())
 
 
 def _copy_choice(chosen: SEIP_PG_site, site: SEIP_PG_site) -> None:

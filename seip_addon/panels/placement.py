@@ -191,7 +191,7 @@ def figures(record: PlacementRecord) -> list[tuple[str, str]]:
 
 def _warnings(record: PlacementRecord) -> list[str]:
     chosen = [sensor.sensor for sensor in record.sensors]
-    return relevant_warnings(record.warnings, record.asked.candidates.sensors, chosen)
+    return relevant_warnings(record.warnings, record.request.candidates.sensors, chosen)
 
 
 CLASSES = (

@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatPrope
 
 from ..core.errors import SeipError
 from ..core.site.scene_geometry import DEFAULT_WEIGHT
-from ..core.workflows.site_building import AskedSite
+from ..core.workflows.site_building import SiteRequest
 from ..core.workflows.site_places import parsed_position
 from ..core.world.openstreetmap.site import is_extract
 from ..core.world.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
@@ -116,7 +116,7 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
         """Return whether the region follows the approaches of a junction."""
         return (bool(self.junction) or self.is_extract()) and self.region_shape == "APPROACHES"
 
-    def asked(self) -> AskedSite:
+    def request(self) -> SiteRequest:
         """Return the request as the core takes it.
 
         Raises
@@ -130,9 +130,9 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
         chosen = self.junction if found is None else found.id
         if not self.is_extract():
             junction = (chosen,) if chosen else ()
-            return AskedSite(junction=junction, radius=radius, approaches=approaches, anywhere=True)
+            return SiteRequest(junction=junction, radius=radius, approaches=approaches, anywhere=True)
         near = parsed_position(chosen or self.position)
-        return AskedSite(near_latlon=near, radius=radius, approaches=approaches)
+        return SiteRequest(near_latlon=near, radius=radius, approaches=approaches)
 
 
 def _region_weight(obj: bpy.types.Object) -> float:

@@ -85,12 +85,12 @@ def test_junctions_of_an_extract_are_listed_by_their_streets(scene, extract):
     with pytest.raises(RuntimeError, match="'somewhere' is not a position: give latitude and longitude"):
         bpy.ops.seip.build_site()
     site.position = "52.5, 13.4"
-    assert site.asked().near_latlon == (52.5, 13.4)
-    assert (site.asked().approaches, site.asked().radius) == (80.0, None)
+    assert site.request().near_latlon == (52.5, 13.4)
+    assert (site.request().approaches, site.request().radius) == (80.0, None)
     site.region_shape = "CIRCLE"
-    assert (site.asked().approaches, site.asked().radius) == (None, 80.0)
+    assert (site.request().approaches, site.request().radius) == (None, 80.0)
     site.junction = site.junctions[0].name
-    assert site.asked().near_latlon == pytest.approx((52.5, 13.4))
+    assert site.request().near_latlon == pytest.approx((52.5, 13.4))
 
 
 @needs_sumo

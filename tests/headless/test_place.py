@@ -61,7 +61,7 @@ def test_the_folder_holds_every_result(folder):
 def test_the_record_says_how_far_it_can_be_trusted(folder):
     record = load_placement_record(folder / "placement.json")
     assert any("within 1% of the best" in note for note in record.notes)
-    assert record.asked.goal.scenarios == Scenarios()
+    assert record.request.goal.scenarios == Scenarios()
     assert not any("in one of twenty cases" in note for note in record.notes)
     assert any("neighbouring rings" in warning for warning in record.warnings)
 
@@ -153,7 +153,7 @@ def test_another_goal_casts_no_ray_again(folder, tmp_path, rays, run):
     assert sum(rays) == 0
     record = run(tmp_path, "--count", "3", "--pose-errors", "--risk", "none", "--held-out", "100")
     assert sum(rays) > 0
-    assert record.asked.goal.scenarios == Scenarios("pose-errors", held_out=100)
+    assert record.request.goal.scenarios == Scenarios("pose-errors", held_out=100)
     assert any("in one of twenty cases" in note for note in record.notes)
 
 

@@ -24,10 +24,10 @@ from seip_addon.core.site.site import Site
 from seip_addon.core.storage.files import digest, save_json
 from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.sumo_programs import find_sumo
-from seip_addon.core.workflows.site_building import AskedSite, build_site, save_map
+from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
 from seip_addon.core.workflows.survey import SurveySettings, lay_out
 from seip_addon.core.workflows.traffic_runs import traffic_folder
-from seip_addon.core.world.elevation.at_place import AskedTerrain
+from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.scene.blend_file import new_file, save_blend
 from seip_addon.scene.build import build_scene
 from seip_addon.scene.check import contents_of
@@ -179,10 +179,10 @@ def _build(folder: Path, plan: StreetPlan, settings: SiteSettings) -> Generator[
     extract, terrain = folder / "site.osm", folder / "site.tif"
     write_extract(extract, plan)
     write_terrain(terrain, plan)
-    asked = AskedSite(
+    asked = SiteRequest(
         near_latlon=(LATITUDE, LONGITUDE),
         approaches=settings.approaches,
-        terrain=AskedTerrain(terrain),
+        terrain=TerrainRequest(terrain),
         left_hand=plan.left_hand,
     )
     built = yield from build_site(extract, asked)

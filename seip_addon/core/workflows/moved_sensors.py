@@ -100,7 +100,7 @@ def restored_by_hand(survey: Survey, record: PlacementRecord) -> Generator[Progr
     models = find_models(load_catalogue(survey.settings.catalogue), sorted({one.sensor for one in sensors}))
     mounted = [one.mounted(models[one.sensor]) for one in sensors]
     places = {one.id: one.position for one in sensors}
-    return (yield from evaluate_moved_sensors(survey, record.asked.goal, mounted, places))
+    return (yield from evaluate_moved_sensors(survey, record.request.goal, mounted, places))
 
 
 def _off_candidates(layout: Layout, one: MountedSensor, place: str) -> Sensor:

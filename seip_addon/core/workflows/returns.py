@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from .survey import Survey
 
 CROSSING_SHARE = 0.5
-"""Share of the weight of pedestrians that is on crossings, which are 5 to 7 % of the carriageway: in simulated traffic at
-two sites, 47 and 74 % of the pedestrians in the region were there (docs/detection.md)."""
+"""Share of the weight of pedestrians that is on crossings, which are 5 to 7 % of the carriageway. In simulated traffic
+at two sites, 47 and 74 % of the pedestrians in the region were there (docs/detection.md)."""
 
 
 def place_by_returns(survey: Survey, objective: Objective, limits: SolverLimits) -> Generator[Progress, None, Solution]:

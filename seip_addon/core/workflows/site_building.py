@@ -14,8 +14,8 @@ from ..errors import SeipError
 from ..geometry.geo_reference import GeoReference
 from ..progress import Progress
 from ..storage.files import whole_file
-from ..world.citymodel.at_place import AskedBuildings, with_city_model
-from ..world.elevation.at_place import AskedTerrain, MapSurroundings, with_terrain
+from ..world.citymodel.at_place import BuildingsRequest, with_city_model
+from ..world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
 from ..world.elevation.obstacles import Merging
 from ..world.opendrive.junctions import STREETS
 from ..world.opendrive.lanes import lane_surfaces
@@ -39,7 +39,7 @@ from ..world.streetscape.place import SCENE_MARGIN, Place
 
 
 @dataclass(frozen=True)
-class AskedSite:
+class SiteRequest:
     """Options of building a site, in addition to the file that it is built from.
 
     Parameters
@@ -58,9 +58,9 @@ class AskedSite:
         Site description for a map.
     osm : Path or None
         Extract whose buildings, trees and posts are added to an OpenDRIVE map.
-    buildings : AskedBuildings or None
+    buildings : BuildingsRequest or None
         City model whose buildings are added.
-    terrain : AskedTerrain or None
+    terrain : TerrainRequest or None
         Elevation model or laser survey that gives the ground its heights.
     service : bool
         Whether driveways and aisles of an extract are streets.
@@ -78,8 +78,8 @@ class AskedSite:
     level: tuple[str, ...] = ()
     site: Path | None = None
     osm: Path | None = None
-    buildings: AskedBuildings | None = None
-    terrain: AskedTerrain | None = None
+    buildings: BuildingsRequest | None = None
+    terrain: TerrainRequest | None = None
     service: bool = False
     left_hand: bool | None = None
     anywhere: bool = False
@@ -95,7 +95,9 @@ class BuiltSite:
     merging: tuple[Merging, ...] = ()
 
 
-def build_site(source: Path, asked: AskedSite, map_path: Path | None = None) -> Generator[Progress, None, BuiltSite]:
+def build_site(
+    source: Path, request: SiteRequest, map_path: Path | None = None
+) -> Generator[Progress, None, BuiltSite]:
     """Build the model of a site.
 
     Parameters
@@ -112,13 +114,13 @@ def build_site(source: Path, asked: AskedSite, map_path: Path | None = None) -> 
     """
     yield Progress(0, 0, "map")
     if is_extract(source):
-        return (yield from _of_extract(source, asked, map_path))
-    map_path, road_map, description = _of_map(source, asked)
+        return (yield from _of_extract(source, request, map_path))
+    map_path, road_map, description = _of_map(source, request)
     notes: tuple[str, ...] = ()
-    if asked.osm is not None:
+    if request.osm is not None:
         middle, reach = _where(road_map, description)
-        description, notes = yield from surroundings_of_map(asked.osm, road_map, description, middle, reach)
-    description, more, merging = yield from _with_sources(road_map, description, asked)
+        description, notes = yield from surroundings_of_map(request.osm, road_map, description, middle, reach)
+    description, more, merging = yield from _with_sources(road_map, description, request)
     model = yield from site_model(road_map, description)
     return BuiltSite(map_path.name, replace(model, notes=(*notes, *more, *model.notes)), merging=merging)
 
@@ -140,24 +142,24 @@ def _write_map(text: str, path: Path) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-def _of_extract(source: Path, asked: AskedSite, map_path: Path | None) -> Generator[Progress, None, BuiltSite]:
-    if asked.near is not None or asked.osm is not None:
+def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Generator[Progress, None, BuiltSite]:
+    if request.near is not None or request.osm is not None:
         raise SeipError(f"{source.name} is an extract of OpenStreetMap: give its position by --near-latlon LAT LON")
-    if len(asked.junction) == 1:
+    if len(request.junction) == 1:
         raise SeipError(f'a junction of {source.name} needs two streets: give --junction "One Street" "Other Street"')
     place = ExtractPlace(
-        near=asked.near_latlon,
-        streets=asked.junction,
-        radius=asked.radius,
-        approaches=asked.approaches,
-        service=asked.service,
-        left_hand=asked.left_hand,
-        level=asked.level,
+        near=request.near_latlon,
+        streets=request.junction,
+        radius=request.radius,
+        approaches=request.approaches,
+        service=request.service,
+        left_hand=request.left_hand,
+        level=request.level,
     )
     with tempfile.TemporaryDirectory() as folder:
         site = yield from site_of_extract(source, place, Path(folder) / "streets.xodr")
     found = site.description
-    _, described = describe_place(source, site=asked.site)
+    _, described = describe_place(source, site=request.site)
     description = replace(
         found.with_objects_of(described),
         weighted_regions=described.weighted_regions,
@@ -165,9 +167,9 @@ def _of_extract(source: Path, asked: AskedSite, map_path: Path | None) -> Genera
         mandatory_areas=described.mandatory_areas,
         region=described.region,
         name=described.name or found.name,
-        level=asked.level,
+        level=request.level,
     )
-    description, more, merging = yield from _with_sources(site.road_map, description, asked)
+    description, more, merging = yield from _with_sources(site.road_map, description, request)
     yield Progress(0, 0, "heights of streets")
     site = replace(site, description=description).on_ground()
     try:
@@ -182,10 +184,10 @@ def _of_extract(source: Path, asked: AskedSite, map_path: Path | None) -> Genera
 
 
 def _with_sources(
-    road_map: RoadMap, description: SiteDescription, asked: AskedSite
+    road_map: RoadMap, description: SiteDescription, request: SiteRequest
 ) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...], tuple[Merging, ...]]]:
     """Add buildings and terrain from further files to a description."""
-    if asked.buildings is None and asked.terrain is None:
+    if request.buildings is None and request.terrain is None:
         return description, (), ()
     middle, reach = _where(road_map, description)
     area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
@@ -193,12 +195,12 @@ def _with_sources(
     reference = GeoReference(road_map.geo_reference or "", (x, y, z, heading))
     notes: list[str] = []
     merging: tuple[Merging, ...] = ()
-    if asked.buildings is not None:
-        description, more = yield from with_city_model(description, asked.buildings, reference, area)
+    if request.buildings is not None:
+        description, more = yield from with_city_model(description, request.buildings, reference, area)
         notes += more
-    if asked.terrain is not None:
+    if request.terrain is not None:
         surroundings = MapSurroundings(reference, area, *_roads(road_map, area))
-        description, more, merging = yield from with_terrain(description, asked.terrain, surroundings)
+        description, more, merging = yield from with_terrain(description, request.terrain, surroundings)
         notes += more
     return description, tuple(notes), merging
 
@@ -213,18 +215,18 @@ def _roads(road_map: RoadMap, area: BaseGeometry) -> tuple[Float, BaseGeometry]:
     return near if len(near) else points, shapely.union_all(there)
 
 
-def _of_map(source: Path, asked: AskedSite) -> tuple[Path, RoadMap, SiteDescription]:
-    junction = STREETS.join(asked.junction) or None
-    map_path, described = describe_place(source, site=asked.site)
+def _of_map(source: Path, request: SiteRequest) -> tuple[Path, RoadMap, SiteDescription]:
+    junction = STREETS.join(request.junction) or None
+    map_path, described = describe_place(source, site=request.site)
     road_map = read_map(map_path)
-    near = asked.near if asked.near_latlon is None else place_on_map(road_map, asked.near_latlon)
+    near = request.near if request.near_latlon is None else place_on_map(road_map, request.near_latlon)
     placed = described.near is not None or described.junction is not None or described.region is not None
-    if asked.anywhere and near is None and junction is None and not placed:
+    if request.anywhere and near is None and junction is None and not placed:
         near = road_map.middle()
     map_path, description = describe_place(
-        source, site=asked.site, near=near, junction=junction, radius=asked.radius, approaches=asked.approaches
+        source, site=request.site, near=near, junction=junction, radius=request.radius, approaches=request.approaches
     )
-    return map_path, road_map, replace(description, level=asked.level) if asked.level else description
+    return map_path, road_map, replace(description, level=request.level) if request.level else description
 
 
 def _where(road_map: RoadMap, description: SiteDescription) -> tuple[Float, float]:

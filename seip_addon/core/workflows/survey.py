@@ -325,7 +325,7 @@ def restored_solution(survey: Survey, record: PlacementRecord) -> Solution:
     poses = range(len(site.candidates))
     if record.inputs.get("visibility") != grid.key or not all(sensor.pose in poses for sensor in record.sensors):
         raise SeipError("the placement is stale, as the scene or its settings have changed: place again")
-    objective, chosen = record.asked.goal, record.poses
+    objective, chosen = record.request.goal, record.poses
     covered = float(target_weights(site, objective)[grid.times_seen(chosen) > 0].sum())
     deployment = deploy_rows(site, survey.models, grid.rows(chosen), chosen)
     known = replace(deployment, gain_band=record.coverage.gain_band, returns=record.returns)

@@ -90,8 +90,8 @@ def load_evidence(folder: Path) -> Evidence:
     if (counts.targets, counts.poses) != (len(site.targets), len(site.problem.prices)):
         raise SeipError(f"placement.json and site.npz in {folder} contradict each other: place the sensors again")
     names = [*PICTURES]
-    names += POSE_ERROR_PICTURES if record.asked.goal.scenarios.errs else ()
-    names += TRAFFIC_PICTURES if record.asked.goal.scenarios.kind == "traffic" else ()
+    names += POSE_ERROR_PICTURES if record.request.goal.scenarios.errs else ()
+    names += TRAFFIC_PICTURES if record.request.goal.scenarios.kind == "traffic" else ()
     pictures = {name: _picture(folder / name) for name in names if (folder / name).is_file()}
     return Evidence(record, site, _grid(folder / "visibility.npz", site), pictures)
 

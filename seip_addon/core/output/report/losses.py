@@ -121,7 +121,7 @@ def equal_prices(problem: PlacementProblem) -> bool:
 
 def _recorded(evidence: Evidence, problem: PlacementProblem, poses: Integer) -> dict[int, Placement]:
     """Return the recorded placement for each number of sensors whose best coverage its certificate bounds."""
-    record, goal = evidence.record, evidence.record.asked.goal
+    record, goal = evidence.record, evidence.record.request.goal
     objective = record.objective
     if not _is_certified(evidence) or len(poses) < len(evidence.sensors):
         return {}
@@ -138,7 +138,7 @@ def _recorded(evidence: Evidence, problem: PlacementProblem, poses: Integer) -> 
 
 def _proven_limits(evidence: Evidence, problem: PlacementProblem, whole: float) -> dict[int, float]:
     """Return, for numbers of sensors, the weight that the record proves no such number to exceed."""
-    record, goal = evidence.record, evidence.record.asked.goal
+    record, goal = evidence.record, evidence.record.request.goal
     bound = record.objective.bound
     if not _is_certified(evidence) or bound is None:
         return {}
@@ -159,7 +159,7 @@ def _is_certified(evidence: Evidence) -> bool:
 
 def _most_allowed(evidence: Evidence, problem: PlacementProblem, most: int) -> int:
     """Return the largest number of sensors, up to ``most``, of which the budget allows any choice."""
-    budget = evidence.record.asked.goal.budget
+    budget = evidence.record.request.goal.budget
     if budget is None:
         return most
     dearest = float(problem.prices[problem.allowed].max())

@@ -23,11 +23,11 @@ DEFAULT_GRID = 1.0  # metres, of `SurveySettings`
 def repeating_command(record: PlacementRecord) -> str:
     """Return what to type in the folder of a result to have it again; empty where no one command makes it."""
     settings: Mapping[str, Any] = record.settings
-    if record.objective.solver == "none" or record.asked.goal.scenarios.kind == "traffic":
+    if record.objective.solver == "none" or record.request.goal.scenarios.kind == "traffic":
         return ""  # moved by hand, or optimised on runs of traffic that the record does not name
     words = ["seip", "place", "placed.blend", *_of_candidates(settings), *_of_survey(settings)]
     words += _options(VisibilitySettings, settings.get("visibility", {}))
-    words += _of_objective(record.asked.goal)
+    words += _of_objective(record.request.goal)
     words += [] if settings.get("render") else ["--no-render"]
     return shlex.join([*words, "-o", "again"])
 

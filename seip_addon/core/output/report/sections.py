@@ -79,7 +79,7 @@ def certificate_sentence(evidence: Evidence) -> str:
         return MOVED_MESSAGE
     if any(note.startswith(CHOSEN_FOR) for note in record.notes):
         return certificate(found.status, found.gap, cheapest=found.cheapest, notes=record.notes)
-    choice = f"choice{_limits(record.asked.goal, 'of')} among the {places:,} positions, under the same rules,"
+    choice = f"choice{_limits(record.request.goal, 'of')} among the {places:,} positions, under the same rules,"
     if found.bound is None:
         return f"Another {choice} may be better; how much better is not known."
     better = _cheaper(found) if found.cheapest else _more_coverage(evidence)
@@ -110,10 +110,10 @@ def _more_coverage(evidence: Evidence) -> str:
 
 def _question(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
-    goal, counts = record.asked.goal, record.counts
+    goal, counts = record.request.goal, record.counts
     limits = _limits(goal, "with")
     with_limits = f",{limits}" if limits else ""
-    types = ", ".join(record.asked.candidates.sensors)
+    types = ", ".join(record.request.candidates.sensors)
     if goal.coverage is not None:
         yield Paragraph(
             f"Find the cheapest sensors and positions that see {percent(goal.coverage)} of the road{with_limits}."
@@ -368,7 +368,7 @@ def _losses(evidence: Evidence) -> Iterator[Block]:
             frozenset({1, 2}),
         )
     errors = [_sentence(note) for note in record.notes if note.startswith(POSE_ERRORS)]
-    scenarios = record.asked.goal.scenarios
+    scenarios = record.request.goal.scenarios
     if not errors and not scenarios.errs:
         errors = ["The loss from errors of the sensors' poses was not evaluated (option --pose-errors)."]
     if scenarios.kind != "traffic":
@@ -391,7 +391,7 @@ def _front(evidence: Evidence, points: Sequence[FrontPoint]) -> Iterator[Block]:
         return
     record = evidence.record
     weighted = " Coverage is weighted here." if np.ptp(evidence.site.problem.weights) > 0 else ""
-    budget = record.asked.goal.budget
+    budget = record.request.goal.budget
     limit = "" if budget is None else f" The budget of {_dollars(budget)} does not limit the choices of this table."
     yield Paragraph(
         f"For each number of sensors, the placement with most coverage under the same rules, regardless of "
@@ -421,7 +421,7 @@ def _front(evidence: Evidence, points: Sequence[FrontPoint]) -> Iterator[Block]:
 def _warnings(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
     chosen = (sensor.sensor for sensor in record.sensors)
-    warnings = relevant_warnings(record.warnings, record.asked.candidates.sensors, chosen)
+    warnings = relevant_warnings(record.warnings, record.request.candidates.sensors, chosen)
     standing = (
         "A square is seen if a return of the sensor's scan lies near its centre. The scene is a model: objects that it "
         "lacks do not occlude. Check positions on site for ownership, foundations, power and lines."

@@ -227,7 +227,7 @@ class RecordedCandidates:
 
 
 @dataclass(frozen=True)
-class Asked:
+class PlacementRequest:
     """Settings of a record that are read again: objective and sensor types."""
 
     goal: Objective
@@ -244,7 +244,7 @@ class PlacementRecord:
         In the order of their labels.
     price_usd : float, dollars
     settings : mapping
-        All settings by name; `asked` is the part that this program reads again.
+        All settings by name; `request` is the part that this program reads again.
     inputs : mapping of str to str
         Digests of what went in.
     returns : ReturnsSummary, optional
@@ -268,9 +268,9 @@ class PlacementRecord:
     returns: ReturnsSummary | None = None
 
     @cached_property
-    def asked(self) -> Asked:
+    def request(self) -> PlacementRequest:
         """Objective and sensor types."""
-        return from_json(Asked, self.settings, "settings")
+        return from_json(PlacementRequest, self.settings, "settings")
 
     @property
     def poses(self) -> Integer:
@@ -423,7 +423,7 @@ def _read(text: bytes, where: str) -> PlacementRecord:
         schema = content.get("schema") if isinstance(content, dict) else None
         if schema == SCHEMA:
             record = from_json(PlacementRecord, content)
-            _ = record.asked, record.text().encode()  # refused if these cannot be read or written again
+            _ = record.request, record.text().encode()  # refused if these cannot be read or written again
             check_consistency(record)
             return record
     except (SeipError, ValueError, RecursionError) as error:

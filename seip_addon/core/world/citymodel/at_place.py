@@ -31,7 +31,7 @@ UNUSABLE = (f"building {_FAULTS} is", f"buildings {_FAULTS} are")
 
 
 @dataclass(frozen=True)
-class AskedBuildings:
+class BuildingsRequest:
     """A requested city model and its position.
 
     Parameters
@@ -50,7 +50,7 @@ class AskedBuildings:
 
 
 def with_city_model(
-    description: SiteDescription, asked: AskedBuildings, reference: GeoReference, area: BaseGeometry
+    description: SiteDescription, request: BuildingsRequest, reference: GeoReference, area: BaseGeometry
 ) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...]]]:
     """Add the buildings of a city model to a description, replacing buildings of an extract that they cover.
 
@@ -61,7 +61,7 @@ def with_city_model(
     ----------
     description : SiteDescription
         Description to add to.
-    asked : AskedBuildings
+    request : BuildingsRequest
         City model.
     reference : GeoReference
         Position of the map on the Earth.
@@ -80,9 +80,9 @@ def with_city_model(
     SeipError
         The model cannot be read, cannot be placed on the map, or has no building there.
     """
-    yield Progress(0, 0, f"reading {asked.path.name}")
-    model = read_city_model(asked.path)
-    to_map = _to_map(model, asked, reference)
+    yield Progress(0, 0, f"reading {request.path.name}")
+    model = read_city_model(request.path)
+    to_map = _to_map(model, request, reference)
     model = replace(model, vertices=np.column_stack([to_map(model.vertices[:, :2]), model.vertices[:, 2]]))
     left_out = model.left_out
     shapely.prepare(area)
@@ -102,11 +102,11 @@ def with_city_model(
         plan = _plan(solid.vertices, np.array(solid.faces))
         if not plan.intersects(area):
             continue
-        raised = -float(solid.vertices[:, 2].min()) if asked.origin is None else asked.origin[2]
+        raised = -float(solid.vertices[:, 2].min()) if request.origin is None else request.origin[2]
         solid = replace(solid, vertices=solid.vertices + np.array([0.0, 0.0, raised]))
-        solids.append(PlacedSolid("Building", solid, plan, FROM_CITY_MODEL, on_ground=asked.origin is None))
+        solids.append(PlacedSolid("Building", solid, plan, FROM_CITY_MODEL, on_ground=request.origin is None))
     if not solids:
-        raise _elsewhere(asked.path, model, reference, area)
+        raise _elsewhere(request.path, model, reference, area)
     kept, dropped = without_covered_buildings(description, solids)
     notes = [f"{counted(number, *reason)} left out of {model.name}" for reason, number in left_out.items()]
     if dropped:
@@ -114,13 +114,13 @@ def with_city_model(
     return replace(kept, solids=(*kept.solids, *solids)).with_attribution(model.attribution), tuple(notes)
 
 
-def _to_map(model: CityModel, asked: AskedBuildings, reference: GeoReference) -> Transform:
-    if asked.origin is not None:
-        MAP_COORDINATE.require(asked.origin[:2], "--buildings-origin", "X or Y", "give map coordinates")
-        ELEVATION.require(asked.origin[2], "--buildings-origin", "Z", "give a height above the map's zero")
-        shift = np.array(asked.origin[:2])
+def _to_map(model: CityModel, request: BuildingsRequest, reference: GeoReference) -> Transform:
+    if request.origin is not None:
+        MAP_COORDINATE.require(request.origin[:2], "--buildings-origin", "X or Y", "give map coordinates")
+        ELEVATION.require(request.origin[2], "--buildings-origin", "Z", "give a height above the map's zero")
+        shift = np.array(request.origin[:2])
         return lambda xy: xy + shift
-    code = asked.epsg or model.epsg
+    code = request.epsg or model.epsg
     if code is None:
         raise SeipError(
             f"{model.name} names no reference system: give it by --buildings-epsg CODE, or the map coordinates of its "

@@ -48,7 +48,7 @@ FLAT, MIN_FLAT = 0.25, 0.6  # a map is flat if at least this share of its lanes 
 
 
 @dataclass(frozen=True)
-class AskedTerrain:
+class TerrainRequest:
     """A requested file of ground heights.
 
     Parameters
@@ -86,7 +86,7 @@ class MapSurroundings:
 
 
 def with_terrain(
-    description: SiteDescription, asked: AskedTerrain, around: MapSurroundings
+    description: SiteDescription, request: TerrainRequest, around: MapSurroundings
 ) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...], tuple[Merging, ...]]]:
     """Add ground heights to the description of a place with a flat map, and the objects of a survey.
 
@@ -96,7 +96,7 @@ def with_terrain(
     ----------
     description : SiteDescription
         Description of the place.
-    asked : AskedTerrain
+    request : TerrainRequest
         File of heights.
     around : MapSurroundings
         Map at the place.
@@ -115,7 +115,7 @@ def with_terrain(
     SeipError
         The file cannot be read or does not cover the place; or it is an elevation model, and the map has heights.
     """
-    path = asked.path
+    path = request.path
     yield Progress(0, 0, f"reading {path.name}")
     level, is_flat = _level(around.lanes)
     if not is_flat and not is_survey(path):
@@ -128,7 +128,7 @@ def with_terrain(
         smooth = _of_model(model, around.reference, around.area).smoothed(SMOOTHING)
         credited = description.with_attribution(model.copyright)
         return replace(credited, relief=Relief(smooth, level)), (_heights_note(path, smooth),), ()
-    points, classes = yield from _survey_points(asked, around)
+    points, classes = yield from _survey_points(request, around)
     smooth = _surveyed_ground(points, classes, around.area, path.name).smoothed(SMOOTHING)
     yield Progress(0, 0, "boxes of the survey")
     standing = _standing(points, classes, around, description)
@@ -163,11 +163,13 @@ def _heights_note(path: Path, smooth: HeightRaster) -> str:
     )
 
 
-def _survey_points(asked: AskedTerrain, around: MapSurroundings) -> Generator[Progress, None, tuple[Float, Integer]]:
+def _survey_points(
+    request: TerrainRequest, around: MapSurroundings
+) -> Generator[Progress, None, tuple[Float, Integer]]:
     """Return the points of a survey at a place (n, 3), in map coordinates in plan, and their classes (n,)."""
-    path = asked.path
+    path = request.path
     named, middle = survey_system(path)
-    code = asked.epsg or named
+    code = request.epsg or named
     if code is None:
         raise SeipError(f"{path.name} names no reference system: give it by --terrain-epsg CODE")
     system = reprojection(code, around.reference, path.name)

@@ -175,8 +175,8 @@ def test_a_record_is_written_as_it_was_read(record, tmp_path):
     assert parsed_record(record.text()) == read
     assert read.text() == record.text()
     assert read.sensors == record.sensors
-    assert read.asked == record.asked
-    assert read.asked.goal == GOAL
+    assert read.request == record.request
+    assert read.request.goal == GOAL
     assert violations(content_of(read), SCHEMA) == []
 
 

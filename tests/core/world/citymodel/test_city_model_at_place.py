@@ -12,8 +12,8 @@ from seip_addon.core.geometry.geo_reference import GeoReference, projection
 from seip_addon.core.geometry.reference_systems import epsg_code, reprojection
 from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import DESCRIBED, FROM_CITY_MODEL, FROM_EXTRACT
-from seip_addon.core.workflows.site_building import AskedSite, build_site
-from seip_addon.core.world.citymodel.at_place import AskedBuildings, with_city_model
+from seip_addon.core.workflows.site_building import SiteRequest, build_site
+from seip_addon.core.world.citymodel.at_place import BuildingsRequest, with_city_model
 from seip_addon.core.world.streetscape.description import Building, SiteDescription
 from seip_addon.core.world.streetscape.model import site_model
 from tests.builders.city_text import CityModel, origin_at
@@ -33,7 +33,7 @@ def houses(origin=ORIGIN, epsg=25833, **more):
 
 def placed(model, tmp_path, description=None, reference=MAP, **asked):
     path = model.write(tmp_path / "model.city.json")
-    return finish(with_city_model(description or SiteDescription(), AskedBuildings(path, **asked), reference, AREA))
+    return finish(with_city_model(description or SiteDescription(), BuildingsRequest(path, **asked), reference, AREA))
 
 
 def test_a_building_stands_where_its_coordinates_say(tmp_path):
@@ -146,7 +146,7 @@ def test_on_a_hill_it_stands_on_the_lowest_ground_under_it_and_the_map_s_own_giv
     path.write_text(street(HOUSE + BARN), encoding="utf-8")
     model = CityModel(ORIGIN, 25833)
     model.add("a", model.gabled(-56, 9, 12, 10, 6, 9)).write(tmp_path / "model.json")
-    asked = AskedSite(near=(-50.0, 0.0), radius=60.0, buildings=AskedBuildings(tmp_path / "model.json"))
+    asked = SiteRequest(near=(-50.0, 0.0), radius=60.0, buildings=BuildingsRequest(tmp_path / "model.json"))
     built = finish(build_site(path, asked)).model
     assert "1 building of the map replaced by those of the city model or the survey" in built.notes
     names = {part.name: part for part in built.parts}

@@ -12,7 +12,7 @@ from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.geometry.height_raster import HeightRaster
 from seip_addon.core.progress import finish
 from seip_addon.core.world.elevation import geotiff
-from seip_addon.core.world.elevation.at_place import AskedTerrain, MapSurroundings, with_terrain
+from seip_addon.core.world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
 from seip_addon.core.world.elevation.geotiff import read_geotiff
 from seip_addon.core.world.streetscape.description import SiteDescription
 from tests.builders.city_text import origin_at
@@ -31,7 +31,7 @@ def plane(x, y):
 
 def relief(path, reference=MAP, lanes=FLAT, area=AREA):
     around = MapSurroundings(reference, area, lanes)
-    site, _, _ = finish(with_terrain(SiteDescription(), AskedTerrain(path), around))
+    site, _, _ = finish(with_terrain(SiteDescription(), TerrainRequest(path), around))
     return site.relief
 
 

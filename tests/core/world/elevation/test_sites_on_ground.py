@@ -6,8 +6,8 @@ import pytest
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
-from seip_addon.core.workflows.site_building import AskedSite, build_site
-from seip_addon.core.world.elevation.at_place import AskedTerrain
+from seip_addon.core.workflows.site_building import SiteRequest, build_site
+from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.opendrive.read import read_map
 from tests.builders.city_text import origin_at
 from tests.builders.dem_files import sampled, write_dem
@@ -61,7 +61,7 @@ def test_everything_stands_on_a_plane(tmp_path, z):
         "[[street_light]]\nposition = [20, -12]\n[[tree]]\nposition = [-20, 15]\n",
         encoding="utf-8",
     )
-    asked = AskedSite(near=(0.0, 0.0), radius=60.0, site=description, terrain=AskedTerrain(ground(tmp_path, plane)))
+    asked = SiteRequest(near=(0.0, 0.0), radius=60.0, site=description, terrain=TerrainRequest(ground(tmp_path, plane)))
     model = finish(build_site(street(tmp_path, z), asked)).model
     assert model.origin[2] == 40
     assert np.abs(over(named(model, "Driving lanes"), model, plane)).max() < 1e-3
@@ -77,7 +77,7 @@ def test_everything_stands_on_a_plane(tmp_path, z):
 
 def test_roads_follow_hills_within_the_smoothing(tmp_path):
     """A Gaussian of 4 m takes (1 - exp(-(4/40)²/2)) of a wave of 251 m, chords of ten metres take as much again."""
-    asked = AskedSite(near=(0.0, 0.0), radius=60.0, terrain=AskedTerrain(ground(tmp_path, hill)))
+    asked = SiteRequest(near=(0.0, 0.0), radius=60.0, terrain=TerrainRequest(ground(tmp_path, hill)))
     model = finish(build_site(street(tmp_path), asked)).model
     assert np.abs(over(named(model, "Driving lanes"), model, hill)).max() < 6 * 0.005 * 3
     assert np.abs(over(named(model, "Verge"), model, hill)).max() < 0.25
@@ -91,12 +91,14 @@ def test_a_map_of_its_own_heights_is_refused(tmp_path):
     sloping = path.read_text(encoding="utf-8").replace('b="0"', 'b="0.05"', 1)
     path.write_text(sloping, encoding="utf-8")
     with pytest.raises(SeipError, match="own heights"):
-        finish(build_site(path, AskedSite(near=(0.0, 0.0), radius=60.0, terrain=AskedTerrain(ground(tmp_path, plane)))))
+        finish(
+            build_site(path, SiteRequest(near=(0.0, 0.0), radius=60.0, terrain=TerrainRequest(ground(tmp_path, plane))))
+        )
 
 
 @needs_sumo
 def test_streets_of_an_extract_lie_on_the_ground(tmp_path):
-    asked = AskedSite(near_latlon=(52.5, 13.4), terrain=AskedTerrain(ground(tmp_path, plane)))
+    asked = SiteRequest(near_latlon=(52.5, 13.4), terrain=TerrainRequest(ground(tmp_path, plane)))
     built = finish(build_site(crossing().write(tmp_path / "place.osm"), asked))
     roads = named(built.model, "Driving lanes").solid.vertices
     slope = np.linalg.lstsq(np.column_stack([roads[:, :2], np.ones(len(roads))]), roads[:, 2], rcond=None)[0]
@@ -118,7 +120,7 @@ def test_streets_of_an_extract_lie_on_the_ground(tmp_path):
 
 @needs_sumo
 def test_a_bridge_stays_above(tmp_path):
-    asked = AskedSite(near_latlon=(52.5, 13.4), approaches=80.0, terrain=AskedTerrain(ground(tmp_path, plane)))
+    asked = SiteRequest(near_latlon=(52.5, 13.4), approaches=80.0, terrain=TerrainRequest(ground(tmp_path, plane)))
     model = finish(build_site(bridge_above().write(tmp_path / "place.osm"), asked)).model
     deck = over_extract(named(model, "Roads above"), model)
     assert deck.max() == pytest.approx(6.0, abs=0.6)

@@ -16,9 +16,9 @@ from seip_addon.core.geometry.geo_reference import GeoReference, projection
 from seip_addon.core.geometry.height_raster import HeightRaster
 from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import FROM_EXTRACT, FROM_SURVEY
-from seip_addon.core.world.citymodel.at_place import AskedBuildings, with_city_model
+from seip_addon.core.world.citymodel.at_place import BuildingsRequest, with_city_model
 from seip_addon.core.world.elevation import obstacles, point_cloud
-from seip_addon.core.world.elevation.at_place import AskedTerrain, MapSurroundings, with_terrain
+from seip_addon.core.world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
 from seip_addon.core.world.elevation.obstacles import ObstacleRaster, blocked, merged, of_boxes, random_rays
 from seip_addon.core.world.streetscape.description import Building, SiteDescription
 from tests.builders.city_text import CityModel, origin_at
@@ -57,7 +57,9 @@ def around(lanes=None, area=AREA):
 
 def surveyed(tmp_path, points, *, suffix=".laz", description=None, lanes=None, wkt=WKT, epsg=None):
     path = write_survey(tmp_path / f"survey{suffix}", points, (X, Y), wkt)
-    site, notes, tried = finish(with_terrain(description or SiteDescription(), AskedTerrain(path, epsg), around(lanes)))
+    site, notes, tried = finish(
+        with_terrain(description or SiteDescription(), TerrainRequest(path, epsg), around(lanes))
+    )
     return site, notes, tried
 
 
@@ -101,7 +103,7 @@ def test_buildings_of_an_extract_and_of_a_city_model_are_not_there_twice(tmp_pat
     assert notes[-1] == "1 building of the extract replaced by those of the survey"
     model = CityModel((X, Y, 0.0), 25833)
     path = model.add("a", model.block(*HOUSE, 12)).write(tmp_path / "model.json")
-    described, _ = finish(with_city_model(SiteDescription(), AskedBuildings(path), MAP, AREA))
+    described, _ = finish(with_city_model(SiteDescription(), BuildingsRequest(path), MAP, AREA))
     site, _, _ = surveyed(tmp_path, town(np.random.default_rng(3)), description=described)
     assert {one.name for one in site.solids} == {"Building", "Surveyed vegetation"}
 
@@ -220,17 +222,17 @@ def test_too_many_points_are_refused(tmp_path, monkeypatch):
 @pytest.mark.parametrize("suffix", [".las", ".laz"])
 def test_a_damaged_survey_is_refused(suffix, tmp_path):
     path = tmp_path / f"survey{suffix}"
-    asked = with_terrain(SiteDescription(), AskedTerrain(path), around())
+    asked = with_terrain(SiteDescription(), TerrainRequest(path), around())
     with pytest.raises(SeipError, match="no such file"):
         finish(asked)
     for text in (b"", b"nothing", b"LASF" + bytes(400)):
         path.write_bytes(text)
         with pytest.raises(SeipError, match="not a readable LAS or LAZ file"):
-            finish(with_terrain(SiteDescription(), AskedTerrain(path), around()))
+            finish(with_terrain(SiteDescription(), TerrainRequest(path), around()))
     whole = write_survey(path, town(np.random.default_rng(3)), (X, Y), WKT).read_bytes()
     path.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(SeipError, match=r"survey\.la[sz]"):
-        finish(with_terrain(SiteDescription(), AskedTerrain(path), around()))
+        finish(with_terrain(SiteDescription(), TerrainRequest(path), around()))
 
 
 HEADER = {
@@ -254,7 +256,7 @@ def test_a_header_that_the_file_does_not_bear_out_is_refused_at_once(name, tmp_p
     path.write_bytes(content)
     begin = time.process_time()
     with pytest.raises(SeipError, match=complaint):
-        finish(with_terrain(SiteDescription(), AskedTerrain(path), around()))
+        finish(with_terrain(SiteDescription(), TerrainRequest(path), around()))
     assert time.process_time() - begin < 1.0
 
 
@@ -266,7 +268,7 @@ def test_a_chunk_table_that_the_file_does_not_hold_is_refused(tmp_path):
     struct.pack_into("<I", content, table + 4, 2**32 - 1)
     path.write_bytes(content)
     with pytest.raises(SeipError, match="chunk table announces 4,294,967,295 chunks"):
-        finish(with_terrain(SiteDescription(), AskedTerrain(path), around()))
+        finish(with_terrain(SiteDescription(), TerrainRequest(path), around()))
 
 
 @pytest.mark.parametrize("missing", ["laspy", "lazrs"])
@@ -274,5 +276,5 @@ def test_without_laspy_the_cure_is_named(missing, tmp_path, monkeypatch):
     path = write_survey(tmp_path / "survey.laz", town(np.random.default_rng(3)), (X, Y), WKT)
     monkeypatch.setitem(sys.modules, missing, None)
     with pytest.raises(SeipError, match=f"needs {missing}, .*pip install laspy lazrs"):
-        finish(with_terrain(SiteDescription(), AskedTerrain(path), around()))
+        finish(with_terrain(SiteDescription(), TerrainRequest(path), around()))
     importlib.invalidate_caches()

@@ -11,8 +11,8 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.plan import surface_height
 from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import OTHER_LEVELS
-from seip_addon.core.workflows.site_building import AskedSite, build_site
-from seip_addon.core.world.elevation.at_place import AskedTerrain
+from seip_addon.core.workflows.site_building import SiteRequest, build_site
+from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.opendrive.lanes import lane_surfaces
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.terrain import MAX_ROADSIDE
@@ -31,7 +31,7 @@ X, Y, _ = origin_at(*MID)
 def built(extract, tmp_path, **asked):
     path = extract.write(tmp_path / "place.osm")
     asked = {"near_latlon": (extract.latitude, extract.longitude), "radius": 90.0} | asked
-    site = finish(build_site(path, AskedSite(**asked)))
+    site = finish(build_site(path, SiteRequest(**asked)))
     (tmp_path / "place.xodr").write_text(site.map_text, encoding="utf-8")
     return site, read_map(tmp_path / "place.xodr")
 
@@ -227,7 +227,7 @@ def test_on_terrain_a_bridge_leads_from_bank_to_bank(tmp_path):
     trunk(extract)
     heights = sampled(embankment, X - 420, Y + 420, 840)
     dem = write_dem(tmp_path / "dem.tif", heights, X - 420, Y + 420)
-    site, road_map = built(extract, tmp_path, level=("High Road",), terrain=AskedTerrain(dem))
+    site, road_map = built(extract, tmp_path, level=("High Road",), terrain=TerrainRequest(dem))
     deck = [lane for lane in lanes_of(road_map, "High Road") if abs(lane.left[:, 0].mean() - 300) < 20]
     assert min(lane.left[:, 2].min() for lane in deck) > 45.0
     assert max(lane.left[:, 2].max() for lane in lanes_of(road_map)) < 47.0

@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from seip_addon.core.progress import finish
-from seip_addon.core.workflows.site_building import AskedSite, build_site
+from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from seip_addon.core.world.opendrive.objects import placed_objects
 from seip_addon.core.world.opendrive.read import read_map
 from tests.builders.osm_text import Extract, corner_houses
@@ -31,7 +31,7 @@ def streets(*, crossing=None, footway=False):
 
 def built(extract, tmp_path):
     path = extract.write(tmp_path / "place.osm")
-    return finish(build_site(path, AskedSite(near_latlon=(extract.latitude, extract.longitude))))
+    return finish(build_site(path, SiteRequest(near_latlon=(extract.latitude, extract.longitude))))
 
 
 def crossings(site):

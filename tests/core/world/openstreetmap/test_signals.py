@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.progress import finish
-from seip_addon.core.workflows.site_building import AskedSite, build_site
+from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from seip_addon.core.world.openstreetmap.extract import read_extract, window
 from seip_addon.core.world.openstreetmap.streets import write_streets
 from tests.builders.osm_text import Extract, corner_houses
@@ -27,7 +27,7 @@ def approached(away=10.0, arms=("east", "west", "north", "south"), far=200.0, **
 def signal_poles(extract, tmp_path, **asked):
     path = extract.write(tmp_path / "place.osm")
     place = {"near_latlon": (extract.latitude, extract.longitude)} | asked
-    model = finish(build_site(path, AskedSite(**place))).model
+    model = finish(build_site(path, SiteRequest(**place))).model
     return [part for part in model.parts if "ignal pole" in part.name], model
 
 

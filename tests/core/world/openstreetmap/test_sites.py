@@ -11,7 +11,7 @@ from seip_addon.core import sumo_programs
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
-from seip_addon.core.workflows.site_building import AskedSite, build_site
+from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from seip_addon.core.world.opendrive.read import read_map
 from tests.builders.osm_text import (
     JUNCTIONS,
@@ -33,7 +33,7 @@ CORNER_HOUSE = 24.0 * 24.0
 def built(extract, tmp_path, **asked):
     path = extract.write(tmp_path / "place.osm")
     asked = {"near_latlon": (extract.latitude, extract.longitude)} | asked
-    return finish(build_site(path, AskedSite(**asked)))
+    return finish(build_site(path, SiteRequest(**asked)))
 
 
 def plan(model, name):
@@ -227,7 +227,7 @@ def test_an_extract_adds_buildings_to_an_opendrive_map(tmp_path):
     map_path = tmp_path / "street.xodr"
     map_path.write_text(site.map_text, encoding="utf-8")
     middle = tuple((site.model.origin[:2] * 1.0).tolist())
-    asked = AskedSite(near=middle, radius=60.0, osm=tmp_path / "place.osm")
+    asked = SiteRequest(near=middle, radius=60.0, osm=tmp_path / "place.osm")
     model = finish(build_site(map_path, asked)).model
     rows = {row.kind: row for row in model.sources()}
     assert (rows["Building"].count, rows["Building"].source) == (4, "extract")
@@ -243,7 +243,7 @@ def test_latitude_and_longitude_are_places_of_a_map_with_a_projection_and_of_no_
     assert site.map_text is not None
     map_path = tmp_path / "street.xodr"
     map_path.write_text(site.map_text, encoding="utf-8")
-    asked = AskedSite(near_latlon=(52.5, 13.4), radius=50.0)
+    asked = SiteRequest(near_latlon=(52.5, 13.4), radius=50.0)
     middle = finish(build_site(map_path, asked)).model
     assert middle.region.centroid.distance(shapely.Point(0, 0)) < 2.0
     map_path.write_text(
@@ -379,7 +379,7 @@ def test_a_crossing_at_the_date_line_and_one_whose_next_nodes_are_far(tmp_path):
         path = corner_houses(extract).write(tmp_path / "place.osm")
         text = re.sub(r'"180\.\d+"', lambda found: f'"{float(found[0][1:-1]) - 360}"', path.read_text(encoding="utf-8"))
         path.write_text(text, encoding="utf-8")
-        model = finish(build_site(path, AskedSite(near_latlon=(latitude, longitude)))).model
+        model = finish(build_site(path, SiteRequest(near_latlon=(latitude, longitude)))).model
         assert model.region.bounds == pytest.approx((-87, -87, 87, 87), abs=3)
 
 

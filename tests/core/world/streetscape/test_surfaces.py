@@ -10,7 +10,7 @@ import shapely
 
 from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
-from seip_addon.core.workflows.site_building import AskedSite, build_site
+from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from seip_addon.core.world.opendrive.lanes import LaneSurface
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import SiteDescription
@@ -56,13 +56,13 @@ def check(model):
 def test_surfaces_of_an_extract_lie_beside_each_other(name, tmp_path):
     extract = JUNCTIONS[name]()
     source = extract.write(tmp_path / "place.osm")
-    place = AskedSite(near_latlon=(extract.latitude, extract.longitude))
+    place = SiteRequest(near_latlon=(extract.latitude, extract.longitude))
     check(finish(build_site(source, place)).model)
 
 
 @needs_sumo
 def test_surfaces_of_the_shipped_extract_lie_beside_each_other():
-    asked = AskedSite(junction=("Harbour Road", "Rope Lane"))
+    asked = SiteRequest(junction=("Harbour Road", "Rope Lane"))
     check(finish(build_site(ROOT / "scenes" / "harbour.osm", asked)).model)
 
 
@@ -73,7 +73,7 @@ def test_surfaces_of_real_places_lie_beside_each_other(name):
     source = SHARED / name
     if not source.is_file():
         pytest.skip(f"{source} is not beside the project")
-    check(finish(build_site(source, AskedSite(**REAL[name]))).model)
+    check(finish(build_site(source, SiteRequest(**REAL[name]))).model)
 
 
 def test_a_lane_that_overlaps_another_road_gives_way(tmp_path):
@@ -128,7 +128,7 @@ def test_a_path_that_met_the_footway_is_led_on_to_the_pavement():
 def test_a_mapped_footway_beside_the_street_makes_no_second_pavement(tmp_path):
     extract = crossing()
     extract.way([(12, 11), (90, 11)], highway="footway", footway="sidewalk")
-    site = finish(build_site(extract.write(tmp_path / "place.osm"), AskedSite(near_latlon=(52.5, 13.4))))
+    site = finish(build_site(extract.write(tmp_path / "place.osm"), SiteRequest(near_latlon=(52.5, 13.4))))
     assert not [part for part in site.model.parts if part.name == "Footways"]
     assert any("m of footways along a pavement" in note for note in site.model.notes)
 

@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from seip_addon.core.progress import finish
-from seip_addon.core.workflows.site_building import AskedSite, build_site
+from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from tests.builders.osm_text import Extract
 from tests.oracles.face_areas import plan
 from tests.sumo_here import needs_sumo
@@ -26,7 +26,7 @@ def street(tmp_path, *, lanes, one_way=False, left_hand=False):
     extract.way([(0, 0), (300, 0)], lanes=after, **usual)
     for y in (-200, 200):
         extract.way([(0, y), (0, 0)], highway="residential", name="Mill Lane")
-    place = AskedSite(near_latlon=(extract.latitude, extract.longitude), approaches=150)
+    place = SiteRequest(near_latlon=(extract.latitude, extract.longitude), approaches=150)
     return finish(build_site(extract.write(tmp_path / "place.osm"), place)).model.parts
 
 
