@@ -21,7 +21,7 @@ from seip_addon.core.sensing.visibility.float32_precision import FLOAT32_STEP, M
 from .arithmetic import ArithmeticStudy
 from .criterion import CriterionStudy
 from .solver_limits import SolverStudy
-from .weather import FAILS_BELOW, WeatherStudy, in_words
+from .weather import FAILS_BELOW, WeatherStudy, describe_weather
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 """Told apart by colour-blind people (Okabe and Ito 2008)."""
@@ -219,7 +219,13 @@ def save_weather_chart(path: str | os.PathLike[str], study: WeatherStudy, title:
     panel.axhline(FAILS_BELOW, **LIMIT_LINE)
     panel.set_xticks(
         at,
-        ["clear", *(in_words(one.words).replace(" of ", "\n").replace(", visibility ", "\n") for one in study.answers)],
+        [
+            "clear",
+            *(
+                describe_weather(one.words).replace(" of ", "\n").replace(", visibility ", "\n")
+                for one in study.answers
+            ),
+        ],
     )
     panel.set_ylim(0, 1.03)
     _share_axis(panel)
