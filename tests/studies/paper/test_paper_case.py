@@ -48,7 +48,7 @@ def run(tmp_path):
     ("changes", "message"),
     [
         ({"junction": "965"}, r"no junction '965' in map"),
-        ({}, r"a.net.xml is no network of the map junction.xodr at this place \(none of its streets is there\)"),
+        ({}, r"a.net.xml is not a network of the map junction.xodr at this site \(none of its streets is there\)"),
         ({"net": "<net/>"}, r"a.net.xml is no SUMO network"),
         ({"source": MAP.with_name("none.xodr")}, r"there is no file .*none.xodr: check its path"),
     ],

@@ -59,7 +59,7 @@ def test_what_goes_through_is_counted(tmp_path):
             FLOWS.format(9, "").replace("w e", "w x"),
             r"flow 'f' takes the edge 'x', which a.net.xml does not have",
         ),
-        ("<net/>", None, r"a.net.xml is not a SUMO network"),
+        ("<net/>", None, r"a.net.xml is no SUMO network"),
     ],
 )
 def test_files_of_another_place_are_one_sentence(tmp_path, net, flows, message):

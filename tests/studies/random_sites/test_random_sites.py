@@ -215,5 +215,5 @@ def test_a_plan_that_fails_the_check_is_drawn_again(tmp_path, monkeypatch):
     assert (attempt, plan) == (2, calls[2])
     monkeypatch.setattr(production, "MAX_ATTEMPTS", 2)
     calls.clear()
-    with pytest.raises(SeipError, match="2 plans of site 1 did not pass the check of sites .the last: a hole"):
+    with pytest.raises(SeipError, match=r"2 plans of site 1 did not pass the check of sites \(the last: a hole"):
         finish(production._built(tmp_path, replace(settings, seed=2), 1))  # noqa: SLF001
