@@ -178,7 +178,7 @@ def _facts(
 
 def _charts(folder: Path, study: CoverageStudy, found: DetectionOfCase) -> list[tuple[str, str]]:
     """Draw the charts; return their paths from the page, and captions."""
-    name, points = found.results.name, cells([one.seed_result for one in found.results.marguments])
+    name, points = found.results.name, cells([one.seed_result for one in found.results.masked])
     charts = [
         ("paper_heights.png", "Coverage by type, height and number"),
         ("paper_ap.png", "Average precision by type and number"),
