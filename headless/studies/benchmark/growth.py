@@ -110,7 +110,7 @@ def visibility_cost(
 ) -> tuple[float, float | None]:
     """Compute visibility from places of a site; return the processor seconds and MB of it.
 
-    What is done once for a site counts once, the places count for those they stand for.
+    Work done once for a site counts once; work at a position is scaled by the number of positions that it represents.
     """
     site, poses = scaled.site, scaled.site.candidates
     every = sharing_rays(poses.xyz, poses.yaw, poses.tilt)
