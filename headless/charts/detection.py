@@ -54,13 +54,13 @@ class PrecisionCell:
     sensor : str
         Catalogue key.
     count : int
-        N, the number of sensors that were allowed.
+        N, the largest number of sensors allowed.
     price : float, US dollars
     coverage : float, 0 to 1
     values : tuple of float
         Average precision by seed.
     interval : (float, float) or None
-        95 % interval of their mean, where there is one.
+        95 % interval of their mean, or None.
     """
 
     sensor: str
@@ -90,7 +90,7 @@ class PrecisionRecallLine:
     sensor, count
         As in `PrecisionCell`.
     recall, precision : (s,) float64, 0 to 1
-        At each score, the highest first.
+        Recall and precision at each score, the highest first.
     """
 
     sensor: str
@@ -102,18 +102,18 @@ class PrecisionRecallLine:
 
 @dataclass(frozen=True)
 class BinnedFigure:
-    """A figure in parts of the road users, one line for each series.
+    """A figure in bins of road users, with one line for each series.
 
     Parameters
     ----------
     what, figure : str
-        What the parts go by, and what is drawn, with units.
+        Labels, with units, of the binned quantity and of the figure.
     edges : sequence of float
-        Each part is from one edge to below the next; the last may be infinite.
+        Edges of the bins, lower ones inclusive; the last may be infinite.
     lines : mapping of str to sequence of float
-        A value for each part, NaN where there is none.
+        Values in each bin, NaN for a bin without a value.
     road_users : sequence of int
-        In each part, drawn behind the lines; empty where they mean nothing.
+        Numbers of road users in each bin, drawn behind the lines; empty to leave them out.
     """
 
     what: str
@@ -125,17 +125,17 @@ class BinnedFigure:
 
 @dataclass(frozen=True)
 class DetectorSetting:
-    """One setting of the detector and what it costs.
+    """One setting of the detector with its cost.
 
     Parameters
     ----------
     name : str
-        What differs from the default: ``pillars 0.32 m``.
+        Difference from the default: ``pillars 0.32 m``.
     family : str
-        Settings of one family look alike.
+        Group of settings; settings of one family have the same colour.
     training : float, seconds
     inference : float, milliseconds
-        For one merged frame.
+        Time for one merged frame.
     average_precision : float, 0 to 1
     interval : (float, float) or None
     """
@@ -180,7 +180,7 @@ def save_price_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell
     panel.step(
         [cell.price for cell in best],
         [cell.mean for cell in best],
-        where="post",  # what is bought for less is at hand for more
+        where="post",  # a higher price never gives less: cheaper placements can be chosen, too
         color=SOFT_INK,
         linewidth=1.1,
         linestyle=DASHED,
@@ -250,7 +250,7 @@ def save_precision_recall_chart(
 
 
 def save_parts_chart(path: str | os.PathLike[str], panels: Sequence[BinnedFigure], title: str) -> None:
-    """Draw figures in parts of the road users, a panel for each way to part them, as PNG."""
+    """Draw figures in bins of road users, with one panel for each binned quantity, as PNG."""
     _check(panels, "detection by parts of the road users")
     figure, axes = new_figure(PANEL_SIZE[0] * 0.85 * len(panels), PANEL_SIZE[1], len(panels))
     for panel, parts in zip(axes, panels, strict=True):
@@ -276,9 +276,9 @@ def save_training_chart(
     Parameters
     ----------
     loss : sequence of float
-        Of each step.
+        Loss of each step.
     validation : mapping of int to float
-        Average precision after so many steps; the best is marked.
+        Average precision by number of steps; the best is marked.
     """
     _check(loss, "a training")
     figure, (panel,) = new_figure(PANEL_SIZE[0] * 1.25, PANEL_SIZE[1])
@@ -338,7 +338,7 @@ def save_setting_chart(path: str | os.PathLike[str], settings: Sequence[Detector
 
 def _check(drawn: Sequence[object] | Mapping[str, object], what: str) -> None:
     if not drawn:
-        raise SeipError(f"there is nothing to draw a chart of {what} from: evaluate a detector first")
+        raise SeipError(f"there are no data for a chart of {what}: evaluate a detector first")
 
 
 def _named(count: int, sensor: str) -> str:
@@ -382,14 +382,14 @@ def _reached(cells: Sequence[PrecisionCell]) -> list[float]:
 
 
 def _precision_axis(panel: Axes, reached: Sequence[float], x: str) -> None:
-    """Scale the axis to the values: differences near 1 would not be visible on an axis from 0."""
+    """Scale the axis to the values; on an axis from 0, differences near 1 would not be visible."""
     lowest = min(value for value in reached if math.isfinite(value))
     panel.set_ylim(max(0.0, math.floor(10 * lowest - 0.3) / 10), 1.005 if max(reached) <= 1 else None)
     style_axes(panel, x, PRECISION_LABEL, "y")
 
 
 def _draw_road_users(panel: Axes, counts: Sequence[int]) -> None:
-    """Draw behind the lines how many road users each part has, the most of them half as high as the panel."""
+    """Draw the number of road users of each bin behind the lines, the largest half as high as the panel."""
     heights = 0.5 * np.asarray(counts) / max(1, *counts)
     panel.bar(range(len(counts)), heights, width=0.86, color="#eef0f2", zorder=0, label="road users")
     for place, (count, height) in enumerate(zip(counts, heights, strict=True)):
@@ -397,12 +397,12 @@ def _draw_road_users(panel: Axes, counts: Sequence[int]) -> None:
 
 
 def _spans(edges: Sequence[float]) -> list[str]:
-    """Return the words for each part: ``0–10``, or ``60 +`` for the last one without an end."""
+    """Return the label of each bin: ``0–10``, or ``60 +`` for the last one without an end."""
     return [f"{low:g}–{high:g}" if math.isfinite(high) else f"{low:g} +" for low, high in pairwise(edges)]
 
 
 def _smoothed(values: Float) -> Float:
-    """Return the running mean over a fiftieth of the values, as many on either side as there are."""
+    """Return the centred running mean over a fiftieth of the values; the window is shorter at the ends."""
     reach = len(values) // 100
     total = np.concatenate([[0.0], np.cumsum(values)])
     places = np.arange(len(values))
@@ -412,8 +412,8 @@ def _smoothed(values: Float) -> Float:
 
 
 def _name(figure: Figure, panel: Axes, named: Sequence[tuple[float, float, str, bool]]) -> None:
-    """Write names (x, y, name, whether it stands out) beside their marks, none on another or on a mark."""
-    figure.draw_without_rendering()  # sets the panels' places and limits, which names have to know
+    """Write names (x, y, name, whether highlighted) next to their marks, without overlaps."""
+    figure.draw_without_rendering()  # fixes the positions and limits of panels, which names are placed by
     figure.set_layout_engine("none")
     texts = [panel.text(x, y, words, weight="bold" if out else "normal", **LABEL) for x, y, words, out in named]
     extents = [text.get_window_extent() for text in texts]
@@ -426,7 +426,7 @@ def _name(figure: Figure, panel: Axes, named: Sequence[tuple[float, float, str, 
     for text, point, centre, size in zip(texts, points, centres, sizes, strict=True):
         text.set(x=back.transform(centre)[0], y=back.transform(centre)[1])
         gap = np.maximum(np.abs(point - centre) - size / 2, 0)
-        if np.hypot(*gap) > 2.5 * radius:  # far enough to be taken for another's
+        if np.hypot(*gap) > 2.5 * radius:  # so far that the name could be attributed to another mark
             panel.plot(*back.transform([point, centre]).T, color=FAINT_COLOUR, linewidth=0.7, zorder=1)
             text.set_bbox({"facecolor": PAPER, "edgecolor": "none", "pad": 0.8})
 

@@ -25,9 +25,9 @@ TRUTH_FILL = TRUTH_COLOUR + "22"
 HIT_COLOUR, GROUND_COLOUR = "#9aa3ab", "#f1f3f4"
 PICTURE_SIDE, DPI = 5.6, 200  # inches
 MARGIN_SHARE = 0.03  # of the region's size, shown around it
-MAX_POINTS = 150_000  # returns that are drawn of each cloud, evenly chosen: more hide each other
-RING_RADIUS = 4.0  # metres, radius of the rings about errors
-MIN_NOSE_LENGTH = 0.3  # metres, of the stroke that shows where a box's front is
+MAX_POINTS = 150_000  # largest number of drawn returns of a cloud, evenly chosen: more would cover each other
+RING_RADIUS = 4.0  # metres, radius of the rings around errors
+MIN_NOSE_LENGTH = 0.3  # metres, least length of the stroke that marks a box's front
 
 CLOUD, REGION, IGNORED, TRUTH, DETECTION, ERROR, SENSOR = range(7)
 
@@ -44,11 +44,11 @@ class ErrorView:
     truth : (g, 5) float64
         Road users in plan: x, y of the middle, length, width (metres), yaw (radians, counter-clockwise from +x).
     wanted, missed : (g,) bool
-        Whether each had to be found, and of these, whether none found it.
+        Whether each road user had to be found, and whether it had to be and was missed.
     detected : (k, 5) float64
         Detections in plan.
     false : (k,) bool
-        Whether each is false.
+        Whether each detection is false.
     """
 
     name: str
@@ -70,10 +70,10 @@ def save_error_view(
     Parameters
     ----------
     attribution : sequence of str
-        Credits that the sources of the scene demand.
+        Credits required by the sources of the scene.
     """
     if not views:
-        raise SeipError("there is no frame to draw the errors of: evaluate a detector on at least one frame")
+        raise SeipError("there are no frames to draw: evaluate a detector on at least one frame")
     limits, shape = limits_around(shapely.total_bounds([view.region for view in views]), MARGIN_SHARE)
     figure, panels = new_figure(PICTURE_SIDE * len(views), PICTURE_SIDE * shape + 1.1, len(views), dpi=DPI)
     for panel, view in zip(panels, views, strict=True):
@@ -108,7 +108,7 @@ def _draw(panel: Axes, view: ErrorView) -> None:
 
 
 def _boxes(panel: Axes, boxes: Float, colour: str, zorder: int, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
-    """Draw boxes, each with a stroke from its middle to where its front is."""
+    """Draw boxes, each with a stroke from its middle to its front."""
     draw_polygons(panel, corners(boxes), **{"facecolor": "none"} | style, edgecolor=colour, zorder=zorder)
     ahead = np.column_stack([np.cos(boxes[:, 4]), np.sin(boxes[:, 4])]) * np.maximum(boxes[:, 2:3] / 2, MIN_NOSE_LENGTH)
     strokes = np.stack([boxes[:, :2], boxes[:, :2] + ahead], axis=1)

@@ -1,4 +1,4 @@
-"""Charts of a placement that was optimised over scenarios, beside its other results."""
+"""Charts of a placement that was optimised over scenarios."""
 
 from __future__ import annotations
 

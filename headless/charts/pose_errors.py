@@ -27,15 +27,15 @@ from seip_addon.core.output.pictures.palette import SOFT_INK
 FIGURE_SIZE = (7.6, 4.4)  # inches
 
 X_LETTERS, Y_LETTERS, LEGEND_LETTERS = 80, 34, 44
-"""Letters to a line below the axis, beside it, and in one of two columns of the legend."""
+"""Characters per line below the axis, next to it, and in one of two columns of the legend."""
 
 
 def save_spread_chart(path: str | os.PathLike[str], study: RobustStudy, title: str) -> None:
     """Draw the distribution of coverage over unseen draws for each placement, as PNG.
 
-    Steps are empirical distribution functions; a mark on the 5 % line is the quantile with its interval, a tick
-    on the axis what the placement covers as planned. Coverage is what a placement is evaluated by: after a loss, or by
-    several sensors, where it was chosen for that.
+    Steps are empirical distribution functions. A mark on the 5 % line is the quantile with its interval; a tick on the
+    axis is the planned coverage. For placements optimised for failures or multi-cover, coverage is after a failure, or
+    by several sensors.
     """
     figure, (axes,) = new_figure(*FIGURE_SIZE)
     for row, contender in enumerate((*study.nominal, *study.robust)):
@@ -87,18 +87,18 @@ def save_frontier_chart(path: str | os.PathLike[str], study: RobustStudy, title:
 
 
 def _outcome(study: RobustStudy) -> str:
-    """Name what placements are evaluated by, if it is one thing."""
+    """Return the name of the evaluated quantity if it is the same for all placements, otherwise "coverage"."""
     return study.nominal[0].evaluated_by.describe_outcome() if len(study.nominal) == 1 else "coverage"
 
 
 def _named(study: RobustStudy, contender: Contender) -> str:
-    """Name a placement, and the nominal optimum, of which there are several then, with what it is evaluated by."""
+    """Return the name of a placement; of several nominal optima, each with its evaluated quantity."""
     several = len(study.nominal) > 1 and contender in study.nominal
     name = f"{contender.name}: {contender.evaluated_by.describe_outcome()}" if several else contender.name
     return fill(name, LEGEND_LETTERS)
 
 
-def _interval(  # what is drawn, where, and how
+def _interval(
     axes: Axes, estimate: IntervalEstimate, height: float, shown: str, marker: str, label: str | None
 ) -> None:
     axes.plot(interval_ends(estimate), [height, height], color=shown, linewidth=2.4)

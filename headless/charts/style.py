@@ -14,9 +14,9 @@ from seip_addon.core.output.pictures.drawing import save_png
 from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
 
 COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
-"""Colours of series, told apart by colour-blind people (Okabe and Ito 2008)."""
+"""Colours of series, distinct for colour-blind readers (Okabe and Ito 2008)."""
 
-MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # one more than colours: 42 series before a pair comes again
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # one more than colours, so that pairs repeat only after 42 series
 DASHED = (0, (4, 2))
 GRID_COLOUR, FAINT_COLOUR = "#e3e6e8", "#c3c9ce"
 
@@ -41,7 +41,7 @@ def new_figure(
 
 
 def limits_around(bounds: Iterable[float], margin: float) -> tuple[dict[str, Any], float]:
-    """Return the limits of a plan with a margin, a share of its size, around (left, bottom, right, top), and its shape.
+    """Return the limits of a plan around (left, bottom, right, top), with a relative margin, and its shape.
 
     The shape is how many times as high as wide it is.
     """
@@ -52,7 +52,7 @@ def limits_around(bounds: Iterable[float], margin: float) -> tuple[dict[str, Any
 
 
 def style_axes(panel: Axes, x: str = "", y: str = "", grid: Literal["both", "x", "y"] = "both", **font: Any) -> None:  # noqa: ANN401 -- matplotlib's own
-    """Name the axes that are given a name, and draw grid, ticks and borders as in all charts."""
+    """Label the axes, and draw grid, ticks and borders as in all charts; empty labels are left out."""
     if x:
         panel.set_xlabel(x, color=INK, **font)
     if y:
@@ -70,7 +70,7 @@ def set_title(figure: Figure, title: str) -> None:
 
 
 def add_legend(figure: Figure, panels: Sequence[Axes], columns: int | None = None) -> None:
-    """Write one legend of the panels' entries below all panels, in as many columns as there is room for."""
+    """Write one legend of the panels' entries below all panels, in the number of columns that fit."""
     handles = [handle for panel in panels for handle in panel.get_legend_handles_labels()[0]]
     labels = [str(handle.get_label()) for handle in handles]
     if columns is None:
@@ -82,7 +82,7 @@ def add_legend(figure: Figure, panels: Sequence[Axes], columns: int | None = Non
 
 
 def save_chart(path: str | os.PathLike[str], figure: Figure, title: str, panels: Sequence[Axes] = ()) -> None:
-    """Write title and, where panels are given, their legend, and save the chart as PNG."""
+    """Write the title and, if panels are given, their legend, and save the chart as PNG."""
     if panels:
         add_legend(figure, panels)
     set_title(figure, title)

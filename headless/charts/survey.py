@@ -1,4 +1,4 @@
-"""Chart of a survey's boxes: how many a tolerance leaves, and how many lines of sight they change."""
+"""Chart of a survey's boxes: their number by tolerance, and the lines of sight that they change."""
 
 import os
 from collections.abc import Sequence

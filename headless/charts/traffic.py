@@ -1,4 +1,4 @@
-"""Charts of the coverage that traffic leaves, for nominal and for traffic-aware placements."""
+"""Charts of coverage in traffic, for nominal and for traffic-aware placements."""
 
 import os
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ from seip_addon.core.site.site import Site
 from seip_addon.core.site.target_squares import target_squares
 
 TIME_CMAP = LinearSegmentedColormap.from_list("time", (SEEN_COLOURS[0], "#f7e3ae", *SEEN_COLOURS[1:]))
-"""From never seen to always seen: from the colour of targets that no sensor sees to that of those that two see."""
+"""Colour map from never to always visible: from the colour of uncovered targets to that of targets seen by two."""
 
 OBSTACLE_COLOUR = "#8b9285"
 PICTURE_SIDE = 6.4  # inches
@@ -32,7 +32,7 @@ MARGIN_SHARE = 0.04  # of the region's size, shown around it
 BAR_STEP = 0.26  # of the step from one group of bars to the next
 
 
-def save_time_map(  # what is drawn, and where
+def save_time_map(
     path: str | os.PathLike[str],
     geometry: SceneGeometry,
     site: Site,
@@ -40,7 +40,7 @@ def save_time_map(  # what is drawn, and where
     placed: TrafficEvaluation,
     title: str,
 ) -> None:
-    """Draw for each target, and for the point above it, the share of time for which it is seen, as PNG."""
+    """Draw the share of time for which each target, and the point above it, is visible, as PNG."""
     limits, shape = limits_around(site.region.bounds, MARGIN_SHARE)
     figure, panels = new_figure(PICTURE_SIDE * len(placed.seen) + 0.9, PICTURE_SIDE * shape + 0.9, len(placed.seen))
     for panel, (layer, seen) in zip(panels, placed.seen.items(), strict=True):

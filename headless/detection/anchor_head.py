@@ -95,7 +95,8 @@ class AnchorHead(nn.Module):
         found = predicted[cloud, anchor, row, column]
         count = max(1, len(found))
         wanted = encoded(target, anchors)
-        # The sine of the difference of the angles: a box turned by 180 degrees is as good.
+        # The sine of the difference of the angles is zero for a box rotated by 180 degrees, too (SECOND): the box loss
+        # does not depend on front and back, which the direction classifier learns.
         turn = torch.sin(found[:, 7] - wanted[:, 6])
         error = torch.cat((found[:, 1:7] - wanted[:, :6], turn[:, None]), dim=1)
         box = functional.smooth_l1_loss(error, torch.zeros_like(error), beta=SMOOTH_L1_BETA, reduction="sum") / count
@@ -137,12 +138,16 @@ def assignment(wanted: TrainingTargets, grid: PillarGrid) -> Tensor:
     if len(overlap) == 0:
         return torch.full(shape, BACKGROUND, device=device)
     learnable = torch.nonzero(wanted.learnable)[:, 0]
+    # Anchors between the two thresholds are left out of the loss. The test includes road users with too few points:
+    # anchors on these are left out, too, instead of being trained as background.
     unclear = (overlap >= negative).any(dim=0)
     assigned = torch.where(unclear, IGNORED, BACKGROUND)
     if len(learnable) == 0:
         return assigned
     most, owner = overlap[learnable].max(dim=0)
     assigned = torch.where(most >= positive, learnable[owner], assigned)
+    # A road user that no anchor overlaps by `positive` (small, or between cells) would have no anchor: its best one is
+    # assigned in any case.
     peak, place = overlap[learnable].flatten(1).max(dim=1)
     flat = assigned.flatten()
     # Where one anchor is the best of two road users the later keeps it, on every machine.
@@ -164,6 +169,8 @@ def anchor_boxes(grid: PillarGrid, anchor: Tensor, row: Tensor, column: Tensor) 
 
 def encoded(boxes: Tensor, anchors: Tensor) -> Tensor:
     """Return what anchors must predict to become boxes, all (m, 7)."""
+    # Offsets in units of the anchor's diagonal and height, and logarithms of the ratios of sizes: errors of large and
+    # small road users have the same magnitude in the loss (SECOND).
     diagonal = torch.hypot(anchors[:, 3], anchors[:, 4])[:, None]
     return torch.cat(
         (
@@ -180,6 +187,8 @@ def decoded(predicted: Tensor, anchors: Tensor) -> Tensor:
     """Return the boxes (m, 7) that anchors have become by what they predict, (m, 9) with two for the direction."""
     diagonal = torch.hypot(anchors[:, 3], anchors[:, 4])[:, None]
     direction = predicted[:, 7:].argmax(dim=1)
+    # The predicted yaw is known modulo 180 degrees: it is brought into the half circle from `DIRECTION_FROM` on, and
+    # the direction class adds the other half. Then it is wrapped to [−π, π).
     yaw = torch.remainder(predicted[:, 6] + anchors[:, 6] - DIRECTION_FROM, math.pi)
     yaw = yaw + DIRECTION_FROM + math.pi * direction
     yaw = torch.remainder(yaw + math.pi, 2 * math.pi) - math.pi
@@ -203,6 +212,8 @@ def _overlaps(wanted: TrainingTargets, grid: PillarGrid) -> Tensor:
     """Return the overlaps (boxes, anchors, rows, columns) of anchors set along the axes; 0 across classes."""
     boxes = wanted.boxes
     x, y = cell_centres(grid, OUTPUT_STRIDE, boxes.device)
+    # With boxes aligned to the nearer axis, the shared area is a product of a length in x and one in y. It takes
+    # (boxes × columns) and (boxes × rows) values instead of rotated IoUs of all boxes with all anchors.
     across = torch.sin(boxes[:, 6]).abs() > math.sqrt(0.5)
     wide = torch.where(across, boxes[:, 4], boxes[:, 3])
     deep = torch.where(across, boxes[:, 3], boxes[:, 4])

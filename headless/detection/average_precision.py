@@ -267,12 +267,16 @@ def _areas(evaluation: Evaluation, times: Float, group: Integer, wanted: Float |
         The number of road users that count.
     """
     detections = evaluation.detections
+    # Detections are sorted by score, so the first k of them are those above a threshold, and cumulative sums give hits
+    # and detections at all thresholds. Runs may come several times without matching again: matches are within frames.
     last = _last_of_equals(detections.score)
     last = last[np.diff(np.cumsum(detections.hit)[last], prepend=0) > 0]
     belongs = np.arange(times.shape[1])[:, None] == group
     hits = times @ np.cumsum(belongs & detections.hit, axis=1)[:, last].astype(np.float64)
     found = times @ np.cumsum(belongs, axis=1)[:, last].astype(np.float64)
     precision = np.divide(hits, found, out=np.zeros(hits.shape), where=found > 0)
+    # All-point interpolation: the best precision at this or a larger recall. The area is then a sum over steps of
+    # recall, which is hits over the number of road users; the sum is over steps of hits, and divided at the end.
     best_from_here = np.maximum.accumulate(precision[:, ::-1], axis=1)[:, ::-1]
     areas = (np.diff(hits, axis=1, prepend=0) * best_from_here).sum(axis=1)
     return np.divide(areas, wanted, out=np.full(len(areas), np.nan), where=wanted > 0)

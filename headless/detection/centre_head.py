@@ -67,6 +67,8 @@ class CentreHead(nn.Module):
         """Return the parts of the loss; see `heads.DetectionHead`."""
         maps = [_target_maps(wanted, grid, output.device) for wanted in targets]
         heat, owner = (torch.stack(part) for part in zip(*maps, strict=True))
+        # Cells near road users with too few points take no part: a detection there should be neither rewarded nor
+        # punished. Cells near the window's border do not either, as they see only parts of road users.
         ignored = torch.stack([heat_of(wanted.boxes[~wanted.learnable], grid, output.device)[0] for wanted in targets])
         counted = (ignored < MIN_HEAT) & inner_cells(grid, OUTPUT_STRIDE, margin, output.device)
         heat_loss = heat_map_loss(output[:, : len(CLASSES)], heat, counted[:, None])
@@ -80,6 +82,8 @@ class CentreHead(nn.Module):
     def candidates(self, output: Tensor, grid: PillarGrid, least_score: float) -> list[BoxProposals]:
         """Return a box for each peak of heat; see `heads.DetectionHead`."""
         heat = torch.sigmoid(output[:, : len(CLASSES)])
+        # A cell is a peak if it equals the maximum of its 3 × 3 neighbourhood. This removes most of the many boxes of
+        # one road user before suppression, which is quadratic in their number.
         heat = heat * (heat == functional.max_pool2d(heat, 3, 1, 1))
         found = []
         for cloud, values in enumerate(heat):
@@ -89,6 +93,7 @@ class CentreHead(nn.Module):
             predicted = output[cloud, len(CLASSES) :, row, column].T
             boxes = _boxes(predicted, reference_points(grid, row, column))
             overlap = torch.sigmoid(predicted[:, OVERLAP])
+            # Geometric mean: heat tells whether there is a road user, the predicted IoU how well this box fits it.
             score = values[category, row, column].pow(1 - OVERLAP_POWER) * overlap.pow(OVERLAP_POWER)
             found.append(BoxProposals(boxes, score, category))
         return found
@@ -107,6 +112,8 @@ def box_losses(predicted: Tensor, target: Tensor, reference: Tensor, weight: Ten
     axis = torch.stack((torch.sin(2 * yaw), torch.cos(2 * yaw)), dim=1)
     heading = torch.stack((torch.cos(yaw), torch.sin(yaw)), dim=1)
     size = torch.log(target[:, 3:6] / target.new_tensor(TYPICAL_SIZE))
+    # The IoU of the current boxes is the target of the overlap channel. Without no_grad its gradient would flow into
+    # the boxes, and they could lower this loss by becoming worse.
     with torch.no_grad():
         true_overlap = paired_iou(in_plan(_boxes(predicted, reference)), in_plan(target)).to(predicted.dtype)
     overlap = functional.binary_cross_entropy_with_logits(predicted[:, OVERLAP], true_overlap, reduction="none")
@@ -122,6 +129,8 @@ def box_losses(predicted: Tensor, target: Tensor, reference: Tensor, weight: Ten
 def _boxes(predicted: Tensor, reference: Tensor) -> Tensor:
     """Return the boxes (m, 7) of predicted channels (m, 11) at reference points (m, 3)."""
     (sine, cosine), (ahead_x, ahead_y) = predicted[:, AXIS].T, predicted[:, HEADING].T
+    # Half of the angle of (cos 2θ, sin 2θ) gives the axis of the box, in (−π/2, π/2]. The heading vector chooses
+    # between the axis and its opposite; its length does not matter.
     yaw = torch.atan2(sine, cosine) / 2
     yaw = torch.where(ahead_x * torch.cos(yaw) + ahead_y * torch.sin(yaw) < 0, yaw + math.pi, yaw)
     yaw = torch.remainder(yaw + math.pi, 2 * math.pi) - math.pi
@@ -142,6 +151,7 @@ def _target_maps(wanted: TrainingTargets, grid: PillarGrid, device: torch.device
     heat = torch.stack(
         [heat_of(wanted.boxes[learnable[category == number]], grid, device)[0] for number in range(len(CLASSES))]
     )
+    # Heat is separate for each class, but a cell learns one box: that with the most heat there, of any class.
     most, owner = heat_of(wanted.boxes[learnable], grid, device)
     if len(learnable) == 0:
         return heat, torch.full_like(owner, -1)
@@ -162,6 +172,8 @@ def heat_of(boxes: Tensor, grid: PillarGrid, device: torch.device) -> tuple[Tens
     # At least 0.6 cells, so that the cells around a pedestrian's get heat as well.
     spread = (HEAT_STD * boxes[:, 3:5]).clamp(min=0.6 * side)[:, :, None, None]
     heat = torch.exp(-0.5 * ((along / spread[:, 0]).square() + (across / spread[:, 1]).square()))
+    # The cell that contains a centre gets heat 1 exactly: the heat map loss counts only cells of heat 1 as positive,
+    # and a Gaussian sampled at cell centres would hardly ever reach it.
     centre = (dx.abs() <= side / 2)[:, None, :] & (dy.abs() <= side / 2)[:, :, None]
     heat = torch.where(centre, torch.ones_like(heat), heat)
     most, owner = heat.max(dim=0)

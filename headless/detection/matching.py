@@ -92,6 +92,8 @@ def match(frame: FrameResult, rule: Rule) -> Match:
     overlap = np.where(of_its_kind(frame, rule)[:, None], overlaps(frame, rule), 0.0)
     best = overlap.max(axis=1, initial=0.0)
     found_by, found = np.full(len(truth), NO_MATCH), np.full(len(detected), NO_MATCH)
+    # lexsort sorts by its last key first: by score, and equal scores by their best overlap. The loop cannot be
+    # vectorised, as each detection takes only road users that the ones before it left.
     for row in np.lexsort((-best, -detected.score)):
         if best[row] <= rule.iou:
             continue
@@ -99,6 +101,7 @@ def match(frame: FrameResult, rule: Rule) -> Match:
         if free.max() > rule.iou:
             found[row] = free.argmax()
             found_by[found[row]] = row
+    # A second detection of a counted road user is not excused: it is a false positive, which punishes duplicates.
     excused = (overlap[:, ~counted] > rule.iou).any(axis=1) | ~detected.inside
     return Match(counted, found_by, found, (found != NO_MATCH) | (of_its_kind(frame, rule) & ~excused))
 

@@ -155,6 +155,8 @@ def fill_pillars(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Pi
     offset = np.empty((len(kept), 3), dtype=np.float32)
     offset[:, :2] = kept[:, :2] - middle
     offset[:, 2] = kept[:, 2] - grid.bottom
+    # Points are sorted by pillar, so each pillar is one slice that begins where the number changes, and reduceat sums
+    # the slices.
     first = np.flatnonzero(np.diff(pillar, prepend=-1))
     counts = np.diff(first, append=len(pillar))
     mean = np.add.reduceat(offset, first, axis=0) / counts[:, None] if len(first) else offset
@@ -213,10 +215,14 @@ def _choose(points: NDArray[np.float32], grid: PillarGrid, most: int) -> tuple[I
     """
     inside = np.flatnonzero(grid.holds(points))
     within = points[inside]
+    # A point just inside the east or north border may round up to the next column or row, which does not exist.
     column = np.minimum(((within[:, 0] - grid.west) / grid.pillar).astype(np.int64), grid.columns - 1)
     row = np.minimum(((within[:, 1] - grid.south) / grid.pillar).astype(np.int64), grid.rows - 1)
     index_bits = max(1, len(inside).bit_length())
     hash_bits = min(32, _KEY_BITS - index_bits - len(grid).bit_length())
+    # Fields of the key from the highest bits down: pillar, hash, index. Sorted, the key groups points by pillar and
+    # orders them by hash within it; the index breaks ties and leads back to the point. The hash gets the bits that
+    # pillar and index leave of a non-negative int64.
     key = row * grid.columns + column
     key <<= hash_bits
     key |= _hashed(within) >> np.uint32(32 - hash_bits)
@@ -226,6 +232,8 @@ def _choose(points: NDArray[np.float32], grid: PillarGrid, most: int) -> tuple[I
     pillar = key >> (index_bits + hash_bits)
     first = np.flatnonzero(np.diff(pillar, prepend=-1))
     met = np.diff(first, append=len(pillar))
+    # Rank of each point in its pillar. The lowest hashes are kept: a random choice that depends on no other pillar, and
+    # of which a second choice keeps the same points.
     rank = np.arange(len(pillar)) - np.repeat(first, met)
     kept = rank < most
     order = key[kept] & ((1 << index_bits) - 1)
@@ -234,6 +242,8 @@ def _choose(points: NDArray[np.float32], grid: PillarGrid, most: int) -> tuple[I
 
 def _hashed(points: NDArray[np.float32]) -> NDArray[np.uint32]:
     """Return 32 well mixed bits of each point's x, y, z: sums of odd multiples, finished after MurmurHash3."""
+    # Nearby points differ only in the low bits of their coordinates. The multiplications (modulo 2^32) and shifts
+    # spread these over all bits, so that the order of hashes is unrelated to the positions of points.
     bits = np.ascontiguousarray(points[:, :3]).view(np.uint32)
     mixed: NDArray[np.uint32] = (
         bits[:, 0] * np.uint32(0x9E3779B1) + bits[:, 1] * np.uint32(0x85EBCA77) + bits[:, 2] * np.uint32(0xC2B2AE3D)

@@ -86,6 +86,8 @@ def suppress(boxes: Tensor, scores: Tensor, threshold: float) -> Tensor:
     (k,) int64 Tensor
         Indices, best first.
     """
+    # All overlaps are computed at once, so the loop only combines rows of a matrix. A box that was removed does not
+    # remove others.
     order = torch.sort(scores, descending=True, stable=True).indices
     overlaps = (iou_matrix(boxes[order], boxes[order]) > threshold).cpu().numpy()
     stays = np.ones(len(order), dtype=np.bool_)
@@ -102,6 +104,8 @@ def _overlap(a: Tensor, b: Tensor) -> Tensor:
 
 
 def _few_overlaps(a: Tensor, b: Tensor) -> Tensor:
+    # Clamping x and y moves a point to the nearest point of the rectangle of b. Parts of the outline of a outside of it
+    # move onto its border, where they run back and forth or around it, so that the enclosed area is the overlap.
     half_length, half_width = b[:, 2] / 2, b[:, 3] / 2
     x, y = _corners_seen_from(a, b)
     dx, dy = x.roll(-1, dims=0) - x, y.roll(-1, dims=0) - y
@@ -110,6 +114,7 @@ def _few_overlaps(a: Tensor, b: Tensor) -> Tensor:
     first, last = _cuts(y, dy, half_width)
     bends = (cut.clamp(first, last) for cut in _cuts(x, dx, half_length))
     along = torch.stack((first, *bends, last))  # (4 cuts, 4 edges, n)
+    # Area by Green's theorem, ∮ x dy: the mean x of each straight piece times its change of y.
     x = torch.clamp(x + along * dx, -half_length, half_length)
     y = torch.clamp(y + along * dy, -half_width, half_width)
     return ((x[1:] + x[:-1]) / 2 * y.diff(dim=0)).sum(dim=(0, 1)).clamp(min=0)

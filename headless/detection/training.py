@@ -181,6 +181,8 @@ class _Run:
     def advance(self) -> None:
         """Do one step."""
         self.detector.train()
+        # A generator for each step, not one for the training: a resumed training draws the same samples as one that was
+        # not interrupted, without storing the generator's state.
         random = np.random.default_rng([self.settings.seed, 1, self.step])
         samples = [drawn(self.training_set, random) for _ in range(self.settings.batch)]
         grid = self.window
@@ -202,6 +204,7 @@ class _Run:
         results = [
             result_of_sample(self.detector, area, sample) for area, sample in spread(self.aside, VALIDATION_FRAMES)
         ]
+        # Road users with too few points are not counted, as they are no targets of the training either.
         rule = Rule(fewest_points=self.settings.least_points)
         self.curve.validation[self.step] = evaluate(results, rule).average_precision
         if self.curve.best == self.step:
@@ -223,6 +226,8 @@ class _Run:
 
     def store(self, path: str | os.PathLike[str]) -> None:
         """Write all that is needed to go on, and the best weights so far as those of a detector."""
+        # The best weights are stored like those of a detector, so that the file can be loaded as one at any time; the
+        # latest weights, with the state of the optimiser, are for resuming.
         save_state(
             path,
             {
@@ -306,9 +311,13 @@ def vary(sample: TrainingSample, window: PillarGrid, random: np.random.Generator
     scale = float(random.uniform(1 - MAX_STRETCH, 1 + MAX_STRETCH))
     lift = float(random.uniform(-MAX_LIFT, MAX_LIFT))
 
+    # Mirroring (y → −y) comes before the rotation, so that a yaw becomes angle − yaw.
     matrix = scale * np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     if mirrored:
         matrix = matrix @ np.diag((1.0, -1.0))
+    # Half of the window's diagonal, enlarged by the strongest shrinking, reaches its corners at any rotation. Points
+    # are sorted by x, so a binary search avoids a pass over the whole cloud; the mask below makes a copy, so that
+    # changing its coordinates does not change the sample.
     reach = size * math.sqrt(0.5) / (1 - MAX_STRETCH)
     first, last = np.searchsorted(sample.points[:, 0], (focus[0] - reach, focus[0] + reach))
     points = sample.points[first:last]
@@ -374,6 +383,8 @@ class _Torch:
         self._before = (0, False, False)
 
     def enter(self, threads: int) -> None:
+        # torch has one such setting for the whole process, and trainings run in several threads: only the first user
+        # changes it, and only the last restores it.
         with self._lock:
             if not self._users:
                 self._before = (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled(), _fills())

@@ -21,11 +21,11 @@ class Claim:
     Parameters
     ----------
     number : int
-        In the paper's list of claims.
+        Number in the paper's list of claims.
     verdict : str
-        ``holds``, ``does not hold``, or ``undecided`` where bounds or intervals leave it open.
+        ``holds``, ``does not hold``, or ``undecided`` if bounds or intervals leave it open.
     evidence : str
-        The figures behind the verdict.
+        Figures behind the verdict.
     """
 
     number: int
@@ -39,7 +39,7 @@ class Claim:
 
 
 def verdict(*, holds: bool, fails: bool) -> str:
-    """Return the verdict on what is known to hold, known to fail, or neither."""
+    """Return the verdict: known to hold, known to fail, or undecided."""
     if holds:
         return HOLDS
     return FAILS if fails else UNDECIDED
@@ -76,5 +76,5 @@ def save_claims(path: str | os.PathLike[str], claims: Sequence[Claim], title: st
 
 
 def _cell(words: str) -> str:
-    """Return text that a Markdown table takes as one cell."""
+    """Return text escaped for a cell of a Markdown table."""
     return words.replace("|", "\\|")

@@ -14,17 +14,20 @@ from seip_addon.core.storage.files import whole_file
 
 from .street_network import DRIVING, PARKED_CLASS, PARKING, WALKING, NetworkEdge, NetworkLane, StreetNetwork
 
-_MAX_ROUTE_EDGES = 40  # edges; in a network without ends a vehicle leaves after so many
+_MAX_ROUTE_EDGES = 40  # edges; after these, a vehicle leaves a network without ends
 _MAX_WALK = 150.0  # metres in plan from one pavement to another
-_MIN_PAVEMENT = 20.0  # metres; on a shorter one nobody sets out
+_MIN_PAVEMENT = 20.0  # metres; no pedestrians start on a shorter one
 _DELIVERY_SHARE = 0.35  # of the vans and trucks; they stop once on their way
 _STOP_SECONDS = (20.0, 60.0)  # seconds
-_PARKED_GAP = 0.5  # metres between parked cars at least
+_PARKED_GAP = 0.5  # least metres between parked cars
 _BAY_LENGTH = 6.5  # metres of kerb for a parked car
 _OCCUPIED_SHARE = 0.6  # of the bays in parking lanes
-_FIRST_BAY = 35.0  # metres from where the street begins
-_ROWS_ALONG = 2  # places for a row of cars along the kerb of a street, one behind the other
-_SHIFT = 0.26  # of a bay from seed to seed: four in turn are 1.4 m apart, and after many all places have been taken
+_FIRST_BAY = 35.0  # metres from the start of the street
+_ROWS_ALONG = 2  # positions for a row of cars along the kerb of a street, one behind the other
+# Shift of the bays from seed to seed, as a share of a bay. Four successive seeds are 1.4 m or more apart (0.22 bays
+# of 6.5 m), so that a detector tested on one of them does not find parked cars where it was trained on them. After
+# many seeds, all positions have been used.
+_SHIFT = 0.26
 _PARKING_SECONDS = 1e6  # seconds
 
 
@@ -77,10 +80,10 @@ MODELS = {
         "child": RoadUserModel("pedestrian", "pedestrian", 0.35, 0.42, 1.28, 0.15, 1.2),
     },
 }
-"""Sizes of what drives and walks in European cities, riders included; after makers' data sheets, rounded."""
+"""Sizes of road users in European cities, riders included; after makers' data sheets, rounded."""
 
 VEHICLE_SHARES = {"car": 0.58, "van": 0.13, "truck": 0.10, "bus": 0.06, "motorcycle": 0.07, "bicycle": 0.06}
-"""Shares of the vehicles that come in on each arm."""
+"""Shares of the vehicles that enter on each arm."""
 
 
 @dataclass(frozen=True)
@@ -90,13 +93,13 @@ class KerbParking:
     Parameters
     ----------
     bays : int
-        Of a row.
+        Number of bays in a row.
     occupied : float
-        Share of the bays that hold a car.
+        Share of the bays with a car.
     streets : float
         Share of the streets with room for a row that have one.
     first : float, metres
-        From where the street begins to the first bay.
+        Distance from the start of the street to the first bay.
     """
 
     bays: int = 3
@@ -112,17 +115,17 @@ class Demand:
     Parameters
     ----------
     flow : float, vehicles per hour
-        That come in on each arm.
+        Vehicles that enter on each arm.
     turns : (3,) float
-        Shares that turn left, go straight on and turn right, where a junction offers that.
+        Shares that turn left, go straight on and turn right, if a junction offers the movement.
     pedestrians : float, persons per hour
-        That set out for each arm of the network.
+        Pedestrians that start, per arm of the network.
     shares : mapping of str to float
         Shares of the vehicles by category.
     own_sizes : bool
-        Whether each road user has a size of its own, drawn as `varied_bodies` draws it, in place of a model's.
+        Whether each road user has its own size, drawn as in `varied_bodies`, instead of a model's.
     kerb : KerbParking
-        Where no street has parking lanes.
+        Parking at kerbs, used if no street has parking lanes.
     """
 
     flow: float = 600.0
@@ -141,7 +144,9 @@ class Demand:
             raise SeipError(f"--turns must be three shares of which one is above 0, not {self.turns}")
         given = self.shares.values()
         if not self.shares.keys() <= VEHICLE_SHARES.keys() or min(given, default=0.0) < 0.0 or not sum(given):
-            raise SeipError(f"shares of vehicles are of {', '.join(VEHICLE_SHARES)}, and one is above 0: {self.shares}")
+            raise SeipError(
+                f"shares of vehicles must be for {', '.join(VEHICLE_SHARES)}, with one above 0, not {self.shares}"
+            )
 
 
 def write_routes(
@@ -149,22 +154,25 @@ def write_routes(
 ) -> None:
     """Write the routes of all road users from 0 to ``duration`` seconds; the same for the same seed.
 
-    All is drawn anew for each seed: who comes when, on what way, in which vehicle, and where which cars are parked. The
-    seed is in the names of all, as paint goes by the name.
+    Departures, routes, vehicles and parked cars are drawn independently for each seed. The seed is part of all names
+    because the paint of a road user depends on its name.
 
     Raises
     ------
     SeipError
-        The network has no arm on which vehicles could come in.
+        The network has no arm on which vehicles can enter.
     """
     arms = network.arms
     if not arms:
         raise SeipError(
-            "no road leads into the map from outside, so no traffic can come in; name a scene that cuts one"
+            "no road leads into the map from outside, so no traffic can enter: use a scene whose border cuts a road"
         )
+    # Parking, each arm, pedestrians and sizes have random streams of their own: changing the demand of one of them
+    # does not change the draws of the others.
     random = np.random.default_rng([seed, 0])
     bays = _bays(network, demand.kerb, seed, random)
     entries = list(_parked(bays, seed, random))
+    # Deliveries stop in the outer lane: not on streets where parked cars stand in it.
     free = set(network.edges) - {edge.id for edge, lane, _ in bays if lane.use == DRIVING}
     for number, arm in enumerate(arms, start=1):
         random = np.random.default_rng([seed, 1, number])
@@ -201,7 +209,7 @@ _PARKED = "parked_"  # begins the types of parked vehicles
 
 
 def _own_type_lines(entries: list[_Departure], random: np.random.Generator) -> Iterator[str]:
-    """Yield a type for each road user, with its own size; what is parked fits into its bay."""
+    """Yield a type for each road user, with its own size; parked vehicles fit into their bays."""
     known = {name: (category, model) for category, models in MODELS.items() for name, model in models.items()}
     for entry in entries:
         parked = entry.type.startswith(_PARKED)
@@ -270,11 +278,12 @@ def _vehicle(
 def _route(
     network: StreetNetwork, arm: NetworkEdge, turns: tuple[float, float, float], random: np.random.Generator
 ) -> list[NetworkEdge]:
-    """Return a way through the network that turns at random, by the shares of what each junction offers."""
+    """Return a random route through the network; at each junction, the shares of the offered movements apply."""
     share = dict(zip("lsr", turns, strict=True))
     route = [arm]
     while network.leads_on(route[-1]) and len(route) < _MAX_ROUTE_EDGES:
         ways = network.onward[route[-1].id]
+        # Shares apply to the movements that this junction offers; if none of them has a share, all are equally likely.
         weights = np.array([share[way] for _, way in ways])
         if not weights.any():
             weights = np.ones(len(ways))
@@ -283,7 +292,7 @@ def _route(
 
 
 def _delivery(streets: list[NetworkEdge], random: np.random.Generator) -> str:
-    """Return a stop in the outer lane of one of the streets that have another lane to pass by; empty without any."""
+    """Return a stop in the outer lane of a street with another lane for passing, or "" if there is none."""
     streets = [edge for edge in streets if len(edge.of(DRIVING)) > 1 and edge.lanes[0].length > 2.0 * _FIRST_BAY]
     if not streets:
         return ""
@@ -296,10 +305,10 @@ def _delivery(streets: list[NetworkEdge], random: np.random.Generator) -> str:
 def _bays(
     network: StreetNetwork, kerb: KerbParking, seed: int, random: np.random.Generator
 ) -> list[tuple[NetworkEdge, NetworkLane, float]]:
-    """Return the middles of the bays where cars stand all the time: in parking lanes, or else in rows at the kerb.
+    """Return the middles of the bays with parked cars: in parking lanes, otherwise in rows at the kerb.
 
-    A row stands in the outer of several lanes of some of the streets on which vehicles leave the network. Bays are not
-    marked on the road: those of one seed lie between those of the others, so that no run has cars where another has.
+    A row is in the outer of several lanes of some streets on which vehicles leave the network. Bays are not marked on
+    the road. Those of one seed lie between those of the others, so that parked cars stand at different positions.
     """
     shift = _BAY_LENGTH * (seed * _SHIFT % 1.0)
     bays = [
@@ -330,9 +339,11 @@ def _parked(
 def _rows(
     network: StreetNetwork, kerb: KerbParking, seed: int, random: np.random.Generator
 ) -> Iterator[tuple[NetworkEdge, NetworkLane, float]]:
-    """Yield the bays of rows of cars: from seed to seed they go round the streets, then along them, then by a shift."""
+    """Yield the bays of rows of cars: successive seeds use other streets, then positions along them, then a shift."""
     exits = [edge for edge in network.edges.values() if len(edge.of(DRIVING)) > 1 and not network.leads_on(edge)]
     rows = math.ceil(kerb.streets * len(exits))
+    # Rows are numbered over all seeds. The remainder by the number of streets is the street, the quotient counts the
+    # rows used there before: first the positions along the kerb, and when all are used, a shift by a part of a bay.
     for number in range(seed * rows, (seed + 1) * rows):
         edge = exits[number % len(exits)]
         lane = edge.of(DRIVING)[0]
@@ -354,6 +365,7 @@ def _walkers(network: StreetNetwork, rate: float, seed: int, duration: float) ->
     length = np.array([lane.length for _, lane in pavements])
     middle = np.array([lane.line.mean(axis=0) for _, lane in pavements])
     for number, depart in enumerate(poisson_departures(rate, random, duration)):
+        # Longer pavements have more starts; a pedestrian walks to any pavement that is near enough.
         start = int(random.choice(len(pavements), p=length / length.sum()))
         within = np.hypot(*(middle - middle[start]).T) < _MAX_WALK
         within[start] = False

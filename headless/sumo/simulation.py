@@ -23,8 +23,8 @@ from .street_network import PARKED_CLASS, StreetNetwork, read_network
 STEP_SECONDS = 0.1  # seconds between two steps of the simulation
 SAMPLING_SECONDS = 0.2  # seconds between two samples of the trajectories
 _LANE_CHANGE_SECONDS = 4.0  # seconds; without it SUMO's vehicles jump from lane to lane
-_MAX_SIGNAL_DISTANCE = 60.0  # metres: a crosswalk further from any traffic light belongs to none
-_PAVEMENT_REACH = 6.0  # metres that pavements reach beyond the ends of a crosswalk
+_MAX_SIGNAL_DISTANCE = 60.0  # metres, largest distance of a crosswalk from its traffic light
+_PAVEMENT_REACH = 6.0  # metres that pavements extend beyond the ends of a crosswalk
 
 _PERMISSIONS = {
     "driving": 'disallow="pedestrian"',
@@ -32,7 +32,7 @@ _PERMISSIONS = {
     "biking": 'allow="bicycle"',
     "parking": f'allow="{PARKED_CLASS}"',
 }
-"""Permissions of groups of lane types; all others are closed: SUMO leaves a type that it is not told of open to all."""
+"""Permissions of groups of lane types; all others are closed explicitly: SUMO opens types without any to all."""
 _OWN_PERMISSIONS = {"bus": 'allow="bus"', "taxi": 'allow="taxi bus"'}
 _LANES = {lane: _PERMISSIONS.get(group, 'disallow="all"') for lane, group in GROUPS.items()} | _OWN_PERMISSIONS
 """Permissions of all lane types of OpenDRIVE that have a surface."""
@@ -40,7 +40,7 @@ _LANES = {lane: _PERMISSIONS.get(group, 'disallow="all"') for lane, group in GRO
 
 @dataclass(frozen=True)
 class SignalPlan:
-    """The fixed plan of every traffic light: opposite arms have green together; seconds of each state."""
+    """Fixed plan of every traffic light, with green for opposite arms together; seconds of each state."""
 
     green: int = 25
     amber: int = 3
@@ -58,7 +58,7 @@ class Scenario:
     Parameters
     ----------
     seed : int
-        Of everything that is random, here and in SUMO.
+        Seed of all randomness, here and in SUMO.
     duration : float, seconds
     """
 
@@ -82,17 +82,17 @@ def simulate(
     Parameters
     ----------
     bounds : (4,) float, metres, optional
-        Only roads that reach into this rectangle of the map are kept: left, low, right, high.
+        Rectangle of the map (left, bottom, right, top); only roads that reach into it are used.
 
     Returns
     -------
     TrafficFiles
-        Byte for byte the same for the same arguments, but for the dates in SUMO's comments.
+        Files, identical for the same arguments except for the dates in SUMO's comments.
 
     Raises
     ------
     SeipError
-        SUMO is missing or refuses its input, or the map has no road that leads in.
+        SUMO is missing or rejects its input, or the map has no road that leads in.
     """
     programs = find_sumo()
     recorded, routes, network = (folder / f"traffic.{kind}.xml" for kind in ("fcd", "rou", "net"))
@@ -114,7 +114,7 @@ def run_sumo(programs: Sumo, files: TrafficFiles, seed: int, duration: float) ->
     Raises
     ------
     SeipError
-        SUMO refuses its input.
+        SUMO rejects its input.
     """
     yield from run(
         programs,
@@ -162,10 +162,10 @@ def _network(
 
 
 def _junction_shapes(network: StreetNetwork, road_map: RoadMap) -> dict[str, Float]:
-    """Return for signalised junctions an outline (k, 2) round their crosswalks.
+    """Return an outline (k, 2) around the crosswalks of each signalised junction.
 
-    SUMO lays crossings along the inside of a junction and stops vehicles where it begins: so both are where they are
-    painted.
+    SUMO places crossings along the inside of a junction and stops vehicles at its edge. With these outlines, both are
+    where the map has them.
     """
     if not network.signalised:
         return {}
@@ -181,7 +181,7 @@ def _junction_shapes(network: StreetNetwork, road_map: RoadMap) -> dict[str, Flo
 
 
 def _whole_nodes(network: StreetNetwork, bounds: tuple[float, float, float, float]) -> set[str]:
-    """Return the nodes that keep all edges that lead to them where the network is cut at a rectangle."""
+    """Return the nodes that keep all incoming edges if the network is cut at a rectangle."""
     kept = shapely.box(*bounds)
     cut = {
         edge.end

@@ -1,4 +1,4 @@
-"""A street network as SUMO drives on it: edges, their lanes, and how one leads to the next."""
+"""A street network of SUMO: edges, their lanes, and the connections between edges."""
 
 import os
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from seip_addon.core.progress import finish
 from seip_addon.core.storage.xml_stream import Attributes, quoted, read_tags
 
 WALKING, PARKING, DRIVING, OTHER = "walking", "parking", "driving", "other"  # uses of lanes
-PARKED_CLASS = "custom1"  # the vClass that alone may stand in a parking lane
+PARKED_CLASS = "custom1"  # the only vClass allowed in a parking lane
 
 
 @dataclass(frozen=True, eq=False)
 class NetworkLane:
-    """A lane: its number from the right, what it is for, its length in metres, and its middle line (k, 2)."""
+    """A lane: its number from the right, its use, its length in metres, and its centre line (k, 2)."""
 
     index: int
     use: str
@@ -46,11 +46,11 @@ class StreetNetwork:
     Parameters
     ----------
     edges : dict of str to NetworkEdge
-        In the order of the file.
+        Edges by id, in the order of the file.
     onward : dict of str to list of (str, str)
-        From an edge to which, and how it goes there: ``l``, ``s`` or ``r``.
+        Next edges of each edge, with the direction: ``l``, ``s`` or ``r`` (left, straight, right).
     signalised : dict of str to (2,) float64, metres
-        Where the nodes with traffic lights are.
+        Positions of the nodes with traffic lights.
     """
 
     edges: dict[str, NetworkEdge]
@@ -59,14 +59,14 @@ class StreetNetwork:
 
     @property
     def arms(self) -> list[NetworkEdge]:
-        """Edges on which vehicles come in: nothing leads to them, and they lead on."""
+        """Edges on which vehicles enter: driving edges without a preceding edge and with a next one."""
         entered = {edge for ways in self.onward.values() for edge, _ in ways}
         return [
             edge for edge in self.edges.values() if edge.of(DRIVING) and edge.id not in entered and self.leads_on(edge)
         ]
 
     def leads_on(self, edge: NetworkEdge) -> bool:
-        """Return whether vehicles can drive on from an edge."""
+        """Return whether an edge has a next edge for vehicles."""
         return bool(self.onward.get(edge.id))
 
 
@@ -93,10 +93,10 @@ class _Reader:
         self.edges: dict[str, NetworkEdge] = {}
         self.onward: dict[str, list[tuple[str, str]]] = {}
         self.signalised: dict[str, Float] = {}
-        self._current = ""  # the edge whose lanes come now; "" within a junction
+        self._current = ""  # edge of the lanes that follow in the stream; "" for internal edges of a junction
 
     def take(self, tag: str, attributes: Attributes) -> None:
-        """Take an element, and name the file and the element where it is faulty."""
+        """Read an element; an error names the file and the element."""
         take = {"edge": self._edge, "lane": self._lane, "connection": self._connection, "junction": self._junction}
         if tag not in take:
             return
@@ -108,6 +108,8 @@ class _Reader:
             raise SeipError(f"{named} {fault}; let netconvert write the network again") from error
 
     def _edge(self, attributes: Attributes) -> None:
+        # Edges with a function (internal, crossing, walkingarea) are parts of junctions, not streets: their lanes
+        # are skipped.
         self._current = "" if attributes.get("function") else attributes["id"]
         if self._current:
             self.edges[self._current] = NetworkEdge(self._current, attributes["to"], ())
@@ -125,7 +127,9 @@ class _Reader:
         if not 0 <= lane < len(self.edges[begin].lanes):
             raise ValueError(f"begins on lane {lane} of an edge with {len(self.edges[begin].lanes)}")
         ways = self.onward.setdefault(begin, [])
-        # a lane that is also walked on leads to where people cross, which is no edge for vehicles
+        # A lane also for pedestrians has connections to crossings, which are not edges for vehicles. Partly left
+        # and partly right (L, R) count as left and right; turnarounds (t) are left out, as the demand has no share of
+        # them.
         onward = way[0] in self.edges and way[1] in {"l", "s", "r"}
         if onward and self.edges[begin].lanes[lane].use == DRIVING and way not in ways:
             ways.append(way)
@@ -160,6 +164,7 @@ def _use(attributes: Attributes) -> str:
         return WALKING
     if allowed == [PARKED_CLASS]:
         return PARKING
+    # A lane has either a list of allowed or a list of closed classes; without both it is open to all.
     closed = attributes.get("disallow", "").split()
     drives = "passenger" in allowed if allowed else "passenger" not in closed and "all" not in closed
     return DRIVING if drives else OTHER

@@ -21,14 +21,14 @@ from .simulation import Scenario, simulate
 
 @dataclass(frozen=True, eq=False)
 class SimulatedRun:
-    """A run of traffic: its trajectories from time 0 on, and how it was made.
+    """A run of traffic: its trajectories from time 0 on, with notes on its simulation.
 
     Parameters
     ----------
     simulated : int
-        Number of road users before those that ran into others were left out.
+        Number of road users, including those removed because they overlapped others.
     collided : tuple of str
-        Names of those.
+        Names of the removed road users.
     warnings : tuple of str
     """
 
@@ -48,12 +48,12 @@ def simulate_run(
     scenario : Scenario
         Its duration includes the warm-up.
     warm_up : float, seconds
-        What is simulated before the run begins.
+        Simulated time before the run begins.
 
     Raises
     ------
     SeipError
-        SUMO is missing or refuses the map, or nobody is on the road.
+        SUMO is missing or rejects the map, or there are no road users on the road.
     """
     demand = scenario.demand
     with tempfile.TemporaryDirectory() as folder:
@@ -65,19 +65,19 @@ def simulate_run(
 def recorded_run(
     files: TrafficFiles, span: tuple[float, float], geometry: SceneGeometry, source: str
 ) -> Generator[Progress, None, SimulatedRun]:
-    """Read what SUMO recorded and fit it to the road of a scene.
+    """Read trajectories recorded by SUMO and fit them to the road of a scene.
 
     Parameters
     ----------
     span : (float, float), seconds
         Begin and end of the run in the simulation.
     source : str
-        What the trajectories come from, for people.
+        Source of the trajectories, for messages.
 
     Raises
     ------
     SeipError
-        Nobody is on the road.
+        There are no road users on the road.
     """
     read = yield from read_sumo(files, Extent(*span, road_bounds(geometry, ROAD_MARGIN)), geometry, source)
     fit = fit_to_road(smooth_walks(read.trajectories), geometry)

@@ -267,7 +267,7 @@ def test_the_same_chart_has_the_same_bytes(tmp_path):
     ],
 )
 def test_nothing_to_draw_is_said(tmp_path, draw):
-    with pytest.raises(SeipError, match=r"there is nothing to draw|there is no frame to draw"):
+    with pytest.raises(SeipError, match=r"there are no data for a chart|there are no frames to draw"):
         draw(tmp_path / "chart.png")
     assert not (tmp_path / "chart.png").exists()
 

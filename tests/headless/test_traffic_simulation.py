@@ -214,7 +214,7 @@ def test_own_sizes_are_drawn_for_each_road_user(tmp_path):
 
 @pytest.mark.parametrize("shares", [{"tram": 1.0}, {"car": 0.0}, {"car": 1.0, "bus": -0.1}, {}])
 def test_no_mix_of_vehicles_is_one_sentence(shares):
-    with pytest.raises(SeipError, match="shares of vehicles are of car, van"):
+    with pytest.raises(SeipError, match="shares of vehicles must be for car, van"):
         Demand(shares=shares)
 
 

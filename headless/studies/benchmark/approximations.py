@@ -23,9 +23,9 @@ class Approximation:
     Parameters
     ----------
     site : Site
-        With the poses of the exact site.
+        Simplified site, with the poses of the exact one.
     stands_for : (t,) int64
-        Target of ``site`` whose answer is taken for each target of the exact site.
+        Target of ``site`` whose visibility is taken for each target of the exact site.
     """
 
     name: str
@@ -58,12 +58,12 @@ def approximations(
 
 
 def thinner(model: LidarModel, times: int) -> LidarModel:
-    """Return a model whose azimuth steps are so many times as wide."""
+    """Return a model with `times` times wider azimuth steps."""
     return replace(model, points_per_second=model.points_per_second / times)
 
 
 def every_other_channel(model: LidarModel) -> LidarModel:
-    """Return a model with every second channel, as many azimuth steps in each."""
+    """Return a model with every second channel; the azimuth steps of each channel stay the same."""
     elevations, offsets = model.elevations[::2], model.azimuth_offsets[::2]
     share = len(elevations) / model.channels
     points = model.points_per_second * share
@@ -81,7 +81,7 @@ def bounding_box(mesh: Mesh) -> Float:
 
 
 def decimated(mesh: Mesh, share: float = 0.25) -> Float:
-    """Return a mesh that Blender's Decimate modifier leaves a share of the faces, (n, 3, 3) float64."""
+    """Return a mesh reduced to a share of its faces by Blender's Decimate modifier, (n, 3, 3) float64."""
     corners, index = np.unique(mesh.triangles.reshape(-1, 3), axis=0, return_inverse=True)
     data = bpy.data.meshes.new(mesh.name)
     data.from_pydata(corners.tolist(), [], index.reshape(-1, 3).tolist())
@@ -111,7 +111,7 @@ def _coarser(
     layout: CandidateSettings,
     factor: int,
 ) -> Approximation:
-    """Lay a coarser grid; each target of the finer one takes the answer of the nearest."""
+    """Build a coarser grid; each target of the finer grid takes the visibility of the nearest coarse target."""
     spacing = site.targets.spacing * factor
     coarse = make_site(geometry, layout, spacing, models=models)
     gap = site.targets.xyz[:, None, :2] - coarse.targets.xyz[None, :, :2]
@@ -126,5 +126,5 @@ def _with_objects(geometry: SceneGeometry, site: Site, simplify: Callable[[Mesh]
 
 
 def with_triangles(site: Site, triangles: Float) -> Site:
-    """Return a site of other triangles (n, 3, 3), all of the default reflectivity."""
+    """Return a site with its triangles replaced by `triangles` (n, 3, 3), all of the default reflectivity."""
     return replace(site, triangles=triangles, reflectivity=np.full(len(triangles), DEFAULT_REFLECTIVITY))

@@ -1,6 +1,6 @@
 """Alternative placement methods, as baselines: spopt, plain integer programs, simple greedy.
 
-They know the plain problem alone: so many sensors, at most one at each position.
+They solve only the plain problem: a given number of sensors, at most one at each position.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ class Found:
     Parameters
     ----------
     chosen : (k,) int64 or None
-        None where it found nothing.
+        Chosen poses; None if no placement was found.
     bound : float
-        No placement covers more; infinite where it does not say.
+        Upper bound on the covered weight; infinite if the method gives none.
     note : str
-        What came out otherwise than asked.
+        Why the result does not answer the problem, or "".
     """
 
     chosen: Integer | None
@@ -49,13 +49,15 @@ def ours(problem: PlacementProblem, seconds: float) -> Found:
 
 
 def plain_greedy(problem: PlacementProblem, _: float) -> Found:
-    """Take what adds most, again and again, with the project's bound."""
+    """Add the pose with the largest gain until the count is reached, with the project's bound."""
     placement = solve_greedy(problem)
     return Found(placement.chosen, placement.bound)
 
 
 def lazy_greedy(problem: PlacementProblem, _: float) -> Found:
-    """As greedy, but compute a gain anew only where the old one might still be the largest (Minoux 1978)."""
+    """As greedy, but recompute a gain only if the old one could still be the largest (Minoux 1978)."""
+    # Coverage is submodular: a pose's gain never grows as poses are added. An outdated gain is therefore an upper
+    # bound, and a pose whose gain is up to date and on top of the heap is the greedy choice.
     unseen = np.ones(problem.visible.shape[1], dtype=bool)
     gains = problem.visible @ problem.weights
     heap = [(-gain, pose, 0) for pose, gain in enumerate(gains.tolist())]
@@ -75,7 +77,7 @@ def lazy_greedy(problem: PlacementProblem, _: float) -> Found:
 
 
 def local_search(problem: PlacementProblem, seconds: float) -> Found:
-    """Improve the greedy choice by the best exchange of one pose for another, until none helps (Teitz, Bart 1968)."""
+    """Improve the greedy choice by the best swap of one pose for another, until none helps (Teitz and Bart 1968)."""
     chosen = lazy_greedy(problem, seconds).chosen
     while chosen is not None:
         times = problem.visible[chosen].sum(axis=0)
@@ -112,21 +114,21 @@ def rounded_relaxation(problem: PlacementProblem, seconds: float) -> Found:
 
 
 def plain_cbc(problem: PlacementProblem, seconds: float) -> Found:
-    """Give the plain program to CBC through PuLP."""
+    """Solve the plain program with CBC through PuLP."""
     model, x = _plain_program(problem, pulp.LpBinary)
     model.solve(pulp.COIN_CMD(path=pulp_cbc_path, msg=False, timeLimit=seconds, gapRel=0.0, threads=1))
     return _outcome(model, x)
 
 
 def plain_highs(problem: PlacementProblem, seconds: float) -> Found:
-    """Give the plain program to HiGHS through PuLP."""
+    """Solve the plain program with HiGHS through PuLP."""
     model, x = _plain_program(problem, pulp.LpBinary)
     model.solve(pulp.HiGHS(msg=False, timeLimit=seconds, gapRel=0.0, threads=1))
     return _outcome(model, x)
 
 
 def spopt_mclp(problem: PlacementProblem, seconds: float) -> Found:
-    """Solve with spopt's MCLP and HiGHS; spopt does not know that a position carries one sensor at most."""
+    """Solve with spopt's MCLP and HiGHS; spopt has no constraint of one sensor per position."""
     from spopt.locate import MCLP  # noqa: PLC0415 - of the group 'benchmark', which need not be installed
 
     hidden = 1.0 - problem.visible.T
@@ -167,7 +169,7 @@ def can_run(rival: str) -> bool:
 
 
 def _plain_program(problem: PlacementProblem, category: str) -> tuple[Any, list[Any]]:
-    """Return the integer program as it stands in textbooks, and its x."""
+    """Return the textbook integer program and its variables x, one for each pose."""
     model = pulp.LpProblem("plain", pulp.LpMaximize)
     x = [model.add_variable(f"x{i}", 0, 1, category) for i in range(len(problem.visible))]
     y = [model.add_variable(f"y{j}", 0, 1, category) for j in range(len(problem.weights))]
@@ -181,7 +183,7 @@ def _plain_program(problem: PlacementProblem, category: str) -> tuple[Any, list[
 
 
 def _outcome(model: Any, x: list[Any]) -> Found:  # noqa: ANN401 - PuLP's programs are untyped
-    """Read what a solver left in a program; PuLP calls a solution optimal at the time limit as well."""
+    """Read the result of a solved program; PuLP reports a solution at the time limit as optimal, too."""
     if model.sol_status not in (pulp.LpSolutionOptimal, pulp.LpSolutionIntegerFeasible):
         return Found(None, note="nothing found in time")
     chosen = np.flatnonzero([round(variable.value() or 0.0) for variable in x])
@@ -196,5 +198,5 @@ def _covered(problem: PlacementProblem, chosen: Integer) -> float:
 
 def _count(problem: PlacementProblem) -> int:
     if problem.count is None:
-        raise ValueError("the rivals of the benchmark place a number of sensors")
+        raise ValueError("the benchmark's methods need the number of sensors: set `count`")
     return problem.count

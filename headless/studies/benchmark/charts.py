@@ -32,7 +32,7 @@ def save_charts(pictures: Path, findings: Findings) -> None:
         },
         f"Visibility of {setting['scene']}: processor time of {setting['places']} sampled places against error",
         "full: every ray cast · lazy: only rays that can matter, the same grid as the full scan's, bit for bit",
-        nought=1e-3,
+        linear_below=1e-3,
     )
     instances = dict.fromkeys(run.instance for run in findings.runs)
     save_trade_off_chart(
@@ -40,7 +40,7 @@ def save_charts(pictures: Path, findings: Findings) -> None:
         {f"gap: {name}": _ways_to_place(findings.runs, name) for name in instances},
         f"Placement: processor time against the gap to the best bound, {setting['time_limit']:g} s for each",
         "the largest instance: twice that",
-        nought=1e-4,
+        linear_below=1e-4,
     )
     lines = [(f"{g.what}, {g.size_of}", g) for g in findings.growths]
     save_growth_chart(

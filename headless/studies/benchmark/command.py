@@ -21,21 +21,23 @@ from seip_addon.scene.read import read_scene
 
 
 def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
-    """Measure, and write the results into a folder; tests give a small ``scope``."""
+    """Run the measurements and write the results into a folder; tests pass a small ``scope``."""
     parser = argparse.ArgumentParser(
         prog="benchmark", description=__doc__.splitlines()[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
     )
-    parser.add_argument("scene", type=Path, help="the .blend")
+    parser.add_argument("scene", type=Path, help="scene (.blend)")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for benchmark.md and benchmark/")
-    parser.add_argument("--places", type=int, default=12, help="how many places are sampled; a full scan takes seconds")
-    parser.add_argument("--time-limit", type=float, default=60.0, help="for each answer of a solver, in seconds")
+    parser.add_argument(
+        "--places", type=int, default=12, help="number of sampled positions; a full scan of each takes seconds"
+    )
+    parser.add_argument("--time-limit", type=float, default=60.0, help="time limit of each solve, seconds")
     models = parser.add_argument_group("models of the sensor")
-    models.add_argument("--sensor-models", action="store_true", help="measure this chapter alone; keep the others")
+    models.add_argument("--sensor-models", action="store_true", help="measure only this chapter; keep the others")
     models.add_argument(
         "--site", action="append", type=Path, default=[], metavar="BLEND", help="another scene to measure; repeat it"
     )
-    models.add_argument("--seed", type=int, default=0, help="of placements, scans and the detector's training")
-    models.add_argument("--steps", type=int, default=1800, help="of that training, where PyTorch is installed")
+    models.add_argument("--seed", type=int, default=0, help="seed for placements, scans and the detector's training")
+    models.add_argument("--steps", type=int, default=1800, help="training steps of the detector (only with PyTorch)")
     models.add_argument("--work", type=Path, default=Path("out/benchmark"), help="folder of the detector")
     options = parser.parse_args(argv)
     scope = scope or BenchmarkScope()
@@ -51,7 +53,8 @@ def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
         findings, names = measure(read_scene(bpy.context.scene).geometry, options.places, options.time_limit, scope)
         checks = bars(findings.costs, findings.runs, names, findings.scans)
     for bar in checks:
-        runtime.print_line(f"{bar.what}: asked {bar.asked}, measured {bar.measured}{'' if bar.met else ' – NOT MET'}")
+        verdict = "" if bar.met else " – NOT MET"
+        runtime.print_line(f"{bar.what}: required {bar.asked}, measured {bar.measured}{verdict}")
     steps = compare_sensor_models(
         [options.scene, *options.site],
         options.time_limit,

@@ -1,6 +1,6 @@
-"""Run work in a fresh process, whose memory nothing else has touched.
+"""Work run in a fresh process, so that earlier work does not affect its memory.
 
-Not by `multiprocessing`: that hands on the search path, in which bpy has put Blender's scripts before itself.
+`multiprocessing` is not used: it passes on the search path, where bpy has put Blender's scripts before its own package.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _ROOT = Path(__file__).resolve().parents[3]
 
 
 def alone(work: Callable[[], Result]) -> Result:
-    """Return what ``work``, which must be possible to pickle, returns in a process of its own."""
+    """Return the result of ``work``, a picklable function, run in a process of its own."""
     command = [sys.executable, "-m", __name__]
     outcome = subprocess.run(command, input=pickle.dumps(work), stdout=subprocess.PIPE, check=True, cwd=_ROOT)  # noqa: S603 - our own interpreter and module
     result: Result = pickle.loads(outcome.stdout)  # noqa: S301 - written by this very module

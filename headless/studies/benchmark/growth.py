@@ -38,13 +38,15 @@ class Growth:
     Parameters
     ----------
     what : str
-        The work.
+        Name of the work.
     size_of : str
-        What grows.
+        Name of the quantity that grows.
+    size : tuple of float
+        Sizes measured.
     seconds : tuple of float
-        Of processor time.
+        Processor time at each size.
     memory : tuple of float or None, MB
-        By how much the process grew.
+        Growth of the process at each size.
     """
 
     what: str
@@ -60,7 +62,7 @@ class Growth:
 
     @property
     def memory_exponent(self) -> float | None:
-        """The exponent b in memory ~ size**b; None where it was not measured."""
+        """The exponent b in memory ~ size**b; None if memory was not measured."""
         known = [memory for memory in self.memory if memory]
         return growth_exponent(self.size, known) if len(known) == len(self.size) else None
 
@@ -72,9 +74,9 @@ class Scaled:
     Parameters
     ----------
     looked_from : int
-        Number of positions, evenly spread, that visibility is computed from.
+        Number of evenly spread positions at which visibility is computed.
     stand_for : float
-        How many places each of them stands for.
+        Number of positions that each of them represents.
     """
 
     size: float
@@ -108,7 +110,7 @@ def visibility_cost(
 ) -> tuple[float, float | None]:
     """Compute visibility from places of a site; return the processor seconds and MB of it.
 
-    What is done once for a site counts once, the places count for those they stand for.
+    Work done once for a site counts once; work at a position is scaled by the number of positions that it represents.
     """
     site, poses = scaled.site, scaled.site.candidates
     every = sharing_rays(poses.xyz, poses.yaw, poses.tilt)
@@ -149,7 +151,7 @@ def visibility_growth(
 def placement_growth(
     size_of: str, size: Sequence[int], steps: Sequence[tuple[int, int, int]], seconds: float
 ) -> Growth:
-    """Measure placement in streets of so many positions, targets and blocks."""
+    """Measure placement in streets with the positions, targets and blocks of each step."""
     found = [alone(partial(place, *step, seconds)) for step in steps]
     return _growth(f"placement, N = {STREET_SENSORS}", size_of, size, found)
 
@@ -186,7 +188,7 @@ def _growth(what: str, size_of: str, size: Sequence[float], found: Sequence[tupl
 
 
 def _shifted(xyz: Float, shift: Float) -> Float:
-    """Return copies of points, each farther along x."""
+    """Return copies of points, each shifted along x."""
     return np.concatenate([xyz + np.array([dx, 0.0, 0.0]) for dx in shift])
 
 

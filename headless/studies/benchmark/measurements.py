@@ -67,29 +67,29 @@ class BenchmarkScope:
     Parameters
     ----------
     street : tuple of int
-        Positions (three poses at each), targets, blocks along a side.
+        Positions (three poses at each), targets, and blocks along a side of the synthetic street grid.
     counts : tuple of int
-        Few and many sensors there.
+        Small and large number of sensors in the street grid.
     largest : tuple of int
-        As ``street``, with many sensors.
+        Largest street grid, as ``street``; solved for the large number of sensors.
     places : int
         Number of positions in the measurements of growth.
     multiples : tuple of int
-        Of the places, and of what grows in the streets.
+        Multiples of ``places``, and of the size that grows in the street grids.
     copies : tuple of int
-        Of the scene, in a row.
+        Numbers of copies of the scene in a row.
     spacings : tuple of float, metres
-        Of the targets.
+        Spacings of the targets.
     scanned_by : str
         Type of the sensors that scan traffic.
     frames : int
-        Of scans.
+        Number of scanned frames.
     modelled : str
-        Type whose models are compared.
+        LiDAR type of the compared sensor models.
     placements : int
-        Random ones of each number of its sensors.
+        Number of random placements for each number of sensors.
     every_beam : int
-        Poses at which the lazy engine is held to every diverging beam.
+        Number of poses at which the lazy engine is compared with casting every diverging beam.
     """
 
     layout: CandidateSettings = field(default_factory=CandidateSettings)
@@ -115,11 +115,11 @@ def measure(
     models = find_models(load_catalogue(), layout.sensors)
     site = make_site(geometry, layout, models=models)
     simpler = approximations(geometry, site, models, layout)
-    LOG.info(f"{site.name}: full scans and lazy ones from {samples} places")
+    LOG.info(f"{site.name}: full and lazy scans from {samples} positions")
     costs = visibility_costs(site, models, settings, samples, simpler)
     for way, cost in costs.items():
         LOG.info(f"{way:<24}{cost.seconds:>9.3f} s of CPU{cost.rays:>12,} rays")
-    LOG.info("whole grids, exact and simplified, and a placement by each")
+    LOG.info("exact and simplified grids, and a placement by each")
     degradation = degradations(site, models, settings, simpler, time_limit)
     rates = {engine: cast_rate(make_ray_caster(site.triangles, engine), site.candidates.xyz[0]) for engine in ENGINES}
     limits = {str(engine): c.seconds * rates[engine] / c.seen for engine in ENGINES for c in [costs[f"lazy {engine}"]]}
@@ -146,16 +146,16 @@ def measure(
 def compare_sensor_models(
     scenes: Sequence[Path], time_limit: float, scope: BenchmarkScope, *, seed: int, steps: int, work: Path
 ) -> Generator[Progress, None, SensorModelFindings]:
-    """Measure models of one LiDAR on scenes, and on the first one's traffic where there is any, and PyTorch.
+    """Measure models of one LiDAR on scenes; if the first has traffic and PyTorch is installed, detection, too.
 
     Parameters
     ----------
     time_limit : float, seconds
-        For each best placement.
+        Time limit of each best placement.
     seed : int
-        Of placements, scans and the training.
+        Seed for placements, scans and the training.
     steps : int
-        Of the training of the detector.
+        Training steps of the detector.
     work : path
         Folder of the detector.
 
@@ -206,20 +206,20 @@ def placements(
     )
     ways = [way for way in BASELINES if can_run(way)]
     for way in set(BASELINES).difference(ways):
-        LOG.info(f"{way} is left out: the group 'benchmark' of pyproject.toml is not installed")
-    runs = _told(compare(f"{site.name}, {site.candidates.sensor[0]}, N = {SENSOR_COUNT}", problem, ways, time_limit))
+        LOG.info(f"{way} is left out: to include it, install the group 'benchmark' of pyproject.toml")
+    runs = _logged(compare(f"{site.name}, {site.candidates.sensor[0]}, N = {SENSOR_COUNT}", problem, ways, time_limit))
     names = []
     for count in scope.counts:
         names.append(_street_name(scope.street, count))
         positions, targets, blocks = scope.street
         street = street_problem(positions, targets, blocks=blocks, count=count)
-        runs += _told(compare(names[-1], street, ways, time_limit))
+        runs += _logged(compare(names[-1], street, ways, time_limit))
     names.append(_street_name(scope.largest, scope.counts[-1]))
     positions, targets, blocks = scope.largest
     street = street_problem(positions, targets, blocks=blocks, count=scope.counts[-1])
     quick = ("greedy", "local search", "ours")
-    # in a process of its own: its memory is asked for
-    runs += _told(alone(partial(compare, names[-1], street, quick, 2 * time_limit)))
+    # in a process of its own: a requirement limits its memory, and memory of earlier work would hide a part
+    runs += _logged(alone(partial(compare, names[-1], street, quick, 2 * time_limit)))
     return runs, (names[0], names[1], names[2])
 
 
@@ -271,7 +271,7 @@ def growth(
     return found
 
 
-def _told(runs: list[SolverRun]) -> list[SolverRun]:
+def _logged(runs: list[SolverRun]) -> list[SolverRun]:
     for run in runs:
         LOG.info(
             f"{run.instance}: {run.way:<13}{run.objective:>10.0f} ≤ {run.bound:<10.1f}{run.expense.cpu:>8.2f} s of CPU"

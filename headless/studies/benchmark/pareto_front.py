@@ -15,13 +15,13 @@ class Method:
     Parameters
     ----------
     family : str
-        Ways of one family look alike in a chart.
+        Methods of one family have the same colour and mark in a chart.
     seconds : float
-        Of processor time.
+        Processor time.
     error : float
-        0 for an exact answer.
+        Error of the result; 0 if exact.
     default : bool
-        Whether it is what is done unless one asks for another.
+        Whether the method is the default.
     interval : tuple of two float, optional
         95 % interval of the error.
     """
@@ -35,7 +35,7 @@ class Method:
 
 
 def front(ways: Sequence[Method]) -> list[Method]:
-    """Return the Pareto front of methods by run time and error, the quickest first."""
+    """Return the Pareto front of methods by run time and error, the fastest first."""
     best: list[Method] = []
     for way in sorted(ways, key=lambda w: (w.seconds, w.error)):
         if not best or way.error < best[-1].error:
@@ -44,6 +44,6 @@ def front(ways: Sequence[Method]) -> list[Method]:
 
 
 def growth_exponent(size: Sequence[float], cost: Sequence[float]) -> float:
-    """Return b of the power law cost = a · size**b that fits best, by least squares of the logarithms."""
+    """Return the exponent b of the power law cost = a · size**b, fitted by least squares of the logarithms."""
     slope, _ = np.polyfit(np.log(size), np.log(cost), 1)
     return float(slope)

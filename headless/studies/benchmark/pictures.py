@@ -22,23 +22,23 @@ from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
 from .pareto_front import Method, front, growth_exponent
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#999999")
-"""Told apart by colour-blind people (Okabe and Ito 2008), and by their marks on grey paper."""
+"""Colours of families, distinct for colour-blind readers (Okabe and Ito 2008); `MARKS` keep them apart in print."""
 
 COLUMNS = 2
 MARKS = ("D", "o", "s", "^", "v", "P", "*", "X")
 
 
 def save_trade_off_chart(
-    path: str | os.PathLike[str], panels: Mapping[str, Sequence[Method]], title: str, subtitle: str, nought: float
+    path: str | os.PathLike[str], panels: Mapping[str, Sequence[Method]], title: str, subtitle: str, linear_below: float
 ) -> None:
     """Draw processor time against error, with the front and the default, as PNG.
 
     Parameters
     ----------
     panels : mapping of str to sequence of Method
-        What the error is, over each panel; the same families in all.
-    nought : float
-        Errors up to this are drawn apart from those above, on a linear piece of the axis.
+        Methods of each panel by the meaning of its error; the same families in all panels.
+    linear_below : float
+        Errors up to this value are drawn on a linear part of the axis, larger ones on a logarithmic part.
     """
     rows = math.ceil(len(panels) / COLUMNS)
     figure = Figure((12.5, 5.0 * rows + 1.2), dpi=150, facecolor=PAPER, layout="constrained")
@@ -56,14 +56,14 @@ def save_trade_off_chart(
         _mark_default(panel, ways)
         panel.set_yscale("log")
         panel.yaxis.set_minor_formatter(LogFormatter())  # within a decade, plain numbers
-        panel.set_xscale("symlog", linthresh=nought, linscale=0.5)
-        panel.set_xlim(-0.35 * nought, 2.5 * max(nought, *(way.error for way in ways)))
+        panel.set_xscale("symlog", linthresh=linear_below, linscale=0.5)
+        panel.set_xlim(-0.35 * linear_below, 2.5 * max(linear_below, *(way.error for way in ways)))
         panel.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{share * 100:g} %"))
         style_axes(panel, what, "processor time (s)")
     handles, labels = panel.get_legend_handles_labels()
     figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=6)
     set_title(figure, f"{title}\n{subtitle}")
-    figure.draw_without_rendering()  # sets the panels' places and limits, which names have to know
+    figure.draw_without_rendering()  # fixes the positions and limits of panels, which names are placed by
     figure.set_layout_engine("none")
     for panel, ways in zip(axes, panels.values(), strict=True):
         _name(panel, ways)
@@ -80,7 +80,7 @@ def save_growth_chart(
     Parameters
     ----------
     panels : mapping of str to sequence of (name, sizes, costs)
-        By what is measured. Sizes are drawn as multiples of the smallest.
+        Curves of each panel by the measured quantity. Sizes are drawn as multiples of the smallest.
     """
     figure, axes = new_figure(12.5, 6.4, len(panels), dpi=150)
     for panel, (what, lines) in zip(axes, panels.items(), strict=True):
@@ -101,7 +101,7 @@ def _draw_front(panel: Axes, ways: Sequence[Method]) -> None:
     panel.step(
         [way.error for way in best],
         [way.seconds for way in best],
-        where="pre",  # what costs no more and errs no more is at hand everywhere above the front
+        where="pre",  # each point of the front dominates everything that is above and to the right of it
         color=SOFT_INK,
         linewidth=1.2,
         linestyle=DASHED,
@@ -134,7 +134,7 @@ def _mark_default(panel: Axes, ways: Sequence[Method]) -> None:
 
 
 def _name(panel: Axes, ways: Sequence[Method]) -> None:
-    """Write each method's name beside its mark, without overlaps, and off the front where there is room."""
+    """Write each method's name next to its mark, without overlaps, and off the front where there is room."""
     style: dict[str, Any] = {"size": 7.5, "color": INK, "ha": "center", "va": "center", "zorder": 3}
     box = {"facecolor": PAPER, "edgecolor": "none", "pad": 0.6}
     texts = [panel.text(0, 0, way.name, bbox=box, **style) for way in ways]

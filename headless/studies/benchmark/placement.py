@@ -21,11 +21,11 @@ class SolverRun:
     ----------
     memory : float or None, MB
     objective : float
-        Covered weight; 0 where nothing was found.
+        Covered weight; 0 if no placement was found.
     bound : float
-        Its own proof; infinite where it gives none.
+        Upper bound that the method proves itself; infinite if it gives none.
     best_bound : float
-        The least bound that any way proved.
+        Lowest bound that any method proved for the instance.
     """
 
     instance: str
@@ -44,12 +44,12 @@ class SolverRun:
 
     @property
     def own_gap(self) -> float:
-        """The gap that it can prove by itself; infinite where it gives no bound."""
+        """Gap that the method proves itself; infinite if it gives no bound."""
         return max(0.0, 1 - self.objective / self.bound) if math.isfinite(self.bound) else math.inf
 
     @property
     def proven(self) -> bool:
-        """Whether it proved by itself that none is better."""
+        """Whether the method itself proves that its placement is optimal."""
         return self.own_gap < 1e-6
 
 
@@ -59,7 +59,7 @@ def compare(name: str, problem: PlacementProblem, ways: Sequence[str], seconds: 
     Parameters
     ----------
     name : str
-        Of the instance.
+        Name of the instance.
     ways : sequence of str
         Keys of `BASELINES`.
 

@@ -25,7 +25,16 @@ from seip_addon.core.storage.files import whole_file
 
 @dataclass(frozen=True)
 class Bar:
-    """A requirement of the project and the figure measured for it."""
+    """A requirement of the project and the figure measured for it.
+
+    Parameters
+    ----------
+    what : str
+        Compared quantity.
+    asked, measured : str
+        Required and measured value.
+    met : bool
+    """
 
     what: str
     asked: str
@@ -40,9 +49,9 @@ class Findings:
     Parameters
     ----------
     setting : dict
-        What was measured, on how many cores, with which versions.
+        Scene and sizes measured, number of cores, and versions.
     limits : dict of str to float
-        By engine, how many times the time of one cast per seen target the lazy engine takes.
+        Time of the lazy engine by caster, as a multiple of the time of one cast per visible target.
     """
 
     setting: dict[str, Any]
@@ -63,10 +72,12 @@ def bars(
     Parameters
     ----------
     names : three str
-        Instances: the one with few sensors, the one with many, the largest.
+        Names of the instances with few sensors, with many sensors, and of the largest one.
     """
     pairs = (("lazy bvh", "full bvh", 20), ("lazy embree", "full bvh", 100), ("lazy embree", "full embree", 10))
-    checks = [_ratio(f"{a} against {b}, same V", costs[b].seconds / costs[a].seconds, asked) for a, b, asked in pairs]
+    checks = [
+        _ratio(f"{a} against {b}, same V", costs[b].seconds / costs[a].seconds, required) for a, b, required in pairs
+    ]
     by_name = {(run.instance, run.way): run for run in runs}
     few, many, largest = names
     us, cbc = by_name[few, "ours"], by_name[few, "PuLP + CBC"]
@@ -78,14 +89,14 @@ def bars(
     plain = scans["anew bvh"]
     for engine in ENGINES:
         times = scans[f"kept {engine}"].rate / plain.rate
-        checks.append(_ratio(f"frames of scans, {engine} against the whole scene anew with bvh", times, 15))
+        checks.append(_ratio(f"scanned frames, {engine} with cached returns against full scans with bvh", times, 15))
     most = max(cost.differing / cost.rays for cost in scans.values())
-    few_differ = f"{most * 1e6:.2g} in a million, each grazes something"
-    return [*checks, Bar("returns of scans elsewhere than the full scan's", "1 in a million", few_differ, most <= 1e-6)]
+    few_differ = f"{most * 1e6:.2g} in a million, each grazes an edge or a surface"
+    return [*checks, Bar("returns that differ from the full scan's", "1 in a million", few_differ, most <= 1e-6)]
 
 
 def save_json(path: str | os.PathLike[str], findings: Findings, checks: Sequence[Bar]) -> None:
-    """Write all figures; what is not finite is null."""
+    """Write all figures as JSON; values that are not finite become null."""
     runs = [asdict(run) | {"gap": run.gap, "own_gap": run.own_gap, "proven": run.proven} for run in findings.runs]
     growths = [
         asdict(g) | {"time_exponent": g.time_exponent, "memory_exponent": g.memory_exponent} for g in findings.growths
@@ -106,18 +117,18 @@ def save_json(path: str | os.PathLike[str], findings: Findings, checks: Sequence
 
 
 def load_json(path: str | os.PathLike[str]) -> tuple[Findings, list[Bar]]:
-    """Read what `save_json` wrote: findings, and the requirements that they were compared with.
+    """Read a file of `save_json`: findings, and the requirements that they were compared with.
 
     Raises
     ------
     SeipError
-        There is no such file, or it is no benchmark's.
+        The file is missing or is not a benchmark's.
     """
     try:
         record = json.loads(Path(path).read_text(encoding="utf-8"))
         return _findings(record), [Bar(**bar) for bar in record["bars"]]
     except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
-        raise SeipError(f"{path} holds no benchmark ({error}): delete it, and measure all of it") from error
+        raise SeipError(f"{path} is not a benchmark's file ({error}): delete it and rerun the benchmark") from error
 
 
 def save_page(path: str | os.PathLike[str], findings: Findings, checks: Sequence[Bar], pictures: str) -> None:
@@ -137,58 +148,58 @@ def save_page(path: str | os.PathLike[str], findings: Findings, checks: Sequence
 def _summary(setting: Mapping[str, Any], checks: Sequence[Bar]) -> list[str]:
     versions = ", ".join(f"{name} {version}" for name, version in setting["versions"].items())
     text = (
-        "Written by `make benchmark`. Seconds are of processor time and differ from machine to machine; ratios hardly "
-        "do: what is compared ran in turn in one process. "
+        "Written by `make benchmark`. Seconds are processor time and depend on the machine. Ratios hardly depend on "
+        "it: compared methods ran in turn in one process. "
         f"Here: {setting['cores']} cores, {versions}."
     )
     rows = [(bar.what, bar.asked, bar.measured, "met" if bar.met else "**not met**") for bar in checks]
-    return ["# Benchmark", text, table(("", "asked", "measured", ""), rows)]
+    return ["# Benchmark", text, table(("", "required", "measured", ""), rows)]
 
 
 def _about_visibility(findings: Findings, pictures: str) -> list[str]:
     setting, plain, exact = findings.setting, findings.costs["full bvh"], findings.degradations["exact"]
     text = (
         f"{setting['scene']}: {setting['targets']:,} targets, {setting['poses']:,} poses, {setting['triangles']:,} "
-        f"triangles. Times are of {setting['places']} places spread evenly over the site, every type at each: the "
-        "plain loop would take hours for all. At each of them each lazy result was compared with its full scan's, bit "
-        "for bit. Errors are of the whole grid: pairs of pose and target that come out wrong, per pair that is seen "
-        f"in truth. The placement is of {setting['count']} {setting['sensor']} sensors, chosen by the simplified grid "
-        "and judged by the exact one."
+        f"triangles. Times are for {setting['places']} positions spread evenly over the site, with every sensor type "
+        "at each: the plain loop (full scans with BVHTree) would take hours for all of them. At each position, each "
+        "lazy result was compared bit for bit with its full scan. Errors are for the whole grid: wrong pairs of pose "
+        f"and target, per pair that is visible in the exact grid. The placement of {setting['count']} "
+        f"{setting['sensor']} sensors is optimised on the simplified grid and evaluated on the exact one."
     )
     costs = table(
-        ("way", "times as quick as the plain loop", "s", "s on the clock", "rays", "rays per seen target"),
+        ("method", "times as fast as the plain loop", "s", "wall-clock s", "rays", "rays per visible target"),
         [_cost_row(way, cost, plain) for way, cost in findings.costs.items()],
     )
     degradation = table(
-        ("simplification", "wrong pairs", "coverage claimed", "coverage in truth", "lost", "poses kept", ""),
+        ("simplification", "wrong pairs", "claimed coverage", "exact coverage", "lost", "poses kept", ""),
         [_degradation_row(name, degradation, exact) for name, degradation in findings.degradations.items()],
     )
     times = "; ".join(f"with {engine} it takes {n:.1f} times that" for engine, n in findings.limits.items())
-    limit = f"The least that any method can do is to cast one ray for each seen target. Of the lazy engine: {times}."
+    limit = f"Any method has to cast at least one ray for each visible target. The lazy engine: {times}."
     picture = f"![processor time against error of visibility]({pictures}/visibility.png)"
     return ["## Visibility", text, picture, costs, degradation, limit]
 
 
 def _about_placement(findings: Findings, pictures: str) -> list[str]:
     text = (
-        f"Every way had {findings.setting['time_limit']:g} s on the clock, the largest instance twice that. The gap is "
-        "to the least bound that any way proved for the instance; the own gap is what the way proves by itself. A "
-        "plain program has one binary variable for each pose and each target, as in "
-        "textbooks. Memory is what the process grew by, beyond what it had kept from before; that of CBC, a program of "
-        "its own, is not in it."
+        f"Every method had {findings.setting['time_limit']:g} s of wall-clock time, on the largest instance "
+        "twice that. The gap is to the lowest bound that any method proved for the instance; the own gap is to the "
+        "bound of the method itself. The plain program is the textbook one, with a binary variable for each pose and "
+        "each target. Memory is the growth of the process beyond the memory it held before; it does not include CBC, "
+        "which runs as a separate program."
     )
-    head = ("instance", "way", "ours is … times as quick", "s", "s on the clock", "MB", "covers", "gap", "own gap", "")
+    head = ("instance", "method", "ours is … times as fast", "s", "wall-clock s", "MB", "covers", "gap", "own gap", "")
     picture = f"![processor time against gap of placement]({pictures}/placement.png)"
     return ["## Placement", text, picture, table(head, _run_rows(findings.runs))]
 
 
 def _about_growth(findings: Findings, pictures: str) -> list[str]:
     text = (
-        "Each size ran in a process of its own. A corridor was looked at from some of its places, which stand for all. "
-        "An exponent b says that twice the size costs 2^b times as much, by least squares over all sizes; "
-        "work that is done once whatever the size makes it smaller."
+        "Each size ran in a process of its own. For corridors, visibility was computed at a sample of positions and "
+        "scaled up to all. An exponent of b means that twice the size costs 2^b times as much (least squares over all "
+        "sizes); a fixed cost that does not depend on the size makes it smaller."
     )
-    head = ("work", "what grows", "sizes", "s", "exponent", "MB", "exponent of memory")
+    head = ("work", "growing size", "sizes", "s", "exponent", "MB", "exponent of memory")
     picture = f"![growth of time and memory]({pictures}/growth.png)"
     return ["## Growth", text, picture, table(head, [_growth_row(growth) for growth in findings.growths])]
 
@@ -196,16 +207,16 @@ def _about_growth(findings: Findings, pictures: str) -> list[str]:
 def _about_scans(findings: Findings) -> list[str]:
     plain = findings.scans["anew bvh"]
     text = (
-        f"Frames of {SENSORS} {findings.setting['scanned_by']} sensors among {ROAD_USERS} road users that all drive, "
-        "noise and labels included. *Anew*: a tree of everything for each frame, and every ray cast. *Kept*: static "
-        "returns are kept, and road users cast in their own axes by the rays that pass their bounding boxes. (Who "
-        "stands still is not cast again either, of which nothing shows here.) Returns are the same to 0.1 mm but for "
-        "rays that graze an edge, or a surface so edge-on that single precision of the full scan's corners moves its "
-        "return."
+        f"Frames of {SENSORS} {findings.setting['scanned_by']} sensors and {ROAD_USERS} road users that all drive, "
+        "noise and labels included. *Full*: each frame builds a tree of the whole scene and casts every ray. *Cached*: "
+        "returns of the static scene are cached, and road users are cast in their own axes, only by rays that pass "
+        "their bounding boxes. (Stationary road users are cached as well, which this test does not show.) Returns are "
+        "the same to 0.1 mm, except for rays that graze an edge, or a surface so edge-on that the single precision of "
+        "the full scan's corners moves its return."
     )
     rows = [
         (
-            way,
+            way.replace("kept", "cached").replace("anew", "full"),
             f"{cost.rate:.3g}",
             f"{cost.rate / plain.rate:.3g}",
             f"{cost.frames / cost.expense.wall:.3g}",
@@ -213,24 +224,24 @@ def _about_scans(findings: Findings) -> list[str]:
         )
         for way, cost in findings.scans.items()
     ]
-    head = ("way", "frames per second", "times as many as anew with bvh", "on the clock", "rays that end elsewhere")
+    head = ("method", "frames per second", "ratio to full bvh", "per wall-clock second", "differing rays")
     return ["## Scans of traffic", text, table(head, rows)]
 
 
-def _ratio(what: str, ratio: float, asked: float, *, holds: bool = True, note: str = "") -> Bar:
+def _ratio(what: str, ratio: float, required: float, *, holds: bool = True, note: str = "") -> Bar:
     measured = f"{ratio:.3g}×{note}" + ("" if holds else ", not the same optimum")
-    return Bar(what, f"{asked:g}×", measured, holds and ratio >= asked)
+    return Bar(what, f"{required:g}×", measured, holds and ratio >= required)
 
 
 def _small_gap(run: SolverRun, gap: float, seconds: float, memory: float | None) -> Bar:
-    asked = f"proven, or a gap under {gap:.1%} in {seconds:g} s" + (f" and {memory / 1024:g} GB" if memory else "")
+    required = f"proven, or a gap under {gap:.1%} in {seconds:g} s" + (f" and {memory / 1024:g} GB" if memory else "")
     wall = run.expense.wall
     measured = f"{'proven' if run.proven else f'gap {run.own_gap:.2%}'} in {wall:.0f} s"
-    met = run.own_gap < gap and wall < seconds * 1.1  # the limit is looked at between steps
+    met = run.own_gap < gap and wall < seconds * 1.1  # the solver checks the limit only between steps
     if memory and run.memory:
         measured += f" and {run.memory / 1024:.1f} GB"
         met &= run.memory < memory
-    return Bar(f"ours, {run.instance}", asked, measured, met)
+    return Bar(f"ours, {run.instance}", required, measured, met)
 
 
 def _cost_row(way: str, cost: Cost, plain: Cost) -> tuple[str, ...]:
@@ -333,7 +344,7 @@ def _costs(kind: type[AnyCost], record: Mapping[str, Any]) -> dict[str, AnyCost]
 
 
 def _fields(kind: type[Any], record: Mapping[str, Any]) -> dict[str, Any]:
-    """Return of a record what a dataclass is made of; the rest follows from it."""
+    """Return the entries of a record that are fields of a dataclass; the others are derived from them."""
     return {field.name: record[field.name] for field in fields(kind)}
 
 

@@ -21,15 +21,16 @@ class Expense:
     Parameters
     ----------
     cpu : float, seconds
-        Of processor time, all threads and processes together.
+        Processor time of all threads and processes together.
     wall : float, seconds
+        Wall-clock time.
     """
 
     cpu: float = 0.0
     wall: float = 0.0
 
     def time(self, work: Callable[[], Result]) -> Result:
-        """Return what ``work`` returns and add its cost."""
+        """Return the result of ``work`` and add its cost."""
         cpu, wall = _processor_seconds(), time.perf_counter()
         result = work()
         self.cpu += _processor_seconds() - cpu
@@ -38,9 +39,9 @@ class Expense:
 
 
 def peak_memory(work: Callable[[], Result]) -> tuple[Result, float | None]:
-    """Return what ``work`` returns, and by how many MB the process grew for it; None where Linux does not tell.
+    """Return the result of ``work`` and the growth of the process in MB; None for the growth except on Linux.
 
-    In a process that did other work before, memory that it kept from then hides a part.
+    In a process that did other work before, memory that it still holds hides a part of the growth.
     """
     try:
         (_PROCESS / "clear_refs").write_text("5", encoding="ascii")  # sets the peak to what is in use now
@@ -52,7 +53,7 @@ def peak_memory(work: Callable[[], Result]) -> tuple[Result, float | None]:
 
 
 def _processor_seconds() -> float:
-    """Of this process and of its ended children, in nanosecond steps for the process itself."""
+    """Return the processor time of this process and its ended children, seconds; nanosecond steps for this process."""
     times = os.times()
     return time.process_time() + times.children_user + times.children_system
 

@@ -1,4 +1,4 @@
-"""Frames with cached static returns against frames cast anew."""
+"""Cost of frames with cached static returns against frames in which every ray is cast again."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ class ScanCost:
     Parameters
     ----------
     rays : int
-        Of all sensors in all frames.
+        Rays of all sensors in all frames.
     differing : int
-        Rays that did not end where those of the full scan do; all of them graze an edge or a surface.
+        Rays whose return differs from the full scan's; all of them graze an edge or a surface.
     """
 
     expense: Expense = field(default_factory=Expense)
@@ -61,22 +61,23 @@ class ScanCost:
 
 
 def scan_costs(site: Site, static: StaticScene, model: LidarModel, frames: int) -> dict[str, ScanCost]:
-    """Make the same frames of four sensors and forty road users, all of which move, in both ways with each engine.
+    """Simulate the same frames of four sensors and forty moving road users by both methods with each engine.
 
     Parameters
     ----------
     site : Site
-        At whose candidate places, evenly spread, the sensors hang.
+        Site whose candidate positions, evenly spread, carry the sensors.
 
     Returns
     -------
     dict of str to ScanCost
-        By ``kept bvh``, ``anew bvh``, ``kept embree``, ``anew embree``.
+        Costs by method and engine: ``kept bvh`` and ``kept embree`` (cached returns), ``anew bvh`` and
+        ``anew embree`` (full scans).
 
     Raises
     ------
     SeipError
-        A return differs from the full scan's and grazes nothing.
+        A return differs from the full scan's, and its ray grazes nothing.
     """
     places = site.candidates.xyz[np.linspace(0, len(site.candidates) - 1, SENSORS).astype(int)]
     sensors = [
@@ -88,28 +89,29 @@ def scan_costs(site: Site, static: StaticScene, model: LidarModel, frames: int) 
     for engine in ENGINES:
         simulation = finish(prepare(static, sensors, traffic, bodies, ScanSettings(engine=engine)))
         rescan = Rescan(simulation, static, bodies, engine)
-        kept, anew = costs[f"kept {engine}"], costs[f"anew {engine}"]
+        cached, full = costs[f"kept {engine}"], costs[f"anew {engine}"]
         for number in range(frames):
             snapshot = traffic.at(number / model.rotation_rate)
-            kept.expense.time(partial(simulation.frame, number, snapshot.time))
-            anew.expense.time(partial(rescan.frame, number, snapshot))
-            kept.differing += rescan.differing(snapshot)
-        kept.frames = anew.frames = frames
-        kept.rays = anew.rays = frames * sum(len(scanner.directions) for scanner in simulation.scanners)
+            cached.expense.time(partial(simulation.frame, number, snapshot.time))
+            full.expense.time(partial(rescan.frame, number, snapshot))
+            cached.differing += rescan.differing(snapshot)
+        cached.frames = full.frames = frames
+        cached.rays = full.rays = frames * sum(len(scanner.directions) for scanner in simulation.scanners)
     return costs
 
 
 @dataclass(frozen=True, eq=False)
 class Rescan:
-    """Makes frames by casting every ray against everything.
+    """Reference simulator of frames, which casts every ray against the whole scene.
 
     Parameters
     ----------
     simulation : Simulation
-        Whose frames are to be made otherwise.
+        Simulation with cached returns to compare with.
     bodies : sequence of Body
-        Of each road user.
+        Body of each road user.
     engine : {"bvh", "embree"}
+        Ray caster.
     """
 
     simulation: Simulation
@@ -118,29 +120,29 @@ class Rescan:
     engine: Engine
 
     def frame(self, number: int, snapshot: Snapshot) -> Frame:
-        """Return what the sensors measure at an instant."""
+        """Return the frame that the sensors measure at an instant."""
         return self.simulation.measure(number, snapshot, self.scans(snapshot)[0])
 
     def scans(self, snapshot: Snapshot) -> tuple[list[Scan], Float]:
-        """Return what the rays of each sensor end on, and all triangles (n, 3, 3)."""
+        """Return the scan of each sensor, and all triangles (n, 3, 3)."""
         surface, owner = combined(self.static, self.bodies, snapshot, self.engine)
         scans = [full_scan(scanner, surface, owner, len(self.bodies)) for scanner in self.simulation.scanners]
         return scans, surface.caster.triangles
 
     def differing(self, snapshot: Snapshot) -> int:
-        """Return how many of the simulation's rays end elsewhere, having seen that each of them grazes something."""
+        """Return the number of the simulation's rays that differ; raise an error if one of them grazes nothing."""
         full, triangles = self.scans(snapshot)
         count = 0
         for scanner, ours, theirs in zip(self.simulation.scanners, self.simulation.scans(snapshot), full, strict=True):
             for ray in differing(ours, theirs):
                 if not grazes(scanner.sensor.xyz, scanner.directions[ray], triangles, ours.distance[ray]):
-                    raise SeipError(f"ray {ray} of {scanner.sensor.label} is not the full scan's; this is a defect")
+                    raise SeipError(f"ray {ray} of {scanner.sensor.label} differs from the full scan: a defect")
                 count += 1
         return count
 
 
 def driving(site: Site) -> Trajectories:
-    """Return road users of several sizes that start anywhere on the site's targets and drive straight on."""
+    """Return road users of several sizes that start at random targets of the site and drive straight ahead."""
     random = np.random.default_rng(0)
     start: list[Float] = []
     for xyz in random.permutation(site.targets.xyz):
@@ -164,7 +166,7 @@ def driving(site: Site) -> Trajectories:
 def combined(
     static: StaticScene, bodies: Sequence[Body], snapshot: Snapshot, engine: Engine
 ) -> tuple[ReflectiveSurface, Integer]:
-    """Put the road users of an instant among what stands still; return that, and which road user each triangle is."""
+    """Return the surface of the static scene with an instant's road users, and the owner of each triangle."""
     placed = [
         position + bodies[user].triangles @ attitude.T
         for user, position, attitude in zip(
@@ -179,7 +181,7 @@ def combined(
 
 
 def full_scan(scanner: Scanner, surface: ReflectiveSurface, owner: Integer, users: int) -> Scan:
-    """Cast every ray of a sensor against everything."""
+    """Cast every ray of a sensor against the whole scene."""
     model, rays = scanner.sensor.model, len(scanner.directions)
     distance, intensity, reflected = np.full(rays, np.inf), np.zeros(rays), np.zeros(rays)
     instance = np.full(rays, STATIC_INSTANCE, dtype=np.int32)
@@ -197,7 +199,7 @@ def full_scan(scanner: Scanner, surface: ReflectiveSurface, owner: Integer, user
 
 
 def differing(one: Scan, other: Scan) -> Integer:
-    """Return the rays that do not end at the same place on the same thing."""
+    """Return the rays that do not end at the same distance on the same object."""
     hit, there = np.isfinite(one.distance), np.isfinite(other.distance)
     both = hit & there
     apart = hit != there
@@ -208,7 +210,7 @@ def differing(one: Scan, other: Scan) -> Integer:
 def grazes(origin: Float, direction: Float, triangles: Float, distance: float) -> bool:
     """Return whether a ray grazes an edge or a surface, so that two engines may disagree on it.
 
-    It passes an edge, or it meets a surface so edge-on that single precision of the
+    It passes an edge, or it hits a surface so edge-on that the single precision of the
     corners moves the full scan's return, while double precision agrees with this one.
     """
     return (
@@ -217,7 +219,7 @@ def grazes(origin: Float, direction: Float, triangles: Float, distance: float) -
 
 
 def exact_hit(origin: Float, direction: Float, triangles: Float) -> float:
-    """Return how far a ray goes to the first triangle in double precision (Möller and Trumbore 1997), or infinity."""
+    """Return the distance to the first triangle in double precision (Möller and Trumbore 1997), or infinity."""
     start, first, second = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     across = np.cross(direction, second)
     volume = (first * across).sum(axis=1)

@@ -42,14 +42,14 @@ EVERY_RANGE = CarlaDropoff(attenuation=0.0, zero_intensity=0.0)
 
 @dataclass(frozen=True, eq=False)
 class DivergentCaster:
-    """A ray caster whose rays are beams: each is five rays, its axis and four at the edge of its divergence.
+    """Ray caster of diverging beams: five rays for each, one along its axis and four at the edge of its divergence.
 
-    A beam returns from where the middle one of its rays does, by range: what most of them meet or pass by decides.
+    The range of a beam is the median of its rays' ranges, so that the majority of them decides hit or miss.
 
     Parameters
     ----------
     caster : RayCaster
-        That casts the rays.
+        Caster of the single rays.
     divergence : float, radians
         Full angle between opposite rays at the edge.
     """
@@ -69,7 +69,7 @@ class DivergentCaster:
 
     @property
     def threads(self) -> int:
-        """Number of threads that may cast at once to advantage."""
+        """Number of threads that can cast at once without slowing each other down."""
         return self.caster.threads
 
     def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
@@ -96,7 +96,7 @@ class SensorModel:
     Parameters
     ----------
     divergence : float, radians
-        Full angle of its beams; 0 where they are lines.
+        Full angle of its beams; 0 for beams that are lines.
     """
 
     name: str
@@ -105,7 +105,7 @@ class SensorModel:
 
     @property
     def rays_per_beam(self) -> int:
-        """How many rays stand for a beam."""
+        """Number of rays cast for a beam."""
         return SUB_RAYS if self.divergence else 1
 
     def caster(self, triangles: Float) -> RayCaster:
@@ -120,7 +120,7 @@ def sensor_models(lidar: LidarModel, divergence: float = DIVERGENCE) -> tuple[Se
     Parameters
     ----------
     divergence : float, radians
-        Of the finest one's beams.
+        Full angle of the finest model's beams.
     """
     return (
         SensorModel(PLAIN, replace(lidar, law=EVERY_RANGE)),
@@ -131,23 +131,23 @@ def sensor_models(lidar: LidarModel, divergence: float = DIVERGENCE) -> tuple[Se
 
 @dataclass(frozen=True, eq=False)
 class SiteFront:
-    """Coverage of the same placements by each model, and what it cost.
+    """Coverage of the same placements by each model of a site's sensors, and the cost.
 
     Parameters
     ----------
     poses : int
-        Of all candidates: what the costs are of.
+        Number of candidate poses; ``costs`` are for all of them.
     costs : mapping of str to Cost
-        By model; rays within beams count one by one.
+        Cost by model; each ray of a beam counts.
     coverage : mapping of str to mapping of str to sequence of float
-        By model and number of sensors: of each random placement.
+        Coverage of each random placement, by model and number of sensors.
     best : mapping of str to mapping of str to tuple of two float
-        Alike, of the placement that is best by that model: coverage by the same model, and by the finest.
+        Coverage of the best placement by a model, by the same model and by the finest; by model and number of sensors.
     differing, compared : int
-        Pairs of pose and target that the lazy engine decides otherwise with diverging beams than every beam cast does,
-        and pairs that are seen, in the poses where both were tried.
+        Pairs of pose and target for which the lazy engine with diverging beams differs from casting every beam, and
+        visible pairs, at the poses where both were tried.
     bare : bool
-        Whether nothing at the site can hide anything.
+        Whether nothing at the site can block the view.
     """
 
     site: str
@@ -161,14 +161,14 @@ class SiteFront:
     bare: bool = False
 
     def change(self, model: str, count: str | None = None, seed: int = 0) -> IntervalEstimate:
-        """Return by how much mean coverage differs from the finest model's, paired placement by placement.
+        """Return the difference of mean coverage from the finest model's, paired placement by placement.
 
         Parameters
         ----------
         count : str, optional
             Number of sensors; all numbers together if not given.
         seed : int
-            Of the bootstrap over placements.
+            Seed of the bootstrap over placements.
         """
         counts = list(self.coverage[model]) if count is None else [count]
         gap = np.concatenate([np.subtract(self.coverage[model][n], self.coverage[FINEST][n]) for n in counts])
@@ -183,13 +183,13 @@ class PrecisionFront:
     Parameters
     ----------
     placed : str
-        The sensors.
+        Name of the sensor configuration.
     frames, steps : int
-        Of the test, and of the training on scans of the shipped model.
+        Number of test frames, and of training steps on scans of the shipped model.
     costs : mapping of str to Cost
-        Of the scans, by model.
+        Cost of the scans by model.
     precision, change : mapping of str to IntervalEstimate
-        By model, and against the finest, paired block by block of traffic.
+        Average precision by model, and its change against the finest model, paired by block of traffic.
     """
 
     site: str
@@ -203,7 +203,7 @@ class PrecisionFront:
 
 @dataclass(frozen=True, eq=False)
 class SensorModelFindings:
-    """What is known of the models of one LiDAR type.
+    """Findings about the models of one LiDAR type.
 
     Parameters
     ----------
@@ -211,12 +211,12 @@ class SensorModelFindings:
         Catalogue key.
     divergence : float, radians
     placements : int
-        Random ones of each number of sensors.
+        Number of random placements for each number of sensors.
     sites : sequence of SiteFront
     precision : PrecisionFront or None
-        None where no detector was tried.
+        None if no detector was trained.
     seed : int
-        Of placements, scans and the training.
+        Seed for placements, scans and the training.
     """
 
     sensor: str
@@ -227,7 +227,7 @@ class SensorModelFindings:
     seed: int = 0
 
     def over(self, earlier: SensorModelFindings | None) -> SensorModelFindings:
-        """Return these findings with those of earlier sites, and of a detector, that were not measured again."""
+        """Return these findings, completed by earlier ones for the sites and the detector not measured again."""
         if earlier is None or earlier.sensor != self.sensor:
             return self
         again = {one.site: one for one in self.sites}
@@ -236,12 +236,12 @@ class SensorModelFindings:
 
 
 def random_placements(candidates: Candidates, count: int, number: int, seed: int) -> list[Integer]:
-    """Return random placements: poses (count,), at as many different positions, each pose of a position as likely.
+    """Return random placements, poses (count,) each: distinct positions, and a uniformly drawn pose at each.
 
     Parameters
     ----------
     number : int
-        How many.
+        Number of placements.
     seed : int
         The same seed draws the same placements.
     """
@@ -256,7 +256,7 @@ def random_placements(candidates: Candidates, count: int, number: int, seed: int
 def best_placement(
     site: Site, models: Mapping[str, LidarModel], visible: Boolean, count: int, time_limit: float
 ) -> Integer:
-    """Return the poses (count,) that cover most targets by a grid."""
+    """Return the poses (count,) that cover the most targets by a visibility grid."""
     problem = placement_problem(site, visible, models, Objective(count=count))
     return finish(solve(problem, SolverLimits(time_limit=time_limit))).chosen
 
@@ -276,17 +276,17 @@ def site_front(  # noqa: PLR0913  # what is measured, and how much of it
     Parameters
     ----------
     site : Site
-        With candidates of the models' LiDAR alone.
+        Site with candidates of only the models' LiDAR.
     counts : sequence of int
         Numbers of sensors.
     placements : int
-        Random ones of each number.
+        Number of random placements for each number of sensors.
     checked : int
-        Poses at which the lazy engine is held to every diverging beam.
+        Number of poses at which the lazy engine is compared with casting every diverging beam.
     seed : int
-        Of the placements.
+        Seed of the placements.
     time_limit : float, seconds
-        For each best placement.
+        Time limit of each best placement.
 
     Raises
     ------
@@ -330,7 +330,7 @@ def site_front(  # noqa: PLR0913  # what is measured, and how much of it
 def _against_every_beam(
     site: Site, model: SensorModel, settings: VisibilitySettings, lazy: VisibilityModel, samples: int
 ) -> tuple[int, int]:
-    """Return how many pairs the lazy engine decides otherwise than every beam, and how many are seen."""
+    """Return the number of pairs for which the lazy engine differs from casting every beam, and of visible pairs."""
     surfaces = near_surfaces(site.triangles, site.targets.xyz, settings.delta, site.reflectivity)
     caster, candidates, wrong, seen = model.caster(site.triangles), site.candidates, 0, 0
     for poses in sampled_places(site, samples):

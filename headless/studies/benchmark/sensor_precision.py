@@ -39,14 +39,14 @@ FRAME_INTERVAL = 2.5  # seconds
 def simulation_by(
     model: SensorModel, static: StaticScene, sensors: Sequence[MountedSensor], traffic: Trajectories, seed: int
 ) -> Simulation:
-    """Return the simulation of traffic in which every sensor is modelled so.
+    """Return the simulation of traffic with every sensor replaced by `model`.
 
     Parameters
     ----------
     sensors : sequence of MountedSensor
-        Where they hang; of the model's LiDAR.
+        Mounted sensors of the model's LiDAR type.
     seed : int
-        Of noise, losses and surfaces.
+        Seed of noise, losses and surfaces.
     """
     bodies = [fitted_body(user) for user in traffic.users]
     casters = {
@@ -67,7 +67,7 @@ def frames_by(
     seed: int,
     cost: Cost,
 ) -> Generator[tuple[SampledRun, Frame], None, None]:
-    """Scan runs of traffic by a model, and add to ``cost`` what that takes; see `simulation_by`."""
+    """Scan runs of traffic by a model and add the time to ``cost``; see `simulation_by`."""
     for run in runs:
         simulation = cost.expense.time(partial(simulation_by, model, static, sensors, run.trajectories, seed))
         for number, time in enumerate(run.times.tolist()):
@@ -86,20 +86,20 @@ def precision_front(
     count: int,
     training: TrainingSettings,
 ) -> Generator[Progress, None, PrecisionFront]:
-    """Train a detector on scans of the shipped model, and try it on the same traffic scanned by each.
+    """Train a detector on scans of the shipped model, and test it on the same traffic scanned by each model.
 
     Parameters
     ----------
     survey : Survey
-        Of the LiDAR alone.
+        Survey of only the LiDAR.
     runs : sequence of path
-        Traffic: to learn from, to validate on, and the last two to test on.
+        Traffic runs, the last two of them for the test; the others are for training and validation.
     folder : path
-        Of the detector: one that is there already is not trained again.
+        Folder of the detector; a detector that is already there is not trained again.
     count : int
-        Sensors, placed where they cover most.
+        Number of sensors, placed for the largest coverage.
     training : TrainingSettings
-        Its seed is that of scans, too.
+        Training settings; their seed is also the seed of the scans.
 
     Yields
     ------
@@ -164,7 +164,7 @@ def _trained(
     network = NetworkSettings()
     simulator = Simulator(survey.geometry, ScanSettings(seed=training.seed))
     name = f"detector-{configuration.sensor}-{training.steps}-{training.seed}"
-    asked = case_study.ModelConfiguration(name, (configuration,), network, training)
-    learnt = yield from case_study.simulate_training_set(simulator, [configuration], traffic, network)
-    (trained,) = yield from case_study.train_all([asked], learnt, folder, device="cpu")
+    model = case_study.ModelConfiguration(name, (configuration,), network, training)
+    samples = yield from case_study.simulate_training_set(simulator, [configuration], traffic, network)
+    (trained,) = yield from case_study.train_all([model], samples, folder, device="cpu")
     return trained

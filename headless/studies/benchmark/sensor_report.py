@@ -22,7 +22,7 @@ from seip_addon.core.estimates import IntervalEstimate
 
 CHART = "sensor_models.png"
 NEGLIGIBLE = 0.0025
-"""Change of coverage below which a part of the model is left out, whatever chance says: a quarter of a point."""
+"""Change of coverage below which a part of the model is left out, significant or not: a quarter of a point."""
 
 HEAD = (
     "where",
@@ -50,7 +50,7 @@ def save_sensor_model_chart(folder: Path, findings: SensorModelFindings) -> None
         panels,
         f"Models of {findings.sensor}: processor time against the distance from diverging beams",
         f"coverage: mean over {findings.placements} random placements of each number of sensors · bars: 95 % intervals",
-        nought=1e-3,
+        linear_below=1e-3,
     )
 
 
@@ -58,15 +58,15 @@ def sensor_model_parts(findings: SensorModelFindings, pictures: str) -> list[str
     """Return heading, text, picture and table; ``pictures`` is the folder of the charts, as seen from the page."""
     rows = [row for one in findings.sites for row in _site_rows(one)]
     text = (
-        f"Visibility of every candidate of `{findings.sensor}` alone, by three models in turn. *{_titled(PLAIN)}*: "
-        f"every return within the range is detected. *{_titled(SHIPPED)}*: as shipped. *{_titled(FINEST)}*: the range "
-        f"equation, and in place of each ray five, the axis and four at the edge of a divergence of "
-        f"{math.degrees(findings.divergence):.2g}° (full width at half of the power), of which the middle one by range "
-        "is the return; rays within beams count one by one. Coverage is the mean over the same "
-        f"{findings.placements} random placements of 1, 2 and 4 sensors, with its difference from that of diverging "
-        "beams in points (paired bootstrap over placements, 95 %). The last column is of the best placement by each "
-        "model, of equally good ones one: what the model claims for it, and what it covers with diverging beams. On a "
-        "bare site nothing hides anything. Rows of a site stay until that site is measured again."
+        f"Visibility of every candidate of `{findings.sensor}`, by three models. *{_titled(PLAIN)}*: every return "
+        f"within the range is detected. *{_titled(SHIPPED)}*: as shipped. *{_titled(FINEST)}*: the range equation, "
+        "with five rays for each beam, one along its axis and four at the edge of a divergence of "
+        f"{math.degrees(findings.divergence):.2g}° (full width at half of the power); the beam's return is the middle "
+        "one of the five by range. The column of rays counts each of the five. Coverage is the mean over the same "
+        f"{findings.placements} random placements of 1, 2 and 4 sensors. Brackets give the difference from diverging "
+        "beams in points (paired bootstrap over placements, 95 %). The last column is for the best placement by each "
+        "model (one of several equally good ones): the coverage that the model claims, and the coverage with diverging "
+        "beams. A bare site has nothing that blocks the view. Rows of a site stay until that site is measured again."
     )
     if findings.precision is not None:
         text += " " + _about_precision(findings.precision)
@@ -83,7 +83,7 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 
 def differs(estimate: IntervalEstimate) -> bool:
-    """Return whether a change is told from none by its interval."""
+    """Return whether the interval of a change excludes zero."""
     return estimate.low > 0 or estimate.high < 0
 
 
@@ -130,8 +130,8 @@ def _about_precision(front: PrecisionFront) -> str:
     return (
         "Average precision (overlap of 0.7 in plan) is that of one detector, trained in "
         f"{front.steps:,} steps on scans of {front.placed} drawn with the range equation, on the same {front.frames} "
-        "test frames scanned by each model; its intervals are over blocks of traffic, and say nothing about another "
-        "training."
+        "test frames scanned by each model. Its intervals are over blocks of traffic; they do not include the "
+        "variation between trainings."
     )
 
 
@@ -144,25 +144,26 @@ def _verdict(findings: SensorModelFindings) -> str:
     lost = [_own(one, FINEST) - _own(one, PLAIN) for one in findings.sites]
     left_out = ": it is left out" if largest < NEGLIGIBLE else ""
     text = (
-        f"The law of detection changes coverage by {100 * least:.1f} to {100 * most:.1f} points, by more than its "
-        f"interval in {sum(map(differs, law))} of {len(law)} comparisons; the best placement by "
+        f"The law of detection changes coverage by {100 * least:.1f} to {100 * most:.1f} points, significantly in "
+        f"{sum(map(differs, law))} of {len(law)} comparisons; the best placement by "
         f"plain range covers {100 * min(lost):.1f} to {100 * max(lost):.1f} points less. Divergence changes it by "
-        f"{100 * largest:.2f} points at most, by more than its interval in {sum(map(differs, beams))} of {len(beams)}, "
-        f"for {_span(slower)} times the time{left_out}. Of {compared:,} pairs of pose and target that are seen the "
-        f"lazy engine, which is made for lines, decides {differing} otherwise than every diverging beam does."
+        f"at most {100 * largest:.2f} points, significantly in {sum(map(differs, beams))} of {len(beams)} comparisons, "
+        f"and takes {_span(slower)} times as long{left_out}. The lazy engine is made for beams that are lines: for "
+        f"{differing} of {compared:,} visible pairs of pose and target it differs from casting every diverging beam."
     )
     if findings.precision is not None:
         change = findings.precision.change
         text += (
-            f" Average precision is off that with diverging beams by {_points(change[PLAIN])} points with plain range, "
-            f"{_told(change[PLAIN])}, and by {_points(change[SHIPPED])} with the range equation, "
-            f"{_told(change[SHIPPED])}: its detector has learnt from beams that are lines."
+            f" Average precision differs from that with diverging beams by {_points(change[PLAIN])} points with plain "
+            "range, "
+            f"{_significance(change[PLAIN])}, and by {_points(change[SHIPPED])} with the range equation, "
+            f"{_significance(change[SHIPPED])}: its detector was trained on beams that are lines."
         )
     return text
 
 
 def _own(front: SiteFront, model: str) -> float:
-    """Return what the best placement of most sensors by a model covers by the finest."""
+    """Return the coverage by the finest model of a model's best placement with the most sensors."""
     return list(front.best[model].values())[-1][1]
 
 
@@ -170,8 +171,8 @@ def _changes(findings: SensorModelFindings, model: str) -> list[IntervalEstimate
     return [one.change(model, count) for one in findings.sites for count in one.coverage[model]]
 
 
-def _told(change: IntervalEstimate) -> str:
-    return "more than its interval" if differs(change) else "not told from chance"
+def _significance(change: IntervalEstimate) -> str:
+    return "significant" if differs(change) else "not significant"
 
 
 def _points(change: IntervalEstimate) -> str:

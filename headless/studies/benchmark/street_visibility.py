@@ -1,4 +1,4 @@
-"""Synthetic street visibility, without a scene: junctions, wedges behind buildings, ranges."""
+"""Synthetic visibility grids of streets, without a scene: junctions, shadows of buildings and trees, ranges."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 
 MAX_RANGE = 110.0
-"""Metres beyond which no sensor of these streets sees."""
+"""Maximum range of every sensor in these streets, metres."""
 
 
 def street_problem(

@@ -30,7 +30,7 @@ from seip_addon.core.site.site import Site
 
 ENGINES: tuple[Engine, ...] = ("bvh", "embree")
 
-PROVEN_GAP = 1e-6  # gap below which nothing is better
+PROVEN_GAP = 1e-6  # gap below which a placement counts as optimal
 
 SENSOR_COUNT = 4
 """Sensors of the placement in which the degradation is measured."""
@@ -43,7 +43,7 @@ class Cost:
     Parameters
     ----------
     seen : int
-        Pairs of pose and target.
+        Visible pairs of pose and target.
     """
 
     expense: Expense = field(default_factory=Expense)
@@ -63,15 +63,15 @@ class Degradation:
     Parameters
     ----------
     wrong : float
-        Pairs of pose and target that come out wrong, per pair that is seen in truth.
+        Wrong pairs of pose and target, per pair that is visible in the exact grid.
     claimed : float
-        Coverage that the placement has by the simplified grid.
+        Coverage of the placement by the simplified grid.
     coverage : float
-        Coverage that it has in truth.
+        Coverage of the placement by the exact grid.
     kept : int
-        How many of its poses the exact grid's placement has as well.
+        Number of its poses that the placement for the exact grid has as well.
     proven : bool
-        Whether the placement is proven the best by its grid; else the solver had too little time.
+        Whether the placement is proven optimal on its grid; otherwise the solver had too little time.
     """
 
     wrong: float
@@ -98,7 +98,7 @@ class FullAndLazy:
         self._lazy = VisibilityModel(site, settings, self._caster)
 
     def full(self, poses: Integer) -> tuple[Boolean, int]:
-        """Cast every ray of poses at one place; return what they see, (k, t) bool, and how many rays that took."""
+        """Cast every ray of poses at one position; return the visible targets, (k, t) bool, and the number of rays."""
         candidates = self._site.candidates
         used = [self._models[key] for key in candidates.sensor[poses].tolist()]
         origin, yaw = candidates.xyz[poses[0]], float(candidates.yaw[poses[0]])
@@ -112,7 +112,7 @@ class FullAndLazy:
 
 
 def sampled_places(site: Site, samples: int) -> list[Integer]:
-    """Return places evenly spread over a site, each as its poses."""
+    """Return positions evenly spread over a site, each as its poses."""
     every = sharing_rays(site.candidates.xyz, site.candidates.yaw, site.candidates.tilt)
     return [every[number] for number in np.unique(np.linspace(0, len(every) - 1, samples).astype(int))]
 
@@ -129,19 +129,20 @@ def visibility_costs(
     Parameters
     ----------
     samples : int
-        How many places, evenly spread over the site.
+        Number of positions, evenly spread over the site.
     simpler : sequence of Approximation
-        With Embree alone.
+        Simplifications, computed only with Embree.
 
     Returns
     -------
     dict of str to Cost
-        By ``full bvh``, ``lazy bvh``, ``full embree``, ``lazy embree``, ``full azimuth ÷ 2``, …
+        Costs by scan and engine, or simplification:
+        ``full bvh``, ``lazy bvh``, ``full embree``, ``lazy embree``, ``full azimuth ÷ 2``, …
 
     Raises
     ------
     SeipError
-        A lazy result is not that of its full scan.
+        A lazy result differs from its full scan.
     """
     ways = {str(engine): FullAndLazy(site, models, settings, engine) for engine in ENGINES}
     ways |= {one.name: FullAndLazy(one.site, one.models, settings, "embree") for one in simpler}
@@ -151,7 +152,7 @@ def visibility_costs(
             full = _timed(costs[f"full {name}"], observers.full, poses)
             lazy = _timed(costs[f"lazy {name}"], observers.lazy, poses)
             if (full != lazy).any():
-                raise SeipError(f"pose {poses[0]}: the lazy {name} grid is not the full scan's; this is a defect")
+                raise SeipError(f"pose {poses[0]}: the lazy {name} grid differs from the full scan: a defect")
     return costs
 
 
@@ -164,12 +165,12 @@ def degradations(
 ) -> dict[str, Degradation]:
     """Compute the degradation of grid and placement by each simplification, for four sensors of the first type.
 
-    The grids are computed lazily: they are the full scans', as `visibility_costs` checks on a sample.
+    The grids are computed lazily; `visibility_costs` checks on a sample that they equal those of full scans.
 
     Returns
     -------
     dict of str to Degradation
-        By name; the first is ``exact``.
+        Degradation by name; the first is ``exact``.
     """
     exact = finish(compute_visibility(site, models, settings)).visible
     best = placed(site, models, exact, time_limit)
@@ -196,7 +197,7 @@ def placed(site: Site, models: Mapping[str, LidarModel], visible: Boolean, time_
 
 
 def cast_rate(caster: RayCaster, origin: Float, rays: int = 20_000) -> float:
-    """Return how many rays a second a caster casts, in one thread, in random directions below the horizon."""
+    """Return the rays per second of a caster in one thread, in random directions below the horizon."""
     random = np.random.default_rng(0)
     directions = random.normal(size=(rays, 3)) * (1, 1, 0.1)
     directions[:, 2] = -np.abs(directions[:, 2])

@@ -1,4 +1,4 @@
-"""Charts of LiDAR models beside measured sweeps: share returned, range noise, and how alike fates are."""
+"""Charts of LiDAR models and measured sweeps: share returned, range noise, and correlation of fates."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def save_noise_chart(path: str | os.PathLike[str], comparisons: Sequence[Compari
 
 
 def save_fate_chart(path: str | os.PathLike[str], comparisons: Sequence[Comparison]) -> None:
-    """Draw how alike the fates of rays are against how many rays they are apart, as PNG."""
+    """Draw the correlation of the fates of rays (returned or lost) against their distance in rays, as PNG."""
     figure, panels = _new_figure(len(comparisons))
     for panel, one in zip(panels, comparisons, strict=True):
         model = one.fates.along_ring
@@ -80,7 +80,7 @@ def save_fate_chart(path: str | os.PathLike[str], comparisons: Sequence[Comparis
         panel.plot(list(measured), list(measured.values()), "o", color=INK, label="measured")
         _finish(panel, one, "rays apart along the ring", "correlation of fate" if panel is panels[0] else "")
         panel.set_ylim(min([0.0, *measured.values()]), 1.0)
-    save_chart(path, figure, "How alike the fates of neighbouring rays are, 20 to 100 m away", panels[:1])
+    save_chart(path, figure, "Correlation of the fates of neighbouring rays, 20 to 100 m away", panels[:1])
 
 
 def _save_share_chart(

@@ -44,7 +44,7 @@ def main(argv: list[str]) -> None:
             runtime.print_line(line)
     alone = [name for name in measured if name not in models]
     if alone:
-        runtime.warn([f"{', '.join(alone)}: compared with no model; --sensor MEASURED=KEY names one"])
+        runtime.warn([f"{', '.join(alone)}: not compared with any model; name one with --sensor MEASURED=KEY"])
     with runtime.incomplete_if_interrupted(options.output):
         save_calibration(options.output / "calibration.json", comparisons)
         for file, save in CHARTS.items():
@@ -61,7 +61,7 @@ def _parser() -> argparse.ArgumentParser:
         nargs="+",
         default=[],
         metavar="MEASURED=KEY",
-        help="models of measured sensors whose name is no key of the catalogue",
+        help="model (catalogue key) of a measured sensor whose name is not itself a key",
     )
     add_settings(parser, SurveySettings, "catalogue")
     return parser

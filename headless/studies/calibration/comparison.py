@@ -18,14 +18,15 @@ from .reference import MeasuredSensor, NoiseBin
 from .share_fit import Fits, fit
 
 CHART_LAGS = tuple(range(1, 11))
-"""Rays apart for which charts show how alike fates are."""
+"""Lags, in rays, for which charts show the correlation of fates."""
 
 
 @dataclass(frozen=True)
 class BeamDifference:
     """Largest and root mean square differences of beams, in degrees.
 
-    Those of azimuth are what is left after the common rotation, counted in the sense of turning that fits better.
+    The common rotation is removed from azimuths first. Of the two possible senses of rotation, the one that fits
+    better is taken.
     """
 
     elevation_largest: float
@@ -44,14 +45,14 @@ class NoiseRatio:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What a model and a measured sensor have in common.
+    """Comparison of a model with a measured sensor.
 
     Parameters
     ----------
     name : str
-        Of the measured sensor.
+        Name of the measured sensor.
     fits : Fits or None
-        None where no bin has rays enough.
+        Fitted laws of detection; None if no bin has enough rays.
     """
 
     name: str
@@ -65,11 +66,11 @@ class Comparison:
 
 
 def pair(
-    measured: Mapping[str, MeasuredSensor], catalogue: Mapping[str, LidarModel], asked: Sequence[str]
+    measured: Mapping[str, MeasuredSensor], catalogue: Mapping[str, LidarModel], pairs: Sequence[str]
 ) -> dict[str, LidarModel]:
     """Return the model that each measured sensor is compared with.
 
-    Those are models of the same key; ``asked`` names others as ``MEASURED=KEY``.
+    By default that is the model of the same key; ``pairs`` names others as ``MEASURED=KEY``.
 
     Raises
     ------
@@ -77,14 +78,14 @@ def pair(
         A name is unknown, or there is nothing to compare.
     """
     keys = {name: name for name in measured if name in catalogue}
-    for one in asked:
+    for one in pairs:
         name, equals, key = one.partition("=")
         if not equals or name not in measured:
             raise SeipError(f"--sensor {one}: write MEASURED=KEY, where MEASURED is {' or '.join(measured)}")
         keys[name] = key
     if not keys:
         raise SeipError(
-            f"no measured sensor ({', '.join(measured)}) has the name of one in the catalogue: name a pair, as in "
+            f"no measured sensor ({', '.join(measured)}) is named like a catalogue key: name a pair, as in "
             f"--sensor {next(iter(measured))}=vls128"
         )
     models = find_models(catalogue, list(keys.values()))
@@ -102,7 +103,7 @@ def compare(name: str, sensor: MeasuredSensor, model: LidarModel) -> Comparison:
     law = model.law
     if not isinstance(law, RangeEquation):
         raise SeipError(
-            f"LiDAR '{model.key}' follows the drop-off of CARLA, not the range equation: name another model"
+            f"LiDAR '{model.key}' uses the drop-off of CARLA instead of the range equation: name another model"
         )
     lags = sorted({*sensor.fate_correlation, *CHART_LAGS})
     return Comparison(
@@ -118,7 +119,7 @@ def compare(name: str, sensor: MeasuredSensor, model: LidarModel) -> Comparison:
 
 
 def _beam_difference(sensor: MeasuredSensor, model: LidarModel) -> BeamDifference:
-    """Match beams by elevation: in order where there are as many, else each measured one with the nearest."""
+    """Match beams by elevation: in order if their numbers are equal, otherwise each measured beam to the nearest."""
     measured = np.asarray(sensor.beams.elevation_deg)
     published = np.degrees(model.elevations)
     if len(measured) == len(published):
@@ -134,7 +135,7 @@ def _beam_difference(sensor: MeasuredSensor, model: LidarModel) -> BeamDifferenc
 
 
 def _unrotated(difference: Float) -> Float:
-    """Return the sizes (n,) of differences of angles, in degrees, less their common rotation, the circular mean."""
+    """Return the absolute differences of angles (n,), degrees, without their common rotation (the circular mean)."""
     turns = np.exp(1j * np.radians(difference))
     rest: Float = np.abs(np.degrees(np.angle(turns * np.conj(turns.mean()))))
     return rest

@@ -1,4 +1,4 @@
-"""How alike the fates of rays on level ground are, along a ring and from sweep to sweep."""
+"""Correlation of the fates of rays on level ground (returned or lost), along a ring and from sweep to sweep."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ NEAREST, FARTHEST = 20.0, 100.0
 """Ranges in metres of the rays whose fates are correlated along rings."""
 
 SWEEPS_FROM = 50.0
-"""Range in metres from which on fates are correlated over sweeps: nearer, hardly a ray is lost."""
+"""Range in metres beyond which fates are correlated over sweeps; at shorter ranges hardly any ray is lost."""
 
 _SURFACES = 16
 _MOST_SHARE = 0.9995
-"""Surfaces that are drawn, and the share that stands for all rays: where none is lost, no fates differ."""
+"""Number of drawn surfaces, and the largest share used: if no ray is lost, fates do not vary."""
 
 
 @dataclass(frozen=True)
@@ -36,37 +36,37 @@ class FateCorrelation:
 
 @dataclass(frozen=True, eq=False)
 class _SeenBin:
-    """Chances (surfaces, rings, steps) of the rays in a bin, and how many rays were measured there."""
+    """A measured bin with the simulated chances (surfaces, rings, steps) that its rays return."""
 
     bin: ShareBin
     chance: Float
 
     @property
     def variance(self) -> float:
-        """Of one fate: P (1 − P) of the mean chance."""
+        """Variance of one fate: P (1 − P) of the mean chance P."""
         mean = float(self.chance.mean())
         return mean * (1.0 - mean)
 
     def covariance(self, lag: int) -> float:
-        """Of the fates of rays so many steps apart, the bin's mean removed; with lag 0, of one ray in two sweeps."""
+        """Return the covariance of the fates of rays `lag` steps apart; with lag 0, of one ray in two sweeps."""
         rest = self.chance - self.chance.mean()
         return float((rest * np.roll(rest, -lag, axis=-1)).mean())
 
 
 def simulate_fates(sensor: MeasuredSensor, spread: float, lags: Sequence[int]) -> FateCorrelation:
-    """Return how alike fates are where surfaces deviate patch by patch (`surface_deviation`).
+    """Return the correlation of fates if surfaces deviate patch by patch (`surface_deviation`).
 
-    The sensor's beams sweep level ground at its height. How alike fates are depends on the share that returns, so in
-    each bin the threshold gives the measured share, and no return is lost whatever its power. Luck that is drawn anew
-    is independent, hence fates of different rays, or of one ray in different sweeps, have the covariance of their
-    chances. Bins count by the rays measured in them.
+    The sensor's beams sweep level ground at its height. The correlation depends on the share of rays that return, so
+    in each bin the threshold is set to reproduce the measured share, without losses that do not depend on power. Each
+    ray of each sweep is drawn independently, given its chance. The covariance of two fates is therefore the covariance
+    of their chances. Bins are weighted by the number of rays measured in them.
 
     Parameters
     ----------
     spread : float
-        s of the law.
+        Spread s of the law.
     lags : sequence of int
-        Rays apart.
+        Distances along the ring, in rays.
     """
     seen = list(_bins(sensor, spread))
     variance = math.fsum(one.bin.rays * one.variance for one in seen)
@@ -103,7 +103,7 @@ def _bins(sensor: MeasuredSensor, spread: float) -> Iterator[_SeenBin]:
 
 
 def _law_of_share(distance: Float, reflected: Float, spread: float, share: float) -> RangeEquation:
-    """Return the law without a ceiling that detects a share of some rays, by halving."""
+    """Return the law without a ceiling that detects a given share of the rays, by bisection of the threshold."""
     low, high = -60.0, 20.0
     law = RangeEquation(0.0, spread, 1.0)
     for _ in range(60):

@@ -1,4 +1,4 @@
-"""What was measured of LiDARs' sweeps: shares returned, beams, noise, and how alike the fates of rays are."""
+"""Measurements of LiDAR sweeps: shares returned, beams, range noise, and correlation of the fates of rays."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class RangeBin:
     Parameters
     ----------
     bin : str
-        Its ends in metres, such as ``20-30``, or ``>100``.
+        Ends in metres, such as ``20-30``, or ``>100``.
     """
 
     bin: str
@@ -43,27 +43,27 @@ class RangeBin:
 
     @property
     def high(self) -> float:
-        """Greatest range in metres; infinite of an open bin."""
+        """Greatest range in metres; infinite for an open bin."""
         return float(self.bin.partition("-")[2] or math.inf)
 
     @property
     def middle(self) -> float:
-        """Middle of the bin in metres; infinite of an open bin."""
+        """Middle of the bin in metres; infinite for an open bin."""
         return (self.low + self.high) / 2.0
 
 
 @dataclass(frozen=True)
 class ShareBin(RangeBin):
-    """The share of rays at surfaces in a range bin that return.
+    """Share of the rays that return from surfaces in a range bin.
 
     Parameters
     ----------
     rays : int
-        Rays that meet the surface, returned or not.
+        Number of rays that hit a surface, returned or not.
     share : float
-        0 to 1.
+        Share that returned, 0 to 1.
     mean_cos_incidence : float
-        0 to 1.
+        Mean cosine of the angle of incidence, 0 to 1.
     sector_bootstrap95 : tuple of two floats
         Interval of the share, ascending.
     """
@@ -109,7 +109,7 @@ class SweepsBin(RangeBin):
 
 @dataclass(frozen=True)
 class Beams:
-    """Beams of a sensor, in degrees; azimuth offsets count in the direction in which its head turns, or against it."""
+    """Beams of a sensor, in degrees; azimuth offsets are positive along or against the rotation of its head."""
 
     elevation_deg: tuple[float, ...]
     azimuth_offset_deg: tuple[float, ...]
@@ -119,7 +119,7 @@ class Beams:
         checks = {
             "elevation_deg must hold 1 to 1,000 beams": 1 <= len(self.elevation_deg) <= 1000,
             "elevation_deg must lie between -90 and 90": all(abs(value) < 90 for value in self.elevation_deg),
-            "azimuth_offset_deg must have as many numbers as elevation_deg": (
+            "azimuth_offset_deg must have one number for each of elevation_deg": (
                 len(self.azimuth_offset_deg) == len(self.elevation_deg)
             ),
             "azimuth_offset_deg must lie between -360 and 360": all(abs(one) <= 360 for one in self.azimuth_offset_deg),
@@ -127,14 +127,14 @@ class Beams:
             "a revolution must have at most 1,000,000 rays": len(self.elevation_deg) * 360
             <= 1e6 * self.azimuth_step_deg,
         }
-        for sentence, holds in checks.items():
+        for requirement, holds in checks.items():
             if not holds:
-                raise ValueError(f"beams: {sentence}")
+                raise ValueError(f"beams: {requirement}")
 
 
 @dataclass(frozen=True)
 class Identity:
-    """What a sensor is called, and its height above the road in metres."""
+    """Name of a sensor, and its height above the road in metres."""
 
     sensor: str
     mounting_height_m: float
@@ -146,7 +146,7 @@ class Identity:
 
 @dataclass(frozen=True)
 class MeasuredSensor:
-    """Figures of a sensor's sweeps, by the names that they have in the file."""
+    """Figures of a sensor's sweeps; fields have the names of the file's keys."""
 
     identity: Identity
     ground_by_range_m: tuple[ShareBin, ...]
@@ -163,7 +163,7 @@ class MeasuredSensor:
         for lag, value in self.fate_correlation_along_ring_20_to_100_m.items():
             where = "fate_correlation_along_ring_20_to_100_m"
             if not (lag.isdecimal() and lag.isascii() and 1 <= int(lag[:4]) <= 100 and len(lag) <= 3):
-                raise ValueError(f"{where} is by the number of rays apart, 1 to 100, not by {lag[:20]!r}")
+                raise ValueError(f"{where}: keys must be distances in rays, 1 to 100, not {lag[:20]!r}")
             _require_correlation(f"{where}.{lag}", value)
 
     @property
@@ -178,7 +178,7 @@ class MeasuredSensor:
 
     @property
     def fate_correlation(self) -> dict[int, float]:
-        """Correlation of the fates of rays by how many rays on along the ring."""
+        """Correlation of the fates of rays by their distance along the ring, in rays."""
         return {int(lag): value for lag, value in self.fate_correlation_along_ring_20_to_100_m.items()}
 
 
@@ -201,7 +201,7 @@ def load_reference(path: str | os.PathLike[str]) -> dict[str, MeasuredSensor]:
     try:
         content = json.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise SeipError(f"cannot read the measurements {path}: {error}; name a JSON file") from error
+        raise SeipError(f"cannot read the measurements {path} ({error}): name a JSON file") from error
     where = str(path)
     try:
         sensors = from_json(Reference, content).sensors

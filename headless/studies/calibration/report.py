@@ -18,7 +18,7 @@ def describe(one: Comparison) -> Iterator[str]:
     """Yield the lines of a comparison's table."""
     yield f"{one.name} ({one.sensor.identity.sensor}, {one.sensor.height:g} m high) and {one.model.key}"
     if one.fits is None:
-        yield "  share returned     no bin has rays enough"
+        yield "  share returned     no bin has enough rays"
     else:
         fits = one.fits
         for what, law, misfit in zip(
@@ -29,7 +29,7 @@ def describe(one: Comparison) -> Iterator[str]:
         if fits.determined:
             yield f"  detection_law = {_numbers(fits.free)}"
         else:
-            yield "  no detection_law   these bins do not tell threshold or spread: it is at the limit of what is tried"
+            yield "  no detection_law   these bins do not determine threshold and spread: the fit is at its limits"
     beams = one.beams
     yield f"  elevations         largest difference {beams.elevation_largest:.2f}°, rms {beams.elevation_rms:.2f}°"
     yield f"  azimuth offsets    largest difference {beams.azimuth_largest:.2f}°, rms {beams.azimuth_rms:.2f}°"

@@ -1,4 +1,4 @@
-"""Share of rays that return: what a law says, and the law that fits measured shares."""
+"""Share of rays that return: prediction by a law of detection, and fit of a law to measured shares."""
 
 from __future__ import annotations
 
@@ -15,33 +15,34 @@ from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from .reference import MeasuredSensor, ShareBin
 
 GROUND_REFLECTIVITY, VERTICAL_REFLECTIVITY = 0.17, 0.3
-"""Of asphalt, and of façades and vehicles, in the near infrared."""
+"""Reflectivity of asphalt, and of façades and vehicles, in the near infrared."""
 
 LEAST_RAYS, FARTHEST = 200, 60.0
-"""Bins of fewer rays, or that end farther away in metres, are not fitted: surfaces differ too much there."""
+"""Bins with fewer rays, or with a farther end in metres, are not fitted: surfaces differ too much there."""
 
 _RANGES = (np.arange(32) + 0.5) / 32
-"""Places in a bin over which shares are averaged."""
+"""Ranges over which shares are averaged, as fractions of a bin."""
 
 _THRESHOLDS, _SPREADS = (-20.0, -5.0), (math.log(0.1), math.log(4.0))
-"""Least and greatest m and ln s that are tried."""
+"""Limits of m and ln s in the fit."""
 
 _GRID, _ROUNDS = 21, 8
-"""Values of each that are tried at once, and how often the grid is laid closer about the best."""
+"""Grid values of each parameter, and number of rounds; each round narrows the grid around the best value."""
 
 
 @dataclass(frozen=True)
 class Fits:
-    """A law as the catalogue has it, with another gain, and fitted to a measurement, each with its misfit.
+    """A law of detection from the catalogue, with fitted gain, and with all parameters fitted, each with its misfit.
 
     Parameters
     ----------
     bins : int
-        Bins that were fitted.
+        Number of fitted bins.
     catalogue, gain, free : RangeEquation
-        As it stands; with the threshold that fits; with threshold, spread and ceiling that fit, in clear air.
+        Law of the catalogue; the same with fitted threshold; law with fitted threshold, spread and ceiling, in clear
+        air.
     misfits : tuple of three floats
-        Root mean square of model share minus measured share, over the bins.
+        Root mean square difference of the law's share and the measured share over the bins, for each law.
     """
 
     bins: int
@@ -52,7 +53,7 @@ class Fits:
 
     @property
     def determined(self) -> bool:
-        """Whether the bins tell threshold and spread: the fit is not at the limits of what is tried."""
+        """Whether the bins determine threshold and spread: the fit is not at the limits of the search."""
         values = (self.free.threshold, math.log(self.free.spread))
         return all(
             low + 0.1 < value < high - 0.1 for value, (low, high) in zip(values, (_THRESHOLDS, _SPREADS), strict=True)
@@ -68,18 +69,18 @@ class _Shares:
     share: Float
 
     def of(self, law: RangeEquation) -> Float:
-        """Return the share (b,) that a law has in each bin."""
+        """Return the share (b,) by a law in each bin."""
         chance = law.chance(self.distance.ravel(), self.reflected.ravel()).reshape(self.distance.shape)
         mean: Float = chance.mean(axis=1)
         return mean
 
     def misfit(self, law: RangeEquation) -> float:
-        """Return the root mean square of the law's less the measured shares."""
+        """Return the root mean square difference between the law's and the measured shares."""
         return math.sqrt(float(np.mean((self.of(law) - self.share) ** 2)))
 
 
 def fitted(one: ShareBin) -> bool:
-    """Return whether a bin is one to fit."""
+    """Return whether a bin is used in fits."""
     return one.rays >= LEAST_RAYS and one.high <= FARTHEST
 
 
@@ -89,7 +90,7 @@ def ground_reflected(sensor: MeasuredSensor, distance: Float) -> Float:
 
 
 def fit(sensor: MeasuredSensor, law: RangeEquation) -> Fits | None:
-    """Compare a law with the shares of a measured sensor, and fit it; None where no bin is one to fit."""
+    """Compare a law with the shares of a measured sensor, and fit it; None if no bin can be used."""
     shares = _fitted_shares(sensor)
     if not len(shares.share):
         return None
@@ -126,7 +127,7 @@ def _with_gain(shares: _Shares, law: RangeEquation) -> RangeEquation:
 
 
 def _with_three_numbers(shares: _Shares) -> RangeEquation:
-    """Return the best law: on ever closer grids of m and ln s, each with the c that is best for them."""
+    """Return the best law by a search on ever finer grids of m and ln s, each pair with its best ceiling c."""
     thresholds, spreads = _THRESHOLDS, _SPREADS
     best = RangeEquation(0.0)
     for _ in range(_ROUNDS):
@@ -139,12 +140,13 @@ def _with_three_numbers(shares: _Shares) -> RangeEquation:
 
 
 def _closer(best: float, width: float, limits: tuple[float, float]) -> tuple[float, float]:
-    """Return an interval about the best value, a quarter as wide as the last, within limits."""
+    """Return an interval around the best value, a quarter as wide as the last, within limits."""
     return max(best - width / 8, limits[0]), min(best + width / 8, limits[1])
 
 
 def _best_ceiling(shares: _Shares, threshold: float, spread: float) -> RangeEquation:
-    """Return the law of a threshold and a spread whose ceiling fits best: shares are in proportion to it."""
+    """Return the law of a threshold and a spread with the ceiling that fits best."""
+    # Shares are proportional to the ceiling, so the least-squares ceiling is a projection and needs no search.
     whole = RangeEquation(threshold, spread, 1.0)
     of = shares.of(whole)
     power = float(of @ of)

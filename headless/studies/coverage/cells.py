@@ -18,8 +18,8 @@ from seip_addon.core.site.site import Site
 
 COUNTS = (1, 2, 4)
 CENTRAL_WEIGHTS = (2.0, 4.0, 8.0, 16.0)
-CHARTED_WEIGHT = CENTRAL_WEIGHTS[1]  # central weight of the plans that stand beside the vanilla ones
-Span = tuple[float, float]  # least and largest possible value of something that the solver may not have settled
+CHARTED_WEIGHT = CENTRAL_WEIGHTS[1]  # central weight of the plans drawn next to the vanilla ones
+Span = tuple[float, float]  # least and largest possible value of a figure that the solver may not have settled
 
 
 @dataclass(frozen=True)
@@ -29,9 +29,9 @@ class Cell:
     Parameters
     ----------
     sensor : str
-        Catalogue key of the one type allowed.
+        Catalogue key of the only type allowed.
     height : float or None, metres
-        The one height allowed; None where heights are free.
+        Only height allowed; None for all heights.
     count : int
         N, the largest number of sensors.
     weight : float
@@ -51,7 +51,7 @@ class Case(Cell):
     Parameters
     ----------
     placement, greedy : Placement
-        The integer program's and the greedy algorithm's answer.
+        Placement by the integer program and by the greedy algorithm.
     """
 
     placement: Placement
@@ -60,7 +60,7 @@ class Case(Cell):
 
     @property
     def span(self) -> Span:
-        """Least and largest possible best objective: they meet where the optimum is proven."""
+        """Least and largest possible best objective; equal if the optimum is proven."""
         return self.placement.objective, max(self.placement.objective, self.placement.bound)
 
 
@@ -71,7 +71,7 @@ class EmptyCell(Cell):
     Parameters
     ----------
     note : str
-        Why: the sentence that a user would read who asked for this placement alone.
+        Reason, as in the message for a single request of this placement.
     """
 
     note: str
@@ -86,7 +86,7 @@ class CoverageStudy:
     sensors : tuple of str
         Catalogue keys, from the simplest type to the best.
     cells : tuple of Case or EmptyCell
-        In the order in which they were solved.
+        All cells, in the order of their solution.
     targets : int
         Number of targets, the unit of vanilla objectives.
     """
@@ -102,12 +102,12 @@ class CoverageStudy:
         return tuple(cell for cell in self.cells if isinstance(cell, Case))
 
     def find(self, sensor: str, count: int, height: float | None = None, weight: float = 1.0) -> Case | None:
-        """Return one cell, or None where it has no placement."""
-        wanted = (sensor, count, height, weight)
-        return next((c for c in self.cases if (c.sensor, c.count, c.height, c.weight) == wanted), None)
+        """Return one cell, or None if it has no placement."""
+        key = (sensor, count, height, weight)
+        return next((c for c in self.cases if (c.sensor, c.count, c.height, c.weight) == key), None)
 
     def possible(self, sensor: str, count: int, height: float | None = None) -> Span | None:
-        """Return the least and largest possible best coverage of a vanilla cell, or None where it has no placement."""
+        """Return the least and largest possible best coverage of a vanilla cell, or None if it has no placement."""
         found = self.find(sensor, count, height)
         if found is None:
             return None
@@ -118,21 +118,21 @@ class CoverageStudy:
 def coverage_study(
     site: Site, models: Mapping[str, LidarModel], visible: NDArray[np.bool_], limits: SolverLimits = DEFAULT_LIMITS
 ) -> Generator[Progress, None, CoverageStudy]:
-    """Solve every cell: each type, each height alone and all together, N = 1, 2, 4; then a sweep of central weights.
+    """Solve every cell: each type, each single height and all heights, N = 1, 2, 4; then a sweep of central weights.
 
     A cell that has no placement (more sensors than positions, a type that sees
-    nothing from one height) is recorded with the reason, and the others go on.
+    nothing from one height) is recorded with the reason, and the study continues.
 
     Parameters
     ----------
     site : Site
-        With poses of every type and height to be studied.
+        Site with poses of every type and height to be studied.
     visible : (c, t) bool
 
     Raises
     ------
     SeipError
-        No cell has a placement; the first one's reason.
+        No cell has a placement; the message is the reason of the first cell.
     """
     sensors = tuple(dict.fromkeys(site.candidates.sensor.tolist()))
     heights = tuple(sorted(set(site.candidates.height.tolist())))
@@ -163,7 +163,7 @@ def solve_cell(
     Raises
     ------
     SeipError
-        It has no placement.
+        The cell has no placement.
     """
     allowed = site.candidates.sensor == cell.sensor
     if cell.height is not None:

@@ -14,14 +14,15 @@ from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
 
 from .cells import CENTRAL_WEIGHTS, COUNTS, CoverageStudy
 
-PANEL_HEIGHT, PANEL_WIDTH, MIN_PANELS = 4.2, 3.65, 3  # inches, inches, panels that a chart is wide at least
+PANEL_HEIGHT, PANEL_WIDTH, MIN_PANELS = 4.2, 3.65, 3  # inches, inches, least width of a chart in panels
 TYPE_SHIFT = 0.09  # of the step between two heights, from one type to the next
 
 
 def save_height_chart(path: str | os.PathLike[str], study: CoverageStudy, title: str) -> None:
     """Draw coverage against mounting height, a panel for each number of sensors, as PNG.
 
-    A bar above a mark ends at the coverage that the solver could not rule out. Cells without a placement are left out.
+    A bar above a mark ends at the largest coverage that the solver could not rule out. Cells without a placement are
+    left out.
     """
     figure, panels = _figure(len(COUNTS))
     ticks = [*(f"{height:g}" for height in study.heights), "free"]

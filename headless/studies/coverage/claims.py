@@ -14,7 +14,7 @@ MIN_CHANGE = 0.01  # share of the region below which a gain or loss of coverage 
 def coverage_claims(study: CoverageStudy) -> tuple[Claim, ...]:
     """Evaluate claims 1 to 4 and 10 of the paper on the solved cells.
 
-    Claims that compare types, heights or weights are left out where there is nothing to compare.
+    Claims that compare types, heights or weights are left out if there is nothing to compare.
     """
     claims = [_four_of_the_best(study), _greedy(study)]
     if len(study.sensors) > 1:
@@ -53,7 +53,7 @@ def _four_of_the_best(study: CoverageStudy) -> Claim:
         return Claim(2, text, UNDECIDED, f"there is no placement of {most} {best} sensors")
     used = len(case.placement.chosen)
     spare = used < most or any(_is_full(study.possible(best, n)) for n in COUNTS[:-1])
-    # All sensors in use means that none is to spare only if ties were broken; a note says so where they were not.
+    # All sensors in use means that all are needed only if ties were broken; a note reports if they were not.
     settled = case.placement.status == "optimal" and not case.placement.notes
     return Claim(
         2,
@@ -121,7 +121,7 @@ def _weighting_verdict(changes: Sequence[tuple[float, float]], proven: Sequence[
 
 
 def _change(plain: Case, weighted: Case) -> tuple[float, float]:
-    """Return what weighting adds to the coverage of the centre and of the whole."""
+    """Return the change of the coverage of the centre and of the whole by weighting."""
     (central, whole), (central_after, whole_after) = _views(plain), _views(weighted)
     return central_after - central, whole_after - whole
 
@@ -149,7 +149,7 @@ def _greedy(study: CoverageStudy) -> Claim:
 
 
 def _rises(more: Span | None, less: Span | None) -> str:
-    """Whether coverage rises by more than a negligible share; where less than that is left to see, it need not."""
+    """Return the verdict on a non-negligible rise of coverage; it holds, too, if nearly all was covered before."""
     if more is None or less is None:
         return UNDECIDED
     full = 1 - MIN_CHANGE
@@ -170,14 +170,14 @@ def _is_full(span: Span | None) -> bool:
 
 
 def _gain(more: Span | None, less: Span | None) -> Span | None:
-    """Return the least and largest possible gain; another sensor never takes coverage away."""
+    """Return the least and largest possible gain; an additional sensor never reduces coverage."""
     if more is None or less is None:
         return None
     return max(0.0, more[0] - less[1]), more[1] - less[0]
 
 
 def _best(spans: Iterable[Span | None]) -> Span | None:
-    """Return the least and largest possible best of several, or None where one of them is missing."""
+    """Return the least and largest possible best of several, or None if one of them is missing."""
     known = list(spans)
     found = [span for span in known if span is not None]
     if len(found) < len(known):
@@ -186,7 +186,7 @@ def _best(spans: Iterable[Span | None]) -> Span | None:
 
 
 def _best_heights(shares: Mapping[float, Span | None]) -> str:
-    """Name the height at which most was seen, or those between which there is a tie."""
+    """Return the height with the most coverage in words, or the heights between which there is a tie."""
     found = {height: span[0] for height, span in shares.items() if span is not None}
     if not found:
         return "no placement"

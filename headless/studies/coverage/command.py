@@ -49,7 +49,7 @@ def main(argv: list[str]) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    what = "Redo the study's coverage figures on a scene; name sensor types from the simplest to the best."
+    what = "Reproduce the paper's coverage figures on a scene; name sensor types from the simplest to the best."
     parser = new_parser("study coverage", what)
     survey.add_options(parser)
     return parser

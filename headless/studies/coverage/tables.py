@@ -15,7 +15,7 @@ COLUMNS = (
 
 
 def save_study_table(path: str | os.PathLike[str], study: CoverageStudy) -> None:
-    """Write one row for each cell as CSV; one without a placement has its reason in the column ``note``."""
+    """Write one row for each cell as CSV; for cells without a placement, the column ``note`` has the reason."""
     rows = [_key(cell) | (_figures(cell) if isinstance(cell, Case) else {"note": cell.note}) for cell in study.cells]
     save_csv(path, COLUMNS, [[row.get(column, "") for column in COLUMNS] for row in rows])
 

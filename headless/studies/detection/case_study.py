@@ -1,7 +1,7 @@
 """The detection study: average precision of sensor types × numbers, against price and coverage.
 
-Placements come from the integer program, clouds from simulated traffic. One detector learns from all placements at once
-(or one from each), several times with other seeds, and is evaluated with each placement on traffic that none has seen.
+Placements come from the integer program, clouds from simulated traffic. A detector is trained on all placements at once
+(or one detector on each), several times with different seeds, and evaluated with each placement on unseen traffic.
 """
 
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
@@ -38,10 +38,10 @@ MIN_RUNS = 4  # one to learn from, one for validation, two for tests
 RUNS_PER_TEST, RUNS_PER_VALIDATION = 2, 8  # of all runs one half is for tests, and one eighth for validation
 RUNS_PER_CRITERIA = 4  # without training one quarter is for criteria that go by traffic, the others for tests
 
-SPLIT = "the last half for tests, an eighth before it (one at least) for validation, the others to learn from"
-"""How runs are split, in words."""
+SPLIT = "the last half is for tests, an eighth before it (at least one) for validation, the others for training"
+"""Split of the runs, as a message."""
 
-TEST_STRIDE = 2  # frames to learn from for each to test on: what is seen now is seen again soon, and only costs time
+TEST_STRIDE = 2  # every second frame is tested: frames shortly after each other are similar, and cost time
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +51,12 @@ class Traffic:
     Parameters
     ----------
     training, validation, test : tuple of SampledRun
-        To learn from, to see by when that is enough, and to evaluate with.
+        Runs for training, for validation (which decides when to stop), and for evaluation.
 
     Raises
     ------
     SeipError
-        Two runs are nearly the same: their frames show the same vehicles in the same places.
+        Two runs are nearly the same: their frames show the same vehicles at the same positions.
     """
 
     training: tuple[SampledRun, ...]
@@ -67,19 +67,19 @@ class Traffic:
         self.overlap()
 
     def overlap(self) -> str:
-        """Return a sentence on how much the runs of each pair overlap; see `require_independent`."""
+        """Return a message with the overlap of the runs of each pair; see `require_independent`."""
         runs = (*self.training, *self.validation, *self.test)
         return require_independent(combinations([vehicle_positions(run.name, run.trajectories) for run in runs], 2))
 
     def shared_bays(self) -> str:
-        """Return a sentence on how many of the parked of a test run stand where others of another split do."""
+        """Return a message with the share of parked road users of test runs that stand as in runs of other splits."""
         others = (*self.training, *self.validation)
         most = max(
             shared_bays(one.trajectories, other.trajectories, MATCH_RADIUS) for one in self.test for other in others
         )
         return (
-            f"of the parked road users of a test run and of a run that was learnt from, at most {most:.0%} stand "
-            f"within {MATCH_RADIUS:g} m of one of the other's"
+            f"at most {most:.0%} of the parked road users of a test run and of a training or validation run stand "
+            f"within {MATCH_RADIUS:g} m of a parked road user of the other run"
         )
 
 
@@ -90,12 +90,12 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     ----------
     origin : (3,) float64, metres
     every : float, seconds
-        From frame to frame of those to learn from; in the others `TEST_STRIDE` times that.
+        Time between training frames; in the other runs `TEST_STRIDE` times that.
 
     Raises
     ------
     SeipError
-        There are too few, or one is too short.
+        There are too few runs, or one is too short.
     """
     return Traffic(*split_sampled(paths, origin, every))
 
@@ -129,17 +129,17 @@ def split_untrained(runs: Sequence[SampledRun]) -> tuple[tuple[SampledRun, ...],
 
 
 def split_sampled(paths: Sequence[Path], origin: Float, every: float) -> tuple[tuple[SampledRun, ...], ...]:
-    """Return the runs to learn from, for validation and for tests, whether they are independent or not."""
+    """Return the runs for training, validation and tests, without checking that they are independent."""
     if len(paths) < MIN_RUNS:
         raise SeipError(
             f"{len(paths)} runs of traffic are too few: name {MIN_RUNS} or more with --traffic, better "
-            f"{RUNS_PER_TEST * ADVISED_TEST_RUNS}, made by headless/traffic.py with a seed each: {SPLIT}"
+            f"{RUNS_PER_TEST * ADVISED_TEST_RUNS}, made by `seip traffic` with different seeds; {SPLIT}"
         )
     runs = sampled_runs(paths, origin, every)
     tested = len(runs) // RUNS_PER_TEST
-    learnt = len(runs) - tested - max(1, len(runs) // RUNS_PER_VALIDATION)
-    sparse = tuple(replace(run, times=run.times[::TEST_STRIDE]) for run in runs[learnt:])
-    return runs[:learnt], sparse[:-tested], sparse[-tested:]
+    trained_on = len(runs) - tested - max(1, len(runs) // RUNS_PER_VALIDATION)
+    sparse = tuple(replace(run, times=run.times[::TEST_STRIDE]) for run in runs[trained_on:])
+    return runs[:trained_on], sparse[:-tested], sparse[-tested:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,11 +149,11 @@ class ModelConfiguration:
     Parameters
     ----------
     name : str
-        Also of its file.
+        Name of the detector and its file.
     configurations : tuple of SensorConfiguration
-        Whose clouds it learns from, and is evaluated with.
+        Sensor configurations for training and evaluation.
     start : Detector, optional
-        Whose weights it begins with, in place of random ones.
+        Detector with the initial weights; random weights if not given.
     """
 
     name: str
@@ -170,7 +170,7 @@ class DetectorOutcome:
     Parameters
     ----------
     score : float
-        From which on false positives are counted: the best balance of precision and recall on validation frames.
+        Least score of counted false positives: the best balance of precision and recall on validation frames.
     """
 
     model: ModelConfiguration
@@ -181,7 +181,7 @@ class DetectorOutcome:
 
     @property
     def seed_result(self) -> SeedResult:
-        """Its figures, as the claims need them."""
+        """Figures of this outcome for the claims."""
         configuration, false = self.configuration, false_positives(self.evaluation, self.score)
         return SeedResult(
             sensor=configuration.sensor,
@@ -227,12 +227,12 @@ def model_configurations(
 
 
 def padded(some: Sequence[ModelConfiguration]) -> list[ModelConfiguration]:
-    """Return the same with pillars that are padded with zeros: the ablation of claim 9."""
+    """Return the same models with pillars padded with zeros: the ablation of claim 9."""
     return [replace(model, name=f"{model.name}-padded", network=replace(model.network, padded=True)) for model in some]
 
 
 def place_all(survey: Survey) -> Generator[Progress, None, tuple[SensorConfiguration, ...]]:
-    """Place 1, 2 and 4 sensors of each type where they cover most.
+    """Place 1, 2 and 4 sensors of each type for the largest coverage.
 
     Raises
     ------
@@ -265,7 +265,7 @@ def simulate_training_set(
     traffic: Traffic,
     network: NetworkSettings,
 ) -> Generator[Progress, None, TrainingSet]:
-    """Simulate what the configurations measure, and keep what a network learns from it."""
+    """Simulate the frames of all configurations, and store the training samples of a network."""
     area = simulator.area(network.pillar)
 
     def recordings(placed: MountedSensors, runs: Sequence[SampledRun]) -> list[SampledRecording]:
@@ -284,7 +284,7 @@ def simulate_training_set(
 
 
 def most_rays_first(configurations: Iterable[SensorConfiguration]) -> list[SensorConfiguration]:
-    """Return them in an order in which no long work is left to one core at the end."""
+    """Return configurations in descending number of rays, so that no long work is left to one core at the end."""
 
     def rays(placed: SensorConfiguration) -> int:
         return sum(sensor.model.channels * sensor.model.azimuth_count for sensor in placed.sensors)
@@ -321,10 +321,10 @@ def training(
 def train_all(
     models: Sequence[ModelConfiguration], training_set: TrainingSet, folder: Path, *, device: str
 ) -> Generator[Progress, None, list[TrainedDetector]]:
-    """Train detectors, on the CPU one on each core; what was trained before an interruption is not trained again."""
+    """Train detectors, on the CPU one on each core; detectors trained before an interruption are read from files."""
     trainings = [training(model, training_set, device=device, store=folder / f"{model.name}.pt") for model in models]
     at_once = AT_ONCE if device == "cpu" else 1
-    with deterministic(models[0].training.threads):  # all the time, as torch keeps one such setting for all threads
+    with deterministic(models[0].training.threads):  # around all works, as torch has one such setting for all threads
         return (yield from side_by_side(trainings, at_once))
 
 
@@ -335,20 +335,20 @@ def evaluate_all(
     configurations = most_rays_first({one.name: one for model in models for one in model.configurations}.values())
     runs = (*traffic.validation, *traffic.test)
     threads = models[0].training.threads
-    asked = [
+    model_numbers = [
         [number for number, model in enumerate(models) if configuration in model.configurations]
         for configuration in configurations
     ]
     works = [
         detect_in_runs(simulator, configuration, runs, [detectors[number] for number in numbers], threads)
-        for configuration, numbers in zip(configurations, asked, strict=True)
+        for configuration, numbers in zip(configurations, model_numbers, strict=True)
     ]
-    with deterministic(threads):  # all the time, as torch keeps one such setting for all threads
+    with deterministic(threads):  # around all works, as torch has one such setting for all threads
         found = yield from side_by_side(works, AT_ONCE)
     aside = sum(len(run.times) for run in traffic.validation)
     validated: dict[tuple[str, str], list[FrameResult]] = {}
     tested: dict[tuple[str, str], list[FrameResult]] = {}
-    for configuration, numbers, results in zip(configurations, asked, found, strict=True):
+    for configuration, numbers, results in zip(configurations, model_numbers, found, strict=True):
         for number, frames in zip(numbers, results, strict=True):
             validated[models[number].name, configuration.name] = frames[:aside]
             tested[models[number].name, configuration.name] = frames[aside:]
@@ -364,9 +364,9 @@ def suitability_by_configuration(
     for model, detector in zip(models, detectors, strict=True):
         for one in model.configurations:
             area = simulator.area(detector.settings.pillar)
-            sentences = suitability_warnings(detector, one.types, area, frames[one.name])
-            found.setdefault(one.name, {}).update(dict.fromkeys(sentences))
-    return {name: tuple(sentences) for name, sentences in found.items()}
+            warnings = suitability_warnings(detector, one.types, area, frames[one.name])
+            found.setdefault(one.name, {}).update(dict.fromkeys(warnings))
+    return {name: tuple(warnings) for name, warnings in found.items()}
 
 
 def _outcomes(

@@ -1,10 +1,9 @@
 """Verdicts on the paper's claims about detection, 5 to 9, for one site.
 
 Gains are in points of average precision. All figures are means over the seeds of the training with Student's 95 %
-interval; seeds are compared pair by pair. A claim holds where the interval lies within what is claimed, does not hold
-where it lies outside, and is undecided between the two. Where the study says "about", from half to twice its figure is
-meant. Nothing is decided, whatever the intervals say, while the detectors find next to nothing (`LEAST_PRECISION`) or
-were still learning when their training ended.
+interval; seeds are compared in pairs. A claim holds if the interval lies within the claimed range, does not hold if it
+lies outside, and is undecided otherwise. "About" a published figure means from half to twice the figure. All claims are
+undecided if the average precision is below `LEAST_PRECISION`, or if it was still rising when the training ended.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -18,12 +17,12 @@ import numpy as np
 from seip_addon.core.counts import counted
 from seip_addon.core.estimates import ANYTHING, CHANGE_OF_SHARE, COUNT, SHARE, Interval, mean_interval
 
-FACTOR = 2.0  # factor up to which a figure is about another
+FACTOR = 2.0  # largest ratio of two figures that are "about" the same
 MIN_SEEDS = 3  # seeds below which nothing is decided
 LEAST_PRECISION = 0.3  # average precision that the detectors must reach with the best of a claim's placements
 
 PUBLISHED_GAINS = ((0.20, 0.07), (0.10, 0.05))
-"""What the study gained from one to two and from two to four sensors, of the simplest type and the next."""
+"""Published gains from one to two and from two to four sensors, of the simplest type and the next."""
 
 FEW, SOME, MANY = COUNTS
 
@@ -37,18 +36,18 @@ class SeedResult:
     sensor : str
         Catalogue key.
     count : int
-        N, the number of sensors that were allowed.
+        N, the largest number of sensors allowed.
     average_precision : float, 0 to 1
-        Of vehicles at an intersection over union of 0.7 in plan.
+        Average precision for vehicles at an intersection over union of 0.7 in plan.
     price : float, US dollars
     coverage : float, 0 to 1
         Share of targets that the placement sees.
     false_positives : float
-        Per frame, at a score that all results of a training share.
+        False positives per frame, at a score that all results of a training share.
     sparse : float, 0 to 1
-        Share of these where the cloud is sparser than around half of the hits; NaN where there are none.
+        Share of the false positives where the cloud is sparser than around half of the hits; NaN without any.
     padded : bool
-        Whether empty places in pillars were fed to the network as points, and not masked: the ablation of claim 9.
+        Whether empty slots of pillars were fed to the network as points instead of masked: the ablation of claim 9.
     still_rising : bool
         Whether the average precision on validation frames was still rising when the training ended.
     """
@@ -73,7 +72,7 @@ def detection_claims(results: Sequence[SeedResult]) -> tuple[Claim, ...]:
     Parameters
     ----------
     results : sequence of SeedResult
-        Types in the order from the simplest to the best; several seeds of each.
+        Results with several seeds for each type; types in order from the simplest to the best.
     """
     masked = [result for result in results if not result.padded]
     sensors = list(dict.fromkeys(result.sensor for result in masked))
@@ -95,7 +94,7 @@ def _of(results: Sequence[SeedResult], sensor: str) -> list[SeedResult]:
 
 
 def _decided(claim: Claim, results: Sequence[SeedResult]) -> Claim:
-    """Return a claim without its verdict, and with the reason, where the trainings that it goes by say nothing yet."""
+    """Return the claim, or if its trainings are not conclusive, the undecided claim with the reason."""
     doubts = list(_doubts(results))
     if not doubts:
         return claim
@@ -110,7 +109,7 @@ def _doubts(results: Sequence[SeedResult]) -> Iterator[str]:
     if best < LEAST_PRECISION:
         yield (
             f"the detectors reach an AP of {best:.1%} with the best of these placements, and below "
-            f"{LEAST_PRECISION:.0%} they say nothing about sensors"
+            f"{LEAST_PRECISION:.0%} they support no conclusion about sensors"
         )
     trainings = {(one.seed, one.padded) for one in results}
     rising = {(one.seed, one.padded) for one in results if one.still_rising}
@@ -188,7 +187,7 @@ def _padding(results: Sequence[SeedResult]) -> Claim:
 
 @dataclass(frozen=True)
 class _Mean:
-    """The mean over seeds, and its interval where they are enough."""
+    """Mean over seeds; its interval is None with fewer than `MIN_SEEDS`."""
 
     value: float
     seeds: int
@@ -222,7 +221,7 @@ def _mean(of: BySeed, possible: Interval = ANYTHING) -> _Mean:
 
 
 def _by_seed(results: Sequence[SeedResult], sensor: str, count: int, figure: Callable[[SeedResult], float]) -> BySeed:
-    """Return a figure of one cell by seed; a seed for which it is not known is left out."""
+    """Return a figure of one cell by seed, without seeds for which it is NaN."""
     cell = {result.seed: figure(result) for result in results if (result.sensor, result.count) == (sensor, count)}
     return {seed: value for seed, value in cell.items() if not np.isnan(value)}
 
@@ -241,7 +240,7 @@ def _sparse_false_positives(result: SeedResult) -> float:
 
 
 def _per_price(results: Sequence[SeedResult], sensor: str) -> str:
-    """Return the gain for each thousand dollars that the added sensors cost, in words."""
+    """Return the gain for each thousand dollars of price of the added sensors, as a message."""
     price = {count: _mean(_by_seed(results, sensor, count, lambda result: result.price)).value for count in (FEW, MANY)}
     spent = (price[MANY] - price[FEW]) / 1000
     if not spent > 0:

@@ -1,11 +1,11 @@
 """Average precision as the KITTI benchmark computes it (Geiger et al. 2012; 40 points since Simonelli et al. 2019).
 
-It differs from the interpolated average precision that other tools give by the same names. Every road user first takes,
-of the detections that overlap it enough, the one with the best score; the scores so found give at most 41 thresholds,
-each at the score whose recall is nearest to a multiple of 1/40. At every threshold all are matched anew, each road user
-with the detection that overlaps it most. Precision is the best at this threshold or a lower one, and nothing where
-recall does not reach. AP40 leaves out the threshold at recall 0, AP11 takes every fourth. With fewer than 41 road users
-there are fewer thresholds, and even a perfect detector scores less than 1.
+It differs from the interpolated average precision that other tools report under the same names. First, each road user
+is matched with the highest-scoring of the detections that overlap it enough. The scores of these matches give at most
+41 thresholds: the scores at which recall is nearest to multiples of 1/40. At each threshold, detections are matched
+again, each road user with the detection that overlaps it most. The precision at a threshold is the best at this or a
+lower threshold; it is zero at recalls that are not reached. AP40 leaves out the threshold at recall 0, AP11 takes every
+fourth. With fewer than 41 road users there are fewer thresholds, and even a perfect detector scores less than 1.
 """
 
 from collections.abc import Sequence
@@ -31,10 +31,10 @@ class Kitti(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """A frame as this benchmark treats it: k detections in the order given, and which overlap which road user.
+    """A frame prepared for matching: k detections in the given order, and their overlaps with road users.
 
-    ``near`` holds for each road user the detections that overlap it enough, and by how much; ``blamed`` (k,) whether a
-    detection that finds nobody is false; ``counted`` whether the road user counts.
+    ``near`` has the detections that overlap a road user enough, with their overlaps, for each road user; ``blamed``
+    (k,) whether a detection is a false positive if it matches nothing; ``counted`` whether a road user counts.
     """
 
     score: Float
@@ -44,7 +44,7 @@ class _Scene:
 
 
 def kitti(frames: Sequence[FrameResult], rule: Rule) -> Kitti:
-    """Return KITTI's average precisions of the detections of all frames."""
+    """Return the average precisions of the detections of all frames as KITTI computes them."""
     scenes = [_scene(frame, rule) for frame in frames]
     wanted = sum(int(scene.counted.sum()) for scene in scenes)
     thresholds = _thresholds(np.concatenate([_scores_of_hits(scene) for scene in scenes]), wanted)
@@ -52,6 +52,7 @@ def kitti(frames: Sequence[FrameResult], rule: Rule) -> Kitti:
     for place, threshold in enumerate(thresholds):
         hits, false = np.sum([_count(scene, threshold) for scene in scenes], axis=0)
         precision[place] = hits / max(hits + false, 1)
+    # KITTI takes the best precision at this or a larger recall, so that precision never rises with recall.
     precision = np.maximum.accumulate(precision[::-1])[::-1]
     return Kitti(ap40=float(precision[1:].mean()), ap11=float(precision[::4].mean()))
 
@@ -64,7 +65,7 @@ def _scene(frame: FrameResult, rule: Rule) -> _Scene:
 
 
 def _scores_of_hits(scene: _Scene) -> Float:
-    """Return the scores of the detections that road users take when each takes the one with the best score."""
+    """Return the scores of the hits if each road user is matched with its highest-scoring free detection."""
     free = np.ones(len(scene.score), dtype=np.bool_)
     found = []
     for counts, (rows, _) in zip(scene.counted, scene.near, strict=True):
@@ -87,12 +88,12 @@ def _thresholds(scores: Float, wanted: int) -> list[float]:
         here, beyond = (place + 1) / wanted, (place + 2) / wanted
         if is_last or beyond - recall >= recall - here:
             thresholds.append(score)
-            recall += 1 / (RECALL_POINTS - 1)  # summed up as KITTI does, for ties fall by its rounding
+            recall += 1 / (RECALL_POINTS - 1)  # summed as KITTI does: ties depend on its rounding
     return thresholds
 
 
 def _count(scene: _Scene, threshold: float) -> tuple[int, int]:
-    """Return the hits and the false detections among those that reach a threshold."""
+    """Return the numbers of hits and of false detections with at least a threshold score."""
     free = scene.score >= threshold
     hits = 0
     for counts, (rows, overlap) in zip(scene.counted, scene.near, strict=True):

@@ -1,4 +1,4 @@
-"""Placements that `seip place` or the panel wrote, as sensor configurations to be evaluated."""
+"""Placements written by `seip place` or the panel, as sensor configurations for evaluation."""
 
 from collections.abc import Generator, Sequence
 from pathlib import Path
@@ -26,7 +26,7 @@ def records_in(folders: Sequence[Path]) -> dict[str, PlacementRecord]:
     Raises
     ------
     SeipError
-        A folder holds no placement, or one without sensors, or has the name of another.
+        A folder has no placement, a placement without sensors, or the same name as another folder.
     """
     records: dict[str, PlacementRecord] = {}
     for folder in folders:
@@ -35,7 +35,7 @@ def records_in(folders: Sequence[Path]) -> dict[str, PlacementRecord]:
             raise SeipError(f"two placements are called {name!r}, after their folders: rename one of the folders")
         record = load_placement_record(folder / FILE)
         if not record.sensors:
-            raise SeipError(f"the placement in {folder} has no sensors: there is nothing to evaluate, so place some")
+            raise SeipError(f"the placement in {folder} has no sensors: optimise a placement with `seip place` first")
         records[name] = record
     return records
 
@@ -43,9 +43,9 @@ def records_in(folders: Sequence[Path]) -> dict[str, PlacementRecord]:
 def read_placements(
     survey: Survey, records: dict[str, PlacementRecord]
 ) -> Generator[Progress, None, tuple[SensorConfiguration, ...]]:
-    """Return placements of the surveyed scene, with what their sensors see of its targets.
+    """Return placements of the surveyed scene, with the visibility of its targets.
 
-    The sensors may be of any types and hang anywhere. The survey's weather applies to them.
+    The sensors may be of any types and mounted anywhere. The survey's weather applies to them.
 
     Raises
     ------

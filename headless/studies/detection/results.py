@@ -49,7 +49,7 @@ _NO_ENDS = (math.nan, math.nan)
 
 @dataclass(frozen=True, eq=False)
 class StudyResults:
-    """All that was found on one site; models and the curves of their trainings in the same order."""
+    """Results of the study on one site; models and their learning curves are in the same order."""
 
     name: str
     simulator: Simulator
@@ -60,7 +60,7 @@ class StudyResults:
 
     @property
     def seed_results(self) -> list[SeedResult]:
-        """The figures of all numbers of sensors of a type, with how their trainings went."""
+        """Figures of all types and numbers of sensors, each with whether its training was still improving."""
         rising = {model.name: curve.still_rises for model, curve in zip(self.models, self.curves, strict=True)}
         return [
             replace(one.seed_result, still_rising=rising[one.model.name])
@@ -70,12 +70,12 @@ class StudyResults:
 
     @property
     def masked(self) -> list[DetectorOutcome]:
-        """Those without the ablation."""
+        """Outcomes without the ablation."""
         return [outcome for outcome in self.outcomes if not outcome.model.network.padded]
 
     @property
     def first(self) -> list[DetectorOutcome]:
-        """Those of one training for each configuration, to be shown where only one can be."""
+        """Outcomes of the first training for each configuration, for charts that show only one."""
         found: dict[str, DetectorOutcome] = {}
         for outcome in self.masked:
             found.setdefault(outcome.configuration.name, outcome)
@@ -106,7 +106,7 @@ def save_charts(folder: Path, results: StudyResults, trained: Sequence[TrainedDe
 
 
 def _parts(outcomes: Sequence[DetectorOutcome]) -> list[BinnedFigure]:
-    """Return the panels of where road users are found and where detections are false."""
+    """Return the panels of detected road users and false detections by distance, returns, visibility and density."""
 
     def panel(what: str, figure: str, bins: Callable[[DetectorOutcome], Sequence[Bin]]) -> BinnedFigure:
         return parts(what, figure, {one.configuration.name: bins(one) for one in outcomes})
@@ -136,7 +136,7 @@ def _parts(outcomes: Sequence[DetectorOutcome]) -> list[BinnedFigure]:
 
 
 def _save_errors(path: Path, results: StudyResults, outcomes: Sequence[DetectorOutcome]) -> None:
-    """Draw the test frame with the most road users as each of some configurations sees it."""
+    """Draw the test frame with the most road users, with the detections of each configuration."""
     run = results.traffic.test[0]
     inside = [int(frame.truth.inside.sum()) for frame in outcomes[0].frames[: len(run.times)]]
     number = int(np.argmax(inside))
@@ -238,7 +238,7 @@ def save_record(
 
 
 def in_words(results: StudyResults) -> Iterator[str]:
-    """Yield a line for each configuration, and one on whether coverage foretells detection."""
+    """Yield lines for each configuration, and one on the correlation of coverage and average precision."""
     for cell in cells([outcome.seed_result for outcome in results.masked]):
         yield (
             f"{cell.name}: AP {cell.mean:.1%}{_between(cell.interval)} of vehicles at an overlap of 0.7 in plan, "
@@ -247,12 +247,12 @@ def in_words(results: StudyResults) -> Iterator[str]:
         yield f"  {_by_rules(results, cell.name)}"
     correlation, interval = results.correlation
     between = "" if interval is None else f" ({interval[0]:.2f} to {interval[1]:.2f})"
-    found = f"{correlation:.2f}{between}" if math.isfinite(correlation) else "none, where all have the same"
+    found = f"{correlation:.2f}{between}" if math.isfinite(correlation) else "undefined, as all values are equal"
     yield f"rank correlation of coverage and AP: {found}"
 
 
 def _by_rules(results: StudyResults, name: str) -> str:
-    """Return the average precision of one configuration by the other rules, the mean over trainings, in words."""
+    """Return the average precision of one configuration by the other rules, averaged over trainings, as a message."""
     tables = [one.precisions for one in results.masked if one.configuration.name == name]
     words = []
     for rule in RULES:

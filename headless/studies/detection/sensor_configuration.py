@@ -1,4 +1,4 @@
-"""Sensor configuration of a study: a placement with the type and number that charts and tables group it under."""
+"""Sensor configuration of a study: a placement with the type and number by which charts and tables group it."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from seip_addon.core.sensing.scans.sensor import MountedSensor
 
 @dataclass(frozen=True, eq=False)
 class SensorConfiguration(MountedSensors):
-    """Sensors of a placement, however it came about.
+    """Sensors of a placement, optimised by the study or read from a folder.
 
     Parameters
     ----------
     sensors : tuple of MountedSensor
-        Those of the deployment.
+        Sensors of the deployment.
     sensor : str
-        What charts and tables group it under: the type, or the name of a placement that was read.
+        Group in charts and tables: the type, or the name of a placement that was read.
     count : int
-        N, the number of sensors asked for.
+        N, the requested number of sensors.
     status : str
-        As in `Placement`.
+        Status as in `Placement`.
     gap : float
-        Infinite where nothing bounds it.
+        Optimality gap; infinite without a bound.
     read : bool
-        Whether it was read from a folder; it is no number of sensors of a type then.
+        Whether it was read from a folder; such a placement may mix types.
     """
 
     sensors: tuple[MountedSensor, ...] = field(init=False)
@@ -44,6 +44,6 @@ class SensorConfiguration(MountedSensors):
 
     @classmethod
     def of_case(cls, case: Case) -> SensorConfiguration:
-        """Return a number of sensors of one type, placed where they cover most."""
+        """Return the configuration of a solved cell: sensors of one type with the largest coverage."""
         name = f"{case.count} × {case.sensor}"
         return cls(name, case.deployment, case.sensor, case.count, case.placement.status, case.placement.gap)

@@ -43,15 +43,15 @@ def detector_limits(
     Parameters
     ----------
     scene : path or None
-        Its file; its runs of traffic stand beside it, and denser ones too, if there are any.
+        File of the scene; its runs of traffic are next to it, and optionally runs of denser traffic.
     others : sequence of path
-        Other scenes with traffic beside them, to try the detectors on.
+        Other scenes with traffic next to them, to test the detectors on.
     folder : path
-        Of the detectors and of all that was tried: an interrupted study goes on from there.
+        Folder of detectors and trials; an interrupted study resumes from it.
     seeds : int
-        How many detectors are alike but for their seeds.
+        Number of detectors that differ only in their seeds.
     steps : int
-        Of each training.
+        Steps of each training.
 
     Yields
     ------
@@ -66,29 +66,31 @@ def detector_limits(
     traffic = case_study.read_traffic(survey.runs_beside(scene), origin, TRAINING_INTERVAL)
     configurations = yield from case_study.place_all(surveyed)
     simulator = _studio(surveyed)
-    asked = training_plan(configurations, network, TrainingSettings(steps=steps), seeds=seeds, padding=True)
-    trained = yield from _trained(asked, simulator, configurations, traffic, folder)
+    plan = training_plan(configurations, network, TrainingSettings(steps=steps), seeds=seeds, padding=True)
+    trained = yield from _trained(plan, simulator, configurations, traffic, folder)
     shipped = EvaluatedDetector("shipped", Detector.load(SHIPPED_DETECTOR))
-    candidates = asked.candidates([one.detector for one in trained], shipped=(shipped,))
+    candidates = plan.candidates([one.detector for one in trained], shipped=(shipped,))
 
     main = _most(configurations)
     home = TrialSite(simulator.site, simulator, traffic.test)
     practice = TrialSite(simulator.site, simulator, traffic.validation)
-    (tried,) = yield from trials(practice, main, Disturbance(), candidates.tested[:1], folder)
-    elsewhere = []
+    (validated,) = yield from trials(practice, main, Disturbance(), candidates.tested[:1], folder)
+    other_sites = []
     dense = sampled_runs(survey.runs_beside(scene, "_dense"), origin, TEST_INTERVAL)
     if dense:
-        elsewhere.append(OtherSite(TrialSite("denser traffic", simulator, dense), (main,)))
+        other_sites.append(OtherSite(TrialSite("denser traffic", simulator, dense), (main,)))
     for other in others:
         there = yield from _on_other_scene(other, surveyed, main, folder)
-        elsewhere.append(there)
+        other_sites.append(there)
     return (
-        yield from limits_study(home, [main], candidates, elsewhere, folder, score=balanced_score(tried.evaluation))
+        yield from limits_study(
+            home, [main], candidates, other_sites, folder, score=balanced_score(validated.evaluation)
+        )
     )
 
 
 def _trained(
-    asked: TrainingPlan,
+    plan: TrainingPlan,
     simulator: Simulator,
     configurations: Sequence[SensorConfiguration],
     traffic: case_study.Traffic,
@@ -96,13 +98,13 @@ def _trained(
 ) -> Generator[Progress, None, list[TrainedDetector]]:
     network = NetworkSettings()
     training_set = yield from case_study.simulate_training_set(simulator, configurations, traffic, network)
-    return (yield from case_study.train_all(asked.models, training_set, folder, device="cpu"))
+    return (yield from case_study.train_all(plan.models, training_set, folder, device="cpu"))
 
 
 def _on_other_scene(
     scene: Path, surveyed: Survey, main: SensorConfiguration, folder: Path
 ) -> Generator[Progress, None, OtherSite]:
-    """Place as many sensors of the same type there."""
+    """Place the largest number of sensors of the same type on another scene, and read its runs of traffic."""
     settings = surveyed.settings
     runtime.open_scene(scene)
     reading = read_scene(bpy.context.scene)
@@ -118,7 +120,10 @@ def _studio(layout: Layout) -> Simulator:
 
 
 def _most(configurations: Sequence[SensorConfiguration]) -> SensorConfiguration:
-    """Return the most sensors of the type in the middle: those that have something to lose, and to be lost."""
+    """Return the configuration with the most sensors of the middle type.
+
+    Its average precision is high enough to fall, and it has several sensors, of which one can fail.
+    """
     types = list(dict.fromkeys(one.sensor for one in configurations))
     own = [one for one in configurations if one.sensor == types[len(types) // 2]]
     return max(own, key=lambda one: one.count)

@@ -23,9 +23,9 @@ PANEL_SIZE = (3.6, 3.0)  # inches
 
 
 def save_limits_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None:
-    """Draw average precision against the size of each disturbance, with intervals; dashed: where it begins to harm."""
+    """Draw average precision against the size of each disturbance, with intervals; dashed: least harmful size."""
     if not study.curves:
-        raise SeipError("there is no disturbance to draw: try some first")
+        raise SeipError("the study has no disturbances to draw: evaluate some first")
     names = list(dict.fromkeys(curve.name for curve in study.curves))
     rows = -(-len(names) // COLUMNS)
     size = (PANEL_SIZE[0] * min(COLUMNS, len(names)), PANEL_SIZE[1] * rows + 0.7)
@@ -37,15 +37,15 @@ def save_limits_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None:
         _draw(panel, own, [configurations.index(curve.configuration) for curve in own])
     for panel in panels[len(names) :]:
         panel.set_axis_off()
-    title = f"{study.name}: average precision under disturbances (dashed: from here on it is lower than by chance)"
+    title = f"{study.name}: average precision under disturbances (dashed: significantly lower from here on)"
     save_chart(path, figure, title, panels[:1])
 
 
 def save_transfer_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None:
-    """Draw by how much average precision differs where detectors are used beyond what they have learnt."""
+    """Draw the change of average precision of detectors used on other types, traffic and sites than in training."""
     changes = (*study.transfers, *study.padding)
     if not changes:
-        raise SeipError("there is nothing foreign to draw: try detectors elsewhere first")
+        raise SeipError("the study has no results on other types, traffic or sites to draw: evaluate some first")
     figure, (panel,) = new_figure(9.0, 1.2 + 0.42 * len(changes), dpi=150)
     for row, one in enumerate(changes):
         low, high = one.change.low * 100, one.change.high * 100
@@ -55,7 +55,7 @@ def save_transfer_chart(path: str | os.PathLike[str], study: LimitsStudy) -> Non
     panel.set_yticks(range(len(changes)), [_in_words(one) for one in changes], fontsize=8.5, parse_math=False)
     panel.invert_yaxis()
     style_axes(panel, "change of average precision (points)")
-    save_chart(path, figure, f"{study.name}: beyond what was learnt")
+    save_chart(path, figure, f"{study.name}: types, traffic and sites not in training")
 
 
 def _in_words(one: TransferResult) -> str:
@@ -63,7 +63,7 @@ def _in_words(one: TransferResult) -> str:
 
 
 def _draw(panel: Axes, curves: Sequence[DisturbanceCurve], rows: Sequence[int]) -> None:
-    """Draw the lines of one disturbance; sizes stand as far from each other whatever they are."""
+    """Draw the lines of one disturbance; sizes are equally spaced along the axis."""
     falling = isinstance(curves[0].points[0].disturbance, CappedPillars)  # the fewer points, the worse
     sizes = sorted({point.disturbance.size for curve in curves for point in curve.points}, reverse=falling)
     for curve, row in zip(curves, rows, strict=True):
@@ -74,7 +74,7 @@ def _draw(panel: Axes, curves: Sequence[DisturbanceCurve], rows: Sequence[int]) 
         reach = np.nan_to_num(np.abs(ends - value), posinf=0.0)
         each = isinstance(
             curve.points[0].disturbance, SensorFailure
-        )  # sensors in turn, none of which is more than another
+        )  # sizes are numbers of sensors, which have no order
         style = {"color": colour(row), "marker": mark(row), "markersize": 5}
         style["linestyle"] = "none" if each else "-"
         panel.errorbar(at, value, reach, label=curve.configuration, capsize=2.5, linewidth=1.2, **style)  # type: ignore[arg-type]  # colours and marks are text, sizes are not

@@ -1,10 +1,9 @@
 """Disturbances of measurements (noise, loss, rain, pose and clock errors), each with a size.
 
-A disturbance changes what hangs there, who is on the road, how a frame is
-taken, what a frame shows, or how a detector looks at it, and leaves the rest as
-it is. At size 0 nothing changes, bit for bit. Whatever is random follows from
-the frame's number and a seed; a larger loss takes what a smaller one takes, and
-more.
+A disturbance changes the sensors, the traffic, the scan of a frame, its points,
+or the detector, and nothing else. At size 0 nothing changes, bit for bit.
+Random draws depend only on the frame's number and a seed. A larger loss removes
+everything that a smaller one removes.
 """
 
 from __future__ import annotations
@@ -28,23 +27,23 @@ from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.sensing.traffic.varied_bodies import resized
 
 ERROR_AXIS = np.array([1.0, 1.0, 0.0]) / math.sqrt(2)
-"""Unit vector of position and tilt errors, along no street."""
+"""Unit vector of position and tilt errors, diagonal in plan, along no street."""
 
 DROP_RANGE = 10.0
-"""Metres from a sensor within which a raindrop may cause a return."""
+"""Largest distance of a raindrop that causes a return from the sensor, metres."""
 
 DROP_INTENSITY = 0.05
-"""Intensity of a drop's return: at the dark end of what surfaces return."""
+"""Intensity of a drop's return: at the dark end of the range of surfaces."""
 
 
 @dataclass(frozen=True)
 class Disturbance:
-    """Base class of disturbances, without any: each overrides one of these methods.
+    """Base class of disturbances, without effect; subclasses override one of the methods.
 
     Parameters
     ----------
     size : float
-        In `unit`.
+        Size in `unit`.
     """
 
     size: float = 0.0
@@ -63,7 +62,7 @@ class Disturbance:
         """Return a frame of a disturbed scan."""
         return simulation.frame(number, time)
 
-    def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # for those who override it
+    def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # for overriding methods
         """Return the disturbed frame."""
         return frame
 
@@ -74,7 +73,7 @@ class Disturbance:
 
 @dataclass(frozen=True)
 class RangeNoise(Disturbance):
-    """Ranges are noisier: normally distributed errors of this standard deviation on top of the sensor's own."""
+    """Additional range noise: normally distributed errors of this standard deviation on top of the sensor's own."""
 
     name: ClassVar[str] = "more range noise"
     unit: ClassVar[str] = "m"
@@ -90,7 +89,7 @@ class RangeNoise(Disturbance):
 
 @dataclass(frozen=True)
 class DropOff(Disturbance):
-    """A share of the returns is lost, whatever they are."""
+    """Loss of a share of all returns, independent of surface and range."""
 
     name: ClassVar[str] = "returns lost"
     unit: ClassVar[str] = "of the returns"
@@ -106,28 +105,29 @@ class DropOff(Disturbance):
 
 @dataclass(frozen=True)
 class Rain(Disturbance):
-    r"""Rain or fog of some extinction coefficient α, in 1/km.
+    r"""Rain or fog with an extinction coefficient α, in 1/km.
 
     Light is lost on the way there and back (Beer and Lambert): the LiDAR
     equation, :math:`P \propto e^{-2αr} / r^2`, as for example in C. Goodin, D.
     Carruth, M. Doude, C. Hudson: Predicting the influence of rain on LIDAR in
-    ADAS. Electronics 8 (2019), 89. So returns are darker, and the range is
-    shorter, at which they are as strong as from the sensor's range in clear air.
+    ADAS. Electronics 8 (2019), 89. So returns are darker, and the maximum range
+    is reduced to the range at which returns are as strong as at the sensor's
+    maximum range in clear air.
 
-    Of the rays as many as a share :math:`1 - e^{-α · 10 m}` return from a drop
-    near the sensor instead of what they would have met: all light that drops
-    scatter there counts as seen, which is the worst case.
+    A share :math:`1 - e^{-α · 10 m}` of the rays return from a drop near the
+    sensor instead of the surface behind it. This assumes that all light
+    scattered by drops there causes returns, which is the worst case.
 
     Rain of R mm/h has α = 0.248 R^0.67 per km (1.076 R^0.67 dB/km, Carbonneau
-    and Wisely 1998, in ITU-R P.1814): 2.1 at 25 mm/h, 5.4 at 100 mm/h. Beyond
-    that it is fog, in which a person sees 3/α far (WMO: meteorological optical range).
+    and Wisely 1998, in ITU-R P.1814): 2.1 at 25 mm/h, 5.4 at 100 mm/h. Larger
+    values are fog, with a visibility of 3/α (WMO: meteorological optical range).
     """
 
     name: ClassVar[str] = "rain or fog"
     unit: ClassVar[str] = "extinction per km"
 
     def disturbed_sensors(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
-        """Return the sensors with what the air between takes from them."""
+        """Return the sensors with the extinction of the air."""
 
         def dimmed(model: LidarModel) -> LidarModel:
             lost = 2 * self.size / 1000.0
@@ -136,7 +136,7 @@ class Rain(Disturbance):
         return _with_models(sensors, dimmed)
 
     def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:
-        """Return the frame with drops where rays ended on them."""
+        """Return the frame with the returns of some rays replaced by those of drops."""
         wet = random.random(len(frame)) < -math.expm1(-self.size / 1000.0 * DROP_RANGE)
         near = random.random(len(frame))
         places = np.array([sensor.xyz for sensor in sensors])[frame.sensor]
@@ -154,9 +154,9 @@ class Rain(Disturbance):
 
 
 def range_in(clear: float, lost: float) -> float:
-    """Return the range (metres) in air that takes ``lost`` per metre there and back, from that in clear air.
+    """Return the range in metres in air with a two-way extinction of ``lost`` per metre, from that in clear air.
 
-    It solves exp(−lost · r) / r² = 1 / clear² by halving: the left side falls with r.
+    It solves exp(−lost · r) / r² = 1 / clear² by bisection: the left side falls with r.
     """
     low, high = 0.0, clear
     if lost == 0.0:
@@ -177,7 +177,7 @@ class OfOneSensor(Disturbance):
     Parameters
     ----------
     sensor : int
-        Its number in the placement, from 0.
+        Number of the sensor in the placement, from 0.
     """
 
     sensor: int = 0
@@ -185,7 +185,7 @@ class OfOneSensor(Disturbance):
 
 @dataclass(frozen=True)
 class PositionError(OfOneSensor):
-    """A sensor is not where it is believed to be: its points lie beside what they are of, along `ERROR_AXIS`."""
+    """Error of a sensor's assumed position: its points are shifted along `ERROR_AXIS`."""
 
     name: ClassVar[str] = "sensor misplaced"
     unit: ClassVar[str] = "m"
@@ -197,31 +197,31 @@ class PositionError(OfOneSensor):
 
 @dataclass(frozen=True)
 class YawError(OfOneSensor):
-    """A sensor's yaw is not what it is believed to be, in degrees."""
+    """Error of a sensor's assumed yaw, in degrees."""
 
     name: ClassVar[str] = "yaw wrong"
     unit: ClassVar[str] = "°"
 
     def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
-        """Return the frame with this sensor's points turned about its own place."""
+        """Return the frame with this sensor's points rotated about its position."""
         return _rotated(frame, self, sensors, np.array([0.0, 0.0, 1.0]))
 
 
 @dataclass(frozen=True)
 class TiltError(OfOneSensor):
-    """A sensor leans where it is believed to be upright, in degrees about `ERROR_AXIS`."""
+    """Error of a sensor's assumed tilt, in degrees about `ERROR_AXIS`."""
 
     name: ClassVar[str] = "tilt wrong"
     unit: ClassVar[str] = "°"
 
     def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
-        """Return the frame with this sensor's points turned about its own place."""
+        """Return the frame with this sensor's points rotated about its position."""
         return _rotated(frame, self, sensors, ERROR_AXIS)
 
 
 @dataclass(frozen=True)
 class ClockOffset(OfOneSensor):
-    """A sensor's clock is late: its points were measured so many seconds ago."""
+    """Late clock of a sensor: its points were measured `size` seconds earlier."""
 
     name: ClassVar[str] = "clock late"
     unit: ClassVar[str] = "s"
@@ -234,14 +234,14 @@ class ClockOffset(OfOneSensor):
 
 @dataclass(frozen=True)
 class SensorFailure(OfOneSensor):
-    """A sensor returns nothing. Its number is the size, so that each in turn makes a series; they count from 1."""
+    """Failure of a sensor. Its number, from 1, is the size, so that the failures of all sensors make a series."""
 
     name: ClassVar[str] = "sensor lost"
     unit: ClassVar[str] = "number of the sensor"
 
     @classmethod
     def each(cls, sensor: int) -> SensorFailure:
-        """Return the loss of a sensor by its number from 0."""
+        """Return the failure of the sensor with this number, from 0."""
         return cls(sensor + 1.0, sensor)
 
     def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
@@ -251,14 +251,14 @@ class SensorFailure(OfOneSensor):
 
 @dataclass(frozen=True)
 class Thinned(Disturbance):
-    """A share of the road users is left out."""
+    """Traffic without a share of the road users."""
 
     seed: int = 0
     name: ClassVar[str] = "thinner traffic"
     unit: ClassVar[str] = "of the road users missing"
 
     def disturbed_traffic(self, trajectories: Trajectories) -> Trajectories:
-        """Return the motion of the others."""
+        """Return the motion of the remaining road users."""
         stays = np.random.default_rng(self.seed).random(len(trajectories)) >= self.size
         counts = np.diff(trajectories.first)
         samples = np.repeat(stays, counts)
@@ -272,26 +272,26 @@ class Thinned(Disturbance):
 
 @dataclass(frozen=True)
 class OtherSizes(Disturbance):
-    """Every dimension of every road user is another, by a share of its own up to this, and its clouds with it."""
+    """Changed dimensions of all road users, each by a random relative change up to this size."""
 
     seed: int = 0
     name: ClassVar[str] = "other sizes"
     unit: ClassVar[str] = "of each dimension at most"
 
     def disturbed_traffic(self, trajectories: Trajectories) -> Trajectories:
-        """Return the same motion of road users of other sizes."""
+        """Return the same motion with changed sizes of the road users."""
         return finish(resized(trajectories, self.size, self.seed))
 
 
 @dataclass(frozen=True)
 class CappedPillars(Disturbance):
-    """Pillars keep fewer points than they were learnt with; the size is how many they keep, 0 for no other cap."""
+    """Pillars with fewer points than in training; the size is the largest number of points, 0 for no change."""
 
     name: ClassVar[str] = "fuller pillars cut"
     unit: ClassVar[str] = "points that a pillar keeps"
 
     def disturbed_detector(self, detector: Detector) -> Detector:
-        """Return the detector with smaller pillars."""
+        """Return the detector with the smaller limit of points in a pillar."""
         return keeping_at_most(detector, round(self.size)) if self.size else detector
 
 
@@ -308,7 +308,7 @@ def _rotated(frame: Frame, wrong: OfOneSensor, sensors: Sequence[MountedSensor],
 
 
 def _rotation(axis: Float, angle: float) -> Float:
-    """Return the matrix of a turn about a unit vector (Rodrigues)."""
+    """Return the matrix of a rotation about a unit vector (Rodrigues' formula)."""
     x, y, z = axis
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     turn: Float = np.eye(3) + math.sin(angle) * across + (1 - math.cos(angle)) * across @ across
@@ -331,7 +331,7 @@ def _some(frame: Frame, kept: Boolean) -> Frame:
 
 
 def _merged(one: Frame, of_one: Boolean, other: Frame, of_other: Boolean) -> Frame:
-    """Return some points of two frames, sensor after sensor, with the road users of the first."""
+    """Return selected points of two frames, ordered by sensor, with the road users of the first."""
     kept = [_some(one, of_one), _some(other, of_other)]
     sensor = np.concatenate([part.sensor for part in kept])
     order = np.argsort(sensor, kind="stable")
@@ -340,7 +340,7 @@ def _merged(one: Frame, of_one: Boolean, other: Frame, of_other: Boolean) -> Fra
 
 
 def _recounted(frame: Frame) -> Frame:
-    """Return the frame with the labels' returns counted anew."""
+    """Return the frame with updated numbers of returns in its labels."""
     labels = frame.labels
     most = max(int(labels.user.max(initial=0)), int(frame.instance.max(initial=0))) + 1
     on_users = frame.instance != STATIC_INSTANCE

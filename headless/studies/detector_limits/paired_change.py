@@ -23,9 +23,9 @@ from seip_addon.core.estimates import (
 
 
 class ResampledPrecision:
-    """One detector's average precision on some frames, and on those of all runs but one.
+    """Average precision of one detector, with the values without each run of traffic (jackknife).
 
-    What is compared pair by pair has the same frames, and so leaves out the same runs.
+    Paired results are from the same frames, and so leave out the same runs.
     """
 
     def __init__(self, evaluation: Evaluation) -> None:
@@ -35,7 +35,7 @@ class ResampledPrecision:
 
 
 def level(those: Sequence[ResampledPrecision]) -> IntervalEstimate:
-    """Return the mean average precision of detectors that differ in their seeds alone."""
+    """Return the mean average precision of detectors that differ only in their seeds."""
     values = [one.value for one in those]
     left_out = _without_each_run(those)
     if left_out is None:
@@ -47,16 +47,16 @@ def level(those: Sequence[ResampledPrecision]) -> IntervalEstimate:
 def change(
     to: Sequence[ResampledPrecision], of: Sequence[ResampledPrecision], *, same_traffic: bool = True
 ) -> IntervalEstimate:
-    """Return by how much the mean average precision changes from one trial to another of the same detectors.
+    """Return the change of mean average precision between two trials of the same detectors.
 
-    Differences are taken detector by detector and, of the same traffic, run by
-    run: what makes traffic hard makes it hard for both. So a change can be told
-    that is far smaller than the interval of either average precision.
+    Differences are taken for each detector and, with the same traffic, for each
+    run: difficult traffic is difficult in both trials. So a change can be
+    significant that is far smaller than the interval of either average precision.
 
     Parameters
     ----------
     to, of : sequence of ResampledPrecision
-        In the same order of detectors.
+        Results after and before the change, with detectors in the same order.
     same_traffic : bool
         Whether both had the same frames.
     """
@@ -74,7 +74,7 @@ def change(
 
 
 def _without_each_run(those: Sequence[ResampledPrecision]) -> Float | None:
-    """Return the mean average precision of detectors without each run (r,), or None on too few runs."""
+    """Return the mean average precision of detectors without each run (r,), or None with too few runs."""
     known = [one.left_out for one in those if one.left_out is not None]
     if len(known) < len(those):
         return None
@@ -83,17 +83,17 @@ def _without_each_run(those: Sequence[ResampledPrecision]) -> Float | None:
 
 
 def _open(values: Sequence[float]) -> IntervalEstimate:
-    """Return the mean of detectors whose traffic is too little for an interval."""
+    """Return the mean over detectors with an infinite interval, for too little traffic."""
     return IntervalEstimate(float(np.mean(values)), -math.inf, math.inf)
 
 
 def _with_trainings(values: Sequence[float], over_traffic: Interval, possible: Interval) -> IntervalEstimate:
-    """Return the mean over detectors; its 95 % interval is over other traffic and over other trainings.
+    """Return the mean over detectors with its 95 % interval over traffic and trainings.
 
-    Over trainings it is Student's. Of two independent errors the distances from
-    the value to the ends add up as squares (G. Y. Zou, A. Donner: Construction
-    of confidence limits about effect measures. Statistics in Medicine 27
-    (2008), 1693-1702).
+    The interval over trainings is Student's. For two independent errors, the
+    distances from the value to the ends of the intervals add in quadrature
+    (G. Y. Zou, A. Donner: Construction of confidence limits about effect
+    measures. Statistics in Medicine 27 (2008), 1693-1702).
     """
     value, (low, high) = float(np.mean(values)), over_traffic
     reach = student_reach(values) if len(values) > 1 else 0.0

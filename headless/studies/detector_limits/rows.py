@@ -39,11 +39,13 @@ from .study import (
 
 METHOD = "detector"
 
-_CATALOGUE = "the catalogue's {} is what scans and trainings go by: give your sensor's own, and evaluate again"
-_CALIBRATION = "one cloud does not tell: calibrate each sensor to better than that, and again after work on its pole"
+_CATALOGUE = "scans and trainings use {} of the catalogue: enter the value of your sensor and evaluate again"
+_CALIBRATION = (
+    "a single cloud does not show it: calibrate each sensor to better than that, and again after work on its pole"
+)
 _RAIN = (
-    "nothing notices: drops near the sensors harm first, not the light lost, so have the sensors filter them; for the "
-    "light evaluate again with --weather, which placements, scans and trainings then go by"
+    "not detected: returns from drops near the sensors harm before the loss of light does, so let the sensors filter "
+    "them; for the loss of light, evaluate again with --weather, which placements, scans and trainings then use"
 )
 REMEDIES: Mapping[str, str] = {
     RangeNoise.name: _CATALOGUE.format("range_noise_std_m"),
@@ -52,16 +54,16 @@ REMEDIES: Mapping[str, str] = {
     PositionError.name: _CALIBRATION,
     YawError.name: _CALIBRATION,
     TiltError.name: _CALIBRATION,
-    ClockOffset.name: "one cloud does not tell: synchronise the sensors' clocks to better than that",
+    ClockOffset.name: "a single cloud does not show it: synchronise the sensors' clocks to better than that",
     SensorFailure.name: "`seip place --failures mean` optimises for the loss of any one sensor",
-    OtherSizes.name: "bodies of training that vary: seip_addon.core.sensing.traffic.varied_bodies",
-    Thinned.name: "nothing: thinner traffic hides less",
-    CappedPillars.name: f"a warning where more than {MAX_OVERFULL_SHARE:.0%} of the pillars with points are over-full",
+    OtherSizes.name: "training with varied bodies: seip_addon.core.sensing.traffic.varied_bodies",
+    Thinned.name: "none needed: thinner traffic hides less",
+    CappedPillars.name: f"a warning if more than {MAX_OVERFULL_SHARE:.0%} of the pillars with points are over-full",
 }
 
 
 def limit_rows(study: LimitsStudy) -> tuple[Row, ...]:
-    """Return the rows: trainings, disturbances, the foreign, the region's borders, pillars, and padding."""
+    """Return the rows: seeds, disturbances, other types and sites, the region's borders, pillars, and padding."""
     return (
         _of_spreads(study.spreads),
         *(_of_curve(curve, study) for curve in study.curves),
@@ -73,7 +75,7 @@ def limit_rows(study: LimitsStudy) -> tuple[Row, ...]:
 
 
 def points_in_words(change: IntervalEstimate) -> str:
-    """Return a change of average precision with its interval, in points: hundredths of it."""
+    """Return a change of average precision with its interval in percentage points, as a message."""
     value, low, high = (100 * end for end in (change.value, change.low, change.high))
     return f"{value:+.1f} points [{low:+.1f}, {high:+.1f}]"
 
@@ -87,8 +89,8 @@ def _of_spreads(spreads: Sequence[SeedSpread]) -> Row:
         METHOD,
         "seeds of the training",
         "; ".join(each),
-        f"{len(spreads[0].values)} trainings that differ in their seeds alone, the same test frames",
-        "seip study detection trains with several seeds and gives the interval over them",
+        f"{len(spreads[0].values)} trainings that differ only in their seeds, the same test frames",
+        "`seip study detection` trains with several seeds and gives the interval over them",
     )
 
 
@@ -115,7 +117,7 @@ def _begins(curve: DisturbanceCurve) -> str:
     words = f"at {_size(begins)}: {points_in_words(begins.change)} on {curve.undisturbed.value:.1%}"
     milder = curve.points[: curve.points.index(begins)]
     if milder:
-        words += f"; at {_size(milder[-1])} not told from chance, {points_in_words(milder[-1].change)}"
+        words += f"; at {_size(milder[-1])} not significant, {points_in_words(milder[-1].change)}"
     if last is not begins:
         words += f"; at {_size(last)} {points_in_words(last.change)}"
     return words
@@ -135,11 +137,11 @@ def _each_loss(curve: DisturbanceCurve) -> str:
 def _transfer_row(one: TransferResult) -> Row:
     return Row(
         METHOD,
-        f"learnt from {one.trained_on}, used on {one.tested_on}",
+        f"trained on {one.trained_on}, used on {one.tested_on}",
         f"{points_in_words(one.change)} against {one.against}: {one.precision.describe(1)}",
-        "the same frames, paired" if one.against != AT_HOME else "other frames: compared as a whole",
-        "a detector's file says of which sensor types and sites it has learnt; on other types, or away from its only "
-        "site, a warning says so",
+        "the same frames, paired" if one.against != AT_HOME else "different frames: not paired",
+        "a detector's file names the sensor types and sites of its training; other types, or another site than the "
+        "only one of the training, cause a warning",
     )
 
 
@@ -151,7 +153,7 @@ def _of_borders(borders: BorderResults) -> Iterator[Row]:
         "few returns from a road user",
         _below_half(recall["points"], "returns"),
         how,
-        "ap_bev_0.7_from_5_points beside the average precision of all; charts by returns",
+        "ap_bev_0.7_from_5_points next to the average precision of all; charts by returns",
     )
     for quantity, what in (("sensor", "from the nearest sensor"), ("border", "from the border of the region")):
         yield Row(
@@ -160,24 +162,24 @@ def _of_borders(borders: BorderResults) -> Iterator[Row]:
             f"recall {_bins(recall[quantity], lambda value: f'{value:.0%}')}; false positives per frame "
             + _bins(borders.false[quantity], lambda value: f"{value:.2f}", recall[quantity]),
             how,
-            "charts by distance; a region as large as what sensors are to watch, not as what is drawn",
+            "charts by distance; a region of interest that covers the area to be watched, not the whole drawing",
         )
 
 
 def _below_half(bins: Sequence[Bin], what: str) -> str:
-    """Return the bins in which fewer than half are found, as a message."""
+    """Return the bins in which fewer than half of the road users are found, as a message."""
     known = [one for one in bins if one.wanted]
     fails = [one for one in known if one.value < 0.5]
     words = _bins(known, lambda value: f"{value:.0%}")
     return f"fewer than half found below {fails[-1].high:g} {what}: {words}" if fails else f"nowhere: {words}"
 
 
-def _bins(bins: Sequence[Bin], in_words: Callable[[float], str], like: Sequence[Bin] | None = None) -> str:
-    wanted = [one.wanted for one in like or bins]
+def _bins(bins: Sequence[Bin], formatted: Callable[[float], str], like: Sequence[Bin] | None = None) -> str:
+    road_users = [one.wanted for one in like or bins]
     return ", ".join(
-        f"{in_words(one.value)} ({one.low:g} to {one.high:g})"
-        for one, there in zip(bins, wanted, strict=True)
-        if there and np.isfinite(one.value)
+        f"{formatted(one.value)} ({one.low:g} to {one.high:g})"
+        for one, count in zip(bins, road_users, strict=True)
+        if count and np.isfinite(one.value)
     )
 
 
@@ -193,7 +195,7 @@ def _of_pillars(pillars: Sequence[PillarFilling]) -> Row:
         f"empty and over-full pillars ({own[0][1][0]} points kept)",
         "; ".join(each),
         "counted in undisturbed test frames",
-        "empty pillars cost nothing, as points alone are looked at; " + REMEDIES[CappedPillars.name],
+        "empty pillars cost nothing, as only points are processed; " + REMEDIES[CappedPillars.name],
     )
 
 
@@ -202,6 +204,6 @@ def _of_padding(one: TransferResult) -> Row:
         METHOD,
         f"pillars padded with zeros, {one.tested_on}",
         f"{points_in_words(one.change)}: {one.precision.describe(1)}",
-        "trained as long with the same seeds, the same frames, paired",
-        "pillars are not padded: no point appears that was not measured",
+        "the same training steps and seeds, the same frames, paired",
+        "pillars are not padded: the network processes only measured points",
     )

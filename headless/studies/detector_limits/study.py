@@ -1,9 +1,9 @@
 """Average precision against the size of each disturbance, and on other types, traffic and sites.
 
-Trained detectors, alike but for their seeds, are evaluated on the same test
-frames under one disturbance at a time. A disturbance begins to harm
-at the smallest size whose average precision is lower than without it by more
-than the interval of the difference, pair by pair, over traffic and trainings.
+Trained detectors that differ only in their seeds are evaluated on the same test
+frames under one disturbance at a time. A disturbance begins to harm at the
+smallest size at which average precision is significantly lower than without it:
+the interval of the paired difference, over traffic and trainings, is below 0.
 """
 
 from __future__ import annotations
@@ -46,16 +46,16 @@ Series = tuple[Disturbance, ...]
 """Disturbances of one kind, the mildest first."""
 
 BORDER_EDGES = (0.0, 2.0, 5.0, 10.0, 20.0, 40.0, np.inf)
-"""Metres from the border of the region of interest, between which road users are counted."""
+"""Edges of bins of the distance from the border of the region of interest, metres."""
 
 AT_HOME = "at home"
-"""Against what detectors are compared on other sites: themselves, on the frames of the site that they learnt from."""
+"""Reference for detectors on other sites: the same detectors, on the frames of the site of their training."""
 
 COUNTED_FRAMES = 8  # frames in which pillars are counted
 
 
 def full_series(sensor: int) -> tuple[Series, ...]:
-    """Return all disturbances, those of one sensor of the sensor with this number."""
+    """Return all disturbances; those of one sensor are of the sensor with this number."""
     return (
         tuple(RangeNoise(size) for size in (0.02, 0.05, 0.1, 0.2, 0.4)),
         tuple(DropOff(size) for size in (0.1, 0.25, 0.5, 0.75, 0.9)),
@@ -88,7 +88,7 @@ class DisturbanceEffect:
     Parameters
     ----------
     precision, change : IntervalEstimate
-        Mean average precision over the detectors, and by how much it differs from that without the disturbance.
+        Mean average precision over the detectors, and its change by the disturbance.
     """
 
     disturbance: Disturbance
@@ -103,7 +103,7 @@ class DisturbanceCurve:
     Parameters
     ----------
     points : tuple of DisturbanceEffect
-        The mildest first.
+        Effects by size, the mildest first.
     """
 
     configuration: str
@@ -112,17 +112,17 @@ class DisturbanceCurve:
 
     @property
     def name(self) -> str:
-        """Of the disturbance."""
+        """Name of the disturbance."""
         return self.points[0].disturbance.name
 
     @property
     def unit(self) -> str:
-        """Of its size."""
+        """Unit of its size."""
         return self.points[0].disturbance.unit
 
     @property
     def begins(self) -> DisturbanceEffect | None:
-        """The smallest size that lowers average precision by more than chance, or None."""
+        """The smallest size that lowers average precision significantly, or None."""
         return next((point for point in self.points if point.change.high < 0), None)
 
 
@@ -150,11 +150,11 @@ class TransferResult:
     trained_on, tested_on : str
         Sensor type or site of the training, and of the test.
     precision : IntervalEstimate
-        On the test.
+        Average precision in the test.
     change : IntervalEstimate
-        Against ``against``.
+        Change against ``against``.
     against : str
-        Whose average precision is subtracted.
+        Name of the reference whose average precision is subtracted.
     """
 
     trained_on: str
@@ -171,10 +171,10 @@ class BorderResults:
     Parameters
     ----------
     score : float
-        From which on detections count.
+        Least score of the detections that count.
     recall, false : mapping of str to tuple of Bin
-        By ``points`` from the road user, and by ``sensor`` and ``border``: metres from the nearest sensor and from
-        the border of the region; false detections per frame by the last two.
+        Recall by ``points`` (returns from the road user), ``sensor`` and ``border`` (metres from the nearest sensor
+        and from the border of the region); false detections per frame by the last two.
     """
 
     configuration: str
@@ -190,7 +190,7 @@ class PillarFilling:
     Parameters
     ----------
     filling : dict of int to Filling
-        Where so many points are kept; means over some frames.
+        Filling by the largest number of points in a pillar; means over some frames.
     """
 
     configuration: str
@@ -204,7 +204,7 @@ class OtherSite:
     Parameters
     ----------
     configurations : tuple of SensorConfiguration
-        With the names of some at home.
+        Configurations on the site, with names of configurations on the home site.
     """
 
     site: TrialSite
@@ -218,13 +218,13 @@ class EvaluatedDetectors:
     Parameters
     ----------
     tested : tuple of EvaluatedDetector
-        Alike but for their seeds.
+        Detectors that differ only in their seeds.
     by_type : mapping of str to EvaluatedDetector
-        Those that have learnt from one sensor type alone.
+        Detectors trained on only one sensor type, by type.
     shipped : tuple of EvaluatedDetector
-        That which ships, which has learnt from random sites; empty where it is not to be tried.
-    padded : tuple of EvaluatedDetector
-        With pillars padded with zeros, and ``unpadded``, trained as long, to compare them with.
+        The shipped detector, which was trained on random sites; empty to leave it out.
+    padded, unpadded : tuple of EvaluatedDetector
+        Detectors with pillars padded with zeros, and comparable ones without, trained for the same number of steps.
     """
 
     tested: tuple[EvaluatedDetector, ...]
@@ -241,11 +241,12 @@ class TrainingPlan:
     Parameters
     ----------
     alike : tuple of ModelConfiguration
-        As an evaluation trains them: in its folder they need not be trained again.
+        Models that differ only in their seeds, as the detection study trains them: in its folder they are not trained
+        again.
     by_type : dict of str to ModelConfiguration
-        Those who learn from one sensor type alone.
+        Models trained on only one sensor type, by type.
     padded : tuple of ModelConfiguration
-        Those with padded pillars; none where padding is not to be tried.
+        Models with padded pillars; empty to leave padding out.
     """
 
     alike: tuple[ModelConfiguration, ...]
@@ -254,13 +255,13 @@ class TrainingPlan:
 
     @property
     def models(self) -> tuple[ModelConfiguration, ...]:
-        """All, as `case_study.train_all` takes them."""
+        """All models, in the order for `case_study.train_all`."""
         return (*self.alike, *self.by_type.values(), *self.padded)
 
     def candidates(
         self, detectors: Sequence[Detector], shipped: tuple[EvaluatedDetector, ...] = ()
     ) -> EvaluatedDetectors:
-        """Return what the study tries, from the detectors of all models in their order, and that which ships."""
+        """Return the detectors to be evaluated, from those of all models in their order and the shipped one."""
         trained = {
             model.name: EvaluatedDetector(model.name, detector)
             for model, detector in zip(self.models, detectors, strict=True)
@@ -282,24 +283,26 @@ def training_plan(
     seeds: int,
     padding: bool,
 ) -> TrainingPlan:
-    """Return the detectors to train; from one type's clouds for as large a part of the steps as they are of all clouds.
+    """Return the detectors to train.
+
+    A detector of one type is trained for the share of the steps that its clouds have of all clouds.
 
     Parameters
     ----------
     configurations : sequence of SensorConfiguration
-        All of an evaluation.
+        All configurations of an evaluation.
     training : TrainingSettings
-        Of those who learn from all types.
+        Training settings of the models for all types.
     padding : bool
-        Whether the ablation is wanted: each model again, with padded pillars.
+        Whether to include the ablation: each model again, with padded pillars.
     """
-    alike = model_configurations(configurations, network, training, seeds=seeds, separate=False)
+    by_seed = model_configurations(configurations, network, training, seeds=seeds, separate=False)
     by_type = {}
     for sensor in dict.fromkeys(one.sensor for one in configurations):
         own = tuple(one for one in configurations if one.sensor == sensor)
         steps = max(1, training.steps * len(own) // len(configurations))
         by_type[sensor] = ModelConfiguration(f"detector-{sensor}", own, network, replace(training, steps=steps))
-    return TrainingPlan(tuple(alike), by_type, tuple(padded(alike)) if padding else ())
+    return TrainingPlan(tuple(by_seed), by_type, tuple(padded(by_seed)) if padding else ())
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,16 +312,16 @@ class LimitsStudy:
     Parameters
     ----------
     name : str
-        Of the site.
+        Name of the site.
     frames : int
         Test frames of each trial at home.
     worst : mapping of str to int
-        For each configuration the sensor, by its number from 0, whose loss costs most: it is the one to be
-        displaced, rotated and late.
+        Number, from 0, of the sensor whose failure costs most, for each configuration: the disturbances of one
+        sensor are of this one.
     transfers : tuple of TransferResult
-        Detectors on other types, traffic and sites.
+        Results of detectors on other types, traffic and sites.
     padding : tuple of TransferResult
-        What padding with zeros does to each configuration; none where it was not trained.
+        Effect of padding with zeros on each configuration; empty if no such detector was trained.
     """
 
     name: str
@@ -345,18 +348,18 @@ def limits_study(
     Parameters
     ----------
     home : TrialSite
-        The site of their training, with unseen traffic.
+        Site of the training, with unseen traffic.
     configurations : sequence of SensorConfiguration
-        The first is driven through everything, the others through the brief series.
+        Sensor configurations; the first is tested with all disturbances, the others with the brief series.
     store : path
-        Folder in which every trial is kept: a study that was stopped goes on.
+        Folder of all trials; an interrupted study resumes from it.
     score : float
-        From which on detections count where they are counted: the best balance on validation frames.
+        Least score of counted detections: the best balance of precision and recall on validation frames.
 
     Yields
     ------
     Progress
-        Trials done, of all.
+        Number of finished trials.
     """
     runner = _TrialRunner(home, store, _length(configurations, candidates, elsewhere))
     spreads, curves, borders, pillars, worst = [], [], [], [], {}
@@ -391,7 +394,7 @@ def limits_study(
 
 
 class _TrialRunner:
-    """Runs trials, and counts them for progress."""
+    """Runner of trials, which counts them for progress."""
 
     def __init__(self, home: TrialSite, store: Path, total: int) -> None:
         self._home, self._store, self._total, self._done = home, store, total, 0
@@ -432,7 +435,7 @@ class _TrialRunner:
         candidates: EvaluatedDetectors,
         elsewhere: Sequence[OtherSite],
     ) -> Generator[Progress, None, list[TransferResult]]:
-        """Evaluate detectors of one type on the others, all of them on other sites, and there that which ships."""
+        """Evaluate detectors of one type on the others, all of them on other sites, and the shipped one on all."""
         found = []
         for configuration in configurations:
             tried = {}
@@ -440,7 +443,7 @@ class _TrialRunner:
                 tried[sensor] = yield from self._undisturbed(configuration, [one_tested])
             native = tried.pop(configuration.sensor, None)
             for sensor, those in tried.items() if native else ():
-                against = f"learnt from {configuration.sensor}"
+                against = f"trained on {configuration.sensor}"
                 found.append(
                     TransferResult(sensor, configuration.name, level(those), change(those, native or those), against)
                 )
@@ -458,7 +461,7 @@ class _TrialRunner:
             shipped = yield from self._undisturbed(configuration, candidates.shipped, site)
             own = yield from self._undisturbed(configuration, candidates.tested, site)
             difference = change(len(own) * shipped, own)
-            against = f"learnt from {self._home.simulator.site}"
+            against = f"trained on {self._home.simulator.site}"
             found.append(
                 TransferResult(
                     "random sites", f"{configuration.name}, {site.name}", level(shipped), difference, against
@@ -495,7 +498,7 @@ class _TrialRunner:
 def _length(
     configurations: Sequence[SensorConfiguration], candidates: EvaluatedDetectors, elsewhere: Sequence[OtherSite]
 ) -> int:
-    """Return how many trials there are."""
+    """Return the number of trials."""
     full, brief = (sum(map(len, series(0))) for series in (full_series, brief_series))
     each = 1 + len(candidates.by_type) + bool(candidates.padded)
     at_home = sum(each + len(one.sensors) for one in configurations) + full + brief * (len(configurations) - 1)
@@ -526,7 +529,7 @@ def _borders(name: str, trial: DisturbedTrial, score: float) -> BorderResults:
 
 
 def _pillars(site: TrialSite, configuration: SensorConfiguration, detector: Detector) -> PillarFilling:
-    """Count how full pillars are in some frames, with the detector's own cap and smaller ones."""
+    """Return the filling of pillars in some frames, with the detector's own cap and smaller ones."""
     caps = (detector.settings.most_points, 8, 4, 2, 1)
     frames = [
         site.simulator.frame(configuration, site.runs[0], number)

@@ -1,4 +1,4 @@
-"""Trials of detectors under disturbances, with their results kept on disk."""
+"""Trials of detectors under disturbances, with results stored on disk."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ from seip_addon.core.storage.source_digest import source_digest
 from .disturbances import Disturbance
 
 _FROM_ZERO = limits.Limits(0.0, math.inf)
-_SCORE = limits.Limits(-math.inf, 1.0)  # of road users; minus infinity where none is found
+_SCORE = limits.Limits(-math.inf, 1.0)  # of road users; minus infinity if not found
 
 FILE = ArrayFile(
     "seip.trial",
     3,
     "trial of a detector",
-    "delete it, and it is tried again",
+    "delete it to evaluate it again",
     {
         "detections.score": ArrayRule("f8", ("d",), limits.SHARE),
         "detections.hit": ArrayRule("b1", ("d",)),
@@ -64,7 +64,7 @@ FILE = ArrayFile(
 )
 
 RULE = Rule()
-"""How average precision is taken: the evaluation's own."""
+"""Rule of average precision: the default of the evaluation."""
 
 TABLES = {"detections": EvaluatedDetections, "wanted": CountedTruth}
 
@@ -76,7 +76,7 @@ class TrialSite:
     Parameters
     ----------
     runs : tuple of SampledRun
-        That no detector has seen.
+        Test runs, unseen by all detectors.
     """
 
     name: str
@@ -84,7 +84,7 @@ class TrialSite:
     runs: tuple[SampledRun, ...]
 
     def key(self, configuration: SensorConfiguration) -> str:
-        """Return a digest of all that undisturbed frames follow from."""
+        """Return a digest of all inputs of undisturbed frames."""
         return self.simulator.key(configuration, self.runs)
 
 
@@ -108,9 +108,9 @@ class DisturbedTrial:
     Parameters
     ----------
     evaluation : Evaluation
-        With distances to the nearest sensor.
+        Evaluation with distances to the nearest sensor.
     from_border : Evaluation
-        The same with distances to the border of the region of interest.
+        Evaluation with distances to the border of the region of interest.
     """
 
     evaluation: Evaluation
@@ -130,7 +130,7 @@ def trials(
     ----------
     tested : sequence of EvaluatedDetector
     store : path
-        Folder of what was tried before.
+        Folder of earlier trials.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def trial_of(frames: Sequence[FrameResult], region: BaseGeometry) -> DisturbedTr
 def disturbed_frames(
     simulator: Simulator, run: SampledRun, configuration: SensorConfiguration, disturbance: Disturbance
 ) -> Generator[Frame, None, None]:
-    """Simulate the frames of a run as they are under a disturbance."""
+    """Simulate the frames of a run under a disturbance."""
     sensors = disturbance.disturbed_sensors(configuration.sensors)
     trajectories = disturbance.disturbed_traffic(run.trajectories)
     bodies = [fitted_body(user) for user in trajectories.users]
@@ -186,7 +186,7 @@ def _results(
 ) -> Generator[Progress, None, list[list[FrameResult]]]:
     """Return the results of all frames by detector."""
     works = [_results_of_run(site, run, configuration, disturbance, detectors) for run in site.runs]
-    with deterministic(1):  # all the time, as torch keeps one such setting for all threads
+    with deterministic(1):  # around all works, as torch has one such setting for all threads
         by_run = yield from side_by_side(works, AT_ONCE)
     return [[frame for run in by_run for frame in run[number]] for number in range(len(detectors))]
 
@@ -220,13 +220,13 @@ def _results_of_run(
 
 
 def _save(path: Path, header: dict[str, str], trial: DisturbedTrial) -> None:
-    evaluation, beside = trial.evaluation, trial.from_border
+    evaluation, from_border = trial.evaluation, trial.from_border
     arrays = {
         f"{table}.{part.name}": getattr(getattr(evaluation, table), part.name)
         for table, kind in TABLES.items()
         for part in fields(kind)
     }
-    border = {f"{table}.border": getattr(beside, table).distance for table in TABLES}
+    border = {f"{table}.border": getattr(from_border, table).distance for table in TABLES}
     FILE.save(path, header, arrays | border | {"run": evaluation.run})
 
 
@@ -238,10 +238,10 @@ def _load(path: Path) -> DisturbedTrial:
         }
         frames = len(arrays["run"])
         if any((arrays[f"{table}.frame"] >= frames).any() for table in TABLES):
-            raise ContentError("it has detections of frames that are not in it")
+            raise ContentError("it has detections for frames that it does not contain")
         evaluation = Evaluation(RULE, tables["detections"], tables["wanted"], arrays["run"])
-        beside = {
+        from_border = {
             table: replace(rows, distance=arrays[f"{table}.border"])  # type: ignore[type-var]  # each is a dataclass
             for table, rows in tables.items()
         }
-        return DisturbedTrial(evaluation, replace(evaluation, **beside))
+        return DisturbedTrial(evaluation, replace(evaluation, **from_border))

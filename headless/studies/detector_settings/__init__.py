@@ -1,1 +1,1 @@
-"""Cost and gain of other settings of the detector."""
+"""Cost and gain of alternative settings of the detector."""

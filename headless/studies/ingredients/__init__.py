@@ -1,1 +1,1 @@
-"""What each ingredient of a training for unseen sites gains: variants, sites to learn from, tests, table and chart."""
+"""Gain of each ingredient of a training for unseen sites: variants, training sites, tests, table and chart."""

@@ -1,4 +1,4 @@
-"""Chart of what is lost at unseen sites where an ingredient of the training is left out."""
+"""Chart of the loss at unseen sites if an ingredient of the training is left out."""
 
 import os
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ PANEL_WIDTH, ROW_HEIGHT = 2.7, 0.42  # inches
 
 @dataclass(frozen=True)
 class IngredientMark:
-    """By how much the average precision of a test changes without an ingredient."""
+    """Change of the average precision of a test without an ingredient."""
 
     test: str
     variant: str
@@ -25,7 +25,7 @@ class IngredientMark:
 def save_ingredients_chart(path: str | os.PathLike[str], marks: Sequence[IngredientMark], title: str) -> None:
     """Draw a panel for each test, and in it a row for each variant: the change with its interval, as PNG."""
     if not marks:
-        raise SeipError("there is no ingredient to draw: train with one left out first")
+        raise SeipError("there are no variants to draw: first train with an ingredient left out")
     tests, variants = (list(dict.fromkeys(getattr(one, name) for one in marks)) for name in ("test", "variant"))
     size = (2.0 + PANEL_WIDTH * len(tests), 1.3 + ROW_HEIGHT * len(variants))
     figure, panels = new_figure(*size, len(tests), sharey=True)

@@ -1,10 +1,10 @@
-"""Average precision at sites never learnt from, with all ingredients of a training and without each.
+"""Average precision at unseen sites, with all ingredients of a training and without each.
 
 seip study random-sites -o out/sites --sites 20
 seip study ingredients out/sites/*/site.blend --unseen scenes/junction.blend -o out/ingredients
 
-Each scene comes with its runs of traffic in the folder SCENE_traffic beside it. Trainings that were stopped go on where
-they were.
+The runs of traffic of each scene are in the folder SCENE_traffic next to it. Rerun the command to resume interrupted
+trainings.
 """
 
 import argparse
@@ -23,19 +23,19 @@ from headless.studies.site_training.command import LearningSettings, read_site, 
 from seip_addon.core.limits import TIME_STEP
 from seip_addon.core.storage.csv_table import save_csv
 
-TEST_STRIDE = 2  # frames to learn from for each to test on
+TEST_STRIDE = 2  # time between test frames, in multiples of that between training frames
 
 
 def main(argv: list[str]) -> None:
-    """Train every variant, try it where it has not learnt, and write table and chart."""
+    """Train every variant, test it at unseen sites, and write table and chart."""
     options = _parser().parse_args(argv)
     training = replace(read_settings(TrainingSettings, options), validate_every=options.steps)
     learning = LearningSettings(placements=1, every=options.every, seed=options.placement_seed)
     folder = options.output
     runtime.check_folder(folder)
-    learnt, aside = set_aside(options.scenes)
+    training_scenes, aside = set_aside(options.scenes)
     sites = TrainingSites(
-        tuple(read_site(scene, learning) for scene in learnt),
+        tuple(read_site(scene, learning) for scene in training_scenes),
         tuple(read_site(scene, learning) for scene in aside),
         folder,
         learning.seed,
@@ -58,7 +58,7 @@ def main(argv: list[str]) -> None:
 
 
 def in_words(one: IngredientEffect) -> str:
-    """Return a line of the table in words."""
+    """Return a row of the table as a message."""
     against = "" if one.change is None else f", {one.change.as_points(1)} against {ALL}"
     return f"{one.test}: {one.variant}: AP {one.precision.describe(1)}{against}"
 
@@ -78,17 +78,19 @@ def save_table(path: Path, found: list[IngredientEffect]) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("study ingredients", "Train with all ingredients and without each; try it at unseen sites.")
-    parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE", help="to learn from, each with its traffic")
+    parser = new_parser("study ingredients", "Train with all ingredients and without each; test at unseen sites.")
+    parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE", help="training scenes, each with its traffic")
     parser.add_argument(
-        "--unseen", nargs="+", type=Path, required=True, metavar="SCENE", help="to try it at, each with its traffic"
+        "--unseen", nargs="+", type=Path, required=True, metavar="SCENE", help="test scenes, each with its traffic"
     )
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for table, chart and trainings")
     parser.add_argument(
-        "--every", type=real_number(TIME_STEP), default=2.5, metavar="S", help="time from frame to frame"
+        "--every", type=real_number(TIME_STEP), default=2.5, metavar="S", help="time between frames, seconds"
     )
-    parser.add_argument("--placement-seed", type=int, default=1, metavar="N", help="of random placements")
+    parser.add_argument("--placement-seed", type=int, default=1, metavar="N", help="seed of random placements")
     add_settings(parser, TrainingSettings, "steps", "batch")
-    parser.add_argument("--trainings", type=int, default=3, metavar="N", help="of each variant, with a seed each")
+    parser.add_argument(
+        "--trainings", type=int, default=3, metavar="N", help="trainings of each variant, with different seeds"
+    )
     parser.set_defaults(steps=600)
     return parser

@@ -1,4 +1,4 @@
-"""Trainings with all ingredients and without each, on the same scans wherever these do not differ."""
+"""Trainings with all ingredients and without each; variants with the same scan ingredients share their scans."""
 
 from __future__ import annotations
 
@@ -33,14 +33,16 @@ Scans = list[tuple[LearntSite, Recording]]
 
 @dataclass(frozen=True, eq=False)
 class TrainingSites:
-    """Sites to learn from, and others to see when to stop.
+    """Training sites, and validation sites, which decide when to stop.
 
     Parameters
     ----------
+    learnt, aside : tuple of LearntSite
+        Training sites and validation sites.
     store : path
-        Folder of what is kept: visibility grids and trainings.
+        Folder of visibility grids and trainings.
     seed : int
-        Of random placements.
+        Seed of random placements.
     """
 
     learnt: tuple[LearntSite, ...]
@@ -49,7 +51,7 @@ class TrainingSites:
     seed: int
 
     def scans(self, ingredients: ScanIngredients) -> Generator[Progress, None, Scans]:
-        """Return what is learnt from."""
+        """Return the training scans."""
         sites = self.learnt if ingredients.many_sites else self.learnt[:FEW_SITES]
         scans: Scans = []
         for number, site in enumerate(sites):
@@ -64,7 +66,7 @@ class TrainingSites:
         return scans
 
     def scans_aside(self) -> Scans:
-        """Return the scans by which all variants see when to stop."""
+        """Return the validation scans, the same for all variants."""
         return [
             (site, recording)
             for number, site in enumerate(self.aside, len(self.learnt))
@@ -76,7 +78,7 @@ class TrainingSites:
 
 
 def covering_most(geometry: SceneGeometry, path: Path) -> Generator[Progress, None, SensorConfiguration]:
-    """Place `COUNT` sensors of type `SENSOR` where they cover most; a scene's visibility grid is kept in a file."""
+    """Place `COUNT` sensors of type `SENSOR` for the largest coverage; the visibility grid is cached in a file."""
     settings = SurveySettings(candidates=CandidateSettings(sensors=(SENSOR,)))
     survey = yield from see(lay_out(geometry, settings), path)
     cell = Cell(SENSOR, None, COUNT, 1.0)
@@ -91,21 +93,21 @@ def train_variants(
     training: TrainingSettings,
     trainings: int,
 ) -> Generator[Progress, None, dict[str, list[Detector]]]:
-    """Train a detector of each variant with each of so many seeds; what is done is kept in the sites' folder.
+    """Train a detector of each variant with each of `trainings` seeds; finished trainings are read from the store.
 
     Returns
     -------
     dict of str to list of Detector
-        By the name of the variant, in the order of the seeds.
+        Detectors by the name of the variant, in the order of the seeds.
     """
-    learnt: dict[str, list[SampledRecording]] = {}
+    samples: dict[str, list[SampledRecording]] = {}
     aside = yield from _sampled(sites.scans_aside(), variants, network)
     for scans in dict.fromkeys(one.scans for one in variants.values()):
-        alike = {name: one for name, one in variants.items() if one.scans == scans}
-        learnt |= yield from _sampled((yield from sites.scans(scans)), alike, network)
+        sharing = {name: one for name, one in variants.items() if one.scans == scans}
+        samples |= yield from _sampled((yield from sites.scans(scans)), sharing, network)
     works = {
         (name, seed): train(
-            learnt[name],
+            samples[name],
             aside[name],
             network,
             replace(training, seed=seed),
@@ -126,25 +128,27 @@ def _of_variant(name: str, trained: Iterator[tuple[tuple[str, int], TrainedDetec
 def _sampled(
     scans: Scans, variants: Mapping[str, Ingredients], network: NetworkSettings
 ) -> Generator[Progress, None, dict[str, list[SampledRecording]]]:
-    """Simulate each frame once, and keep what each variant learns from it."""
+    """Simulate each frame once, and store the training sample of each variant."""
     sampled: list[dict[str, SampledRecording]] = []
     works: dict[LearntSite, list[Generator[Progress, None, None]]] = {}
     for site, recording in scans:
         area, latest = site.simulator.area(network.pillar), functools.lru_cache(1)(recording.frames.__getitem__)
-        kept = replace(recording, frames=LazyFrames(len(recording.frames), latest))
-        alike = {name: SampledRecording(kept, one.area(area), network.most_points) for name, one in variants.items()}
-        sampled.append(alike)
-        works.setdefault(site, []).append(_simulated(list(alike.values()), latest.cache_clear))
+        cached = replace(recording, frames=LazyFrames(len(recording.frames), latest))
+        by_variant = {
+            name: SampledRecording(cached, one.area(area), network.most_points) for name, one in variants.items()
+        }
+        sampled.append(by_variant)
+        works.setdefault(site, []).append(_simulated(list(by_variant.values()), latest.cache_clear))
     for site, of_site in works.items():
         yield from side_by_side(of_site, AT_ONCE)
         site.simulator.forget()
     return {name: [of_one[name] for of_one in sampled] for name in variants}
 
 
-def _simulated(alike: Sequence[SampledRecording], forget: Callable[[], None]) -> Generator[Progress, None, None]:
-    total = len(alike[0])
+def _simulated(samples: Sequence[SampledRecording], forget: Callable[[], None]) -> Generator[Progress, None, None]:
+    total = len(samples[0])
     for number in range(total):
-        yield Progress(number, total, f"simulate {alike[0].recording.name}")
-        for one in alike:
+        yield Progress(number, total, f"simulate {samples[0].recording.name}")
+        for one in samples:
             one.get(number)
     forget()

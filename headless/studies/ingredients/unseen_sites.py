@@ -1,4 +1,4 @@
-"""Tests of detectors on sites that none of them has learnt from: traffic and sensors there, and what is found."""
+"""Tests of detectors at unseen sites: traffic and sensors there, and the average precision."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class UnseenTest:
 
 
 def unseen_tests(site: LearntSite, best: MountedSensors, seed: int, *, full: bool) -> tuple[UnseenTest, ...]:
-    """Return the tests at a site: with one placement; in full also with random ones, and road users of other sizes."""
+    """Return the tests at a site: with one placement; if `full`, also with random ones and changed road users."""
     runs = site.runs
     tests = [UnseenTest(f"{site.simulator.site}, {best.name}", site.simulator, tuple((run, best) for run in runs))]
     if full:
@@ -54,9 +54,9 @@ class IngredientEffect:
     Parameters
     ----------
     precision : IntervalEstimate
-        Over test runs and trainings.
+        Average precision over test runs and trainings.
     change : IntervalEstimate or None
-        Against the training with all ingredients, pair by pair; None of that itself.
+        Paired change against the training with all ingredients; None for that training itself.
     """
 
     variant: str
@@ -70,20 +70,22 @@ def effects(
 ) -> Generator[Progress, None, list[IngredientEffect]]:
     """Evaluate the detectors of all variants on the same frames, and compare them with those of all ingredients."""
     names = [name for name, own in detectors.items() for _ in own]
-    looking = [detector for own in detectors.values() for detector in own]
+    all_detectors = [detector for own in detectors.values() for detector in own]
     works = []
     for test in tests:
         areas = [
             variants[name].area(test.simulator.area(detector.settings.pillar))
-            for name, detector in zip(names, looking, strict=True)
+            for name, detector in zip(names, all_detectors, strict=True)
         ]
-        works += [detect_in_runs(test.simulator, sensors, [run], looking, 1, areas) for run, sensors in test.scanned]
-    with deterministic(1):  # all the time, as torch keeps one such setting for all threads
+        works += [
+            detect_in_runs(test.simulator, sensors, [run], all_detectors, 1, areas) for run, sensors in test.scanned
+        ]
+    with deterministic(1):  # around all works, as torch has one such setting for all threads
         found = iter((yield from side_by_side(works, AT_ONCE)))
     rows = []
     for test in tests:
         by_run = [next(found) for _ in test.scanned]
-        frames = [[frame for run in by_run for frame in run[number]] for number in range(len(looking))]
+        frames = [[frame for run in by_run for frame in run[number]] for number in range(len(all_detectors))]
         resampled: dict[str, list[ResampledPrecision]] = {name: [] for name in detectors}
         for name, own in zip(names, frames, strict=True):
             resampled[name].append(ResampledPrecision(evaluate(own, MAIN_RULE)))

@@ -1,4 +1,4 @@
-"""Ingredients of the training of a detector for sites that it has never seen, each of which can be left out."""
+"""Ingredients of the training of a detector for unseen sites, each of which can be left out."""
 
 from __future__ import annotations
 
@@ -18,24 +18,25 @@ from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.core.sensing.traffic.varied_bodies import resized, with_sizes
 
-SIZE_CHANGE = 0.15  # share by which dimensions of road users are changed at most, in a training and in a test
-FEW_SITES = 2  # to learn from, where many sites are left out
+SIZE_CHANGE = 0.15  # largest relative change of the dimensions of road users, in a training and in a test
+FEW_SITES = 2  # training sites of the variant without many sites
 
 
 @dataclass(frozen=True)
 class ScanIngredients:
-    """Ingredients that decide of what scans a detector learns from.
+    """Ingredients that determine the training scans.
 
     Parameters
     ----------
     varied_bodies : bool
-        Whether road users have the sizes and shapes of their runs; else each has those of the nearest model.
+        Whether road users have the sizes and shapes of their runs; otherwise each has those of the nearest model.
     resized : float
-        Share by which each dimension of each road user is changed at most, beyond the spread of real ones.
+        Largest relative change of each dimension of each road user, beyond the spread of real ones.
     random_placements : bool
-        Whether each run is scanned by random sensors; else all of a site are by those that cover most.
+        Whether each run is scanned by a random placement; otherwise by the site's placement of largest coverage.
     many_sites : bool
-        Whether all sites are learnt from; else the first `FEW_SITES`, with as many scans more of each.
+        Whether all sites are used; otherwise the first `FEW_SITES`, with more random placements at each so that the
+        number of scans stays similar.
     """
 
     varied_bodies: bool = True
@@ -46,14 +47,15 @@ class ScanIngredients:
 
 @dataclass(frozen=True)
 class Ingredients:
-    """What is done for a detector to carry to sites that it has never seen.
+    """Ingredients of a training that help a detector at unseen sites.
 
     Parameters
     ----------
     foreground : bool
-        Whether the background is taken out of clouds.
+        Whether the background is removed from clouds.
     levelled : bool
-        Whether heights are above the road under each point; else above the mean height of the site's roads.
+        Whether heights are above the road under each point; otherwise above the mean height of the site's roads.
+    scans : ScanIngredients
     """
 
     foreground: bool = True
@@ -61,7 +63,7 @@ class Ingredients:
     scans: ScanIngredients = ScanIngredients()
 
     def area(self, area: DetectionArea) -> DetectionArea:
-        """Return where a detector looks at a site, and what it takes out of clouds."""
+        """Return the detection area of a site with these ingredients."""
         road = area.road if self.levelled else _mean_level(area.road)
         kind = DetectionArea if self.foreground else _AllReturns
         return kind(area.grid, road, area.site)
@@ -77,7 +79,7 @@ VARIANTS: Mapping[str, Ingredients] = {
     f"{FEW_SITES} sites": Ingredients(scans=ScanIngredients(many_sites=False)),
     f"bodies changed by ±{SIZE_CHANGE:.0%} as well": Ingredients(scans=ScanIngredients(resized=SIZE_CHANGE)),
 }
-"""Variants of the training by name: with all ingredients, without each, and with one that the default has not."""
+"""Variants of the training by name: with all ingredients, without each, and with one that the default lacks."""
 
 
 class _AllReturns(DetectionArea):
@@ -93,7 +95,7 @@ def _mean_level(road: HeightRaster) -> HeightRaster:
 
 
 def with_bodies(run: SampledRun, ingredients: ScanIngredients, seed: int) -> Generator[Progress, None, SampledRun]:
-    """Return a run whose road users have the bodies that a detector is to learn from."""
+    """Return a run with the bodies of its road users changed according to the ingredients."""
     if not ingredients.varied_bodies:
         run = replace(run, trajectories=(yield from _with_bodies_of_models(run.trajectories)))
     if ingredients.resized:

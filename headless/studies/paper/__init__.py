@@ -1,1 +1,1 @@
-"""The paper's own case study beside this program's: its figures and claims, traffic after its demand, and the page."""
+"""The paper's own case study, reproduced: published figures and claims, traffic with its demand, and the page."""

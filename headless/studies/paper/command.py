@@ -1,10 +1,11 @@
-"""Redo the paper's own case study on a map and traffic of the user's, and write a page that compares the figures.
+"""Reproduce the paper's own case study on a map and traffic of the user, and write a page that compares the figures.
 
 seip study paper MAP.xodr --junction 965 --routes FILE.rou.xml --types vtypes.rou.xml \
     --network FILE.net.xml -o docs
 blender -b --python-exit-code 1 -P headless/study.py -- paper MAP.xodr --junction 965 … -o docs
 
-Needs torch (make detection) and SUMO (make sumo). What was made before an interruption is kept in the folder of work.
+Needs torch (make detection) and SUMO (make sumo). Finished work is stored in the work folder: rerun the command to
+resume.
 """
 
 import argparse
@@ -53,7 +54,7 @@ def main(argv: list[str]) -> None:
     """Build the scene, draw traffic, place, train, evaluate, and write the page."""
     options = _parser().parse_args(argv)
     if options.trainings < 1:
-        raise SeipError(f"ask for one training or more, not {options.trainings}")
+        raise SeipError(f"--trainings must be 1 or more, not {options.trainings}")
     training = TrainingSettings(steps=options.steps)
     check_device(options.device)
     evaluate.check_every(options.every)
@@ -76,8 +77,8 @@ def main(argv: list[str]) -> None:
     surveyed, watch = site.surveyed, site.stopwatch
     limits = surveyed.settings.limits
     study = watch.run("study", coverage_study(surveyed.site, surveyed.models, surveyed.grid.visible, limits))
-    learnt, aside, tests = case_study.split_sampled(fixed, geometry.origin, options.every)
-    copies = NearCopies(learnt, aside, tests[:COPIES_TESTED])
+    training_runs, validation_runs, tests = case_study.split_sampled(fixed, geometry.origin, options.every)
+    copies = NearCopies(training_runs, validation_runs, tests[:COPIES_TESTED])
     steps = detection_of_case(
         site.simulator,
         placed(study),
@@ -103,12 +104,12 @@ def main(argv: list[str]) -> None:
 
 
 def _built(options: argparse.Namespace, scene: Path) -> SceneGeometry:
-    asked = [str(options.map), "--junction", *options.junction, "-o", str(scene)]
+    arguments = [str(options.map), "--junction", *options.junction, "-o", str(scene)]
     if options.site is not None:
-        asked += ["--site", str(options.site)]
+        arguments += ["--site", str(options.site)]
     if options.approaches is not None:
-        asked += ["--approaches", f"{options.approaches:g}"]
-    build_scene.main(asked)
+        arguments += ["--approaches", f"{options.approaches:g}"]
+    build_scene.main(arguments)
     return read_scene(bpy.context.scene).geometry
 
 
@@ -132,14 +133,18 @@ def _facts(
     geometry, demand = surveyed.geometry, traffic.demand
     runs = found.results.traffic
     bare = not geometry.occluders
-    hidden = "nothing on it hides anything" if bare else f"{len(geometry.occluders)} objects hide what is behind them"
+    hidden = "nothing on it blocks the view" if bare else f"{len(geometry.occluders)} objects block the view"
     doubts = []
     if any(curve.still_rises for curve in found.results.curves):
-        doubts.append("Validation still rose when a training ended: more --steps would change figures of detection.")
+        doubts.append(
+            "Validation AP was still rising when a training ended: more --steps may change the figures of detection."
+        )
     if found.copies_rising:
-        doubts.append("Validation still rose when training on near copies ended: leak may be larger than it seems.")
+        doubts.append(
+            "Validation AP was still rising when training on near copies ended: the leak may be larger than measured."
+        )
     if options.trainings == 1:
-        doubts.append("One training: claims 5 to 8 get no verdict, which takes three (--trainings 3).")
+        doubts.append("There is one training: a verdict on claims 5 to 8 needs three (--trainings 3).")
     junction = " ".join(options.junction)
     return CaseFacts(
         command=(
@@ -149,16 +154,17 @@ def _facts(
             f"--every {options.every:g} --runs {options.runs} --duration {options.duration:g} "
             f"--time-limit {options.time_limit:g} -o docs"
         ),
-        scene=f"the OpenDRIVE map alone, {geometry.region.area:,.0f} m² about junction {junction}; {hidden}",
+        scene=f"only the OpenDRIVE map, {geometry.region.area:,.0f} m² around junction {junction}; {hidden}",
         criterion=(
             f"δ = {surveyed.settings.visibility.delta:g} m, a grid of {surveyed.settings.grid_spacing:g} m, "
             f"{len(surveyed.site.candidates.position)} positions on pavements and poles"
         ),
         traffic=(
-            f"SUMO alone, {demand.rate:,.0f} vehicles per hour ({traffic.through:,.0f} through the junction) in "
-            f"{len(demand.flows)} flows; departures, ways, lanes, {len(demand.models)} models and gaps drawn anew for "
-            f"each of {options.runs} runs of {options.duration:g} s after {options.warm_up:g} s and more; "
-            f"{len(runs.training)} to learn from, {len(runs.validation)} for validation, {len(runs.test)} for tests"
+            f"only SUMO, {demand.rate:,.0f} vehicles per hour ({traffic.through:,.0f} through the junction) in "
+            f"{len(demand.flows)} flows; departures, routes, lanes, {len(demand.models)} models and gaps are drawn "
+            f"randomly for each of {options.runs} runs of {options.duration:g} s, after a warm-up of at least "
+            f"{options.warm_up:g} s; {len(runs.training)} runs for training, {len(runs.validation)} for validation, "
+            f"{len(runs.test)} for tests"
         ),
         training=f"{options.steps} steps on frames {options.every:g} s apart, {counted(options.trainings, 'training')}",
         trainings=options.trainings,
@@ -187,31 +193,45 @@ def _charts(folder: Path, study: CoverageStudy, found: DetectionOfCase) -> list[
 
 def _parser() -> argparse.ArgumentParser:
     runs = RunSettings()
-    parser = new_parser("study paper", "Redo the paper's case study on your map and traffic, and compare the figures.")
+    parser = new_parser(
+        "study paper", "Reproduce the paper's case study on your map and traffic, and compare the figures."
+    )
     parser.add_argument("map", type=Path, help="the OpenDRIVE map (.xodr): Town05 of CARLA for the paper's case")
     parser.add_argument(
         "--junction", nargs="+", required=True, metavar="NAME", help="id, name or streets of the junction"
     )
     parser.add_argument("--routes", type=Path, required=True, metavar="XML", help="SUMO's routes, with flows")
     parser.add_argument("--types", nargs="+", type=Path, default=[], metavar="XML", help="files with vehicle types")
-    parser.add_argument(
-        "--network", type=Path, required=True, metavar="XML", help="the .net.xml that the routes are on"
-    )
+    parser.add_argument("--network", type=Path, required=True, metavar="XML", help="network of the routes (.net.xml)")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the page and its pictures")
-    parser.add_argument("--work", type=Path, default=Path("out/paper"), help="folder for what a rerun goes on from")
-    parser.add_argument("--site", type=Path, metavar="TOML", help="site description: what the map does not have")
-    parser.add_argument("--approaches", type=float, metavar="M", help="how far the region follows streets (80)")
-    parser.add_argument("--time-limit", type=float, default=60.0, metavar="S", help="of the solver, for each placement")
+    parser.add_argument(
+        "--work", type=Path, default=Path("out/paper"), help="folder for finished work, from which a rerun resumes"
+    )
+    parser.add_argument(
+        "--site", type=Path, metavar="TOML", help="site description, for objects that the map does not contain"
+    )
+    parser.add_argument(
+        "--approaches", type=float, metavar="M", help="length of the streets in the region, metres (80)"
+    )
+    parser.add_argument(
+        "--time-limit", type=float, default=60.0, metavar="S", help="time limit of the solver for each placement"
+    )
     traffic = parser.add_argument_group("traffic")
-    traffic.add_argument("--runs", type=int, default=runs.runs, metavar="N", help="each with a seed of its own")
-    traffic.add_argument("--duration", type=float, default=runs.duration, metavar="S", help="of each run")
-    traffic.add_argument("--warm-up", type=float, default=runs.warm_up, metavar="S", help="before each run")
-    traffic.add_argument("--seed", type=int, default=runs.seed, metavar="N", help="of everything random in traffic")
     traffic.add_argument(
-        "--every", type=real_number(TIME_STEP), default=2.5, metavar="S", help="time from frame to frame"
+        "--runs", type=int, default=runs.runs, metavar="N", help="number of runs, with different seeds"
+    )
+    traffic.add_argument("--duration", type=float, default=runs.duration, metavar="S", help="duration of each run")
+    traffic.add_argument("--warm-up", type=float, default=runs.warm_up, metavar="S", help="warm-up before each run")
+    traffic.add_argument("--seed", type=int, default=runs.seed, metavar="N", help="seed of all randomness in traffic")
+    traffic.add_argument(
+        "--every", type=real_number(TIME_STEP), default=2.5, metavar="S", help="time between training frames"
     )
     detection = parser.add_argument_group("detection")
-    detection.add_argument("--steps", type=int, default=TrainingSettings().steps, metavar="N", help="of each training")
-    detection.add_argument("--trainings", type=int, default=3, metavar="N", help="each with a seed of its own")
-    detection.add_argument("--device", default="cpu", help="of torch: cpu or cuda")
+    detection.add_argument(
+        "--steps", type=int, default=TrainingSettings().steps, metavar="N", help="steps of each training"
+    )
+    detection.add_argument(
+        "--trainings", type=int, default=3, metavar="N", help="number of trainings, with different seeds"
+    )
+    detection.add_argument("--device", default="cpu", help="device of torch: cpu or cuda")
     return parser

@@ -1,4 +1,4 @@
-"""Detection for the paper's case: learnt and tested on runs drawn anew, and on near copies for comparison."""
+"""Detection for the paper's case: training and tests on randomly drawn runs, and on near copies for comparison."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ PARTS = 6  # of the whole: simulate, train, and evaluate, for either traffic
 
 
 class NearCopies(Traffic):
-    """Runs that are nearly the same, to learn what that does to average precision."""
+    """Runs that are nearly the same, to measure the effect on average precision."""
 
     def __post_init__(self) -> None:
-        """Refuse no overlap."""
+        """Accept any overlap."""
 
 
 @dataclass(frozen=True, eq=False)
 class DetectionOfCase:
-    """What was found: figures of each placement, all results on the runs drawn anew, and the claims 5 to 8."""
+    """Results: figures of each placement, all results on the randomly drawn runs, and the claims 5 to 8."""
 
     placements: tuple[PlacementFigures, ...]
     results: StudyResults
@@ -46,12 +46,12 @@ class DetectionOfCase:
 
 
 def placed(study: CoverageStudy) -> tuple[SensorConfiguration, ...]:
-    """Return the vanilla placements of a coverage study whose heights are free.
+    """Return the vanilla placements of a coverage study with free heights.
 
     Raises
     ------
     SeipError
-        One is missing.
+        A placement is missing.
     """
     cases = [study.find(sensor, count) for sensor in study.sensors for count in COUNTS]
     if any(case is None for case in cases):
@@ -72,19 +72,19 @@ def detection_of_case(  # noqa: PLR0913  # a site, two kinds of traffic, and how
     seeds: int,
     device: str,
 ) -> Generator[Progress, None, DetectionOfCase]:
-    """Train detectors on runs drawn anew and one on near copies, and test both on both.
+    """Train detectors on randomly drawn runs, and one on near copies, and test both on both.
 
     Parameters
     ----------
     folder : Path
-        Of the detectors: what was trained is not trained again.
+        Folder of the detectors; a detector that is already there is not trained again.
     """
     network = NetworkSettings()
     models = case_study.model_configurations(configurations, network, training, seeds=seeds, separate=False)
     copied = [replace(models[0], name="detector-of-copies")]
     trained: list[TrainedDetector] = []
     for half, (own, runs) in enumerate(((models, traffic), (copied, copies))):
-        progress = Progress(2 * half, PARTS, "learn from near copies" if half else "learn", counted=False)
+        progress = Progress(2 * half, PARTS, "train on near copies" if half else "train", counted=False)
         simulating = case_study.simulate_training_set(simulator, configurations, runs, network)
         training_set = yield from in_detail(progress, simulating)
         learning = case_study.train_all(own, training_set, folder, device=device)

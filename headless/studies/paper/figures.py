@@ -1,4 +1,4 @@
-"""Figures of the paper's case on one site, as the page shows them: no detector is needed to hold or to read them."""
+"""Figures of the paper's case on one site, as shown on the page; this module does not need PyTorch."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,12 +9,12 @@ import numpy as np
 from seip_addon.core.arrays import Float
 from seip_addon.core.estimates import Interval, jackknife_reach, rank_correlation
 
-MIN_DIFFERENCE = 0.005  # of coverage, below which two placements cover as much
+MIN_DIFFERENCE = 0.005  # difference of coverage below which two placements count as equal
 
 
 @dataclass(frozen=True, eq=False)
 class PlacementFigures:
-    """What was measured of one placement with detectors.
+    """Figures of one placement, measured with detectors.
 
     Parameters
     ----------
@@ -24,19 +24,19 @@ class PlacementFigures:
     enough : float, 0 to 1
         Share of the vehicles of the test frames with `ENOUGH_RETURNS` returns or more.
     returns : float
-        From a vehicle of the test frames, in the middle (the median).
+        Median number of returns from a vehicle of the test frames.
     precision : float, 0 to 1
-        AP of runs drawn anew, learnt from such: the mean over the trainings.
+        AP on randomly drawn runs after training on such runs; the mean over the trainings.
     interval : (float, float) or None
-        Of the first training's, over runs.
+        Interval of the first training's AP over runs.
     without_each_run : (r,) float64 or None
-        The first training's AP, without each of the test runs; None where these are too few.
+        AP of the first training without each of the test runs; None with too few runs.
     false_positives : float
-        Per frame.
+        False positives per frame.
     copies : float
-        AP of runs with fixed departures, learnt from such.
+        AP on runs with fixed departures after training on such runs.
     unfamiliar : float
-        AP of the same runs with fixed departures, learnt from those drawn anew.
+        AP on the same runs with fixed departures after training on randomly drawn runs.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Reversal:
     Parameters
     ----------
     gain : float
-        In AP, with its 95 % interval over runs where there is one.
+        Gain in AP; ``interval`` is its 95 % interval over runs, or None.
     more_returns : bool
         Whether more vehicles give `ENOUGH_RETURNS` with it than with the other.
     """
@@ -75,17 +75,17 @@ class Reversal:
 
     @property
     def stands(self) -> bool:
-        """Whether the interval leaves it standing."""
+        """Whether the gain is significant by its interval."""
         return self.interval is not None and self.interval[0] > 0.0
 
     @property
     def more_returns(self) -> bool:
-        """Whether returns on vehicles tell the two apart the right way round."""
+        """Whether the placement with more AP also has more vehicles with enough returns."""
         return self.better.enough > self.worse.enough
 
 
 def reversals(placements: Sequence[PlacementFigures]) -> tuple[Reversal, ...]:
-    """Return the pairs of which that which covers less detects more, the largest gain first."""
+    """Return the pairs of placements in which the one that covers less detects more, the largest gain first."""
     found = [
         Reversal(better, worse, better.precision - worse.precision, _interval(better, worse))
         for better, worse in reversed_pairs(placements, "precision")
@@ -96,7 +96,7 @@ def reversals(placements: Sequence[PlacementFigures]) -> tuple[Reversal, ...]:
 def reversed_pairs(
     placements: Sequence[PlacementFigures], figure: str
 ) -> list[tuple[PlacementFigures, PlacementFigures]]:
-    """Return the pairs of which the first covers less and has more of a figure: of one of the average precisions."""
+    """Return the pairs in which the first placement covers less and has a larger figure, one of the APs."""
     return [
         (better, worse)
         for better, worse in permutations(placements, 2)
@@ -112,7 +112,7 @@ def _interval(better: PlacementFigures, worse: PlacementFigures) -> Interval | N
 
 
 def leaks(placements: Sequence[PlacementFigures]) -> Float:
-    """Return how much AP near copies add to each placement: learnt from near copies less learnt from other runs."""
+    """Return the leak of each placement: AP on near copies after training on near copies, less after other runs."""
     return np.array([one.copies - one.unfamiliar for one in placements])
 
 

@@ -1,4 +1,4 @@
-"""The page on the paper's own case, in Markdown: its claims and figures beside ours, and why they differ."""
+"""The page on the paper's own case, in Markdown: its claims and figures next to ours, and why they differ."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from .figures import ENOUGH_RETURNS, PlacementFigures, Reversal, agreement, leak
 from .published import DIFFERENCES, PUBLISHED_CLAIMS, PUBLISHED_GAINS, PUBLISHED_SENSORS
 
 LEAD = """The case study of Qu, Huang and Suo, *SEIP* (2023): Town05 of CARLA, sensors of types 1 to 3, N = 1, 2, 4,
-heights of 3.5, 5.4 and 8 m. Map and traffic are the user's own files, which this project does not hold. The page is
+heights of 3.5, 5.4 and 8 m. Map and traffic are the user's own files, which this project does not include. The page is
 written by
 
     {command}"""
@@ -26,23 +26,24 @@ MOST_NAMED = 8  # reversals that are listed
 
 @dataclass(frozen=True)
 class CaseFacts:
-    """What a run of the command was about, in words and numbers.
+    """Inputs and circumstances of a run of the command, as text and numbers.
 
     Parameters
     ----------
     command : str
-        That writes the page again, without folders.
+        Command that writes the page again, without folders.
     scene, criterion, traffic, training : str
-        For the table of what differs.
+        Entries of the table of differences.
     trainings : int
+        Number of trainings.
     bare : bool
-        Whether nothing in the scene hides anything.
+        Whether no object in the scene blocks the view.
     most_overlap : float
-        Beyond which a run was drawn again.
+        Overlap with an earlier run above which a run was drawn again.
     overlaps, copied : tuple of float
-        Of each two runs drawn anew, and of each two with fixed departures, in ascending order.
+        Overlaps of all pairs of randomly drawn runs, and of pairs with fixed departures, in ascending order.
     doubts : tuple of str
-        Why figures may not be final.
+        Reasons why figures may not be final.
     """
 
     command: str
@@ -71,7 +72,7 @@ def page(
     Parameters
     ----------
     claims : sequence of Claim
-        Of coverage and of detection.
+        Claims about coverage and about detection.
     charts : sequence of (str, str)
         Path from the page, and caption.
     """
@@ -82,7 +83,7 @@ def page(
         "## Claims",
         _claims(claims),
         "## Figures",
-        "The paper's plots are pictures without values; what its text says of them stands beside ours.",
+        "The paper's plots are pictures without values; figures from its text are next to ours.",
         *_figures(study, placements, facts.trainings),
         *(f"![{caption}]({path})\n\n{caption}" for path, caption in charts),
         "## Sensors",
@@ -130,10 +131,10 @@ def _figures(study: CoverageStudy, placements: Sequence[PlacementFigures], train
     one = "one training" if trainings == 1 else f"the mean of {trainings} trainings"
     yield (
         f"Average precision at an overlap of 0.7 from above (section V-C), {one}; in brackets the first training's "
-        "95 % interval over test runs. *Returns*: from a vehicle in the middle (the median), and the share of vehicles "
-        f"with {ENOUGH_RETURNS} or more. *False*: false positives per frame (section V-D). The last two columns are of "
-        "runs with the file's fixed departures, near copies, with a detector that learnt from such runs, and with the "
-        "one of the columns before:"
+        "95 % interval over test runs. *Returns*: median number of returns from a vehicle, and share of vehicles "
+        f"with {ENOUGH_RETURNS} or more. *False*: false positives per frame (section V-D). The last two columns are "
+        "for runs with the file's fixed departures (near copies): AP of a detector trained on such runs, and of the "
+        "detector of the other columns:"
     )
     head = (
         "placement",
@@ -143,8 +144,8 @@ def _figures(study: CoverageStudy, placements: Sequence[PlacementFigures], train
         "ours",
         "returns",
         "false",
-        "copies, learnt",
-        "copies, not learnt",
+        "copies, trained on them",
+        "copies, not trained on them",
     )
     yield _table(head, list(_precisions(placements)))
 
@@ -173,7 +174,7 @@ def _precisions(placements: Sequence[PlacementFigures]) -> Iterator[tuple[str, .
         theirs = ours = ""
         if last is not None:
             step = COUNTS.index(one.count) - 1
-            theirs = f"+ {PUBLISHED_GAINS[one.sensor][step]}" if one.sensor in PUBLISHED_GAINS else "not said"
+            theirs = f"+ {PUBLISHED_GAINS[one.sensor][step]}" if one.sensor in PUBLISHED_GAINS else "not given"
             ours = f"{100 * (one.precision - last.precision):+.1f} points"
         before[one.sensor] = one
         yield (
@@ -222,11 +223,12 @@ def _type(  # noqa: PLR0913, PLR0917  # the columns of the paper's table
 
 def _runs(facts: CaseFacts) -> str:
     return (
-        f"{facts.traffic}. Of each two runs {_range(facts.overlaps)} of the vehicles are within {MATCH_RADIUS:g} m of "
-        "one of the other run at the same instant. A run that overlapped an earlier one by more than any two of the "
-        f"shipped junction do ({facts.most_overlap:.0%}) was drawn again. With the file's own departures, at fixed "
-        f"times, it is {_range(facts.copied)} of the vehicles, whatever SUMO's seed: near copies, on which a detector "
-        "is tested by what it has learnt by heart."
+        f"{facts.traffic}. For each pair of runs, {_range(facts.overlaps)} of the vehicles are within "
+        f"{MATCH_RADIUS:g} m of a vehicle of the other run at the same instant. A run was drawn again if it "
+        "overlapped an earlier one by more than the largest overlap at the shipped junction "
+        f"({facts.most_overlap:.0%}). With the file's own departures, at fixed times, it is {_range(facts.copied)} of "
+        "the vehicles, for any of SUMO's seeds. Such runs are near copies: a detector trained on some of them can "
+        "recognise the others from memory."
     )
 
 
@@ -234,25 +236,26 @@ def _reasons(facts: CaseFacts, placements: Sequence[PlacementFigures]) -> Iterat
     added, known = leaks(placements), np.array([one.copies for one in placements])
     apart = known - [one.precision for one in placements]
     yield (
-        "**Leak.** Learnt from runs with the file's departures and tested on others of them, near copies, the AP is "
-        f"{known.min():.1%} to {known.max():.1%}, {100 * apart.mean():+.1f} points on average beside that of runs "
-        "drawn anew. A detector that learnt from as many runs drawn anew and is tested on the same frames says how "
-        f"much of it is leak, that is places, bodies and paint known from training: {100 * added.min():+.1f} to "
-        f"{100 * added.max():+.1f} points, {100 * added.mean():+.1f} on average over the placements (one training "
-        "each). The rest is the traffic itself, which drives and queues in other places."
+        "**Leak.** A detector trained on runs with the file's departures and tested on others of them (near copies) "
+        f"has an AP of {known.min():.1%} to {known.max():.1%}, a difference of {100 * apart.mean():+.1f} points on "
+        "average from that on randomly drawn runs. The leak is the part due to positions, bodies and paint known from "
+        "training. It is measured with a detector trained on the same number of randomly drawn runs and tested on the "
+        f"same frames: {100 * added.min():+.1f} to {100 * added.max():+.1f} points, {100 * added.mean():+.1f} on "
+        "average over the placements (one training each). The rest is due to the traffic, which drives and queues at "
+        "different positions."
     )
     least = min(placements, key=lambda one: one.coverage)
     yield (
         "**Scene.** "
-        + ("Nothing in this scene hides anything but vehicles" if facts.bare else facts.scene)
+        + ("Nothing in this scene except vehicles blocks the view" if facts.bare else facts.scene)
         + f". With {least.name}, which covers {least.coverage:.1%}, {least.enough:.0%} of the vehicles give "
-        f"{ENOUGH_RETURNS} returns or more: coverage says where the rings of a sensor fall on the road, and a vehicle "
-        "between two rings is seen all the same. CARLA's buildings and trees are in no OpenDRIVE map; what they would "
-        "change was not measured (`--site` adds described ones)."
+        f"{ENOUGH_RETURNS} returns or more: coverage depends on where the rings of a sensor fall on the road, but a "
+        "vehicle between two rings still returns points. The OpenDRIVE map does not contain CARLA's buildings and "
+        "trees; their effect was not measured (`--site` adds described ones)."
     )
     found = reversals(placements)
     standing = [one for one in found if one.stands]
-    told = sum(one.more_returns for one in found)
+    more_returns = sum(one.more_returns for one in found)
     yield (
         f"**Criterion.** Over the {len(placements)} placements AP has a rank correlation of "
         f"{agreement(placements, 'coverage'):.2f} with coverage, {agreement(placements, 'returns'):.2f} with the "
@@ -260,12 +263,12 @@ def _reasons(facts: CaseFacts, placements: Sequence[PlacementFigures]) -> Iterat
         f"{agreement(placements, 'enough'):.2f} with the share of vehicles that give "
         f"{ENOUGH_RETURNS} returns or more. In {len(found)} pairs the placement that covers less detects more "
         f"({len(standing)} of them beyond the 95 % interval over test runs); on near copies it does in "
-        f"{len(reversed_pairs(placements, 'copies'))} pairs where they were learnt, and in "
-        f"{len(reversed_pairs(placements, 'unfamiliar'))} where they were not. In {told} of the {len(found)} pairs, "
+        f"{len(reversed_pairs(placements, 'copies'))} pairs with the detector trained on them, and in "
+        f"{len(reversed_pairs(placements, 'unfamiliar'))} with the other. In {more_returns} of the {len(found)} pairs, "
         f"and {sum(one.more_returns for one in standing)} of the {len(standing)} beyond the interval, more vehicles "
-        f"give {ENOUGH_RETURNS} returns with the placement that covers less: there the criterion is at fault, coverage "
-        "of an empty road, which knows neither that vehicles hide each other nor how many returns one gives. The "
-        "others are left to the training or to chance."
+        f"give {ENOUGH_RETURNS} returns with the placement that covers less. These are due to the criterion: coverage "
+        "of an empty road includes neither occlusion by vehicles nor their number of returns. The others are due to "
+        "the training or to chance."
     )
     if found:
         head = (

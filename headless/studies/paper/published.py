@@ -1,7 +1,7 @@
-"""What the paper says, as facts.
+"""Published claims, sensors and figures of the paper.
 
 Qu, Huang and Suo, "SEIP: Simulation-based Design and Evaluation of Infrastructure-based Collective Perception", 2023.
-Its plots are pictures, so that their values stand in no text.
+Its plots are pictures without values.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class PublishedClaim:
-    """A claim of the paper: its number here, where it stands, and what it says, in our words."""
+    """A claim of the paper: its number here, its place in the paper, and the claim in our words."""
 
     number: int
     where: str
@@ -64,7 +64,7 @@ PUBLISHED_SENSORS = (
 )
 
 PUBLISHED_GAINS = {"type1": ("about 20 %", "7 %"), "type2": ("10 %", "5 %")}
-"""Of average precision, from one to two and from two to four sensors (V-C); of type 3 the text gives none."""
+"""Gains of average precision from one to two and from two to four sensors (V-C); the text gives none for type 3."""
 
 HEIGHTS = (3.5, 5.4, 8.0)  # metres, section V-A
 
@@ -95,9 +95,9 @@ DIFFERENCES = (
     ),
     (
         "Truth",
-        "which vehicles have to be found is not said",
-        "all vehicles with their middle in the region, seen or not; rolling shutter",
+        "which vehicles have to be found is not given",
+        "all vehicles with their middle in the region, visible or not; rolling shutter",
     ),
     ("AP", "IoU of 0.7 from above; “%” may be points or shares; no intervals", "the same; points; 95 % intervals"),
 )
-"""What differs: aspect, the paper's, and ours, with places for what a run of the command fills in."""
+"""Differences: aspect, the paper's entry, and ours, with placeholders that a run of the command fills in."""

@@ -1,4 +1,4 @@
-"""Demand of a user's route file for SUMO: its flows, drawn anew for each run or as they stand in the file."""
+"""Demand of a user's route file for SUMO: its flows, drawn randomly for each run or as in the file."""
 
 import math
 import os
@@ -17,22 +17,22 @@ from seip_addon.core.storage.files import whole_file
 from seip_addon.core.storage.xml_stream import Attributes, quoted, read_tags
 
 DEFAULT_CLASS = "passenger"  # SUMO's vClass of a vehicle whose flow names no type
-MIN_GAP = (1.0, 4.0)  # metres to the vehicle before; SUMO's 2.5 on average
+MIN_GAP = (1.0, 4.0)  # metres to the vehicle in front; on average SUMO's 2.5
 STOP_LINE_GAP = (0.2, 4.0)  # metres to the stop line
 _DEPARTURE = ("departLane", "departPos", "departSpeed", "arrivalLane", "arrivalPos", "arrivalSpeed")
 
 
 @dataclass(frozen=True)
 class Flow:
-    """Vehicles that go the same way.
+    """A flow of vehicles along one route.
 
     Parameters
     ----------
     rate : float, vehicles per hour
     edges : tuple of str
-        Of the network, in the order in which they are driven on.
+        Edges of the network, in driving order.
     type : str
-        Of its vehicles; empty where the file names none.
+        Type of its vehicles, or "" if the file names none.
     departure : tuple of (str, str)
         Further attributes of each vehicle, for SUMO.
     """
@@ -46,14 +46,14 @@ class Flow:
 
 @dataclass(frozen=True)
 class RouteDemand:
-    """Flows of a route file, and the vehicle types that are known.
+    """Flows of a route file, and the vehicle types of all files.
 
     Parameters
     ----------
     types : dict of str to dict
         Attributes of each vehicle type, by its id.
     models : tuple of str
-        Types that drive where a flow names none: those of `DEFAULT_CLASS` in the files of types.
+        Types for flows without a type: those of `DEFAULT_CLASS` in the files of types.
     """
 
     flows: tuple[Flow, ...]
@@ -72,8 +72,8 @@ def read_demand(routes: Path, types: Sequence[Path] = ()) -> Generator[Progress,
     Raises
     ------
     SeipError
-        A file cannot be read, or the flows cannot be drawn anew: there are none, or one has no route, no rate, a type
-        that no file knows, or its own time.
+        A file cannot be read, or the flows cannot be drawn randomly: there are none, or one has no route, no rate, a
+        type that no file describes, or does not begin at 0.
     """
     reader = _Reader()
     for path in types:
@@ -84,15 +84,15 @@ def read_demand(routes: Path, types: Sequence[Path] = ()) -> Generator[Progress,
         raise SeipError(
             f"{types[0].name} has no vehicle type of class {DEFAULT_CLASS}, which flows without a type need: add one"
         )
-    reader.flows.clear()  # those of files of types are not asked for
+    reader.flows.clear()  # flows in the files of types are ignored
     yield from read_tags(routes, reader.take, reader.leave)
     if not reader.flows:
-        raise SeipError(f"{routes.name} has no flow: name a route file of SUMO with flows, whose departures are drawn")
+        raise SeipError(f"{routes.name} has no flow: name a route file of SUMO with flows")
     return RouteDemand(tuple(_flow(one, reader.ways, known, routes.name) for one in reader.flows), known, models)
 
 
 class _Reader:
-    """What stands in route files: attributes of types and flows, those with their own route among them, and routes."""
+    """Handler of a stream of XML that collects the attributes of vehicle types and flows, and the routes."""
 
     def __init__(self) -> None:
         self.types: dict[str, Attributes] = {}
@@ -125,13 +125,15 @@ def _flow(given: Attributes, ways: dict[str, tuple[str, ...]], known: dict[str, 
     if kind and kind not in known:
         raise SeipError(f"{called} is of type {quoted(kind)}, which no file describes: name its file with --types")
     if _number(given.get("begin", "0")) != 0.0:
-        raise SeipError(f"{called} does not begin at 0: a demand that changes with time cannot be drawn anew")
+        raise SeipError(
+            f"{called} does not begin at 0: demand that changes with time is not supported; let it begin at 0"
+        )
     departure = tuple((key, given[key]) for key in _DEPARTURE if key in given)
     return Flow(name, _rate(given, called), edges, kind, departure)
 
 
 def _rate(given: Attributes, called: str) -> float:
-    """Return the vehicles per hour of a flow, in whichever of SUMO's ways they are given."""
+    """Return the vehicles per hour of a flow, from any of SUMO's attributes for it."""
     period = given.get("period", "")
     if period.startswith("exp(") and period.endswith(")"):
         rate = 3600.0 * _number(period[4:-1])
@@ -144,7 +146,7 @@ def _rate(given: Attributes, called: str) -> float:
         rate = _number(given.get("vehsPerHour", given.get("perHour", "")))
     if not 0.0 < rate <= 10_000.0:
         raise SeipError(
-            f"{called} says no rate above 0 and up to 10,000 vehicles per hour: give it vehsPerHour, period or "
+            f"{called} has no rate above 0 and up to 10,000 vehicles per hour: give it vehsPerHour, period or "
             "probability"
         )
     return rate
@@ -162,15 +164,15 @@ def write_run(
 ) -> None:
     """Write a route file of single vehicles from 0 to ``duration`` seconds; the same for the same seed.
 
-    Departures are a Poisson process of the demand's rate. Each vehicle takes the way of a flow by the flows' shares
-    and, where the files leave them open, a lane, a model, and the gaps at which it stops, at random. The seed is in
-    the names of all, as paint goes by the name.
+    Departures are a Poisson process of the demand's rate. Each vehicle is assigned to a flow with a probability
+    proportional to the flow's rate. Lane, model and stopping gaps are random unless the files give them. The seed is
+    part of all names because the paint of a road user depends on its name.
 
     Parameters
     ----------
     fixed : bool
-        Whether all is as in the file instead, whatever the seed: each flow departs at even intervals from 0 on, lanes
-        and gaps are SUMO's, and the models are the same in all runs.
+        Whether everything is as in the file, for all seeds: each flow departs at even intervals from 0 on, lanes and
+        gaps are SUMO's, and the models are the same in all runs.
     """
     random = np.random.default_rng([0 if fixed else seed, 4])
     drawn = _even(demand, duration) if fixed else _drawn(demand, duration, random)

@@ -1,4 +1,4 @@
-"""Runs of traffic after the demand of a user's route file: drawn anew for each, or with the file's fixed departures."""
+"""Runs of traffic with the demand of a user's route file: drawn randomly for each, or with fixed departures."""
 
 import json
 import math
@@ -28,14 +28,14 @@ from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.workflows.traffic_runs import traffic_folder
 
-MIN_ON_ROAD = 0.8  # share of a network's lanes in the region that lie on the road of the scene, if it is of its map
-SIGNAL_CYCLE = 120  # seconds; drawn runs begin at any of as many, so that signals are at other phases
+MIN_ON_ROAD = 0.8  # least share of a network's lanes in the region on the scene's road, for a network of its map
+SIGNAL_CYCLE = 120  # seconds; the start of a drawn run is random within it, so that the phases of signals differ
 MOST_OVERLAP = 0.16
-"""Share of the vehicles of a drawn run that may be where another's are: the most of any two at the shipped junction."""
+"""Largest overlap of a drawn run with an earlier one: the largest of any two runs at the shipped junction."""
 
-MAX_DRAWS = 40  # of a run, until one overlaps no run before it by more; then the one that overlaps least is taken
+MAX_DRAWS = 40  # draws of a run until the overlap is small enough; then the one with the least overlap is taken
 _ROAD_TOLERANCE = 1.0  # metres from a lane's middle to the road
-_SAMPLING = 2.0  # metres from point to point of a lane
+_SAMPLING = 2.0  # metres between points of a lane
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class TrafficSource:
 
 @dataclass(frozen=True)
 class RunSettings:
-    """Settings of the runs of traffic: how many, how long (seconds), after what warm-up, and their seed."""
+    """Settings of the runs of traffic: number, duration and warm-up (seconds), and seed."""
 
     runs: int = 16
     duration: float = 40.0
@@ -58,7 +58,7 @@ class RunSettings:
 
     def __post_init__(self) -> None:
         if not 4 <= self.runs <= 999:
-            raise SeipError(f"ask for 4 to 999 runs of traffic, not {self.runs} (--runs)")
+            raise SeipError(f"--runs must be 4 to 999 runs of traffic, not {self.runs}")
         if not 3.0 <= self.duration <= 3600.0 or not 0.0 <= self.warm_up <= 3600.0:
             raise SeipError("a run lasts 3 to 3600 s (--duration), after a warm-up of 0 to 3600 s (--warm-up)")
         if not 0 <= self.seed < 10**4:
@@ -74,7 +74,7 @@ class SiteTraffic:
     demand : RouteDemand
         All flows of the file.
     through : float, vehicles per hour
-        Of the flows that cross the region from one of its streets to another.
+        Rate of the flows that cross the region from one of its streets to another.
     """
 
     source: TrafficSource
@@ -100,7 +100,7 @@ def read_traffic_of_site(
     if share is None or share < MIN_ON_ROAD:
         found = "none of its streets is there" if share is None else f"{share:.0%} of its lanes there are on the road"
         raise SeipError(
-            f"{source.network.name} is no network of the map {map_name} at this place ({found}): name the .net.xml "
+            f"{source.network.name} is not a network of the map {map_name} at this site ({found}): name the .net.xml "
             "that was made from the map"
         )
     for flow in demand.flows:
@@ -108,7 +108,7 @@ def read_traffic_of_site(
         if unknown:
             raise SeipError(
                 f"{source.routes.name}: flow {flow.name!r} takes the edge {unknown[0]!r}, which "
-                f"{source.network.name} has not: name the network that the routes were made for"
+                f"{source.network.name} does not have: name the network that the routes were made for"
             )
     through = [flow.rate for flow in demand.flows if _crosses(flow.edges, network, geometry, shift)]
     if not through:
@@ -120,7 +120,7 @@ def read_traffic_of_site(
 
 
 def _share_on_road(network: StreetNetwork, geometry: SceneGeometry, shift: Float) -> float | None:
-    """Return which share of the network's driving lanes in the region is on the road; None where there are none."""
+    """Return the share of the network's driving lanes in the region that is on the road; None without any."""
     lines = [lane.line - shift for edge in network.edges.values() for lane in edge.of(DRIVING)]
     near = [one for one in map(shapely.LineString, lines) if one.intersects(geometry.region)]
     parts = [shapely.segmentize(one, _SAMPLING) for one in near]
@@ -134,7 +134,7 @@ def _share_on_road(network: StreetNetwork, geometry: SceneGeometry, shift: Float
 
 
 def _crosses(edges: Sequence[str], network: StreetNetwork, geometry: SceneGeometry, shift: Float) -> bool:
-    """Return whether a way leads from one street to the next within the region."""
+    """Return whether a route passes from one street to the next within the region."""
     ends = [network.edges[edge].lanes[-1].line[-1] - shift for edge, _ in pairwise(edges)]
     return any(shapely.contains_xy(geometry.region, *end) for end in ends)
 
@@ -142,22 +142,22 @@ def _crosses(edges: Sequence[str], network: StreetNetwork, geometry: SceneGeomet
 def make_runs(
     scene: Path, traffic: SiteTraffic, geometry: SceneGeometry, settings: RunSettings, *, fixed: bool
 ) -> Generator[Progress, None, list[Path]]:
-    """Simulate runs into the folder beside a scene's file, or keep those that are there and were made alike.
+    """Simulate runs into the folder next to a scene's file, unless runs with the same inputs are already there.
 
     Parameters
     ----------
     fixed : bool
-        As of `write_run`: all departures, ways and models as the file has them, and SUMO's seed alone differs.
+        As in `write_run`: departures, routes and models are those of the file, and only SUMO's seed differs.
 
     Returns
     -------
     list of Path
-        ``run-N.npz``, in the order of their numbers.
+        Files ``run-N.npz``, in the order of their numbers.
 
     Raises
     ------
     SeipError
-        SUMO is missing or refuses its input, or nobody is on the road.
+        SUMO is missing or rejects its input, or there are no road users on the road.
     """
     folder = traffic_folder(scene, "_fixed" if fixed else "")
     source, record = traffic.source, folder / "runs.json"
@@ -185,7 +185,7 @@ def _key_of(record: Path) -> str | None:
         return None
 
 
-def _independent(  # noqa: PLR0913  # what a run follows from, and those that it must not repeat
+def _independent(  # noqa: PLR0913  # inputs of a run, and the runs that it must not repeat
     folder: Path,
     traffic: SiteTraffic,
     geometry: SceneGeometry,
@@ -222,8 +222,8 @@ def _simulated(
     try:
         write_run(routes, traffic.demand, seed, end, fixed=fixed)
         yield from run_sumo(find_sumo(), files, seed, end)
-        said = f"SUMO, demand of {traffic.source.routes.name}, {'fixed departures, ' if fixed else ''}seed {seed}"
-        run = yield from recorded_run(files, (begin, end), geometry, said)
+        origin = f"SUMO, demand of {traffic.source.routes.name}, {'fixed departures, ' if fixed else ''}seed {seed}"
+        run = yield from recorded_run(files, (begin, end), geometry, origin)
     finally:
         for path in (routes, recorded):
             path.unlink(missing_ok=True)
@@ -231,7 +231,7 @@ def _simulated(
 
 
 def overlaps(paths: Sequence[Path]) -> tuple[float, ...]:
-    """Return the overlap of each two runs, in ascending order; see `overlap_of`."""
+    """Return the overlaps of all pairs of runs, in ascending order; see `overlap_of`."""
     positions = [vehicle_positions(path.stem, Trajectories.load(path)) for path in paths]
     shares = (overlap_of(*pair) for pair in combinations(positions, 2))
     return tuple(sorted(share for share in shares if share is not None))

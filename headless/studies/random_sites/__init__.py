@@ -1,1 +1,1 @@
-"""Random sites to train detectors on: streets, what stands beside them, their ground and their traffic."""
+"""Random sites to train detectors on: streets, objects next to them, ground and traffic."""

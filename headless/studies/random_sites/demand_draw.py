@@ -1,4 +1,4 @@
-"""Traffic of a training site: volumes, mix and signals drawn anew for each run."""
+"""Traffic of a training site: volumes, mix and signals drawn randomly for each run."""
 
 from headless.sumo.demand import VEHICLE_SHARES, Demand, KerbParking
 from headless.sumo.simulation import SignalPlan
@@ -10,8 +10,8 @@ from .street_plan import StreetPlan
 Random = np.random.Generator
 
 FLOW = {1: (300.0, 700.0), 2: (300.0, 950.0), 3: (400.0, 1100.0)}
-"""Vehicles per hour that come in on each arm, at least and at most, by the lanes of the widest."""
-MIX_SPREAD = 0.45  # standard deviation of the logarithm by which each share of the mix differs from the usual
+"""Least and largest vehicles per hour that enter on each arm, by the number of lanes of the widest arm."""
+MIX_SPREAD = 0.45  # standard deviation of the logarithm of each share of the mix, around the default share
 LEAST_SHARES = {
     "truck": 0.10,
     "bus": 0.10,
@@ -19,7 +19,7 @@ LEAST_SHARES = {
     "bicycle": 0.08,
 }  # of vehicles, before their sum is made 1
 PEDESTRIANS = (60.0, 260.0)  # persons per hour and arm
-BAYS = (3, 9)  # in a row at the kerb, the last one excluded
+BAYS = (3, 9)  # bays in a row at the kerb; the upper end is excluded
 FIRST_BAY = (18.0, 40.0)  # metres from the junction
 
 

@@ -1,4 +1,4 @@
-"""A street plan as an extract of OpenStreetMap and an elevation model, which the builder of sites reads."""
+"""Street plans written as an OpenStreetMap extract and an elevation model, the inputs of the site builder."""
 
 import math
 from pathlib import Path
@@ -14,8 +14,8 @@ from seip_addon.core.world.openstreetmap.crossings import EARTH_RADIUS
 from .street_plan import TURN_LANE_LENGTH, Arm, StreetPlan, Tags
 
 LATITUDE, LONGITUDE = 54.2, 3.0
-"""The middle of every plan, degrees: in the North Sea, where no street is, and north is up on the map (UTM zone 31)."""
-TERRAIN_REACH, TERRAIN_STEP = 420.0, 2.0  # metres from the middle, and between two heights
+"""Middle of every plan, degrees: in the North Sea, without real streets, and on the central meridian of UTM zone 31."""
+TERRAIN_REACH, TERRAIN_STEP = 420.0, 2.0  # metres from the middle, and between samples
 _SCALE, _TIE_POINT, _KEYS = 33550, 33922, 34735  # GeoTIFF's tags
 _WGS84 = 4326
 _STRAIGHT_ENTRY = 15.0  # metres that a street runs straight into a roundabout
@@ -53,7 +53,7 @@ def write_terrain(path: Path, plan: StreetPlan) -> None:
 
 
 def _degrees(place: Float) -> tuple[float, float]:
-    """Return metres east and north of the middle as degrees of longitude and latitude."""
+    """Convert metres east and north of the middle to degrees of longitude and latitude."""
     degree = math.radians(1.0) * EARTH_RADIUS
     return float(place[0]) / (degree * math.cos(math.radians(LATITUDE))), float(place[1]) / degree
 
@@ -108,7 +108,7 @@ def _add_streets(text: _Extract, plan: StreetPlan) -> None:
 
 
 def _add_roundabout(text: _Extract, plan: StreetPlan, radius: float) -> dict[int, int]:
-    """Add a circle of streets; return at which node each arm begins."""
+    """Add the ring of a roundabout; return the first node of each arm."""
     arms = {arm.angle % math.tau: arm for arm in plan.arms}
     ends = sorted(arms)
     places = [

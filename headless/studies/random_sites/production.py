@@ -1,4 +1,4 @@
-"""Making of training sites: each from its seed to a scene, its map and its runs of traffic."""
+"""Generation of training sites: scene, map and runs of traffic from a seed."""
 
 import json
 import math
@@ -43,18 +43,18 @@ _PLAN, _RUN = 0, 1  # streams of random numbers of a site
 
 @dataclass(frozen=True)
 class SiteSettings:
-    """What is asked for of every site.
+    """Settings of all sites.
 
     Parameters
     ----------
     seed : int
-        Of all sites together.
+        Seed of all sites together.
     runs : int
-        Of traffic, on each site.
+        Number of runs of traffic on each site.
     duration, warm_up : float, seconds
-        Of each run, and of the simulation before it.
+        Duration of each run, and of the simulation before it.
     approaches : float, metres
-        How far the region of interest follows the streets.
+        Length of the streets in the region of interest.
     """
 
     seed: int = 0
@@ -67,23 +67,23 @@ class SiteSettings:
         if not 0 <= self.seed < 2**31:
             raise SeipError(f"--seed must be a whole number from 0 to {2**31 - 1}, not {self.seed}")
         if self.runs < 1:
-            raise SeipError(f"ask for one run of traffic or more on each site, not {self.runs}")
+            raise SeipError(f"--runs must be 1 or more runs of traffic on each site, not {self.runs}")
         if not 3.0 <= self.duration <= 3600.0 or not 0.0 <= self.warm_up <= 3600.0:
             raise SeipError("a run lasts 3 to 3600 s (--duration), after a warm-up of 0 to 3600 s (--warm-up)")
         if not 30.0 <= self.approaches <= 100.0:
-            raise SeipError(f"the region follows the streets for 30 to 100 m, not {self.approaches:g} (--approaches)")
+            raise SeipError(f"--approaches must be 30 to 100 m, not {self.approaches:g}")
 
 
 @dataclass(frozen=True, eq=False)
 class MadeSite:
-    """A site that is done.
+    """A finished site.
 
     Parameters
     ----------
     record : mapping
         Content of its ``site.json``.
     kept : bool
-        Whether it was there before.
+        Whether it already existed.
     """
 
     folder: Path
@@ -92,15 +92,15 @@ class MadeSite:
 
 
 def site_key(settings: SiteSettings, number: int) -> str:
-    """Return a digest of all that a site follows from."""
+    """Return a digest of all inputs of a site."""
     return digest(repr(settings), number, bpy.app.version_string, source_digest(__name__))
 
 
 def make_site(folder: Path, settings: SiteSettings, number: int) -> Generator[Progress, None, MadeSite]:
-    """Make a site in a folder, or keep the one that is there and was made with the same settings.
+    """Generate a site in a folder, unless a site with the same settings is already there.
 
-    Its files are ``site.osm``, ``site.tif``, ``site.xodr``, ``site.blend``, ``site_traffic/run-*.npz`` and, when all
-    others are there, ``site.json``.
+    Its files are ``site.osm``, ``site.tif``, ``site.xodr``, ``site.blend``, ``site_traffic/run-*.npz`` and, written
+    last, ``site.json``.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def make_site(folder: Path, settings: SiteSettings, number: int) -> Generator[Pr
 
 
 def _finished(path: Path, key: str, settings: SiteSettings) -> dict[str, Any] | None:
-    """Return the record of a site that is there with all of its files and has this key."""
+    """Return the record of a site that has this key and all of its files, or None."""
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -147,14 +147,14 @@ def _finished(path: Path, key: str, settings: SiteSettings) -> dict[str, Any] | 
 
 
 def run_path(folder: Path, run: int) -> Path:
-    """Return where a site's run of traffic lies; runs count from 1."""
+    """Return the path of a site's run of traffic; runs are numbered from 1."""
     return traffic_folder(folder / "site.blend") / f"run-{run}.npz"
 
 
 def _built(
     folder: Path, settings: SiteSettings, number: int
 ) -> Generator[Progress, None, tuple[StreetPlan, SceneGeometry, int]]:
-    """Write map and scene of the first plan that passes the check; return it, its scene, and how many did not."""
+    """Write map and scene of the first plan that passes the check; return it, its scene, and the number rejected."""
     whole = Progress(0, settings.runs + 1, "streets")
     problems = ""
     for attempt in range(MAX_ATTEMPTS):
@@ -166,26 +166,26 @@ def _built(
             continue
         return plan, geometry, attempt
     raise SeipError(
-        f"{MAX_ATTEMPTS} plans of site {number} did not pass the check of sites, the last as {problems}; "
+        f"{MAX_ATTEMPTS} plans of site {number} did not pass the check of sites (the last: {problems}): "
         "choose another --seed"
     )
 
 
 class _UnusableError(Exception):
-    """A plan cannot be used: why."""
+    """A plan that cannot be used, with the reason."""
 
 
 def _build(folder: Path, plan: StreetPlan, settings: SiteSettings) -> Generator[Progress, None, SceneGeometry]:
     extract, terrain = folder / "site.osm", folder / "site.tif"
     write_extract(extract, plan)
     write_terrain(terrain, plan)
-    asked = SiteRequest(
+    request = SiteRequest(
         near_latlon=(LATITUDE, LONGITUDE),
         approaches=settings.approaches,
         terrain=TerrainRequest(terrain),
         left_hand=plan.left_hand,
     )
-    built = yield from build_site(extract, asked)
+    built = yield from build_site(extract, request)
     scene = new_file()
     yield from build_scene(scene, built.model, built.map_name)
     contents = contents_of(scene)
@@ -204,7 +204,7 @@ def _laid_out(geometry: SceneGeometry) -> tuple[Site, Sequence[str]]:
 def _run_of_traffic(
     folder: Path, settings: SiteSettings, streams: Sequence[int], plan: StreetPlan, geometry: SceneGeometry
 ) -> Generator[Progress, None, dict[str, Any]]:
-    """Simulate and save a run; return what is recorded of it."""
+    """Simulate and save a run; return its entry in the record."""
     random = np.random.default_rng([settings.seed, *streams, _RUN])
     demand, signals = draw_demand(plan, random), draw_signals(random)
     seed = int(random.integers(2**31))

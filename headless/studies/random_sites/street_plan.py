@@ -1,4 +1,4 @@
-"""Plans of random junctions: arms, lanes, slopes, and what stands beside the streets."""
+"""Plans of random junctions: arms, lanes, slopes, and objects next to the streets."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from seip_addon.core.arrays import Float
 Random = np.random.Generator
 Tags = Mapping[str, str]
 
-ARM_SHARES = {3: 0.3, 4: 0.5, 5: 0.2}  # of junctions with so many arms
-MIN_ANGLES = {3: 70.0, 4: 58.0, 5: 52.0}  # degrees between two arms at least
+ARM_SHARES = {3: 0.3, 4: 0.5, 5: 0.2}  # shares of junctions by the number of arms
+MIN_ANGLES = {3: 70.0, 4: 58.0, 5: 52.0}  # least degrees between two arms, by the number of arms
 ARM_LENGTH = (150.0, 200.0)  # metres from the middle
-MAX_BEND = 12.0  # degrees by which the end of an arm lies beside the direction in which it begins
+MAX_BEND = 12.0  # largest angle in degrees between the first and the last direction of an arm
 STRAIGHT, NODE_SPACING = 25.0, 2.5  # metres of an arm before it bends, and between its nodes: few show as kinks
 MAX_SLOPE = 0.06
 FLAT_RADIUS = 16.0  # metres about the middle within which the ground is level
 RAMP = 24.0  # metres beyond that over which arms reach their slope
 ROUNDABOUT_SHARE, LEFT_HAND_SHARE, LEVEL_SHARE = 0.18, 0.35, 0.25
-SIGNALS_SHARE = 0.6  # of junctions that are no roundabouts
+SIGNALS_SHARE = 0.6  # of junctions that are not roundabouts
 TURN_LANE_SHARE, CYCLE_LANE_SHARE = 0.4, 0.3  # of arms
 TURN_LANE_LENGTH = 45.0  # metres from the middle
 LANES = {1: 0.5, 2: 0.37, 3: 0.13}  # shares of lanes in each direction
 LANE_WIDTH, KERB_LANE = (2.9, 3.6), (2.4, 2.9)  # metres
 KERB_LANE_SHARE = 0.6  # of arms
 SIDEWALK, CYCLE_LANE = 2.5, 1.5  # metres, as the builder lays them
-CLEARANCE = 0.6  # metres between pavements and what stands behind them
-BUILT_REACH = 125.0  # metres from the middle within which something stands beside the streets
+CLEARANCE = 0.6  # metres between pavements and the objects behind them
+BUILT_REACH = 125.0  # largest distance of objects along a street from the middle, metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,14 +44,14 @@ class Arm:
     Parameters
     ----------
     line : (k, 2) float64, metres
-        Its middle, from the junction outwards.
+        Centre line, from the junction outwards.
     lanes_in, lanes_out : int
-        Towards the junction and away from it.
+        Numbers of lanes towards the junction and away from it.
     lane_width : float, metres
     turn_lane : bool
-        Whether one more lane towards the junction begins `TURN_LANE_LENGTH` before it.
+        Whether an additional lane towards the junction begins `TURN_LANE_LENGTH` before it.
     kerb_lane : float, metres
-        Width of one more lane away from the junction, at whose kerb cars may stand; 0 where there is none.
+        Width of an additional lane away from the junction with parking at its kerb; 0 without one.
     cycle_lanes : bool
     slope : float
         Rise per metre, away from the junction.
@@ -70,7 +70,7 @@ class Arm:
 
     @property
     def half_width(self) -> float:
-        """Half of its width with pavements where it is widest, metres."""
+        """Half of the largest width with pavements, metres."""
         inwards = (self.lanes_in + self.turn_lane) * self.lane_width
         outwards = self.lanes_out * self.lane_width + self.kerb_lane
         return max(inwards, outwards) + CYCLE_LANE * self.cycle_lanes + SIDEWALK
@@ -84,7 +84,7 @@ class Arm:
 
 @dataclass(frozen=True, eq=False)
 class Thing:
-    """Something that stands beside the streets: a point, line or closed outline (k, 2), and its tags."""
+    """An object next to the streets: a point, line or closed outline (k, 2), and its tags."""
 
     corners: Float
     tags: Tags
@@ -98,7 +98,7 @@ class StreetPlan:
     Parameters
     ----------
     roundabout : float or None, metres
-        Radius of the middle of its carriageway.
+        Radius of the centre line of its carriageway; None without a roundabout.
     """
 
     arms: tuple[Arm, ...]
@@ -108,9 +108,9 @@ class StreetPlan:
     things: tuple[Thing, ...]
 
     def height(self, places: Float) -> Float:
-        """Return the height (n,) of the ground at places (n, 2), metres: level in the middle, sloping along each arm.
+        """Return the height (n,) of the ground at positions (n, 2), metres: level in the middle, sloped along each arm.
 
-        Between two arms it goes over from the slope of one to that of the other.
+        Between two arms, the slope changes smoothly from one to the other.
         """
         distance = np.hypot(*places.T)
         past = np.maximum(distance - FLAT_RADIUS, 0.0)
@@ -181,7 +181,7 @@ def _draw_arms(random: Random) -> tuple[Arm, ...]:
 
 
 _NAMES = ("Alder", "Birch", "Cedar", "Elm", "Hazel")
-_SAME_LANES = 0.8  # share of arms with as many lanes out as in
+_SAME_LANES = 0.8  # share of arms with equal numbers of lanes out and in
 
 
 def _draw_lanes(random: Random) -> int:
@@ -189,7 +189,7 @@ def _draw_lanes(random: Random) -> int:
 
 
 def _draw_line(angle: float, random: Random) -> Float:
-    """Return the middle of an arm: straight at first, then bending to one side."""
+    """Return the centre line of an arm: straight at first, then bending to one side."""
     length = float(random.uniform(*ARM_LENGTH))
     bend = math.radians(MAX_BEND) * float(random.uniform(-1.0, 1.0))
     along = np.concatenate([np.arange(0.0, length, NODE_SPACING), [length]])
@@ -224,7 +224,7 @@ _ROOM = {"tree": 1.6, "street_lamp": 0.3, "bus_stop": 4.0}  # metres to the next
 
 
 def _frames(arm: Arm, first: float, spacing: float) -> Iterator[tuple[float, Float, Float]]:
-    """Yield distance, place and direction at points along an arm."""
+    """Yield distance, position and direction at points along an arm."""
     line = shapely.LineString(arm.line)
     for along in np.arange(first, min(line.length, BUILT_REACH), spacing).tolist():
         here, next_ = (shapely.get_coordinates(line.interpolate(along + step))[0] for step in (0.0, 0.5))
@@ -232,7 +232,7 @@ def _frames(arm: Arm, first: float, spacing: float) -> Iterator[tuple[float, Flo
 
 
 def _sides(plan: StreetPlan) -> Iterator[tuple[Arm, float]]:
-    """Yield both sides of each arm: 1 is to the left as one leaves the junction."""
+    """Yield both sides of each arm: 1 is to the left, seen from the junction."""
     yield from itertools.product(plan.arms, (1.0, -1.0))
 
 
@@ -242,7 +242,7 @@ def _beside(place: Float, ahead: Float, distance: float) -> Float:
 
 
 def _draw_buildings(plan: StreetPlan, streets: BaseGeometry, random: Random) -> Iterator[Thing]:
-    """Yield buildings along the streets: rows, or houses that stand apart, of which some are missing."""
+    """Yield buildings along the streets: terraces, or detached houses with random gaps."""
     taken: list[shapely.Polygon] = []
     keep_clear = streets.buffer(CLEARANCE)
     shapely.prepare(keep_clear)
@@ -269,7 +269,7 @@ _CITY_SHARE, _VACANT_SHARE = 0.55, 0.15
 
 
 def _lot(line: shapely.LineString, along: float, width: float, front: float, depth: float) -> shapely.Polygon:
-    """Return a rectangle whose front lies along a street, ``front`` metres to its left."""
+    """Return a rectangle with its front along a street, ``front`` metres to the left."""
     begin, end = (shapely.get_coordinates(line.interpolate(place))[0] for place in (along, along + width))
     ahead = (end - begin) / max(float(np.hypot(*(end - begin))), 1e-9)
     corners = [_beside(begin, ahead, front), _beside(begin + width * ahead, ahead, front)]
@@ -284,7 +284,7 @@ def _building_tags(usual_levels: int, random: Random) -> dict[str, str]:
 
 
 def _draw_walls(plan: StreetPlan, taken: BaseGeometry, random: Random) -> Iterator[Thing]:
-    """Yield walls, hedges and fences behind the pavement where nothing else stands."""
+    """Yield walls, hedges and fences behind the pavement where there is space."""
     for arm, side in _sides(plan):
         if random.random() > _WALLED_SHARE:
             continue
@@ -325,7 +325,7 @@ _GREEN_SHARE, _TREE_SHARE = 0.5, 0.85
 
 
 def _draw_lamps(plan: StreetPlan, random: Random) -> Iterator[Thing]:
-    """Yield street lamps at the outer edge of the pavements, in turn on one side and the other."""
+    """Yield street lamps at the outer edge of the pavements, on alternating sides."""
     height = f"{random.uniform(5.5, 9.0):.1f}"
     for arm in plan.arms:
         spacing = float(random.uniform(20.0, 32.0))

@@ -1,1 +1,1 @@
-"""Training of the detector on several sites, with a placement of its own for each run."""
+"""Training of the detector on several sites, with a random placement for each run of traffic."""

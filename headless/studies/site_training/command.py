@@ -1,10 +1,10 @@
-"""Train a detector on random placements at several sites, so that it works with any placement at others.
+"""Train a detector on random placements at several sites, for any placement at unseen sites.
 
 seip study random-sites -o out/sites --sites 16
 seip study site-training out/sites/*/site.blend -o out/detector
 
-Each scene comes with its runs of traffic in the folder SCENE_traffic beside it. The last sites are set aside, to see
-when to stop. A training that was stopped goes on where it was.
+The runs of traffic of each scene are in the folder SCENE_traffic next to it. The last sites are set aside for
+validation, which decides when to stop. Rerun the command to resume an interrupted training.
 """
 
 import argparse
@@ -57,7 +57,7 @@ TYPES = (
     "helios_5515",
     "at128",
 )
-ASIDE = 8  # one site in so many is set aside
+ASIDE = 8  # one of this number of sites is set aside
 MIN_SITES = 2
 
 Site = TypeVar("Site")
@@ -70,7 +70,7 @@ def main(argv: list[str]) -> None:
     learning = LearningSettings(tuple(options.sensor), options.placements, options.every, training.seed)
     check_device(options.device)
     runtime.check_folder(options.output)
-    learnt, validation = (
+    training_recordings, validation = (
         [
             recording
             for number, scene in scenes
@@ -79,7 +79,8 @@ def main(argv: list[str]) -> None:
         for scenes in set_aside(list(enumerate(options.scenes)))
     )
     store = options.output / "training.pt"
-    trained = runtime.finish_with_bar(train(learnt, validation, network, training, device=options.device, store=store))
+    steps = train(training_recordings, validation, network, training, device=options.device, store=store)
+    trained = runtime.finish_with_bar(steps)
     best = trained.curve.best
     trained.detector.save(options.output / "detector.pt", half=True)
     save_training_chart(options.output / "training.png", trained.curve.loss, trained.curve.validation, "training")
@@ -91,18 +92,18 @@ def main(argv: list[str]) -> None:
 
 @dataclass(frozen=True)
 class LearningSettings:
-    """What detectors learn from at each site.
+    """Settings of the training scans of each site.
 
     Parameters
     ----------
     sensors : tuple of str
         Catalogue keys of the types.
     placements : int
-        Random ones for each run of traffic.
+        Number of random placements for each run of traffic.
     every : float, seconds
-        From frame to frame.
+        Time between frames.
     seed : int
-        Of random placements, and of the noise of scans.
+        Seed of random placements, and of the noise of scans.
     """
 
     sensors: tuple[str, ...] = TYPES
@@ -112,21 +113,25 @@ class LearningSettings:
 
 
 def read_site(scene: Path, learning: LearningSettings) -> LearntSite:
-    """Read a scene with the runs of traffic beside it.
+    """Read a scene with the runs of traffic next to it.
 
     Raises
     ------
     SeipError
-        There are none, or the scene is none.
+        The scene cannot be read, or has no runs of traffic.
     """
     runtime.open_scene(scene)
     geometry = read_scene(bpy.context.scene).geometry
-    asked = SurveySettings(candidates=CandidateSettings(sensors=learning.sensors, heights=HEIGHTS, tilts=TILTS))
-    models = asked.models()
-    candidates = make_site(geometry, asked.candidates, asked.grid_spacing, asked.reach(), models).candidates
+    survey_settings = SurveySettings(
+        candidates=CandidateSettings(sensors=learning.sensors, heights=HEIGHTS, tilts=TILTS)
+    )
+    models = survey_settings.models()
+    candidates = make_site(
+        geometry, survey_settings.candidates, survey_settings.grid_spacing, survey_settings.reach(), models
+    ).candidates
     runs = sampled_runs(survey.runs_beside(scene), geometry.origin, learning.every)
     if not runs:
-        raise SeipError(f"{scene} has no runs of traffic beside it: simulate some with headless/traffic.py")
+        raise SeipError(f"{scene} has no runs of traffic in the folder next to it: simulate some with `seip traffic`")
     for run in runs:
         require_own_traffic(run.trajectories, geometry, run.name)
     simulator = Simulator(geometry, ScanSettings(seed=learning.seed))
@@ -134,15 +139,15 @@ def read_site(scene: Path, learning: LearningSettings) -> LearntSite:
 
 
 def set_aside(sites: Sequence[Site]) -> tuple[Sequence[Site], Sequence[Site]]:
-    """Return the sites to learn from, and the last ones, to see when to stop.
+    """Return the training sites, and the last sites, which are for validation.
 
     Raises
     ------
     SeipError
-        There are fewer than two.
+        There are fewer than two sites.
     """
     if len(sites) < MIN_SITES:
-        raise SeipError("name two sites or more: the last is set aside, to see when to stop")
+        raise SeipError("name two sites or more: the last is set aside for validation")
     aside = max(1, len(sites) // ASIDE)
     return sites[:-aside], sites[-aside:]
 
@@ -161,26 +166,32 @@ def _sampled(
 
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("study site-training", "Train a detector on random placements at several sites.")
-    parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE", help="each with its traffic beside it")
+    parser.add_argument(
+        "scenes", nargs="+", type=Path, metavar="SCENE", help="scenes (.blend), each with its traffic next to it"
+    )
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the detector")
-    learning = parser.add_argument_group("what is learnt from")
+    learning = parser.add_argument_group("training data")
     default = LearningSettings()
     learning.add_argument(
         "--sensor", nargs="+", default=list(default.sensors), metavar="KEY", help="types in the placements"
     )
     learning.add_argument(
-        "--placements", type=int, default=default.placements, metavar="N", help="random ones for each run of traffic"
+        "--placements",
+        type=int,
+        default=default.placements,
+        metavar="N",
+        help="random placements for each run of traffic",
     )
     learning.add_argument(
-        "--every", type=real_number(TIME_STEP), default=default.every, metavar="S", help="time from frame to frame"
+        "--every", type=real_number(TIME_STEP), default=default.every, metavar="S", help="time between frames, seconds"
     )
     net = parser.add_argument_group("network")
     add_settings(net, NetworkSettings, "head", "pillar", "most_points", "width", "blocks")
     learning.add_argument(
-        "--seed", type=int, default=default.seed, metavar="N", help="of placements, noise, weights and order"
+        "--seed", type=int, default=default.seed, metavar="N", help="seed for placements, noise, weights and order"
     )
     work = parser.add_argument_group("training")
     add_settings(work, TrainingSettings, "steps", "batch")
-    work.add_argument("--device", default="cpu", help="of torch: cpu, cuda")
+    work.add_argument("--device", default="cpu", help="device of torch: cpu, cuda")
     add_settings(work, TrainingSettings, "threads")
     return parser

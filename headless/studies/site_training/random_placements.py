@@ -1,4 +1,4 @@
-"""Random placements, for detectors that are to work with any placement."""
+"""Random placements, to train detectors for any placement."""
 
 from __future__ import annotations
 
@@ -22,28 +22,30 @@ def random_placement(
 ) -> MountedSensors:
     """Return 1 to `MAX_SENSORS` sensors at different positions; positions, and then their poses, are equally likely.
 
-    One in two placements has sensors of one type alone.
+    Half of the placements have sensors of only one type.
 
     Raises
     ------
     SeipError
-        There is no candidate.
+        There are no candidates.
     """
     positions = np.unique(candidates.position_of)
     if not len(positions):
-        raise SeipError("there is no candidate position to put a random sensor at: see the warnings of the site")
+        raise SeipError("the site has no candidate position for a random sensor: see the warnings of the site")
     count = int(random.integers(1, min(MAX_SENSORS, len(positions)) + 1))
     types = sorted(models)
     if random.integers(2):
         types = [types[int(random.integers(len(types)))]]
     sensors = []
     for number, position in enumerate(random.choice(positions, count, replace=False).tolist(), 1):
-        wanted = types[int(random.integers(len(types)))]
+        sensor_type = types[int(random.integers(len(types)))]
         here = candidates.position_of == position
-        poses = np.flatnonzero(here & (candidates.sensor == wanted))
+        poses = np.flatnonzero(here & (candidates.sensor == sensor_type))
         if not len(poses):
             poses = np.flatnonzero(here)
         pose = int(poses[int(random.integers(len(poses)))])
-        turn = orientation(float(candidates.yaw[pose]), float(candidates.tilt[pose]))
-        sensors.append(MountedSensor(f"S{number}", models[str(candidates.sensor[pose])], candidates.xyz[pose], turn))
+        rotation = orientation(float(candidates.yaw[pose]), float(candidates.tilt[pose]))
+        sensors.append(
+            MountedSensor(f"S{number}", models[str(candidates.sensor[pose])], candidates.xyz[pose], rotation)
+        )
     return MountedSensors(name, tuple(sensors))

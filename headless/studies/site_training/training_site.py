@@ -1,4 +1,4 @@
-"""A site to learn from: its runs of traffic, and scans of them by random or given placements."""
+"""Training site: runs of traffic, and scans of them by random placements."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from .random_placements import random_placement
 
 @dataclass(frozen=True, eq=False)
 class LearntSite:
-    """A site to learn from.
+    """A training site.
 
     Parameters
     ----------
     name : str
-        For messages.
+        Name in messages.
     candidates : Candidates
-        That random placements are drawn from.
+        Candidates from which random placements are drawn.
     models : mapping of str to LidarModel
-        The candidates' sensor types.
+        Sensor types of the candidates.
     runs : tuple of SampledRun
     """
 
@@ -45,7 +45,7 @@ class LearntSite:
         return random_placement(name, self.candidates, self.models, random)
 
     def scans(self, placements: int, random: np.random.Generator) -> list[Recording]:
-        """Return the scans of each run by so many random placements of its own."""
+        """Return the scans of each run by `placements` random placements, different ones for each run."""
         return [
             self.simulator.record(self.random_placement(number, random), run)
             for run in self.runs

@@ -1,8 +1,8 @@
 """Both ray casters against float64 on numerically hard scenes.
 
-Two questions are asked of each scene. Of its hits: how many are others than float64's,
-and does any lie where no rounding explains it? Of V: does any entry differ where the
-distance to δ, and all that stands before it, is clearer than the rounding?
+Each scene is checked in two ways. Hits: the number that differ from float64's, and
+whether rounding explains all of them. Visibility V: whether any entry differs although
+its margin to δ, and to everything in front of it, is larger than the rounding.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from .rows import Row
 from .shares import Share
 
 MAX_ROUNDINGS = 64
-"""Steps of float32 at a scene's extent that explain a hit: what visibility allows for, too."""
+"""Tolerance of a hit, in steps of float32 at the scene's extent; visibility uses the same."""
 
 DISTANCES = tuple(10.0 ** (half / 2) for half in range(4, 15))
-"""Metres to which an ordinary street is moved, or at which a stray mesh is left."""
+"""Distances of a moved ordinary street, or of a stray mesh, from the origin, metres."""
 
-RAY_LENGTH = 1e9  # metres that rays go
+RAY_LENGTH = 1e9  # metres
 
 DELTA = 0.5
 TARGETS = 300
@@ -52,27 +52,27 @@ SENSOR = LidarModel(
     rotation_rate=10.0,
     price_range=(1.0, 1.0),
 )
-"""Sensor of the test scenes: few rays, so that float64 can follow all of them."""
+"""Sensor of the test scenes, with few rays, so that all of them can be cast in float64."""
 
 
 @dataclass(frozen=True)
 class HitCheck:
-    """A ray caster's hits against float64's.
+    """Hits of a ray caster compared with float64.
 
     Parameters
     ----------
     distance : float, metres
-        Of the street, or of the stray mesh, from the origin; 0 where that is not in question.
+        Distance of the street, or of the stray mesh, from the origin; 0 if not varied.
     extent : float, metres
-        Of scene and rays.
+        Extent of scene and rays.
     flipped : Share
-        Rays that hit another surface, or hit instead of missing, or miss instead of hitting.
+        Rays that hit a different surface, or hit instead of missing, or miss instead of hitting.
     unexplained : Share
-        Rays whose hit rounding does not explain.
+        Rays whose hit is not explained by rounding.
     off : float, metres
-        By how far the other hits are off at most, across their surfaces.
+        Largest error of the other hits, perpendicular to their surfaces.
     off_along : float, metres
-        The same along the rays.
+        Largest error of the other hits along the rays.
     """
 
     scene: str
@@ -87,16 +87,16 @@ class HitCheck:
 
 @dataclass(frozen=True)
 class GridCheck:
-    """A visibility grid against float64's.
+    """A visibility grid compared with float64.
 
     Parameters
     ----------
     flipped : Share
         Entries that differ.
     in_band : Share
-        Entries that rounding may decide either way.
+        Entries that may have either value by rounding.
     outside : Share
-        Entries that differ though rounding does not explain it.
+        Entries that differ without an explanation by rounding.
     """
 
     scene: str
@@ -108,15 +108,15 @@ class GridCheck:
 
 @dataclass(frozen=True)
 class ArithmeticStudy:
-    """Ray casters against float64.
+    """Ray casters compared with float64.
 
     Parameters
     ----------
     hits : tuple of HitCheck
-        One for each scene and engine.
+        Checks of each scene and engine.
     moved, stored, stray : tuple of HitCheck
-        An ordinary street moved away from the origin in float64; kept there in float32, as Blender does; and with a
-        stray mesh far from it. By distance.
+        Checks by distance of an ordinary street that is moved away from the origin in float64; that is stored there
+        in float32, as Blender does; and that has a stray mesh far away.
     """
 
     hits: tuple[HitCheck, ...]
@@ -127,13 +127,13 @@ class ArithmeticStudy:
 
 
 def engines_here() -> tuple[Engine, ...]:
-    """Return the ray casters that can be had here."""
+    """Return the ray casters that are installed."""
     known: tuple[Engine, ...] = ("bvh", "embree")
     found = []
     for engine in known:
         try:
             make_ray_caster(np.zeros((0, 3, 3)), engine)
-        except SeipError:  # it says that it is not there
+        except SeipError:  # it is not installed
             continue
         found.append(engine)
     return tuple(found)
@@ -147,9 +147,9 @@ def arithmetic_study(
     Parameters
     ----------
     rays : int
-        For each scene.
+        Number of rays for each scene.
     engines : sequence of str, optional
-        All that are there if not given.
+        Ray casters; all that are installed if not given.
     """
     random = np.random.default_rng(seed)
     engines = engines_here() if engines is None else engines
@@ -179,7 +179,7 @@ def arithmetic_study(
 def check_hits(
     scene: HardScene, engine: Engine, truth: FirstHits, distance: float = 0.0, *, kept_at: float = 0.0
 ) -> HitCheck:
-    """Compare a ray caster's hits with those of float64, of a scene that was kept in float32 so far from its origin."""
+    """Compare hits with float64; `kept_at` is the distance from the origin at which the scene was stored in float32."""
     found, _ = make_ray_caster(scene.triangles, engine).cast(scene.origin, scene.directions, RAY_LENGTH)
     missed = np.isfinite(found) != np.isfinite(truth.distance)
     both = np.isfinite(found) & np.isfinite(truth.distance)
@@ -200,7 +200,7 @@ def check_hits(
 
 
 def check_grid(scene: HardScene, engine: Engine) -> GridCheck:
-    """Compare the visibility of targets on a scene with what float64 says of it, and of what it may be."""
+    """Compare the visibility of targets on a scene with float64, and with the entries that rounding may change."""
     site = _site(scene)
     delta = min(DELTA * extent_of(scene) / 20.0, MAX_DELTA)
     settings = VisibilitySettings(delta)
@@ -223,7 +223,7 @@ def extent_of(scene: HardScene) -> float:
 
 
 def tolerance_of(scene: HardScene) -> float:
-    """Return by how much rounding may explain that a hit is off, in metres."""
+    """Return the largest error of a hit that rounding explains, in metres."""
     return MAX_ROUNDINGS * FLOAT32_STEP * extent_of(scene)
 
 
@@ -232,7 +232,7 @@ def _truth(scene: HardScene) -> FirstHits:
 
 
 def _seen_in_float64(scene: HardScene, targets: Float, delta: float) -> tuple[Boolean, Boolean, Boolean]:
-    """Return which targets are seen, surely seen, and maybe seen, (t,) bool each."""
+    """Return whether targets are visible, surely visible, and possibly visible, (t,) bool each."""
     directions = BeamPattern(SENSOR).directions(np.arange(SENSOR.channels * SENSOR.azimuth_count))
     tolerance = tolerance_of(scene)
     hits = first_hits(scene.origin, directions, scene.triangles, tolerance)
@@ -259,7 +259,7 @@ def _within(distance: Float, near: Boolean) -> bool:
 
 
 def _site(scene: HardScene) -> Site:
-    """Return a scene as a site: targets on its surfaces, one pose where its rays start."""
+    """Return a scene as a site: targets on its surfaces, and one pose at the origin of its rays."""
     random = np.random.default_rng(len(scene.triangles))
     which = random.integers(0, len(scene.triangles), TARGETS)
     share = random.dirichlet((1.0, 1.0, 1.0), TARGETS)
@@ -291,41 +291,41 @@ def _site(scene: HardScene) -> Site:
 
 
 def border(checks: Sequence[HitCheck], off: float) -> float:
-    """Return the first distance at which hits are off by more than ``off`` metres; infinite where none is."""
+    """Return the first distance at which the error of hits exceeds ``off`` metres, or infinity."""
     return min((c.distance for c in checks if c.off > off), default=math.inf)
 
 
 def arithmetic_rows(study: ArithmeticStudy) -> list[Row]:
-    """Return where float32 begins to fail."""
-    how = "{:,} rays a scene against float64, both ray casters"
+    """Return the rows on the limits of float32."""
+    how = "{:,} rays for each scene, both ray casters compared with float64"
     trials = max(check.flipped.trials for check in study.hits)
     rows = []
     for engine in dict.fromkeys(check.engine for check in study.hits):
         own = [check for check in study.hits if check.engine == engine]
         flips = {check.scene: check.flipped for check in own if check.flipped.count}
-        said = "; ".join(f"{scene}: {share.per_million}" for scene, share in flips.items()) or "no flipped hit"
+        flipped = "; ".join(f"{scene}: {share.per_million}" for scene, share in flips.items()) or "no flipped hit"
         grids = [check for check in study.grids if check.engine == engine]
         outside, entries = sum(g.outside.count for g in grids), sum(g.outside.trials for g in grids)
         rows.append(
             Row(
                 method=f"ray caster {engine}",
                 regime="edges, vertices, grazing, slivers, duplicate, coplanar, open, inside out, mirrored, scaled",
-                begins=f"{said}; {outside} of {entries:,} entries of V outside the noise band",
+                begins=f"{flipped}; {outside} of {entries:,} entries of V outside the noise band",
                 how=how.format(trials),
-                answer="both sides stop a ray; Embree's distances on needles are computed again in float64",
+                answer="rays hit both sides of surfaces; Embree's distances on slivers are recomputed in float64",
             )
         )
     for name, checks, answer in (
-        ("far origin, computed", study.moved, "moves every scene to its middle in float64 before it casts"),
-        ("far origin, stored by Blender", study.stored, "warns where the scene lies so far out"),
-        ("stray mesh", study.stray, "leaves out what no sensor reaches, and warns of wider meshes by name"),
+        ("far origin, computed", study.moved, "moves the origin to the scene's middle in float64 before casting"),
+        ("far origin, stored by Blender", study.stored, "warns if the scene is that far from the origin"),
+        ("stray mesh", study.stray, "leaves out what no sensor reaches, and names larger meshes in a warning"),
     ):
         first, second = border(checks, MAX_STEP), border(checks, 10 * MAX_STEP)
         rows.append(
             Row(
                 method="ray casters",
                 regime=name,
-                begins=f"hits off by over 1 mm {_from(first)}, by over 1 cm {_from(second)}",
+                begins=f"errors of hits over 1 mm {_from(first)}, over 1 cm {_from(second)}",
                 how=how.format(trials) + ", at powers of ten",
                 answer=answer,
             )

@@ -1,4 +1,4 @@
-"""Chapters of the stability page: each finds the limits of one method."""
+"""Chapters of the stability page, each on the limits of one method."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ from .solver_limits import solver_rows, solver_study
 from .weather import untouched_types, weather_rows, weather_study
 
 RISKS = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
-"""Risks studied: the loss of a sensor, and targets that two sensors must see."""
+"""Risks studied: failure of a sensor, and coverage by two sensors."""
 
 DETECTOR_RUNS = 3
-"""With more runs of traffic than these a detector can learn and be tried."""
+"""Number of runs of traffic that must be exceeded to train and test a detector."""
 
 
 CHAPTERS = ("criterion", "arithmetic", "solvers", "poses", "failures", "traffic", "detector", "weather")
@@ -53,13 +53,13 @@ class StabilityScope:
     Parameters
     ----------
     grids : int
-        Grids of targets, and azimuths, that are drawn at random.
+        Number of random grids of targets, and of random azimuths.
     rays : int
-        That are held to float64 on each scene.
+        Number of rays compared with float64 on each scene.
     instances : int
-        Random placement problems of each kind.
+        Number of random placement problems of each kind.
     instants : tuple of int
-        Of traffic, to choose on and to evaluate on.
+        Numbers of instants of traffic for optimisation and for evaluation.
     detector : mapping of str to int
         See `detector_limits`: seeds and steps of trainings.
     """
@@ -80,13 +80,13 @@ class StudiedScene:
     Parameters
     ----------
     runs : list of Trajectories
-        Traffic; none where there is none beside the scene.
+        Runs of traffic next to the scene; may be empty.
     path : path or None
-        Its file; None for the one that is open.
+        File of the scene; None for the open one.
     others : sequence of path
-        Other scenes, to try on what was learnt on this one.
+        Other scenes, on which the detectors trained on this one are tested.
     work, charts : path
-        Folders of what a rerun goes on from, and of the charts.
+        Folders of finished work, from which a rerun resumes, and of the charts.
     """
 
     survey: Survey
@@ -99,22 +99,22 @@ class StudiedScene:
 
     @property
     def name(self) -> str:
-        """The scene's name, for titles."""
+        """Name of the scene for titles."""
         return self.survey.site.name
 
     @property
     def sensor(self) -> str:
-        """The middle one of the sensor types: neither its best nor its worst coverage is trivial."""
+        """The middle one of the sensor types, which neither covers nearly everything nor nearly nothing."""
         sensors = list(self.survey.models)
         return sensors[len(sensors) // 2]
 
     @property
     def placed(self) -> str:
-        """The placement, for titles."""
+        """Name of the placement for titles."""
         return f"{DEFAULT_COUNT} × {self.sensor}"
 
     def problem(self, sensor: str) -> PlacementProblem:
-        """Return the placement of the usual number of sensors of one type."""
+        """Return the placement problem of `DEFAULT_COUNT` sensors of one type."""
         site = self.survey.site
         problem = placement_problem(site, self.survey.grid.visible, self.survey.models, Objective(count=DEFAULT_COUNT))
         return replace(problem, forbidden=problem.forbidden | (site.candidates.sensor != sensor))
@@ -124,7 +124,7 @@ Work = Callable[[StudiedScene], Generator[Progress, None, Chapter]]
 
 
 def chapters(scene: StudiedScene) -> Iterator[tuple[str, Work]]:
-    """Yield the chapters that a scene allows, by the names that they are kept under."""
+    """Yield the chapters that are possible for a scene, with the names of their files."""
     yield "criterion", criterion
     yield "arithmetic", arithmetic
     yield "solvers", solvers
@@ -150,9 +150,14 @@ def criterion(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
         "The criterion of visibility",
         tuple(criterion_rows(study, delta)),
         (
-            Chart("ring_borders.png", "From which distance on rings on a level road are more than 2δ apart"),
-            Chart("beyond_border.png", "Share of the targets in view that count as seen, by distance in borders"),
-            Chart("delta.png", "Coverage of the best placement, and what its sensors have in view, against δ"),
+            Chart("ring_borders.png", "Border: distance beyond which rings on a level road are more than 2δ apart"),
+            Chart(
+                "beyond_border.png",
+                "Share of the targets in view that count as seen, by distance in multiples of the border",
+            ),
+            Chart(
+                "delta.png", "Coverage of the best placement, and share of targets in view of its sensors, against δ"
+            ),
             Chart("convergence.png", "Coverage of the best placement against the spacings of targets and posts"),
         ),
     )
@@ -165,7 +170,11 @@ def arithmetic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     return Chapter(
         "Arithmetic",
         tuple(arithmetic_rows(study)),
-        (Chart("rounding.png", "How far hits are off, against distance from the origin and a stray mesh's distance"),),
+        (
+            Chart(
+                "rounding.png", "Error of hits against the distance of the scene, or of a stray mesh, from the origin"
+            ),
+        ),
     )
 
 
@@ -185,8 +194,8 @@ def solvers(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
         "Solvers",
         tuple(solver_rows(study, tops)),
         (
-            Chart("solvers.png", "What answers lose on random and adversarial instances"),
-            Chart("flat_top.png", "Placements within 1 % of the best, by how many positions they share with it"),
+            Chart("solvers.png", "Loss of solutions on random and adversarial instances"),
+            Chart("flat_top.png", "Placements within 1 % of the best, by the number of positions they share with it"),
         ),
     )
 
@@ -206,14 +215,12 @@ def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
         scene.charts / "frontier.png", study, f"{scene.placed}: what robustness costs and saves"
     )
     return Chapter(
-        f"Poses that err: {scene.placed}",
+        f"Pose errors: {scene.placed}",
         (*pose_rows(under_errors), *robust_rows(study)),
         (
-            Chart(
-                "spread.png", "Distribution of coverage over unseen draws: the nominal optimum and robust placements"
-            ),
-            Chart("blame.png", "Mean loss when one sensor alone errs, and when one kind of error alone occurs"),
-            Chart("frontier.png", "What robustness costs in planned coverage, and what it saves in the 5 % quantile"),
+            Chart("spread.png", "Distribution of coverage over unseen draws: nominal optimum and robust placements"),
+            Chart("blame.png", "Mean loss with errors of only one sensor, and with only one kind of error"),
+            Chart("frontier.png", "Cost of robustness in planned coverage, and gain in the 5 % quantile"),
         ),
     )
 
@@ -223,7 +230,7 @@ def failures(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     around, problem = surroundings(scene.survey), scene.problem(scene.sensor)
     study = yield from robust_study(around, problem, scene.scope.robust, RISKS, scene.survey.settings.limits)
     pose_error_charts.save_spread_chart(scene.charts / "failures.png", study, f"{scene.placed}: failures")
-    caption = "Distribution over unseen draws of what is left: placements for failures beside the nominal optimum"
+    caption = "Distribution of remaining coverage over unseen draws: placements for failures and the nominal optimum"
     return Chapter(f"Failures: {scene.placed}", robust_rows(study), (Chart("failures.png", caption),))
 
 
@@ -251,11 +258,13 @@ def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     )
     traffic_charts.save_traffic_chart(scene.charts / "promise.png", [(scene.placed, study)], title)
     return Chapter(
-        f"Traffic that hides things: {scene.placed}",
+        f"Occlusion by traffic: {scene.placed}",
         traffic_rows(study),
         (
-            Chart("time_seen.png", "Share of time for which each target, and the point above it, is seen in traffic"),
-            Chart("promise.png", "What placements see on the empty road and, on average over time, in traffic"),
+            Chart(
+                "time_seen.png", "Share of time for which each target, and the point above it, is visible in traffic"
+            ),
+            Chart("promise.png", "Coverage of placements on the empty road and, on average over time, in traffic"),
         ),
     )
 
@@ -271,12 +280,14 @@ def detector(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     charts = [Chart("detector.png", "Average precision against the size of each disturbance, with 95 % intervals")]
     if study.transfers:
         limit_charts.save_transfer_chart(scene.charts / "detector_away.png", study)
-        charts.append(Chart("detector_away.png", "What detectors are worth on what they have not learnt"))
+        charts.append(
+            Chart("detector_away.png", "Change of average precision on types, traffic and sites not in training")
+        )
     return Chapter("The detector", limit_rows.limit_rows(study), tuple(charts))
 
 
 def weather(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Study a fleet in rain and fog, and what they change for the scene's own types."""
+    """Study a fleet in rain and fog, and the effect of weather on the scene's own types."""
     survey = scene.survey
     study = yield from weather_study(survey.geometry, survey.settings)
     best = yield from solve(scene.problem(scene.sensor), survey.settings.limits)
@@ -284,7 +295,7 @@ def weather(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     sensors = deployment.mounted
     rows = weather_rows(study, untouched_types(survey, scene.placed, sensors))
     limits_charts.save_weather_chart(scene.charts / "weather.png", study, f"{scene.name} in rain and fog")
-    caption = "Coverage by weather: placements for clear air and for the weather, and sensors that detect farther"
+    caption = "Coverage by weather: placements for clear air and for the weather, and sensors with a longer range"
     return Chapter(f"Weather: {study.count} × {study.sensor}", rows, (Chart("weather.png", caption),))
 
 
@@ -292,9 +303,9 @@ def introduction(scene: StudiedScene) -> str:
     """Return the introduction of the page."""
     site = scene.survey.site
     return (
-        "Where each method begins to fail, how that was found, and what the tool does about it. Written by "
-        f"`seip study stability`: {site.name}, {len(site.targets):,} targets, {len(site.candidates):,} poses. "
-        "Brackets hold 95 % intervals. Warnings about a scene and a placement stand in the panel, in the batch output "
-        "and in `placement.json`, what traffic leaves of one as soon as it is tried there; those about detectors come "
-        "from the commands that use them."
+        "For each method: the point at which it begins to fail, how that was found, and what the program does about "
+        f"it. Written by `seip study stability`: {site.name}, {len(site.targets):,} targets, "
+        f"{len(site.candidates):,} poses. Brackets hold 95 % intervals. Warnings about a scene and a placement are "
+        "shown in the panel and in the batch output, and stored in `placement.json`; the warning about occlusion by "
+        "traffic needs an evaluation in traffic. Warnings about detectors come from the commands that use them."
     )

@@ -21,16 +21,16 @@ from seip_addon.core.sensing.visibility.float32_precision import FLOAT32_STEP, M
 from .arithmetic import ArithmeticStudy
 from .criterion import CriterionStudy
 from .solver_limits import SolverStudy
-from .weather import FAILS_BELOW, WeatherStudy, in_words
+from .weather import FAILS_BELOW, WeatherStudy, describe_weather
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-"""Told apart by colour-blind people (Okabe and Ito 2008)."""
+"""Colours of series, distinct for colour-blind readers (Okabe and Ito 2008)."""
 
 LIMIT_LINE: dict[str, Any] = {"color": SOFT_INK, "linewidth": 1.2, "linestyle": DASHED}
 
 
 def save_ring_border_chart(path: str | os.PathLike[str], study: CriterionStudy, delta: float, title: str) -> None:
-    """Draw, for each sensor type, from where rings are more than 2δ apart, against δ; what lies above is beams."""
+    """Draw the distance beyond which rings are more than 2δ apart against δ, for each sensor type."""
     sensors = list(dict.fromkeys(border.sensor for border in study.borders))
     figure, panels = _figure(len(sensors))
     for panel, sensor in zip(panels, sensors, strict=True):
@@ -46,7 +46,7 @@ def save_ring_border_chart(path: str | os.PathLike[str], study: CriterionStudy, 
         _delta_axis(panel, study)
         panel.set_ylim(0, top)
         panel.set_title(f"{sensor}: above the line, coverage counts beams", fontsize=10, color=INK)
-        style_axes(panel, "δ (m); dashed: asked for", "distance on a level road (m)")
+        style_axes(panel, "δ (m); dashed: requested", "distance on a level road (m)")
         panel.legend(frameon=False, fontsize=8.5, loc="upper left")
     save_chart(path, figure, title)
 
@@ -73,7 +73,7 @@ def save_border_check_chart(path: str | os.PathLike[str], study: CriterionStudy,
 
 
 def save_delta_chart(path: str | os.PathLike[str], study: CriterionStudy, delta: float, title: str) -> None:
-    """Draw coverage and what is in view against δ, and what the placement for each δ covers under the one asked for."""
+    """Draw coverage and the share in view against δ, and the coverage of each placement with the requested δ."""
     figure, panels = _figure(2)
     for number, sensor in enumerate(dict.fromkeys(answer.sensor for answer in study.by_delta)):
         own = [answer for answer in study.by_delta if answer.sensor == sensor]
@@ -99,7 +99,7 @@ def save_delta_chart(path: str | os.PathLike[str], study: CriterionStudy, delta:
 
 
 def save_convergence_chart(path: str | os.PathLike[str], study: CriterionStudy, title: str) -> None:
-    """Draw coverage against the spacing of targets and of candidates, with what the tolerance picks."""
+    """Draw coverage against the spacing of targets and of candidates, with the spacings chosen for the tolerance."""
     figure, panels = _figure(2)
     picked = study.convergence.settings
     for panel, answers, what, at in (
@@ -122,7 +122,7 @@ def save_convergence_chart(path: str | os.PathLike[str], study: CriterionStudy, 
 
 
 def save_rounding_chart(path: str | os.PathLike[str], study: ArithmeticStudy, title: str) -> None:
-    """Draw by how far hits are off against how far away a street, or a stray mesh, lies."""
+    """Draw the error of hits against the distance of a street, or of a stray mesh, from the origin."""
     figure, (panel,) = _figure(1)
     for number, (name, checks) in enumerate(
         (
@@ -150,7 +150,7 @@ def save_rounding_chart(path: str | os.PathLike[str], study: ArithmeticStudy, ti
 
 
 def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: str) -> None:
-    """Draw what is lost where weights and prices lie far apart, when near-ties move the choice, and greedy's worst."""
+    """Draw losses with extreme weights and prices, choices changed by near-ties, and greedy on its worst case."""
     figure, panels = _figure(3)
     for number, (what, method) in enumerate(dict.fromkeys((c.what, c.method) for c in study.spans)):
         own = [c for c in study.spans if (c.what, c.method) == (what, method)]
@@ -191,7 +191,7 @@ def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: s
 def save_near_optimal_chart(
     path: str | os.PathLike[str], tops: Sequence[tuple[str, NearOptimalSet]], title: str
 ) -> None:
-    """Draw how many placements near the best share how many positions with it."""
+    """Draw the number of placements near the best by the number of positions that they share with it."""
     figure, panels = _figure(len(tops))
     for panel, (name, top) in zip(panels, tops, strict=True):
         panel.bar_label(panel.bar(range(len(top.in_common)), top.in_common, color=COLOURS[0]), fontsize=9)
@@ -202,7 +202,7 @@ def save_near_optimal_chart(
 
 
 def save_weather_chart(path: str | os.PathLike[str], study: WeatherStudy, title: str) -> None:
-    """Draw coverage in each weather of placements for clear air and for the weather, and by a type of more range."""
+    """Draw coverage by weather of placements for clear air and for the weather, and of a type with a longer range."""
     figure, (panel,) = new_figure(9.5, 4.8, dpi=150)
     at = range(1 + len(study.answers))
     clear, longer = study.clear, study.longer_clear
@@ -219,7 +219,13 @@ def save_weather_chart(path: str | os.PathLike[str], study: WeatherStudy, title:
     panel.axhline(FAILS_BELOW, **LIMIT_LINE)
     panel.set_xticks(
         at,
-        ["clear", *(in_words(one.words).replace(" of ", "\n").replace(", visibility ", "\n") for one in study.answers)],
+        [
+            "clear",
+            *(
+                describe_weather(one.words).replace(" of ", "\n").replace(", visibility ", "\n")
+                for one in study.answers
+            ),
+        ],
     )
     panel.set_ylim(0, 1.03)
     _share_axis(panel)

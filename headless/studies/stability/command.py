@@ -4,7 +4,7 @@ seip study stability scenes/junction.blend -o docs
 seip study stability scenes/junction.blend -o docs --only weather
 blender -b --python-exit-code 1 site.blend -P headless/study.py -- stability -o docs
 
-Chapters that are done are kept in the folder of work: a run that was stopped goes on with the next.
+Finished chapters are stored in the work folder: rerun the command to resume.
 """
 
 import argparse
@@ -26,13 +26,13 @@ PAGE, CHARTS = "stability.md", "stability"
 
 
 def main(argv: list[str], scope: StabilityScope | None = None) -> None:
-    """Study what has not been studied yet, and write the page; tests give a small ``scope``."""
+    """Study the chapters that are not finished, and write the page; tests pass a small ``scope``."""
     options = _parser().parse_args(argv)
     charts = options.output / CHARTS
     for other in options.other:
         _check_other(other)
     if options.only and not (options.output / PAGE).is_file():
-        raise SeipError(f"there is no page {options.output / PAGE} to put chapters into: leave out --only")
+        raise SeipError(f"there is no page {options.output / PAGE} to add chapters to: leave out --only")
     runtime.check_folder(charts)
     surveyed, watch = survey.survey(
         argparse.Namespace(**vars(options) | {"output": options.work}),
@@ -49,14 +49,14 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
         source_digest("headless.studies.stability.command"),
     )
     done = []
-    asked = [(name, work) for name, work in chapters(scene) if name in (options.only or [name])]
-    for name, work in asked:
-        kept = load_chapter(options.work / f"{name}.json", made_from)
-        if kept is None or not all((charts / chart.file).exists() for chart in kept.charts):
-            kept = watch.run(name, work(scene))
-            save_chapter(options.work / f"{name}.json", kept, made_from)
-            runtime.LOG.info(f"{kept.title}: {len(kept.rows)} rows, {watch.seconds[name]:.0f} s")
-        done.append(kept)
+    requested = [(name, work) for name, work in chapters(scene) if name in (options.only or [name])]
+    for name, work in requested:
+        chapter = load_chapter(options.work / f"{name}.json", made_from)
+        if chapter is None or not all((charts / chart.file).exists() for chart in chapter.charts):
+            chapter = watch.run(name, work(scene))
+            save_chapter(options.work / f"{name}.json", chapter, made_from)
+            runtime.LOG.info(f"{chapter.title}: {len(chapter.rows)} rows, {watch.seconds[name]:.0f} s")
+        done.append(chapter)
     with runtime.incomplete_if_interrupted(options.output):
         if options.only:
             for chapter in done:
@@ -67,24 +67,30 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
 
 
 def _check_other(scene: Path) -> None:
-    """Raise SeipError, before hours of work, where detectors cannot be tried on a scene."""
+    """Raise SeipError, before hours of work, if detectors cannot be tested on a scene."""
     if not scene.is_file():
-        raise SeipError(f"there is no file {scene}: --other names scenes with traffic beside them")
+        raise SeipError(f"there is no file {scene}: --other takes scenes with traffic next to them")
     if not survey.runs_beside(scene):
         raise SeipError(
-            f"there is no traffic beside {scene}: put runs made by headless/traffic.py into the folder "
-            f"{scene.stem}_traffic beside it"
+            f"there is no traffic next to {scene}: put runs made by `seip traffic` into the folder "
+            f"{scene.stem}_traffic next to it"
         )
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("study stability", "Drive every method to where it fails, and write a page with charts.")
+    parser = new_parser("study stability", "Find the limits of every method, and write a page with charts.")
     survey.add_options(parser)
     parser.add_argument(
-        "--other", nargs="+", type=Path, default=[], metavar="BLEND", help="scenes to try detectors on that learnt here"
+        "--other", nargs="+", type=Path, default=[], metavar="BLEND", help="other scenes to test the detectors on"
     )
     parser.add_argument(
-        "--only", nargs="+", choices=CHAPTERS, metavar="CHAPTER", help=f"put these into the page: {', '.join(CHAPTERS)}"
+        "--only",
+        nargs="+",
+        choices=CHAPTERS,
+        metavar="CHAPTER",
+        help=f"update only these chapters: {', '.join(CHAPTERS)}",
     )
-    parser.add_argument("--work", type=Path, default=Path("out/stability"), help="folder for what a rerun goes on from")
+    parser.add_argument(
+        "--work", type=Path, default=Path("out/stability"), help="folder for finished work, from which a rerun resumes"
+    )
     return parser

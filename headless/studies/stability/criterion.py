@@ -1,7 +1,7 @@
 """Sensitivity of coverage and placement to δ, grid spacings and beam azimuth.
 
-Each setting is varied alone. An answer is evaluated twice: as its own settings see it, and on
-one fine grid of targets with the δ asked for, the same for all.
+The settings are varied one at a time. Each placement is evaluated twice: with its own settings,
+and on one fine grid of targets with the requested δ, the same for all.
 """
 
 from __future__ import annotations
@@ -45,22 +45,23 @@ from .shares import Share
 DELTAS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # metres
 
 BORDER_RATIOS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0)
-"""Distances in multiples of the border, between which targets are counted."""
+"""Edges of bins of the distance of targets, in multiples of the border."""
 
 POSITIONS_COUNTED = 6
-"""Positions from which targets are counted for each sensor type and height."""
+"""Number of positions at which targets are counted, for each sensor type and height."""
 
 SIGHT_CLEARANCE = 0.3
-"""Metres before a target within which a line of sight may end on the road that the target lies on."""
+"""Metres before a target within which a line of sight may end: it may hit the road of the target itself."""
 
 
 @dataclass(frozen=True)
 class RingBorder:
-    """From where the rings on a level road are more than 2δ apart.
+    """Distance beyond which the rings on a level road are more than 2δ apart.
 
     Parameters
     ----------
     height, delta, radius : float, metres
+        Height of the sensor, δ, and the distance.
     """
 
     sensor: str
@@ -71,14 +72,14 @@ class RingBorder:
 
 @dataclass(frozen=True)
 class SeenByRatio:
-    """Which share of the targets in view counts as seen, by their distance in multiples of the border.
+    """Share of the targets in view that count as seen, by their distance in multiples of the border.
 
     Parameters
     ----------
     ratios : tuple of float
-        Edges of the classes.
+        Edges of the bins of distance.
     seen : tuple of Share or None
-        One for each class; None where no target lies in it.
+        Share in each bin; None for a bin without targets.
     """
 
     sensor: str
@@ -94,13 +95,13 @@ class DeltaAnswer:
     ----------
     height, delta : float, metres
     coverage : float
-        Under this δ.
+        Coverage with this δ.
     view : float
-        Share of the targets that its sensors have in view: what coverage would be if beams lay close.
+        Share of the targets in view of its sensors: the coverage with arbitrarily dense beams.
     evaluated : float
-        Its coverage on the fine grid, under the δ asked for.
+        Coverage on the fine grid, with the requested δ.
     moved : float, metres
-        Mean distance of its sensors to the nearest of the placement for the δ asked for.
+        Mean distance of its sensors to the nearest sensor of the placement for the requested δ.
     """
 
     sensor: str
@@ -131,13 +132,13 @@ class Draws:
 
     @property
     def spread_interval(self) -> tuple[float, float]:
-        """Its 95 % interval, by the normal approximation of its logarithm."""
+        """95 % interval of the spread, by the normal approximation of its logarithm."""
         reach = math.exp(NORMAL_QUANTILE / math.sqrt(2 * (len(self.coverage) - 1)))
         return self.spread / reach, self.spread * reach
 
     @property
     def settled(self) -> bool:
-        """Whether half of the draws lead to a spread within the interval."""
+        """Whether the spread of half of the draws is within the interval."""
         half = self.coverage[: len(self.coverage) // 2]
         low, high = self.spread_interval
         return len(half) > 1 and low <= float(half.std(ddof=1)) <= high
@@ -150,13 +151,13 @@ class CriterionStudy:
     Parameters
     ----------
     by_grid, by_candidates : tuple of Answer
-        Best placements under all spacings, the other spacing as asked for.
+        Best placements for all values of one spacing, with the other spacing as requested.
     convergence : Convergence
-        What a tolerance picks.
+        Spacings chosen for a tolerance.
     phase, azimuth : Draws
-        The best placement's coverage on grids that lie and turn otherwise, and with beams that begin elsewhere.
+        Coverage of the best placement on shifted and rotated grids, and with other starting azimuths of beams.
     rechosen : Draws
-        Coverage, on the fine grid, of the placements that such grids lead to.
+        Coverage, on the fine grid, of placements optimised on such grids.
     """
 
     borders: tuple[RingBorder, ...]
@@ -184,11 +185,11 @@ def criterion_study(
     Parameters
     ----------
     settings : SurveySettings
-        What is asked for; δ is varied for each of its sensor types, at the middle one of its heights.
+        Requested settings; δ is varied for each of their sensor types, at the middle one of their heights.
     count : int
-        Sensors.
+        Number of sensors.
     draws : int
-        Grids, and azimuths, that are drawn at random.
+        Number of random grids, and of random azimuths.
     """
     objective, random = Objective(count=count), np.random.default_rng(seed)
     models = settings.models()
@@ -197,7 +198,7 @@ def criterion_study(
     heights = sorted(set(settings.candidates.heights))
     borders = ring_borders(models, heights, DELTAS, reach)
 
-    yield Progress(0, 0, "targets in view that no beam comes near")
+    yield Progress(0, 0, "targets in view and seen targets")
     by_ratio = tuple(_seen_by_ratio(site, model, settings.visibility) for model in models.values())
     by_delta: list[DeltaAnswer] = []
     for key in models:
@@ -234,12 +235,12 @@ def criterion_study(
 def ring_borders(
     models: dict[str, LidarModel], heights: Sequence[float], deltas: Sequence[float], reach: float
 ) -> tuple[RingBorder, ...]:
-    """Return from where rings on a level road are more than 2δ apart, for each type, height and δ.
+    """Return the distances beyond which rings on a level road are more than 2δ apart, for each type, height and δ.
 
     Parameters
     ----------
     reach : float, metres
-        Targets farther away are ignored.
+        Largest distance searched.
     """
     return tuple(
         RingBorder(key, height, delta, unresolved_from(model, height, delta, min(reach, model.max_range)))
@@ -250,7 +251,7 @@ def ring_borders(
 
 
 def in_view(caster: RayCaster, model: LidarModel, xyz: Float, orientation: Float, targets: Float) -> Boolean:
-    """Return to which targets a sensor has a free line of sight, within its range and its field of view.
+    """Return whether targets have a free line of sight to a sensor, within its range and its field of view.
 
     Parameters
     ----------
@@ -282,7 +283,7 @@ def rotated_targets(geometry: SceneGeometry, spacing: float, shift: Float, angle
     ----------
     spacing : float, metres
     shift : (2,) float64
-        In multiples of the spacing.
+        Shift in multiples of the spacing.
     angle : float, radians
     """
     middle = np.array(geometry.region.centroid.coords[0])
@@ -324,7 +325,7 @@ def _by_delta(
     site = make_site(geometry, settings.candidates, settings.grid_spacing, models=settings.models())
     caster = make_ray_caster(site.triangles, settings.engine)
     (sensor,), (height,) = settings.candidates.sensors, settings.candidates.heights
-    asked = yield from within(Progress(0, 0, f"{sensor}: the δ asked for"), evaluator.solve(site, settings))
+    requested = yield from within(Progress(0, 0, f"{sensor}: requested δ"), evaluator.solve(site, settings))
     answers = []
     for delta in DELTAS:
         tried = replace(settings, visibility=replace(settings.visibility, delta=delta))
@@ -332,7 +333,7 @@ def _by_delta(
         sensors = solution.deployment.sensors
         view = np.any([in_view(caster, s.model, s.xyz, s.orientation, site.targets.xyz) for s in sensors], axis=0)
         seen = solution.deployment.seen_by > 0
-        moved = _moved(solution.deployment, asked.deployment)
+        moved = _moved(solution.deployment, requested.deployment)
         coverage = solution.deployment.coverage
         answers.append(
             DeltaAnswer(
@@ -357,7 +358,7 @@ def _by_grid_laid(
     draws: int,
     random: np.random.Generator,
 ) -> Generator[Progress, None, tuple[Draws, Draws]]:
-    """Evaluate the best placement on shifted and rotated grids; optimise anew on a quarter of them."""
+    """Evaluate the best placement on shifted and rotated grids; optimise again on a quarter of them."""
     covered, rechosen = [], []
     for draw in range(draws):
         targets = rotated_targets(
@@ -365,7 +366,7 @@ def _by_grid_laid(
         )
         laid = replace(site, targets=targets)
         covered.append(_coverage(laid, settings, best.deployment))
-        step = Progress(draw, draws, "grids of targets laid otherwise")
+        step = Progress(draw, draws, "shifted and rotated grids of targets")
         yield step
         if draw % 4 == 0:
             solution = yield from within(step, evaluator.solve(laid, settings))
@@ -386,17 +387,17 @@ def _coverage(site: Site, settings: SurveySettings, deployment: Deployment, turn
 def _by_azimuth(
     site: Site, settings: SurveySettings, deployment: Deployment, draws: int, random: np.random.Generator
 ) -> Generator[Progress, None, Draws]:
-    """Let the beams of each sensor begin anywhere within a step of its azimuth."""
+    """Evaluate with the beams of each sensor rotated by random parts of an azimuth step."""
     covered = []
     for draw in range(draws):
-        yield Progress(draw, draws, "beams that begin elsewhere")
+        yield Progress(draw, draws, "other starting azimuths of beams")
         turn = [random.uniform(0, s.model.azimuth_step) for s in deployment.sensors]
         covered.append(_coverage(site, settings, deployment, turn))
     return Draws("azimuth phase", np.array(covered))
 
 
 def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
-    """Return where the criterion begins to fail; ``delta`` is the one asked for, in metres."""
+    """Return the rows on the limits of the criterion; ``delta`` is the requested δ, in metres."""
     rows = []
     for by_ratio in study.by_ratio:
         own = [border for border in study.borders if border.sensor == by_ratio.sensor and border.delta == delta]
@@ -406,8 +407,9 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
                 method=f"visibility, {by_ratio.sensor}",
                 regime=f"far targets, δ = {delta:g} m",
                 begins="from " + ", ".join(f"{border.radius:.0f} m at {border.height:g} m height" for border in own),
-                how=f"rings on a level road; of the targets in view {inside} count as seen within, {beyond} beyond",
-                answer="warns, naming type, height and border",
+                how=f"rings on a level road; {inside} of the targets in view within the border count as seen, "
+                f"{beyond} of those beyond",
+                answer="a warning with type, height and border",
             )
         )
     for by_delta in dict.fromkeys(answer.sensor for answer in study.by_delta):
@@ -417,12 +419,12 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
             Row(
                 method=f"coverage, {by_delta} at {least.height:g} m",
                 regime=f"δ from {least.delta:g} to {most.delta:g} m",
-                begins=f"coverage goes from {least.coverage:.1%} to {most.coverage:.1%} of the targets while "
+                begins=f"coverage rises from {least.coverage:.1%} to {most.coverage:.1%} of the targets while "
                 f"{least.view:.1%} to {most.view:.1%} are in view; the placement loses at "
                 f"most {100 * (max(a.evaluated for a in answers) - min(a.evaluated for a in answers)):.1f} points of "
                 "coverage",
-                how="best placements under each δ, judged under the one asked for",
-                answer="the record holds δ; warns where it cannot resolve the rings",
+                how="best placements for each δ, evaluated with the requested δ",
+                answer="the record contains δ; a warning if it is too small for the rings",
             )
         )
     for what, tried, picked in (
@@ -437,8 +439,8 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
                 method="placement",
                 regime=what,
                 begins=f"loses up to {100 * (finest - worst.evaluated):.2f} points of coverage ({spacing:g} m)",
-                how=f"best placements under each spacing, judged on targets {EVALUATION_SPACING:g} m apart",
-                answer=f"--tolerance {study.convergence.tolerance:g} picks {picked:g} m",
+                how=f"best placements for each spacing, evaluated on targets {EVALUATION_SPACING:g} m apart",
+                answer=f"`--tolerance {study.convergence.tolerance:g}` chooses {picked:g} m",
             )
         )
     for draws in (study.phase, study.azimuth, study.rechosen):
@@ -448,20 +450,21 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
                 method="coverage",
                 regime=draws.what,
                 begins=f"standard deviation {IntervalEstimate(draws.spread, low, high).as_points()}",
-                how=f"{len(draws.coverage)} draws" + ("" if draws.settled else "; half of them say otherwise"),
-                answer="differences of coverage below twice that decide nothing",
+                how=f"{len(draws.coverage)} draws"
+                + ("" if draws.settled else "; half of them give a different result"),
+                answer="differences of coverage below twice that are not significant",
             )
         )
     return rows
 
 
 def _around_border(by_ratio: SeenByRatio) -> tuple[str, str]:
-    """Return in words which share counts as seen within the border and beyond it."""
+    """Return the shares that count as seen within the border and beyond it, as text."""
     inside, beyond = Share(0, 0), Share(0, 0)
     for edge, share in zip(by_ratio.ratios, by_ratio.seen, strict=False):
         if share is not None and edge < 1:
             inside += share
         elif share is not None:
             beyond += share
-    said = (f"{share.value:.1%}" if share.trials else "none" for share in (inside, beyond))
-    return next(said), next(said)
+    within_border, beyond_border = (f"{share.value:.1%}" if share.trials else "none" for share in (inside, beyond))
+    return within_border, beyond_border

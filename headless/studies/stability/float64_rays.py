@@ -1,10 +1,10 @@
 """A float64 ray caster with error bounds, as reference for float32 ray casters.
 
-Every ray meets every triangle, without a tree, so that nothing can be missed. A ray of
-direction d from o passes the line through p and q at the signed distance
-d · ((p − o) × (q − o)) / |d × (q − p)|; it hits a triangle where it passes all three
-sides on the same side (cf. Möller and Trumbore 1997). The least of the three distances
-says how far the triangle's corners would have to move to change that.
+Every ray is tested against every triangle, without a tree, so that nothing can be missed.
+A ray of direction d from o passes the line through p and q at the signed distance
+d · ((p − o) × (q − o)) / |d × (q − p)|; it hits a triangle if it passes all three edges
+on the same side (cf. Möller and Trumbore 1997). The least of the three distances is how
+far the triangle's corners would have to move to change that.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from seip_addon.core.arrays import Boolean, Float
 
 _SEAM = 1e-13
-"""Share of the distance by which triangles are wider than they are, so that no ray slips between two of them."""
+"""Widening of triangles as a share of the distance, so that no ray passes between adjacent ones."""
 
 _PAIRS_AT_ONCE = 1 << 19  # of rays and triangles, bounds the memory
 
@@ -28,9 +28,9 @@ class Meetings:
     Parameters
     ----------
     distance : (r, n) float64, metres
-        Along the ray, to the triangle's plane; not finite where the two are parallel.
+        Distance along the ray to the triangle's plane; not finite if the two are parallel.
     margin : (r, n) float64, metres
-        How far inside the triangle's sides the ray passes; outside it is negative.
+        Distance of the ray from the nearest edge, positive inside the triangle and negative outside.
     slope : (r, n) float64
         Absolute cosine between the ray and the triangle's normal.
     """
@@ -41,7 +41,7 @@ class Meetings:
 
     @property
     def hit(self) -> Boolean:
-        """Which rays hit which triangles before them, sides included, (r, n) bool."""
+        """Whether rays hit triangles in front of them, edges included, (r, n) bool."""
         with np.errstate(invalid="ignore"):
             seam = _SEAM * np.abs(self.distance)
             inside = self.margin >= -seam
@@ -57,7 +57,7 @@ def meet(origin: Float, directions: Float, triangles: Float) -> Meetings:
     directions : (r, 3) float64
         Unit vectors.
     triangles : (n, 3, 3) float64, metres
-        With an area.
+        Triangles with a positive area.
     """
     start = np.broadcast_to(origin, directions.shape)[:, None]
     rays = directions[:, None]
@@ -79,16 +79,16 @@ def meet(origin: Float, directions: Float, triangles: Float) -> Meetings:
 
 @dataclass(frozen=True, eq=False)
 class FirstHits:
-    """The first hits of r rays, and where they may be if no coordinate is off by more than a tolerance.
+    """First hits of r rays, with bounds that hold if no coordinate is off by more than a tolerance.
 
     Parameters
     ----------
     distance : (r,) float64, metres
-        Infinite on a miss.
+        Distance of the hit; infinite for a miss.
     slope : (r,) float64
-        Absolute cosine of incidence there; 1 on a miss.
+        Absolute cosine of incidence at the hit; 1 for a miss.
     nearest, farthest : (r,) float64, metres
-        No first hit is nearer or farther; infinite where the ray may miss all.
+        Bounds on the distance of the first hit; infinite if the ray may miss everything.
     """
 
     distance: Float
@@ -97,16 +97,16 @@ class FirstHits:
     farthest: Float
 
     def allow(self, distance: Float) -> Boolean:
-        """Return which distances (r,) may be those of first hits; misses are infinite."""
+        """Return whether distances (r,) can be those of first hits; misses are infinite."""
         return (self.nearest <= distance) & (distance <= self.farthest)
 
 
 def first_hits(origin: Float, directions: Float, triangles: Float, tolerance: float) -> FirstHits:
     """Find the first hits of rays.
 
-    A triangle is surely hit where the ray passes inside all its sides by more than
-    the tolerance, and may be hit where it passes them outside by less. The hit of a
-    slanting triangle moves along the ray by the tolerance over the cosine of incidence.
+    A triangle is surely hit if the ray passes inside all its edges by more than the
+    tolerance, and possibly hit if it passes outside by less. The hit on a slanted
+    triangle moves along the ray by the tolerance over the cosine of incidence.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def first_hits(origin: Float, directions: Float, triangles: Float, tolerance: fl
     directions : (r, 3) float64
         Unit vectors.
     triangles : (n, 3, 3) float64, metres
-        With an area, one at least.
+        At least one triangle, all with a positive area.
     tolerance : float, metres
     """
     at_once = max(1, _PAIRS_AT_ONCE // len(triangles))

@@ -9,13 +9,13 @@ import numpy as np
 from seip_addon.core.arrays import Float
 
 HALF_SIDE = 10.0
-"""Metres: the street of most scenes reaches so far each way."""
+"""Half of the side of the street of most scenes, metres."""
 
 GROUND = 128
-"""The first so many triangles of the street are its ground."""
+"""Number of ground triangles, which are the first of the street."""
 
 STREET_YAW = 0.37
-"""Radians by which the street is turned about z."""
+"""Rotation of the street about z, radians."""
 
 ORIGIN = np.array([0.3, -0.2, 5.0])  # where rays start in most scenes
 
@@ -72,14 +72,14 @@ def far_away(scene: HardScene, distance: float) -> HardScene:
 
 
 def stored_far_away(scene: HardScene, distance: float) -> HardScene:
-    """Return a scene as Blender keeps it where it is modelled far from its origin: in float32, moved back."""
+    """Return a scene rounded to float32 far from the origin, as Blender stores it, and moved back."""
     way = distance * np.array([1.0, -1.0, 0.0])
     stored = (scene.triangles + way).astype(np.float32).astype(np.float64)
     return replace(scene, triangles=stored - way)
 
 
 def with_stray(scene: HardScene, distance: float) -> HardScene:
-    """Return a scene with one triangle far away, as a mesh that was left behind."""
+    """Return a scene with one additional triangle far away, as a forgotten mesh."""
     stray = np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]) + np.array([distance, 0.0, 0.0])
     return replace(scene, triangles=np.concatenate([scene.triangles, stray]))
 
@@ -90,7 +90,7 @@ def ordinary_scene(rays: int, random: np.random.Generator) -> HardScene:
 
 
 def _street() -> Float:
-    """Return a square of 128 triangles with four boxes on it, turned so that no coordinate is round."""
+    """Return a square of 128 triangles with four boxes on it, rotated so that no coordinate is a round number."""
     boxes = [_box((x, y), size) for x, y, size in ((4, 5, 2.0), (-6, 3, 1.0), (5, -6, 3.0), (-4, -5, 0.5))]
     cos, sin = np.cos(STREET_YAW), np.sin(STREET_YAW)
     turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
@@ -115,7 +115,7 @@ def _box(place: tuple[float, float], size: float) -> Float:
 
 
 def _needles(count: int, random: np.random.Generator) -> Float:
-    """Triangles some metres long and a millimetre to a hundredth of one wide."""
+    """Return triangles some metres long and 0.01 to 1 mm wide."""
     start = random.uniform((-HALF_SIDE, -HALF_SIDE, 0), (HALF_SIDE, HALF_SIDE, 3), (count, 3))
     along = random.normal(0, 3, (count, 3))
     width = 10 ** random.uniform(-5, -3, (count, 1)) * random.normal(0, 1, (count, 3))
@@ -123,7 +123,7 @@ def _needles(count: int, random: np.random.Generator) -> Float:
 
 
 def _grazing(rays: int, random: np.random.Generator) -> HardScene:
-    """Rays that meet a level road at 0.06° to 6°."""
+    """Return a level road with rays that hit it at 0.06° to 6°."""
     road = _square(HALF_SIDE, 8) * (50.0, 1.0, 1.0)
     eye = np.array([-490.0, 0.1, 0.5])
     reach = np.minimum(eye[2] / np.tan(10 ** random.uniform(-3, -1, rays)), 950.0)
@@ -139,14 +139,14 @@ def _everywhere(rays: int, random: np.random.Generator) -> Float:
 
 
 def _on_inner_edges(ground: Float, count: int, random: np.random.Generator) -> Float:
-    """Points on sides that two triangles share, (count, 3): the diagonals of the squares."""
+    """Return points on edges shared by two triangles, (count, 3): the diagonals of the squares."""
     which, share = random.integers(0, len(ground) // 2, count), random.random((count, 1))
     points: Float = ground[which, 0] * (1 - share) + ground[which, 2] * share
     return points
 
 
 def _inner_vertices(ground: Float, count: int, random: np.random.Generator) -> Float:
-    """Corners off the ground's border, (count, 3)."""
+    """Return corners of ground triangles that are not on the ground's border, (count, 3)."""
     corners = np.unique(ground.reshape(-1, 3), axis=0)
     inner = corners[np.linalg.norm(corners, axis=1) < HALF_SIDE * 0.99]
     picked: Float = inner[random.integers(0, len(inner), count)]

@@ -16,17 +16,17 @@ from .rows import Row
 SCHEMA, VERSION = "seip.stability", 1
 
 HEADINGS = ("Method", "Driven by", "Begins to fail", "How found", "What the tool does")
-"""Of the columns: the fields of a row, in their order."""
+"""Headings of the columns, in the order of the fields of a row."""
 
 
 @dataclass(frozen=True)
 class Chart:
-    """A picture beside the rows.
+    """A picture with its caption.
 
     Parameters
     ----------
     file : str
-        Its name in the folder of charts.
+        Name of the file in the folder of charts.
     """
 
     file: str
@@ -43,12 +43,12 @@ class Chapter:
 
 
 def save_chapter(path: Path, chapter: Chapter, key: str) -> None:
-    """Write a chapter as JSON, with a key for all that it was made from."""
+    """Write a chapter as JSON, with a key (digest of all its inputs)."""
     save_json(path, {"schema": SCHEMA, "version": VERSION, "key": key, **asdict(chapter)})
 
 
 def load_chapter(path: Path, key: str) -> Chapter | None:
-    """Read a chapter; None where there is none, or one that was made from something else."""
+    """Read a chapter; None if there is none, or if its inputs had a different key."""
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
         if (kept["schema"], kept["version"], kept["key"]) != (SCHEMA, VERSION, key):
@@ -65,7 +65,7 @@ def save_page(path: Path, lead: str, chapters: Sequence[Chapter], charts: str) -
     Parameters
     ----------
     lead : str
-        What stands before the first chapter.
+        Text before the first chapter.
     charts : str
         Folder of the charts, seen from the page.
     """
@@ -76,7 +76,7 @@ def save_page(path: Path, lead: str, chapters: Sequence[Chapter], charts: str) -
 
 
 def put_chapter(path: Path, chapter: Chapter, charts: str) -> None:
-    """Put a chapter into a page that is there: in place of the one of the same title, or at the end.
+    """Put a chapter into an existing page: in place of the chapter of the same title, or at the end.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from .rows import Row
 
 
 def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
-    """Return what the study says as rows of the page of stability."""
+    """Return the results of the study of pose errors as rows."""
     errors, settings = study.settings.errors, study.settings
     losses, kinds = study.loss_by_sensor(), study.loss_by_kind()
     worst, certain = study.worst_sensor()
@@ -25,16 +25,16 @@ def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
             regime,
             f"planned {study.planned.whole[0]:.2%}; 5 % quantile {study.quantile(0.05).describe()}, "
             f"mean {mean_of(study.together.whole).describe()}",
-            f"{settings.draws} draws, all sensors erring; half of them "
-            f"{'say the same' if study.is_converged() else 'say something else: take more'}",
+            f"{settings.draws} draws, errors of all sensors; half of them "
+            f"{'give the same result' if study.is_converged() else 'give a different result: take more'}",
             "placement over pose errors: `seip place --pose-errors`; `--risk none` reports the 5 % quantile",
         ),
         Row(
             "a sensor's own error",
             regime,
-            f"{worst} costs most{'' if certain else ', though not for certain'}: "
+            f"{worst} costs most{'' if certain else ' (not significant)'}: "
             + ", ".join(f"{label} {loss.as_points()}" for label, loss in zip(study.labels, losses, strict=True)),
-            "mean loss of coverage when one sensor alone errs, the same draws",
+            "mean loss of coverage with errors of only one sensor, the same draws",
             "the warning names the sensor",
         ),
     ]
@@ -45,15 +45,15 @@ def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
                 "a kind of error",
                 regime,
                 f"{costly} costs most: " + ", ".join(f"{kind} {loss.as_points()}" for kind, loss in kinds.items()),
-                f"mean loss of coverage, each kind alone, {settings.draws_of_kind} draws",
-                "set what the installer must hold to by the costly kind first",
+                f"mean loss of coverage with only one kind of error, {settings.draws_of_kind} draws",
+                "tighten the installation tolerance of the most costly kind first",
             )
         )
     return tuple(rows)
 
 
 def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
-    """Return what the study says as a row of the page of stability for each placement."""
+    """Return the results of the study of robust placements as rows, one for each placement."""
     scenarios, errors = study.scenarios, study.scenarios.pose_errors
     regime = f"σ {errors.position:g} m, {np.degrees(errors.tilt):.3g}°; {scenarios.optimised} scenarios"
     return tuple(
@@ -64,41 +64,40 @@ def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
             f"{contender.evaluated_by.describe_outcome()} {contender.low.describe()} against "
             f"{study.beside(contender).low.describe()} of the nominal optimum: "
             f"{study.saving(contender).as_change()}",
-            f"{scenarios.evaluated} draws that nothing was chosen on; half of them "
-            f"{'say the same' if study.is_converged(contender) else 'say something else: take more'}",
-            f"certificate: within {contender.placement.gap:.2%} of the best objective possible",
+            f"{scenarios.evaluated} draws not used in the optimisation; half of them "
+            f"{'give the same result' if study.is_converged(contender) else 'give a different result: take more'}",
+            f"certificate: within {contender.placement.gap:.2%} of the best possible objective",
         )
         for contender in study.robust
     )
 
 
 def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
-    """Return what the study says as rows of the page of stability."""
+    """Return the results of the study of traffic as rows."""
     regime = f"{study.road_users:.0f} road users at a time"
     batch = study.empty.seen[study.layer].batch
     how = (
-        f"{len(batch)} instants in {len(np.unique(batch))} stretches of time, of runs that nothing was chosen on; "
-        f"every other one {'says the same' if study.is_converged() else 'says something else: take more'}"
+        f"{len(batch)} instants in {len(np.unique(batch))} stretches of time, of runs not used in the optimisation; "
+        f"half of them {'give the same result' if study.is_converged() else 'give a different result: take more'}"
     )
     losses = tuple(
         Row(
             f"view of the {LAYER_NAMES[layer]}",
             regime,
-            f"of the targets' weight the empty road promises {seen.empty:.2%} and traffic leaves "
-            f"{seen.mean.describe()} on average over time; of what the empty road promises vehicles hide "
-            f"{seen.hidden.describe()}, and {seen.rarely_seen:.1%} of its targets are seen less than "
-            f"{MOSTLY_SEEN_SHARE:.0%} of the time",
+            f"{seen.empty:.2%} of the targets' weight is visible on the empty road, {seen.mean.describe()} on average "
+            f"over time in traffic: vehicles hide {seen.hidden.describe()} of the visible weight, and "
+            f"{seen.rarely_seen:.1%} of the visible targets are seen less than {MOSTLY_SEEN_SHARE:.0%} of the time",
             how,
-            f"a warning where {NOTABLE_LOSS:.0%} of the weight or more is lost, and a map of the share of time",
+            f"a warning if {NOTABLE_LOSS:.0%} of the weight or more is lost, and a map of the share of time",
         )
         for layer, seen in study.empty.seen.items()
     )
     gain = Row(
         f"placement for the empty road, to see the {LAYER_NAMES[study.layer]}",
         regime,
-        f"placing on traffic holds {study.traffic.seen[study.layer].mean.describe()}, "
+        f"a placement optimised in traffic sees {study.traffic.seen[study.layer].mean.describe()}, "
         f"{study.gain(study.layer).as_change()}",
-        f"chosen on {study.chosen_at} instants; {how}",
+        f"optimised for {study.chosen_at} instants; {how}",
         f"placement over instants of traffic; certificate: within {study.traffic.placement.gap:.2%} of the best",
     )
     return (*losses, gain)

@@ -10,15 +10,15 @@ class Row:
     Parameters
     ----------
     method : str
-        The method, and on what.
+        Method and its subject.
     regime : str
-        The quantity that was increased until it failed.
+        Quantity that was increased until the method failed.
     begins : str
-        Where it begins to fail, with units and the interval of the estimate.
+        Value at which it begins to fail, with unit and interval.
     how : str
-        How that was found.
+        Method by which that was found.
     answer : str
-        What the program does about it.
+        Response of the program.
     """
 
     method: str

@@ -22,7 +22,7 @@ class Share:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The 95 % interval of the probability, by the score test (Wilson 1927): it holds for none of many, too."""
+        """95 % interval of the probability by the score test (Wilson 1927), valid for zero successes, too."""
         n, p, z = self.trials, self.value, NORMAL_QUANTILE
         middle = (p + z**2 / (2 * n)) / (1 + z**2 / n)
         reach = z / (1 + z**2 / n) * math.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))

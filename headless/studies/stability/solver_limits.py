@@ -22,16 +22,16 @@ from .rows import Row
 from .shares import Share
 
 DECADES = (0, 3, 6, 9, 12, 15, 18)
-"""Powers of ten between the lightest and the heaviest target, or the cheapest and the dearest sensor."""
+"""Powers of ten between the lightest and the heaviest target, or the cheapest and the most expensive sensor."""
 
 PERTURBATIONS = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
-"""Shares by which equal weights are disturbed."""
+"""Relative perturbations of equal weights."""
 
 SUM_TOLERANCE = 1e-12
-"""Share by which a covered weight may be off that was summed in float64."""
+"""Relative error of a covered weight summed in float64."""
 
 PLANE_ORDERS = (2, 3, 5, 7, 11, 13, 17)
-"""Of projective planes: as symmetric as instances get, every linear program over them degenerate."""
+"""Orders of projective planes, which are highly symmetric instances with degenerate linear programs."""
 
 GREEDY_COUNTS = (2, 3, 4, 5, 6, 8, 10)
 
@@ -45,13 +45,13 @@ class SpanCheck:
     what : str
         ``weights`` or ``prices``.
     method : str
-        ``solve``, or the name of the solver that was given the integer program alone.
+        ``solve``, or the name of the solver that solved only the integer program.
     decades : int
         Powers of ten that weights or prices span.
     worse : Share
-        Answers that cover less than the best placement does, in exact arithmetic.
+        Solutions that cover less than the best placement, in exact arithmetic.
     lost : float
-        The largest share of the optimum that one of them misses.
+        Largest loss of a solution, as a share of the optimum.
     """
 
     what: str
@@ -68,11 +68,11 @@ class TieCheck:
     Parameters
     ----------
     by : float
-        Share by which each weight is disturbed, at most.
+        Largest relative perturbation of each weight.
     changed : Share
         Instances whose choice changes.
     lost : float
-        The largest share of the undisturbed optimum that a changed choice misses; twice ``by`` is what it may.
+        Largest loss of a changed choice, as a share of the unperturbed optimum; at most twice ``by`` is allowed.
     """
 
     by: float
@@ -87,13 +87,13 @@ class GreedyCheck:
     Parameters
     ----------
     count : int
-        Sensors.
+        Number of sensors.
     greedy, best : float
-        Shares of the weight that greedy and the exact solver cover.
+        Shares of the weight covered by greedy and by the exact solver.
     least : float
-        1 - (1 - 1/count)^count, below which greedy cannot fall.
+        Lower bound on the share of greedy, 1 - (1 - 1/count)^count.
     proven : bool
-        Whether the exact solver proved its answer.
+        Whether the exact solver proved its solution optimal.
     """
 
     count: int
@@ -110,9 +110,9 @@ class TimeCheck:
     Parameters
     ----------
     limit, seconds : float
-        The limit, and what it took.
+        Time limit, and time taken.
     gap : float
-        The certificate: no placement covers more by a larger share.
+        Certified gap: no placement covers more by a larger share.
     """
 
     name: str
@@ -138,9 +138,9 @@ def solver_study(instances: int = 60, seed: int = 0, limit: float = 1.0) -> Gene
     Parameters
     ----------
     instances : int
-        Random ones for each span and each disturbance.
+        Number of random instances for each span and each perturbation.
     limit : float, seconds
-        For the hard instances.
+        Time limit for the hard instances.
     """
     total = 2 * len(DECADES) + len(PERTURBATIONS) + 2
     spans, ties = [], []
@@ -149,11 +149,11 @@ def solver_study(instances: int = 60, seed: int = 0, limit: float = 1.0) -> Gene
             yield Progress(2 * number + kind, total, f"{what} over {decades} decades")
             spans += _check_span(what, decades, instances, np.random.default_rng((seed, decades, kind)))
     for number, by in enumerate(PERTURBATIONS):
-        yield Progress(2 * len(DECADES) + number, total, f"weights disturbed by {by:g}")
+        yield Progress(2 * len(DECADES) + number, total, f"weights perturbed by {by:g}")
         ties.append(_check_ties(by, instances, np.random.default_rng(seed)))
     yield Progress(total - 2, total, "greedy's worst case")
     greedy = tuple(_check_greedy(count) for count in GREEDY_COUNTS)
-    yield Progress(total - 1, total, "symmetric instances against the clock")
+    yield Progress(total - 1, total, "symmetric instances with a time limit")
     times = [_check_time(f"projective plane of order {order}", plane(order), limit) for order in PLANE_ORDERS]
     uneven = _uneven(plane(PLANE_ORDERS[-1]), 1e-7, np.random.default_rng(seed))
     times.append(_check_time(f"projective plane of order {PLANE_ORDERS[-1]}, near-ties", uneven, limit))
@@ -161,16 +161,16 @@ def solver_study(instances: int = 60, seed: int = 0, limit: float = 1.0) -> Gene
 
 
 def worst_for_greedy(count: int, push: float = 1e-3) -> PlacementProblem:
-    """Return an instance on which greedy covers 1 - (1 - 1/count)^count of what can be covered.
+    """Return an instance on which greedy covers the share 1 - (1 - 1/count)^count of the best placement.
 
-    ``count`` candidates see a column of targets each, which together are all.
-    Others see a row each, as much as what is left of a column, and a little
-    more (cf. Cornuéjols, Fisher and Nemhauser 1977, section 4).
+    ``count`` candidates see one column of targets each, and together all targets.
+    The others see one row each, with slightly more weight than is left of a
+    column (cf. Cornuéjols, Fisher and Nemhauser 1977, section 4).
 
     Parameters
     ----------
     push : float
-        How much more, as a share; it makes greedy take the rows.
+        Relative surplus of the rows, which makes greedy take them.
     """
     left = (1 - 1 / count) ** np.arange(count + 1)
     rows = np.append(left[:-1] / count, left[-1])
@@ -183,7 +183,7 @@ def worst_for_greedy(count: int, push: float = 1e-3) -> PlacementProblem:
 
 
 def plane(order: int) -> PlacementProblem:
-    """Return the lines of a projective plane of prime order as candidates, its points as targets."""
+    """Return a problem with the lines of a projective plane of prime order as candidates and its points as targets."""
     points = [(1, a, b) for a in range(order) for b in range(order)] + [(0, 1, a) for a in range(order)] + [(0, 0, 1)]
     homogeneous = np.array(points)
     incident: Boolean = (homogeneous @ homogeneous.T) % order == 0
@@ -191,7 +191,7 @@ def plane(order: int) -> PlacementProblem:
 
 
 def plain_problem(visible: Boolean, weights: Float, count: int) -> PlacementProblem:
-    """Return a problem of one pose at each position and one price."""
+    """Return a problem with one pose at each position, all of the same price."""
     number = len(visible)
     return PlacementProblem(
         visible=visible,
@@ -205,12 +205,12 @@ def plain_problem(visible: Boolean, weights: Float, count: int) -> PlacementProb
 
 
 def best_covered(problem: PlacementProblem) -> float:
-    """Return what the best placement covers, by trying all."""
+    """Return the covered weight of the best placement, by exhaustive search."""
     return max(covered(problem, np.array(choice)) for choice in _allowed(problem))
 
 
 def covered(problem: PlacementProblem, choice: Integer) -> float:
-    """Return what a placement covers."""
+    """Return the covered weight of a placement."""
     return math.fsum(problem.weights[problem.visible[choice].any(axis=0)])
 
 
@@ -260,7 +260,7 @@ def _span_check(
 
 
 def _by_program(problem: PlacementProblem, solver: str) -> Integer:
-    """Return the choice of the integer program alone."""
+    """Return the choice of the integer program without the other methods of the solver."""
     instance, _ = make_instance(problem)
     outcome = finish(reaching(instance, 0.0).maximise_coverage(solver, Clock(10.0)))
     return np.zeros(0, dtype=np.int64) if outcome.chosen is None else instance.original[outcome.chosen]
@@ -277,7 +277,7 @@ def _check_ties(by: float, instances: int, random: np.random.Generator) -> TieCh
 
 
 def _uneven(problem: PlacementProblem, by: float, random: np.random.Generator) -> PlacementProblem:
-    """Return a problem with its weights disturbed by a share."""
+    """Return a problem with weights perturbed by up to a relative amount."""
     return replace(problem, weights=problem.weights * (1 + by * random.uniform(-1, 1, len(problem.weights))))
 
 
@@ -300,7 +300,7 @@ def _check_time(name: str, problem: PlacementProblem, limit: float) -> TimeCheck
 
 
 def solver_rows(study: SolverStudy, tops: Sequence[tuple[str, NearOptimalSet]] = ()) -> list[Row]:
-    """Return where solvers begin to fail; ``tops`` are flat tops of real scenes, by name."""
+    """Return the rows on the limits of solvers; ``tops`` are near-optimal sets of real scenes, by name."""
     rows = []
     methods = dict.fromkeys((check.what, check.method) for check in study.spans)
     for what, method in methods:
@@ -313,11 +313,11 @@ def solver_rows(study: SolverStudy, tops: Sequence[tuple[str, NearOptimalSet]] =
                 regime=f"{what} over many powers of ten",
                 begins=f"no loss up to 1e{own[-1].decades}"
                 if worst is None
-                else f"at 1e{worst.decades}: {worst.worse.value:.0%} of answers lose, at most {worst.lost:.1g}",
-                how=f"{trials} random instances a span, against all placements",
-                answer=f"what differs by less than {TIE_TOLERANCE:g} of the "
-                f"{'whole' if what == 'weights' else 'dearest'} counts as equal; a note where that "
-                "leaves something without a say",
+                else f"at 1e{worst.decades}: {worst.worse.value:.0%} of solutions lose, at most {worst.lost:.1g}",
+                how=f"{trials} random instances for each span, compared with exhaustive search",
+                answer=f"differences below {TIE_TOLERANCE:g} of the "
+                f"{'total' if what == 'weights' else 'largest price'} are ignored; a note if that leaves "
+                "something without effect",
             )
         )
     free = max((check.by for check in study.ties if check.changed.count == 0), default=0.0)
@@ -325,9 +325,9 @@ def solver_rows(study: SolverStudy, tops: Sequence[tuple[str, NearOptimalSet]] =
         Row(
             method="exact solver",
             regime="near-ties",
-            begins=f"choice unmoved by disturbances up to {free:g} of the weights; beyond, a changed choice misses "
-            f"at most {max(check.lost for check in study.ties):.1g} of the optimum",
-            how=f"{study.ties[0].changed.trials} random instances full of ties, a disturbance each",
+            begins=f"choice unchanged by perturbations up to {free:g} of the weights; with larger ones, a changed "
+            f"choice loses at most {max(check.lost for check in study.ties):.1g} of the optimum",
+            how=f"{study.ties[0].changed.trials} random instances with many ties, one perturbation each",
             answer=f"breaks ties within {TIE_TOLERANCE:g} by number, price, double coverage and order",
         )
     )
@@ -336,10 +336,10 @@ def solver_rows(study: SolverStudy, tops: Sequence[tuple[str, NearOptimalSet]] =
         Row(
             method="greedy",
             regime="its worst case",
-            begins=f"covers {last.greedy:.1%} where {last.best:.1%} can be covered by {last.count} sensors; "
-            f"its bound is {last.least:.1%}",
-            how="the instance that meets the bound, 2 to 10 sensors",
-            answer="never answers alone: exchanges, branch and bound and the certificate go beyond it",
+            begins=f"covers {last.greedy:.1%} with {last.count} sensors, {last.best:.1%} is possible; "
+            f"its guarantee is {last.least:.1%}",
+            how="the worst-case instance of the guarantee, 2 to 10 sensors",
+            answer="never the only method: swaps, branch and bound and the certificate follow",
         )
     )
     open_ones = [check for check in study.times if not check.proven]
@@ -348,19 +348,17 @@ def solver_rows(study: SolverStudy, tops: Sequence[tuple[str, NearOptimalSet]] =
             method="exact solver",
             regime=f"symmetry, {study.times[0].limit:g} s of time",
             begins=f"{open_ones[0].name}: gap {open_ones[0].gap:.1%}" if open_ones else "all proven",
-            how=f"{len(study.times)} projective planes; at most {max(c.seconds for c in study.times):.2f} s were taken",
-            answer="returns the best placement with its bound, and says that the time was short",
+            how=f"{len(study.times)} projective planes; at most {max(c.seconds for c in study.times):.2f} s taken",
+            answer="returns the best placement found with its bound, and reports that the time limit was reached",
         )
     )
     rows += [
         Row(
             "placement",
-            f"flat top, {name}",
+            f"near-optimal set, {name}",
             top.message,
-            "all placements, by branch and bound"
-            if top.complete
-            else "the first branches, and exchanges of one sensor",
-            "says so with every proven placement",
+            "all placements, by branch and bound" if top.complete else "the first branches, and swaps of one sensor",
+            "reported with every proven placement",
         )
         for name, top in tops
     ]

@@ -1,4 +1,4 @@
-"""Coverage in rain, fog and on wet roads: where a fleet that was placed for clear air fails, and what helps."""
+"""Coverage in rain, fog and on wet roads: limits of a fleet placed for clear air, and remedies."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ WEATHERS = (
     *("wet", "rain=5", "rain=20", "rain=50"),
     *("visibility=500", "visibility=200", "visibility=100", "visibility=50"),
 )
-"""As the commands take them."""
+"""Weathers, as values of the option ``--weather``."""
 
 FLEET, LONGER = "os1_128", "os1_128_rev7"
-"""The type that is studied, and one that detects farther."""
+"""Type that is studied, and a type with a longer range."""
 
 FLEET_COUNT = 8
-"""Sensors: as many as cover most of the shipped junction in clear air."""
+"""Number of sensors, enough to cover most of the shipped junction in clear air."""
 
 FAILS_BELOW = 0.5  # of the targets
 
@@ -47,15 +47,15 @@ class WeatherAnswer:
     Parameters
     ----------
     words : str
-        The weather, as the commands take it.
+        Weather, as a value of the option ``--weather``.
     kept : float
-        Of the best placement for clear air.
+        Coverage of the best placement for clear air.
     placed : float
-        Of the best placement for this weather.
+        Coverage of the best placement for this weather.
     longer : float
-        Of the best placement for this weather of sensors that detect farther.
+        Coverage of the best placement for this weather with sensors of longer range.
     gap : float
-        Of the placements for this weather, the larger one: how far below the best possible they may be.
+        Larger gap of the two placements for this weather to the best possible.
     """
 
     words: str
@@ -72,7 +72,7 @@ class WeatherStudy:
     Parameters
     ----------
     sensor, longer : str
-        Types.
+        Types: the one studied, and the one with a longer range.
     clear, longer_clear : float
         Coverage of the best placements in clear air.
     """
@@ -87,16 +87,16 @@ class WeatherStudy:
 
 @dataclass(frozen=True)
 class UntouchedTypes:
-    """Types whose coverage no weather changes, and what it changes of their scans.
+    """Types whose coverage does not depend on the weather, and the effect of weather on scans.
 
     Parameters
     ----------
     sensors : tuple of str
-        Whose visibility has the same inputs in all weathers.
+        Types whose visibility has the same inputs in all weathers.
     placed : str
-        The sensors whose scans were looked at.
+        Name of the sensors that scan.
     returned : mapping of str to float
-        By weather, ``clear`` first: of what rays meet within the range, the share that returns.
+        Share of the hits within the range that return, by weather, ``clear`` first.
     """
 
     sensors: tuple[str, ...]
@@ -111,16 +111,16 @@ def weather_study(
     types: tuple[str, str] = (FLEET, LONGER),
     count: int = FLEET_COUNT,
 ) -> Generator[Progress, None, WeatherStudy]:
-    """Place sensors for clear air and for each weather, and look at all placements in the weather.
+    """Place sensors for clear air and for each weather, and evaluate all placements in the weather.
 
     Parameters
     ----------
     settings : SurveySettings
-        Of the surveys, but for weather and types.
+        Settings of the surveys; weather and types are replaced.
     types : two str
-        The one studied, and one that detects farther.
+        Type that is studied, and a type with a longer range.
     count : int
-        Sensors.
+        Number of sensors.
 
     Yields
     ------
@@ -149,16 +149,16 @@ def weather_study(
 
 
 def untouched_types(survey: Survey, placed: str, sensors: Sequence[MountedSensor]) -> UntouchedTypes:
-    """Find the types of a survey whose visibility is the same in all weathers, and what their scans lose.
+    """Find the types of a survey whose visibility is the same in all weathers, and the loss of returns of scans.
 
     Parameters
     ----------
     survey : Survey
-        In clear air.
+        Survey in clear air.
     placed : str
-        The sensors, in words.
+        Name of the sensors.
     sensors : sequence of MountedSensor
-        Whose scans of what stands still are looked at.
+        Sensors that scan the static scene.
     """
     types = tuple(
         key for key in survey.models if len({grid_key(_one_type(survey, key, w)) for w in ("", *WEATHERS)}) == 1
@@ -170,7 +170,7 @@ def untouched_types(survey: Survey, placed: str, sensors: Sequence[MountedSensor
 
 
 def weather_rows(study: WeatherStudy, untouched: UntouchedTypes) -> tuple[Row, ...]:
-    """Return the rows of the page: one for each weather, and one for the types that none changes."""
+    """Return the rows of the page: one for each weather, and one for the types unaffected by weather."""
     rows = [_row(study, answer) for answer in study.answers]
     if untouched.sensors:
         clear, *others = untouched.returned.values()
@@ -178,18 +178,19 @@ def weather_rows(study: WeatherStudy, untouched: UntouchedTypes) -> tuple[Row, .
             Row(
                 f"coverage, {', '.join(untouched.sensors)}",
                 "the same weathers",
-                "changes nowhere: every return within the range counts (CARLA's drop-off); scans of "
-                f"{untouched.placed} have returns from {clear:.1%} of what rays meet in clear air and from "
-                f"{min(others):.1%} in the worst of these weathers",
-                "the inputs of visibility are the same in all weathers; chances of return of all rays, without traffic",
-                "a warning that these types see through any weather; ask with types of the range equation",
+                "no effect: every return within the range counts (CARLA's drop-off); in scans of "
+                f"{untouched.placed}, {clear:.1%} of the hits return in clear air and {min(others):.1%} in the worst "
+                "of these weathers",
+                "the inputs of visibility are the same in all weathers; probabilities of return of all rays, without "
+                "traffic",
+                "a warning that weather does not affect these types; use types with the range equation",
             )
         )
     return tuple(rows)
 
 
-def in_words(words: str) -> str:
-    """Return a weather as a person says it."""
+def describe_weather(words: str) -> str:
+    """Return a description of a weather."""
     weather = weather_of(words.split())
     if math.isfinite(weather.visibility):
         return f"fog, visibility {weather.visibility:g} m"
@@ -201,12 +202,12 @@ def _row(study: WeatherStudy, answer: WeatherAnswer) -> Row:
     remedy = f"`--weather {answer.words}` places for it: {answer.placed:.1%}"
     return Row(
         f"coverage, {study.count} × {study.sensor} placed for clear air",
-        in_words(answer.words),
+        describe_weather(answer.words),
         f"{f'fails, below {FAILS_BELOW:.0%}' if fails else 'holds'}: {answer.kept:.1%}, "
         f"{(study.clear - answer.kept) * 100:.1f} points less than in clear air",
-        f"best placements for clear air and for the weather, looked at in it; at most {answer.gap:.1%} below the best "
-        "possible",
-        f"{remedy}; {study.count} × {study.longer}, placed so, cover {answer.longer:.1%}",
+        f"best placements for clear air and for the weather, evaluated in the weather; at most {answer.gap:.1%} below "
+        "the best possible",
+        f"{remedy}; {study.count} × {study.longer} placed for it cover {answer.longer:.1%}",
     )
 
 
@@ -223,7 +224,7 @@ def _one_type(layout: Layout, key: str, words: str) -> Layout:
 
 
 def _returned(geometry: SceneGeometry, sensors: Sequence[MountedSensor], weather: Weather) -> float:
-    """Return the share of returns among what rays meet within the range."""
+    """Return the share of the hits within the range that return."""
     static = static_scene(weather.over(geometry))
     surface = ReflectiveSurface(make_ray_caster(static.triangles), static.reflectivity)
     chances = []

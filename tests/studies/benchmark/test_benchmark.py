@@ -107,7 +107,7 @@ def test_models_of_the_sensor_are_measured_alone(folder, small_scene, tmp_path):
     assert (after["sensor_models"]["precision"] is None) == (importlib.util.find_spec("torch") is None)
     page = (tmp_path / "docs" / "benchmark.md").read_text(encoding="utf-8")
     assert "| Another junction | diverging beams |" in page
-    with pytest.raises(SeipError, match="holds no benchmark"):
+    with pytest.raises(SeipError, match="is not a benchmark"):
         benchmark.main([str(small_scene), "-o", str(tmp_path / "none"), "--sensor-models"], SMALL)
 
 

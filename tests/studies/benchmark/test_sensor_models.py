@@ -210,7 +210,7 @@ def test_figures_are_read_as_they_were_written(tmp_path):
 @pytest.mark.parametrize("text", ["", "{", "[]", json.dumps({"bars": []})])
 def test_what_is_no_benchmark_is_refused(tmp_path, text):
     (tmp_path / "benchmark.json").write_text(text, encoding="utf-8")
-    with pytest.raises(SeipError, match="holds no benchmark"):
+    with pytest.raises(SeipError, match="is not a benchmark"):
         report.load_json(tmp_path / "benchmark.json")
 
 

@@ -132,7 +132,7 @@ def test_the_command_writes_table_file_and_charts(reference, tmp_path, capsys):
     calibrate.main([str(reference(content)), "-o", str(output), "--sensor", "mine=vls128"])
     said = capsys.readouterr().out
     assert "  detection_law = [-11.6" in said
-    assert "warning: other: compared with no model" in said
+    assert "warning: other: not compared with any model" in said
     (record,) = json.loads((output / "calibration.json").read_text(encoding="utf-8"))["comparisons"]
     assert (record["measured"], record["model"]) == ("mine", "vls128")
     assert record["share"]["free"]["rms"] < 2e-3
@@ -147,14 +147,14 @@ def test_names_choose_the_pairs(sensor):
         "mine": catalogue["vls128"],
     }
     for asked, sentence in (
-        ([], "has the name of one in the catalogue"),
+        ([], "is named like a catalogue key"),
         (["mine"], "write MEASURED=KEY"),
         (["yours=vls128"], "where MEASURED is mine"),
         (["mine=vls129"], "did you mean vls128"),
     ):
         with pytest.raises(SeipError, match=sentence):
             pair({"mine": sensor}, catalogue, asked)
-    with pytest.raises(SeipError, match="follows the drop-off of CARLA"):
+    with pytest.raises(SeipError, match="the drop-off of CARLA"):
         compare("mine", sensor, catalogue["type1"])
 
 
@@ -199,9 +199,9 @@ FATE = "fate_correlation_along_ring_20_to_100_m"
         (setting(0, *MINE, "ground_by_range_m", 0, "rays"), "rays must be 1 or more, not 0"),
         (setting([0.9, 0.1], *MINE, "vertical_by_range_m", 0, "sector_bootstrap95"), "two ascending shares"),
         (setting(0, *MINE, "range_noise_ground", 0, "robust_std_m"), "must lie between 0 and 100 m"),
-        (setting({"no": 0.5}, *MINE, FATE), "by the number of rays apart, 1 to 100, not by 'no'"),
+        (setting({"no": 0.5}, *MINE, FATE), "distances in rays, 1 to 100, not 'no'"),
         (setting({"1": 1.5}, *MINE, FATE), "must lie between -1 and 1"),
-        (setting([1.0], *MINE, "beams", "azimuth_offset_deg"), "as many numbers as elevation_deg"),
+        (setting([1.0], *MINE, "beams", "azimuth_offset_deg"), "one number for each of elevation_deg"),
         (setting(0.0, *MINE, "beams", "azimuth_step_deg"), "azimuth_step_deg must lie between"),
         (setting([90.0] * 61, *MINE, "beams", "elevation_deg"), "elevation_deg must lie between -90 and 90"),
     ],

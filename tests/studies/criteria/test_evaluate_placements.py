@@ -178,7 +178,7 @@ def test_folders_are_evaluated_beside_numbers_and_types(run, placed, tmp_path):
 @pytest.mark.parametrize(
     ("folders", "sentence"),
     [
-        (("empty",), "has no sensors: there is nothing to evaluate"),
+        (("empty",), "has no sensors"),
         (("elsewhere",), "is of the scene 'Away' at .*, not of 'Small junction'"),
         (("nowhere",), "cannot read .*placement.json"),
         (("alone", "alone"), "two placements are called 'alone'"),

@@ -76,7 +76,7 @@ def test_nothing_is_decided_of_detectors_that_find_next_to_nothing():
     assert {claim.verdict for claim in untrained.values()} == {"undecided"}
     for claim in untrained.values():
         assert claim.evidence.startswith("no verdict, as the detectors reach an AP of 0.2% with the best")
-        assert "below 30% they say nothing about sensors" in claim.evidence
+        assert "below 30% they support no conclusion" in claim.evidence
     assert {claim.verdict for claim in decided().values()} == {"holds"}
 
 

@@ -139,7 +139,7 @@ def test_there_is_a_row_for_each_question(study):
         "rain or fog",
         "yaw wrong (S",
         "sensor lost with",
-        "learnt from type2",
+        "trained on type2",
         "random sites",
         "away",
     ):

@@ -48,7 +48,7 @@ def run(tmp_path):
     ("changes", "message"),
     [
         ({"junction": "965"}, r"no junction '965' in map"),
-        ({}, r"a.net.xml is no network of the map junction.xodr at this place \(none of its streets is there\)"),
+        ({}, r"a.net.xml is not a network of the map junction.xodr at this site \(none of its streets is there\)"),
         ({"net": "<net/>"}, r"a.net.xml is not a SUMO network"),
         ({"source": MAP.with_name("none.xodr")}, r"there is no file .*none.xodr: check its path"),
     ],
@@ -72,9 +72,9 @@ def test_routes_elsewhere_are_one_sentence(run, network):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--trainings", "0"], "ask for one training or more, not 0"),
+        (["--trainings", "0"], "--trainings must be 1 or more, not 0"),
         (["--steps", "0"], "training must have 1 step or more"),
-        (["--runs", "3"], "ask for 4 to 999 runs of traffic, not 3"),
+        (["--runs", "3"], "--runs must be 4 to 999 runs of traffic, not 3"),
         (["--every", "0"], r"--every must be 0\.001 to 86,400 s, not 0"),
         (["--device", "abacus"], "abacus"),
     ],
@@ -107,7 +107,7 @@ def test_the_page_is_written_with_its_charts(run, network, tmp_path, capsys):
     text = (tmp_path / "docs" / "paper.md").read_text(encoding="utf-8")
     assert "--steps 1 --trainings 1 --every 9" in text
     assert str(tmp_path) not in text
-    assert "**Validation still rose" in text
+    assert "**Validation AP was still rising" in text
     pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
     assert len(pictures) == 3
     assert all(imread(tmp_path / "docs" / picture).shape[1] > 600 for picture in pictures)

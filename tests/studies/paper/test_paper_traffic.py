@@ -51,10 +51,14 @@ def test_what_goes_through_is_counted(tmp_path):
 @pytest.mark.parametrize(
     ("net", "flows", "message"),
     [
-        (network(y=200.0), None, r"a.net.xml is no network of the map a.xodr at this place \(none of its streets"),
-        (network(y=-8.5).replace("200,", "300,"), None, r"is no network of the map a.xodr"),
+        (network(y=200.0), None, r"a.net.xml is not a network of the map a.xodr at this site \(none of its streets"),
+        (network(y=-8.5).replace("200,", "300,"), None, r"is not a network of the map a.xodr"),
         (network(joint=100.0), None, r"no flow of a.rou.xml goes through the region of street"),
-        (None, FLOWS.format(9, "").replace("w e", "w x"), r"flow 'f' takes the edge 'x', which a.net.xml has not"),
+        (
+            None,
+            FLOWS.format(9, "").replace("w e", "w x"),
+            r"flow 'f' takes the edge 'x', which a.net.xml does not have",
+        ),
         ("<net/>", None, r"a.net.xml is not a SUMO network"),
     ],
 )

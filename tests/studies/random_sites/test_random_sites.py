@@ -115,14 +115,14 @@ def test_demand_has_what_is_rare_and_differs_from_run_to_run():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--sites", "0"], "ask for 1 to 9999 sites, not 0"),
-        (["--sites", "-3"], "ask for 1 to 9999 sites, not -3"),
-        (["--runs", "0"], "ask for one run of traffic or more on each site, not 0"),
+        (["--sites", "0"], "--sites must be 1 to 9999, not 0"),
+        (["--sites", "-3"], "--sites must be 1 to 9999, not -3"),
+        (["--runs", "0"], "--runs must be 1 or more runs of traffic on each site, not 0"),
         (["--seed", "-1"], "--seed must be a whole number from 0"),
         (["--duration", "0"], "a run lasts 3 to 3600 s"),
         (["--duration", "nan"], "--duration must be a finite number"),
         (["--warm-up", "-1"], "a run lasts 3 to 3600 s"),
-        (["--approaches", "5"], "the region follows the streets for 30 to 100 m, not 5"),
+        (["--approaches", "5"], "--approaches must be 30 to 100 m, not 5"),
     ],
 )
 def test_odd_options_are_one_sentence(tmp_path, arguments, message):
@@ -215,5 +215,5 @@ def test_a_plan_that_fails_the_check_is_drawn_again(tmp_path, monkeypatch):
     assert (attempt, plan) == (2, calls[2])
     monkeypatch.setattr(production, "MAX_ATTEMPTS", 2)
     calls.clear()
-    with pytest.raises(SeipError, match="2 plans of site 1 did not pass the check of sites, the last as a hole"):
+    with pytest.raises(SeipError, match=r"2 plans of site 1 did not pass the check of sites \(the last: a hole"):
         finish(production._built(tmp_path, replace(settings, seed=2), 1))  # noqa: SLF001

@@ -69,7 +69,7 @@ def test_mistakes_are_named(sites, tmp_path):
     with pytest.raises(SeipError, match="two sites or more"):
         train_on_sites.main([sites[0], *BRIEF, "type1", "-o", str(tmp_path)])
     copyfile(sites[0], tmp_path / "bare.blend")
-    with pytest.raises(SeipError, match="no runs of traffic beside it"):
+    with pytest.raises(SeipError, match="no runs of traffic in the folder"):
         train_on_sites.main([sites[0], str(tmp_path / "bare.blend"), *BRIEF, "type1", "-o", str(tmp_path / "x")])
     assert not (tmp_path / "x" / "detector.pt").exists()
 

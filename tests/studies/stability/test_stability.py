@@ -77,7 +77,7 @@ def test_the_page_has_all_chapters_and_a_rerun_goes_on(tmp_path, capsys):
     assert "Poses" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("name", "sentence"), [("none.blend", "no file"), ("alone.blend", "no traffic beside")])
+@pytest.mark.parametrize(("name", "sentence"), [("none.blend", "no file"), ("alone.blend", "no traffic next to")])
 def test_another_scene_that_is_of_no_use_is_named_before_any_work(tmp_path, name, sentence):
     (tmp_path / "alone.blend").write_bytes(b"a scene")
     with pytest.raises(SeipError, match=sentence):

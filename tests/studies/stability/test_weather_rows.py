@@ -17,7 +17,7 @@ from headless.studies.stability.weather import (
     UntouchedTypes,
     WeatherAnswer,
     WeatherStudy,
-    in_words,
+    describe_weather,
     untouched_types,
     weather_rows,
     weather_study,
@@ -104,7 +104,7 @@ def test_rows_say_where_it_fails_and_what_helps():
     assert holds.begins == "holds: 57.0%, 23.0 points less than in clear air"
     assert "3.1%" in holds.how
     assert fails.begins.startswith("fails, below 50%: 46.0%")
-    assert fails.answer == "`--weather visibility=100` places for it: 53.0%; 8 × far, placed so, cover 95.0%"
+    assert fails.answer == "`--weather visibility=100` places for it: 53.0%; 8 × far placed for it cover 95.0%"
     assert "from 90.0%" in untouched.begins
     assert "from 70.0%" in untouched.begins
     assert len(weather_rows(STUDY, replace(UNTOUCHED, sensors=()))) == 2
@@ -114,7 +114,7 @@ def test_rows_say_where_it_fails_and_what_helps():
     ("words", "said"), [("wet", "wet road"), ("rain=5", "rain of 5 mm/h"), ("visibility=50", "fog, visibility 50 m")]
 )
 def test_weather_is_said_as_people_say_it(words, said):
-    assert in_words(words) == said
+    assert describe_weather(words) == said
 
 
 def test_the_chart_is_drawn(tmp_path):
