@@ -51,7 +51,7 @@ def main(argv: list[str]) -> None:
         _evaluate_placements(options)
         return
     if options.trainings < 1:
-        raise SeipError(f"ask for one training or more, not {options.trainings}; only --placements needs none")
+        raise SeipError(f"--trainings must be 1 or more without --placements, not {options.trainings}")
     study = prepare_study(options)
     watch, simulator, folder = study.stopwatch, study.simulator, options.output
     network = NetworkSettings()

@@ -82,7 +82,7 @@ def test_best_placements_can_be_evaluated_alone(small_scene, tmp_path):
     ("options", "sentence"),
     [
         (("--placements", "3"), "3 placements say nothing of a correlation"),
-        (("--count", "30"), "asked for 30 sensors, but there are"),
+        (("--count", "30"), "30 sensors are requested, but there are"),
     ],
 )
 def test_what_cannot_be_studied_gets_a_sentence(small_scene, tmp_path, options, sentence):

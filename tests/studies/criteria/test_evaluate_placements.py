@@ -93,7 +93,7 @@ def test_without_training_the_shipped_detector_is_evaluated(run, tmp_path):
 
 
 def test_training_is_needed_without_drawn_placements(run, tmp_path):
-    with pytest.raises(SeipError, match="ask for one training or more, not 0"):
+    with pytest.raises(SeipError, match="--trainings must be 1 or more without --placements, not 0"):
         run(tmp_path, "--trainings", "0")
 
 

@@ -146,7 +146,7 @@ def test_random_placements_are_uniform(survey):
     ("changed", "sensors", "sentence"),
     [
         ({"placements": 3}, ["type2"], "3 placements say nothing of a correlation: ask for 4 or more"),
-        ({"learnt": 0}, ["type2"], "must learn from 1 placement or more, not 0"),
+        ({"learnt": 0}, ["type2"], "must be trained on 1 placement or more, not 0"),
         ({"seed": -1}, ["type2"], "seed of the placements must be 0 or more"),
         ({}, ["type1", "type2"], "placements of one type are compared, not of type1 and type2"),
     ],

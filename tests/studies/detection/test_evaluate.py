@@ -117,7 +117,7 @@ def test_an_evaluation_goes_on_and_ends_the_same(run, folder, tmp_path, capsys, 
     [
         (["--count", "0"], "--count must be 1 to 100,000, not 0"),
         (["--every", "nan"], "--every must be 0.001 to 86,400 s, not nan"),
-        (["--trainings", "0"], "--trainings must be 1 to 1,000, not 0"),
+        (["--trainings", "-1"], "--trainings must be 0 to 1,000, not -1"),
         (["--steps", "-5"], "--steps must be 1 to 10,000,000, not -5"),
         (["--scan-seed", "-1"], "--scan-seed must be at least 0"),
     ],
@@ -162,7 +162,7 @@ def test_runs_beside_a_scene_are_ordered_by_their_numbers(tmp_path):
         ((), (0, 1, 2), "3 runs of traffic are too few"),
         ((), (0, 1, 2, 0), "run-1 and run-1 are nearly the same traffic"),
         (("--every", "0"), (0, 1, 2, 3), "--every must be"),
-        (("--trainings", "0"), (0, 1, 2, 3), "--trainings must be 1 to"),
+        (("--trainings", "0"), (0, 1, 2, 3), "--trainings must be 1 or more without --placements, not 0"),
         (("--device", "abacus"), (0, 1, 2, 3), "torch cannot use the device 'abacus'"),
     ],
 )
