@@ -19,7 +19,7 @@ from ..core.output.results.placement_record import Provenance
 from ..core.output.results.versions import versions
 from ..core.progress import Progress
 from ..core.workflows.placing import place
-from ..core.workflows.survey import record_of
+from ..core.workflows.records import record_of
 from ..core.workflows.traffic_runs import found_runs, read_runs
 from ..properties.conversion import runs_folder
 from ..scene.write import write_result

@@ -25,7 +25,8 @@ from ..core.sensing.scans.sensor import MountedSensor
 from ..core.sensing.visibility.visibility_model import VisibilityModel, visibility_model
 from ..core.storage.files import check_folder, digest
 from ..core.workflows.moved_sensors import evaluate_moved_sensors
-from ..core.workflows.survey import Survey, record_of
+from ..core.workflows.records import record_of
+from ..core.workflows.survey import Survey
 from ..scene.blend_file import save_blend
 from ..scene.gltf import save_glb
 from ..scene.pieces import tidy_pieces

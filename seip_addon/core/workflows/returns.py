@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -28,9 +27,7 @@ from ..sensing.returns.returns_grid import ReturnsGrid, returns_key, stored_retu
 from ..sensing.returns.road_users import BODIES, RoadUsers, road_users
 from ..sensing.visibility.ray_casting import engine_name
 from ..site.targets import Targets
-
-if TYPE_CHECKING:
-    from .survey import Survey
+from .survey import Survey
 
 CROSSING_SHARE = 0.5
 """Share of the weight of pedestrians that is on crossings, which are 5 to 7 % of the carriageway. In simulated traffic

@@ -16,9 +16,9 @@ from seip_addon.core.output.results.placement_record import (
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.visibility_model import visibility_model
-from seip_addon.core.workflows import survey as module
 from seip_addon.core.workflows.placing import place
-from seip_addon.core.workflows.survey import grid_key, inputs_of, lay_out, record_of, restored_solution, see
+from seip_addon.core.workflows.records import record_of, restored_solution
+from seip_addon.core.workflows.survey import grid_key, inputs_of, lay_out, see
 
 MADE = Provenance(datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC), {"placement": 1.0}, {"seip": "0"})
 
@@ -70,10 +70,9 @@ def test_weights_change_the_site_but_not_the_visibility(small_layout):
     assert inputs_of(changed)["site"] != inputs_of(small_layout)["site"]
 
 
-def test_a_solution_is_restored_from_its_record_without_a_solver(small_survey, tmp_path, monkeypatch):
+def test_a_solution_is_restored_from_its_record(small_survey, tmp_path):
     solution = finish(place(small_survey, Objective(count=2)))
     save_placement_record(tmp_path / "placement.json", record_of(small_survey, solution, MADE))
-    monkeypatch.setattr(module, "placement_record", None)
     restored = restored_solution(small_survey, load_placement_record(tmp_path / "placement.json"))
     np.testing.assert_array_equal(restored.placement.chosen, solution.placement.chosen)
     assert restored.placement.objective == solution.placement.objective
