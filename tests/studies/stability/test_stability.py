@@ -74,7 +74,7 @@ def test_the_page_has_all_chapters_and_a_rerun_goes_on(tmp_path, capsys):
 
     with patch.object(stability, "source_digest", lambda module: f"another version of {module}"):
         run(tmp_path)
-    assert "Poses" in capsys.readouterr().out
+    assert "Pose errors" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("name", "sentence"), [("none.blend", "no file"), ("alone.blend", "no traffic next to")])
