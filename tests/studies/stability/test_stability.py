@@ -70,11 +70,11 @@ def test_the_page_has_all_chapters_and_a_rerun_goes_on(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "Solvers:" in said
     assert "Arithmetic:" in said
-    assert "Poses" not in said
+    assert "Pose errors" not in said
 
     with patch.object(stability, "source_digest", lambda module: f"another version of {module}"):
         run(tmp_path)
-    assert "Poses" in capsys.readouterr().out
+    assert "Pose errors" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("name", "sentence"), [("none.blend", "no file"), ("alone.blend", "no traffic next to")])

@@ -129,7 +129,7 @@ def test_it_says_what_traffic_hides(study):
     assert [row.method for row in rows[:2]] == ["view of the road", "view of the points 1.5 m above the road"]
     assert "24 road users at a time" in rows[0].regime
     road = found.empty.seen["road"]
-    assert f"of what the empty road promises vehicles hide {road.hidden.describe()}" in rows[0].begins
+    assert f"vehicles hide {road.hidden.describe()}" in rows[0].begins
     assert f", {found.gain(found.layer).as_change()}" in rows[2].begins
 
 
