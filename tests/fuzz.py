@@ -231,7 +231,7 @@ def _read_description(path: Path, _: bytes) -> None:
 
 
 def _catalogues(_: Path) -> list[bytes]:
-    return [(ROOT / "seip_addon" / "core" / "lidar" / "catalogue.toml").read_bytes()]
+    return [(ROOT / "seip_addon" / "core" / "sensing" / "lidar" / "catalogue.toml").read_bytes()]
 
 
 _mutate_catalogue = _with_wrong_values(
