@@ -89,7 +89,7 @@ def test_on_a_junction_the_pick_is_within_the_tolerance_of_the_finest() -> None:
     [
         (Objective(count=2), 0.0, "above 0 and below 1"),
         (Objective(coverage=0.5), 0.01, "a number of sensors or a budget"),
-        (Objective(count=2, forbidden=("sidewalk 3",)), 0.01, "'sidewalk 3' is no pole"),
+        (Objective(count=2, forbidden=("sidewalk 3",)), 0.01, "'sidewalk 3' is not a pole"),
     ],
 )
 def test_what_a_tolerance_cannot_do(goal: Objective, tolerance: float, words: str) -> None:

@@ -93,7 +93,7 @@ CONTRADICTIONS = {
     "a continent": (_set("position", (7, 0), 9e6), "km apart"),
     "samples of nobody": (_set("first", 1, 9), "its samples are not those"),
     "samples before the first": (_set("first", 0, 1), "its samples are not those"),
-    "a leap of a turn": (_set("yaw", 2, 9.0), "leaps"),
+    "a leap of a turn": (_set("yaw", 2, 9.0), "more than half a turn"),
     "a steep road": (_set("pitch", 2, 3.0), "pitch has the value 3"),
     "a warp": (_set("speed", 2, 1e30), "speed has the value"),
     "fewer speeds": (_cut("speed"), "speed has the length 7 in place of 8"),

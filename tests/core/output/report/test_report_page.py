@@ -384,7 +384,7 @@ def test_each_wrong_folder_has_its_sentence(tmp_path):
         load_evidence(tmp_path)
     with pytest.raises(SeipError, match=r"placement\.json is damaged"):
         load_evidence(broken(tmp_path / "a", "placement.json", b"{"))
-    with pytest.raises(SeipError, match=r"site\.npz is no table .*; place the sensors again"):
+    with pytest.raises(SeipError, match=r"site\.npz is damaged or not a table .*; place the sensors again"):
         load_evidence(broken(tmp_path / "b", "site.npz", b"PK\x03\x04"))
     with pytest.raises(SeipError, match=r"plan\.png is damaged or no picture"):
         load_evidence(broken(tmp_path / "c", "plan.png", b"\x89PNG"))
