@@ -183,7 +183,7 @@ def test_the_chapter_says_what_was_measured(tmp_path):
     assert "(benchmark/sensor_models.png)" in picture
     assert "| a | plain range | 1 | 10 | 60.0% (+35.00 [" in table
     assert "by 35.0 to 35.0 points" in verdict
-    assert "for 2 times the time" in verdict
+    assert "takes 2 times as long" in verdict
     assert "is left out" not in verdict  # five points are not nothing
     save_sensor_model_chart(tmp_path, findings)
     assert (tmp_path / "sensor_models.png").read_bytes().startswith(b"\x89PNG")
