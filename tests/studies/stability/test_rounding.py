@@ -154,7 +154,7 @@ def test_ground_that_the_builder_laid_out_is_left_out_and_not_named() -> None:
     assert laid.warnings == plain.warnings
     assert len(laid.site.triangles) == len(plain.site.triangles) + 1
     by_hand = lay_out(geometry(GROUND, Mesh("Verge", np.concatenate([near, far]))), SHORT)
-    assert any("'Verge', lie 4" in warning for warning in by_hand.warnings)
+    assert any("of 'Verge', are 4" in warning for warning in by_hand.warnings)
 
 
 def test_what_is_just_within_reach_stays() -> None:

@@ -105,8 +105,8 @@ def test_rows_say_where_it_fails_and_what_helps():
     assert "3.1%" in holds.how
     assert fails.begins.startswith("fails, below 50%: 46.0%")
     assert fails.answer == "`--weather visibility=100` places for it: 53.0%; 8 × far placed for it cover 95.0%"
-    assert "from 90.0%" in untouched.begins
-    assert "from 70.0%" in untouched.begins
+    assert "90.0% of the hits" in untouched.begins
+    assert "70.0% in the worst" in untouched.begins
     assert len(weather_rows(STUDY, replace(UNTOUCHED, sensors=()))) == 2
 
 
