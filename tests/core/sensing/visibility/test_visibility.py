@@ -527,7 +527,8 @@ def test_warnings_name_the_radius_from_which_a_rosette_leaves_gaps() -> None:
     models = load_catalogue()
     site = junction_site(positions=8, sensors=["mid40"], heights=[8.0])
     (warning,) = resolution_warnings(site, models, VisibilitySettings(1.0))
-    assert "mid40: from 24 m (at 8 m height) on a frame of 0.1 s leaves level road in view more than δ = 1 m" in warning
+    assert "mid40: beyond 24 m (at 8 m height)" in warning
+    assert "more than δ = 1 m from all rays of a frame of 0.1 s" in warning
     assert resolution_warnings(site, models, VisibilitySettings(80.0)) == ()
 
 
