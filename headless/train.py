@@ -2,7 +2,7 @@
 
 seip train site.blend --train out/run-1 out/run-2 --validation out/run-3 --test out/run-4 -o out/detector
 
-The runs are folders of `headless/simulate.py`, each with sensors and traffic of its own: a detector that is trained
+The runs are folders of `seip simulate`, each with sensors and traffic of its own: a detector that is trained
 on several configurations of sensors works with all of them. A training that was stopped goes on where it was when it
 is started again.
 """

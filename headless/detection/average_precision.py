@@ -262,7 +262,7 @@ def _areas(evaluation: Evaluation, times: Float, group: Integer, wanted: Float |
     times : (b, g) float64
         How often each group is there.
     group : (d,) int64
-        Of each detection.
+        Group of each detection.
     wanted : (b,) array
         The number of road users that count.
     """

@@ -64,7 +64,7 @@ class MountedSensors:
     Parameters
     ----------
     sensors : tuple of MountedSensor
-        Of any types.
+        Sensors of any types.
     """
 
     name: str

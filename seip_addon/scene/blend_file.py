@@ -27,7 +27,7 @@ def open_blend(path: Path) -> None:
         There is no such file, it is not a .blend, or it is damaged.
     """
     if not path.is_file():
-        raise SeipError(f"there is no file {path}; build one with headless/build_scene.py or check the name")
+        raise SeipError(f"there is no file {path}; build one with seip build-scene or check the name")
     try:
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
     except RuntimeError as error:

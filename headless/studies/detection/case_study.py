@@ -101,9 +101,9 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
 
 
 def read_untrained_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
-    """Read runs for a detector that has learnt from none of them: the first quarter for criteria, the rest for tests.
+    """Read runs for a detector that was trained on none of them: the first quarter for criteria, the rest for tests.
 
-    Criteria that go by traffic must not know that of tests. Parameters are those of `read_traffic`.
+    Criteria that depend on traffic must not use that of the tests. Parameters are those of `read_traffic`.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def split_untrained(runs: Sequence[SampledRun]) -> tuple[tuple[SampledRun, ...],
         There are too few.
     """
     if len(runs) < MIN_RUNS:
-        raise SeipError(f"{len(runs)} runs of traffic are too few: make {MIN_RUNS} or more with headless/traffic.py")
+        raise SeipError(f"{len(runs)} runs of traffic are too few: make {MIN_RUNS} or more with seip traffic")
     known = max(1, len(runs) // RUNS_PER_CRITERIA)
     return tuple(runs[:known]), tuple(runs[known:])
 

@@ -1,1 +1,1 @@
-"""What LiDARs measure: models of sensors, visibility of targets, returns from road users, traffic and scans of it."""
+"""Measurements of LiDARs: sensor models, visibility of targets, returns from road users, traffic and its scans."""

@@ -68,14 +68,7 @@ def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: 
 
 def _of_rosette(model: LidarModel, site: Site, of_type: Boolean, delta: float, reach: float) -> list[str]:
     """Return a warning on the radius beyond which the rosettes of a type leave gaps that are too wide for δ."""
-    poses = site.candidates
-    height = np.round(poses.height, 2)
-    beyond = []
-    for level in np.unique(height[of_type]):
-        tilts = np.unique(poses.tilt[of_type & (height == level)])
-        limit = min(unresolved_from(model, float(level), delta, reach, float(tilt)) for tilt in tilts)
-        if limit < reach:
-            beyond.append(f"{limit:.0f} m (at {level:g} m height)")
+    beyond = _limits(model, site, of_type, delta, reach)
     warning = (
         f"{model.key}: beyond {', '.join(beyond)} parts of a level road in view are more than δ = {delta:g} m from all "
         f"rays of a frame of {1 / model.rotation_rate:g} s, so they are not seen although nothing hides them"
@@ -85,20 +78,26 @@ def _of_rosette(model: LidarModel, site: Site, of_type: Boolean, delta: float, r
 
 def _of_tilted(model: LidarModel, site: Site, tilted: Boolean, delta: float, reach: float) -> list[str]:
     """Return a warning on the radius beyond which the tilted sensors of a type do not resolve δ."""
-    poses = site.candidates
-    height = np.round(poses.height, 2)
-    beyond = []
-    for level in np.unique(height[tilted]):
-        tilts = np.unique(poses.tilt[tilted & (height == level)])
-        limit = min(unresolved_from(model, float(level), delta, reach, float(tilt)) for tilt in tilts)
-        if limit < reach:
-            beyond.append(f"{limit:.0f} m (at {level:g} m height)")
+    beyond = _limits(model, site, tilted, delta, reach)
     warning = (
         f"{model.key}: if tilted, beyond {', '.join(beyond)} neighbouring rings on a level road in front of it are "
         f"more than 2δ = {2 * delta:g} m apart, and behind it at a shorter distance, so the road between them is not "
         "seen although nothing hides it"
     )
     return [warning] if beyond else []
+
+
+def _limits(model: LidarModel, site: Site, some: Boolean, delta: float, reach: float) -> list[str]:
+    """Return the radii of `unresolved_from` within reach for some of the poses, (c,) bool, with their heights."""
+    poses = site.candidates
+    height = np.round(poses.height, 2)
+    beyond = []
+    for level in np.unique(height[some]):
+        tilts = np.unique(poses.tilt[some & (height == level)])
+        limit = min(unresolved_from(model, float(level), delta, reach, float(tilt)) for tilt in tilts)
+        if limit < reach:
+            beyond.append(f"{limit:.0f} m (at {level:g} m height)")
+    return beyond
 
 
 def unresolved_from(model: LidarModel, height: float, delta: float, reach: float, tilt: float = 0.0) -> float:
