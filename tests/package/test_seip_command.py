@@ -51,9 +51,10 @@ def test_help_fits_a_screen():
     for arguments, names in (([], VERBS), (["--help"], VERBS), (["study"], STUDIES), (["study", "--help"], STUDIES)):
         shown = seip(*arguments)
         assert shown.returncode == 0
-        assert all(name in shown.stdout for name in names)
-        assert len(shown.stdout.splitlines()) <= 24
-        assert max(map(len, shown.stdout.splitlines())) <= 80
+        lines = shown.stdout[shown.stdout.index("usage:") :].splitlines()  # bpy 5.2 writes its own log before them
+        assert all(any(line.startswith(f"  {name} ") for line in lines) for name in names)
+        assert len(lines) <= 24
+        assert max(map(len, lines)) <= 80
 
 
 def test_another_verb_has_its_sentence():
