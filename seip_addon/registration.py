@@ -8,14 +8,14 @@ import bpy
 PARTS = (
     "preferences",
     "properties.site", "properties.survey", "properties.placement", "properties.results", "properties.view",
-    "properties.traffic", "properties.detection", "properties.scene",
+    "properties.traffic", "properties.detection", "properties.sections", "properties.scene",
     "session", "scene_survey", "sensor_types", "live_scan", "loose_pieces",
     "viewport.beam_preview", "viewport.overlays", "viewport.coverage",
     "operators.base", "operators.site", "operators.sensors", "operators.visibility", "operators.placement",
     "live_coverage",
     "operators.results", "operators.view", "operators.traffic", "operators.detection",
-    "panels.site", "panels.sensors", "panels.visibility", "panels.placement", "panels.results", "panels.view",
-    "panels.traffic", "panels.detection", "panels.front_door",
+    "panels.sensor_table", "panels.placement", "panels.steps", "panels.results", "panels.view", "panels.traffic",
+    "panels.detection", "panels.export", "panels.front_door",
 )  # fmt: skip
 """Modules of the add-on; most have ``CLASSES``.
 

@@ -8,6 +8,7 @@ import bpy
 
 from .core.errors import SeipError
 from .core.output.results.placement_record import PlacementRecord, parsed_record
+from .core.sensing.lidar.range_equation import RangeEquation
 from .core.workflows.survey import SurveySettings
 from .scene import contract
 from .session import SceneState, session
@@ -52,14 +53,59 @@ def has_nothing(scene: bpy.types.Scene) -> bool:
 
 def next_step(scene: bpy.types.Scene) -> str:
     """Return the operator, by its ``bl_idname``, that comes next on the way to placed sensors; empty at its end."""
-    site, state = scene.seip.site, session.state_of(scene)
+    site = scene.seip.site
     if is_linked(scene) or is_newer(scene) or scene.seip.result.record:
         return ""
     if obstacle(scene):
         return "seip.build_site" if site.has_place() else "seip.choose_map"
     if not site.checked:
         return "seip.check_site"
-    return "seip.compute_visibility" if state is None or state.survey is None else "seip.solve_placement"
+    return "seip.solve_placement" if scene.seip.survey.used_types() else "seip.choose_sensors"
+
+
+def current_step(scene: bpy.types.Scene) -> str:
+    """Return the step of the sidebar in which the next operator is, or the answer: site, sensors or placement."""
+    operator = next_step(scene)
+    if operator == "seip.choose_sensors":
+        return "sensors"
+    return "placement" if operator in {"", "seip.solve_placement"} and not has_nothing(scene) else "site"
+
+
+def expected_seconds(scene: bpy.types.Scene) -> float | None:
+    """Return at most how long a placement takes, about; None where nothing is known of it.
+
+    That is the estimate of the last check for visibility, scaled to the present sensors and poses, and the limit of the
+    search. Returns from road users take about twice as long as visibility.
+    """
+    survey, check = scene.seip.survey, session.checks.get(scene.session_uid)
+    state = session.state_of(scene)
+    search = float(survey.time_limit or survey.effort)
+    if state is not None and state.survey is not None and not stale_survey(scene):
+        return search
+    settings = checked_settings(scene)
+    if check is None or check.estimate is None or isinstance(settings, str) or isinstance(check.settings, str):
+        return None
+    ratio = _rays(settings) / max(_rays(check.settings), 1.0)
+    return search + check.estimate.seconds * ratio * (1.0 + 2.0 * _counts_returns(scene, settings))
+
+
+def _rays(settings: SurveySettings) -> float:
+    """Return a measure of the rays from one position: those of each type in a revolution, at each height and tilt."""
+    rays = 0.0
+    for key in settings.candidates.sensors:
+        model = session.sensor_types.get(key)
+        if model is not None:
+            yaws = 1 if model.all_round else settings.candidates.yaws
+            rays += model.channels * model.azimuth_count * yaws
+    return rays * len(settings.candidates.heights) * len(settings.candidates.tilts)
+
+
+def _counts_returns(scene: bpy.types.Scene, settings: SurveySettings) -> bool:
+    """Return whether a placement would be chosen for returns from road users."""
+    criterion = scene.seip.goal.criterion
+    types = (session.sensor_types.get(key) for key in settings.candidates.sensors)
+    real = any(model is not None and isinstance(model.law, RangeEquation) for model in types)
+    return criterion == "returns" or (criterion == "auto" and real)
 
 
 def stale_survey(scene: bpy.types.Scene) -> str:

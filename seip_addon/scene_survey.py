@@ -115,7 +115,7 @@ def _grid_again(
     if not is_of(record, state):
         raise SeipError("the scene or its settings have changed since the placement: place again")
     if state.survey is None and not state.resources.grid_file(state.inputs["visibility"]).exists():
-        raise SeipError("the cache no longer holds the visibility of this placement: press Compute Visibility")
+        raise SeipError("the cache no longer holds the visibility of this placement: place again")
     return (yield from with_visibility(state))
 
 

@@ -5,8 +5,24 @@ import bpy
 from . import preferences
 from .core.errors import SeipError
 from .core.sensing.lidar.catalogue import load_catalogue
-from .core.site.candidates import CandidateSettings
+from .core.sensing.lidar.model import LidarModel
 from .session import session
+
+DEFAULT_TYPE = "os1_128"
+"""Sensor type that a new scene begins with: one that is sold, calibrated on sweeps, for a common price."""
+PAPER = "generic"
+"""Manufacturer of the types of the SEIP paper, which are models and no products."""
+
+
+def title(model: LidarModel) -> str:
+    """Return manufacturer and product; of the paper's types, the name alone."""
+    return model.name if model.manufacturer == PAPER else f"{model.manufacturer} {model.name}"
+
+
+def in_order() -> list[str]:
+    """Return the keys of all types by manufacturer and product, the paper's last."""
+    types = session.sensor_types
+    return sorted(types, key=lambda key: (types[key].manufacturer == PAPER, title(types[key]).casefold()))
 
 
 def refresh() -> None:
@@ -26,10 +42,10 @@ def refresh() -> None:
 def list_types(scene: bpy.types.Scene) -> None:
     """Add to a scene's list the types that it lacks, and drop those that are neither known nor used.
 
-    In a list that was empty those are used that a survey takes if none is chosen.
+    In a list that was empty, the default type is used.
     """
     types = scene.seip.survey.types
-    default = () if len(types) else CandidateSettings().sensors
+    is_new = not len(types)
     for number in reversed(range(len(types))):
         if types[number].name not in session.sensor_types and not types[number].use:
             types.remove(number)
@@ -37,7 +53,7 @@ def list_types(scene: bpy.types.Scene) -> None:
         if key not in types:
             one = types.add()
             one.name = key
-            one.use = key in default
+            one.use = is_new and key == DEFAULT_TYPE
 
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]

@@ -82,8 +82,6 @@ class SceneState:
         Values of the preferences at the last request.
     catalogues : tuple
         The user's catalogue files and when each was last written.
-    estimate : Estimate or None
-        Time and memory that the visibility grid will take.
     solution : Solution or None
         The one that the scene's result tells of.
     record : str
@@ -97,7 +95,6 @@ class SceneState:
     resources: Resources
     catalogues: tuple[tuple[Path, int], ...]
     warnings: tuple[str, ...] = ()
-    estimate: Estimate | None = None
     solution: Solution | None = None
     record: str = ""
     durations: Mapping[str, float] = field(default_factory=dict)
@@ -128,10 +125,13 @@ class CheckedScene:
         Whether the scene has changed since.
     settings : SurveySettings or str
         See `scene_status.checked_settings`.
+    estimate : Estimate or None
+        Time and memory that the visibility grid will take with these settings.
     """
 
     watch: Watch
     settings: SurveySettings | str
+    estimate: Estimate | None = None
 
 
 @dataclass

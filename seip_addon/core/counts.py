@@ -14,3 +14,10 @@ def counted(number: int, one: str, several: str = "") -> str:
         Plural, also used for zero; by default ``one`` with an "s".
     """
     return f"{number:,} {one if number == 1 else several or f'{one}s'}"
+
+
+def duration_text(seconds: float) -> str:
+    """Return a duration as text, rounded as people state it: ``45 s``, ``3 min``, ``1.5 h``."""
+    if seconds < 100:
+        return f"{max(seconds, 1):.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"

@@ -16,8 +16,14 @@ from ..core.choosing.placement.deployment import sensor_at
 from ..core.choosing.placement.objective import Objective, target_weights
 from ..core.errors import SeipError
 from ..core.output.report.write import write_report
+from ..core.output.results.answer import change_text
 from ..core.output.results.comparison import compare, packed_counts, unpacked_counts
-from ..core.output.results.placement_record import PlacementRecord, Provenance, parsed_record
+from ..core.output.results.placement_record import (
+    PlacementRecord,
+    Provenance,
+    load_placement_record,
+    parsed_record,
+)
 from ..core.output.results.ranking import Ranked, rank_added, rank_alone
 from ..core.output.results.versions import versions
 from ..core.progress import Progress
@@ -37,9 +43,10 @@ from ..scene.sensors import labelled_sensors, read_sensors
 from ..scene.write import coverage_of, recolour, show_seen_by, shown_legend, take_over
 from ..sensor_edits import position_names, sensor_edits
 from ..session import SceneState, session
-from .base import LongWork, Outcome, attempt, started
+from .base import LongWork, Outcome, Result, attempt, started
 
-MOST_RANKED = 50
+MOST_RANKED = 10
+"""Number of candidates in the ranking: as many as the sidebar shows without scrolling the list."""
 EYE_DISTANCE = 10.0
 """Metres from a sensor's eye to the point that the view turns about."""
 
@@ -323,6 +330,7 @@ def keep_result(scene: bpy.types.Scene, state: SceneState, record: PlacementReco
     """Have the scene keep a placement that stands in it, all that is needed to go on later included."""
     survey, solution = state.placed()
     kept = scene.seip.result
+    kept.change = "" if no_placement(scene) else change_text(record, parsed_record(kept.record))
     kept.record = record.text()
     kept.targets = digest(survey.site.targets.xyz)
     kept.seen = packed_counts(solution.deployment.seen_by)
@@ -330,6 +338,7 @@ def keep_result(scene: bpy.types.Scene, state: SceneState, record: PlacementReco
     for sensor in solution.deployment.sensors:
         kept.sensors.add().name = sensor.label
     kept.ranking.clear()
+    scene.seip.sections.follow_steps()
     session.keep_state(scene, replace(state, record=kept.record))
 
 
@@ -339,12 +348,8 @@ def not_evaluated(scene: bpy.types.Scene) -> str:
     return f"{sentence} Press {SEIP_OT_evaluate_sensors.bl_label}, or undo." if sentence else ""
 
 
-class SEIP_OT_export_result(ForPlacement, LongWork[SceneState], bpy.types.Operator):
-    """Write tables, pictures and the scene with its sensors to the folder, in place of earlier ones"""
-
-    bl_idname = "seip.export_result"
-    bl_label = "Export"
-    stopped_message = "stopped; nothing was written"
+class _Writes(ForPlacement, LongWork[Result]):
+    """Mixin for operators that write the placement into the folder of the result."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -353,17 +358,31 @@ class SEIP_OT_export_result(ForPlacement, LongWork[SceneState], bpy.types.Operat
             return False
         sentence = no_folder(context.scene) or not_evaluated(context.scene)
         if sentence:
-            cls.poll_message_set(sentence)
+            cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of Blender's operators
         return not sentence
 
+    @staticmethod
+    def checked_folder(scene: bpy.types.Scene) -> Path:
+        """Return the folder, which can be written."""
+        folder = Path(bpy.path.abspath(scene.seip.result.folder))
+        check_folder(folder)
+        return folder
+
+
+class SEIP_OT_export_result(_Writes[SceneState], bpy.types.Operator):
+    """Write tables, pictures and the scene with its sensors to the folder, in place of earlier ones"""
+
+    bl_idname = "seip.export_result"
+    bl_label = "Export"
+    stopped_message = "stopped; nothing was written"
+
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """See that the folder can be written, save the scene as it is, and find the placement again."""
-        self._folder = Path(bpy.path.abspath(scene.seip.result.folder))
-        check_folder(self._folder)
+        """Save the scene as it is, and find the placement again."""
+        self._folder = self.checked_folder(scene)
         return started(_exported(self._folder, scene))
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
-        """Say where the files are."""
+        """Report where the files are."""
         session.keep_state(scene, result)
         self.report({"INFO"}, f"written to {self._folder}")
 
@@ -392,38 +411,42 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
     return state
 
 
-def no_report(scene: bpy.types.Scene) -> str:
-    """Say why no report can be written; empty if one can be."""
-    folder = bpy.path.abspath(scene.seip.result.folder)
-    missing = no_folder(scene)
-    if missing or (Path(folder) / "placement.json").is_file():
-        return missing
-    return f"Press {SEIP_OT_export_result.bl_label} first: the report is on the result in the folder."
-
-
-class SEIP_OT_write_report(LongWork[tuple[Path, ...]], bpy.types.Operator):
-    """Write a report on the exported result into its folder: a page of HTML and a PDF"""
+class SEIP_OT_write_report(_Writes[tuple[SceneState, tuple[Path, ...]]], bpy.types.Operator):
+    """Write a report on the placement into the folder, a page of HTML and a PDF, and export the placement if it is not there yet"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.write_report"
     bl_label = "Write Report"
-    bl_options = {"REGISTER"}
     stopped_message = "stopped; no report was written"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the operator is enabled; otherwise the tooltip says why not."""
-        sentence = no_report(context.scene)
-        if sentence:
-            cls.poll_message_set(sentence)
-        return not sentence
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, tuple[Path, ...]]]:
+        """Return the work: the export where the folder holds another result, and the report."""
+        folder = self.checked_folder(scene)
+        if _holds(folder, scene.seip.result.record):
+            return _reported(folder, scene_survey.with_placement(scene))
+        return started(_reported(folder, _exported(folder, scene)))
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[Path, ...]]:
-        """Return the work, which reads files alone."""
-        return write_report(Path(bpy.path.abspath(scene.seip.result.folder)))
+    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, tuple[Path, ...]]) -> None:
+        """Report where the files are."""
+        state, written = result
+        session.keep_state(scene, state)
+        self.report({"INFO"}, f"written: {' and '.join(path.name for path in written)} in {written[0].parent}")
 
-    def conclude(self, _scene: bpy.types.Scene, result: tuple[Path, ...]) -> None:
-        """Say where the report is."""
-        self.report({"INFO"}, f"written: {' and '.join(path.name for path in result)} in {result[0].parent}")
+
+def _reported(
+    folder: Path, exporting: Generator[Progress, None, SceneState]
+) -> Generator[Progress, None, tuple[SceneState, tuple[Path, ...]]]:
+    state = yield from exporting
+    return state, (yield from write_report(folder))
+
+
+def _holds(folder: Path, record: str) -> bool:
+    """Return whether a folder holds the export of a placement."""
+    try:
+        written = load_placement_record(folder / "placement.json")
+    except SeipError:
+        return False
+    present = parsed_record(record)
+    return (written.sensors, written.inputs, written.notes) == (present.sensors, present.inputs, present.notes)
 
 
 CLASSES = (

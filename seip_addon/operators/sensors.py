@@ -33,6 +33,42 @@ class SEIP_OT_list_sensor_types(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SEIP_OT_drop_sensor_type(bpy.types.Operator):
+    """Choose this sensor no longer"""
+
+    bl_idname = "seip.drop_sensor_type"
+    bl_label = "Remove Sensor"
+    bl_options = {"REGISTER", "UNDO"}
+
+    key: bpy.props.StringProperty(name="Key", description="Catalogue key of the sensor type")
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Take it out of the choice."""
+        types = context.scene.seip.survey.types
+        if self.key not in types:
+            self.report({"ERROR"}, f"there is no sensor type {self.key!r} in the list")
+            return {"CANCELLED"}
+        types[self.key].use = False
+        return {"FINISHED"}
+
+
+class SEIP_OT_about_sensor(bpy.types.Operator):
+    """Show the figures of this sensor and their sources"""
+
+    bl_idname = "seip.about_sensor"
+    bl_label = "About the Sensor"
+    bl_options = {"INTERNAL"}
+
+    key: bpy.props.StringProperty(name="Key", description="Catalogue key of the sensor type")
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Open the section with the figures."""
+        seip = context.scene.seip
+        seip.survey.about = self.key
+        seip.sections.about_sensor = True
+        return {"FINISHED"}
+
+
 class SEIP_OT_add_catalogue(bpy.types.Operator):
     """Add a catalogue of your own, or a unit's calibration file: docs/sensors.md describes both"""
 
@@ -126,7 +162,7 @@ class SEIP_OT_empty_cache(bpy.types.Operator):
 
 
 class SEIP_OT_preview_beams(bpy.types.Operator):
-    """Show or hide the beams of the active sensor, or else of the active type at the 3D cursor: rings on a flat road and the edges of the vertical field of view"""  # noqa: E501  # a tooltip is one line
+    """Show or hide the beams of the selected sensor, or else of the sensor shown in the sidebar at the 3D cursor: rings on a flat road and the edges of the vertical field of view"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.preview_beams"
     bl_label = "Preview Beams"
@@ -162,6 +198,8 @@ class SEIP_OT_add_survey_preset(AddPresetBase, bpy.types.Operator):
 
 CLASSES = (
     SEIP_OT_list_sensor_types,
+    SEIP_OT_drop_sensor_type,
+    SEIP_OT_about_sensor,
     SEIP_OT_add_catalogue,
     SEIP_OT_remove_catalogue,
     SEIP_OT_empty_cache,

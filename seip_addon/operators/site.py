@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 from pathlib import Path
 
 import bpy
 from shapely.geometry.base import BaseGeometry
 
-from .. import scene_status, sensor_types
+from .. import preferences, scene_status, sensor_types
 from ..core.counts import counted
 from ..core.errors import SeipError
+from ..core.output.results.placement_record import relevant_warnings
 from ..core.progress import Progress, finish
-from ..core.site.check import Problem, SiteCheck, check_site
+from ..core.sensing.visibility.estimate import Estimate
+from ..core.site.check import SceneContents, SiteCheck, check_site
 from ..core.site.roles import Role
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
 from ..core.workflows.site_building import BuiltSite, SiteRequest, build_site
 from ..core.workflows.site_places import SitePlaces, site_places
-from ..core.workflows.survey import SurveySettings, lay_out
+from ..core.workflows.survey import Layout, SurveySettings, estimate, lay_out
 from ..core.world.streetscape.description import DESCRIPTION_SUFFIX
-from ..properties.site import ROLE_ITEMS, SEIP_PG_site
+from ..properties.site import ROLE_ITEMS, SEIP_PG_problem, SEIP_PG_site
 from ..scene import contract, roles
 from ..scene.build import build_scene
 from ..scene.changes import watch
@@ -118,6 +120,8 @@ class _BuildsSite(LongWork[BuiltSite]):
         for warning in result.model.warnings:
             report({"WARNING"}, warning)
         report({"INFO"}, f"{counted(len(result.model.parts), 'object')}, region {result.model.region.area:,.0f} m²")
+        if bpy.context.window is not None and not bpy.app.background:
+            bpy.ops.seip.check_site("INVOKE_DEFAULT")
 
 
 class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
@@ -311,51 +315,65 @@ class SEIP_OT_add_area(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
-    """Count what the scene holds by role, and list what stops a survey or harms its answer"""
+class SEIP_OT_check_site(LongWork[tuple[SiteCheck, Estimate | None]], bpy.types.Operator):
+    """Count what the scene holds by role, and list what stops a placement or harms its answer"""
 
     bl_idname = "seip.check_site"
     bl_label = "Check Site"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SiteCheck]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SiteCheck, Estimate | None]]:
         """Read the scene as it is now."""
-        self._check = CheckedScene(watch(scene), scene_status.checked_settings(scene))
+        self._watch, self._settings = watch(scene), scene_status.checked_settings(scene)
         contents = contents_of(scene)
         settings: SurveySettings | SeipError
         try:
             settings = scene.seip.survey.settings()
         except SeipError as error:
             settings = error
-        return check_site(contents, lambda geometry: _laid_out(geometry, settings))
+        return _checked(contents, settings, preferences.cores())
 
-    def conclude(self, scene: bpy.types.Scene, result: SiteCheck) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: tuple[SiteCheck, Estimate | None]) -> None:
         """List what was found."""
-        session.checks[scene.session_uid] = self._check
+        check, estimated = result
+        session.checks[scene.session_uid] = CheckedScene(self._watch, self._settings, estimated)
         site = scene.seip.site
         site.checked = True
         site.counts.clear()
-        for what, value in result.counts.items():
+        for what, value in check.counts.items():
             one = site.counts.add()
             one.name, one.value = what, value
         site.problems.clear()
-        for problem in result.problems:
+        for problem in check.problems:
             listed = site.problems.add()
             listed.name, listed.text, listed.is_error = problem.obj, problem.text, problem.severity == "ERROR"
-        self.report({"INFO"}, in_short(result.problems))
+        scene.seip.sections.follow_steps()
+        self.report({"INFO"}, in_short(site.problems))
 
 
-def _laid_out(geometry: SceneGeometry, settings: SurveySettings | SeipError) -> tuple[Site, tuple[str, ...]]:
-    if isinstance(settings, SeipError):
-        raise settings
-    layout = lay_out(geometry, settings)
-    return layout.site, layout.warnings
+def _checked(
+    contents: SceneContents, settings: SurveySettings | SeipError, cores: int | None
+) -> Generator[Progress, None, tuple[SiteCheck, Estimate | None]]:
+    """Check a scene; if it can be laid out, estimate the time of its visibility grid as well."""
+    layouts: list[Layout] = []
+
+    def laid_out(geometry: SceneGeometry) -> tuple[Site, tuple[str, ...]]:
+        if isinstance(settings, SeipError):
+            raise settings
+        layouts.append(lay_out(geometry, settings))
+        keys = settings.candidates.sensors  # warnings about a type are shown with the type
+        return layouts[0].site, tuple(relevant_warnings(layouts[0].warnings, keys, ()))
+
+    check = yield from check_site(contents, laid_out)
+    if any(problem.severity == "ERROR" for problem in check.problems) or not layouts:
+        return check, None
+    return check, (yield from estimate(layouts[0], cores))
 
 
-def in_short(problems: tuple[Problem, ...]) -> str:
-    """Return how many errors and warnings there are, in words."""
-    errors = sum(problem.severity == "ERROR" for problem in problems)
-    warnings = len(problems) - errors
-    return f"{counted(errors, 'error')}, {counted(warnings, 'warning')}"
+def in_short(problems: Iterable[SEIP_PG_problem]) -> str:
+    """Return the number of errors and warnings as text."""
+    kinds = [problem.is_error for problem in problems]
+    errors, warnings = counted(sum(kinds), "error"), counted(len(kinds) - sum(kinds), "warning")
+    return f"{errors}, {warnings}" if any(kinds) else warnings
 
 
 class SEIP_OT_show_problem(bpy.types.Operator):
@@ -365,37 +383,35 @@ class SEIP_OT_show_problem(bpy.types.Operator):
     bl_label = "Show Object"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is an object to be shown."""
-        nothing = nothing_to_show(context)
-        if nothing:
-            cls.poll_message_set(nothing)
-        return not nothing
+    number: bpy.props.IntProperty(name="Number", description="Number of the problem in the list, from 0", min=0)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Select it alone, and frame it."""
-        site = context.scene.seip.site
-        obj = context.view_layer.objects[site.problems[site.active_problem].name]
+        return attempt(self, lambda: self._show(context))
+
+    def _show(self, context: bpy.types.Context) -> None:
+        obstacle = nothing_to_show(context, self.number)
+        if obstacle:
+            raise SeipError(obstacle)
+        obj = context.view_layer.objects[context.scene.seip.site.problems[self.number].name]
         _select_alone(context, obj)
         _frame_selected(context)
-        return {"FINISHED"}
 
 
-def nothing_to_show(context: bpy.types.Context) -> str:
-    """Say why the active problem's object cannot be shown, or nothing."""
-    site = context.scene.seip.site
-    if not 0 <= site.active_problem < len(site.problems):
-        return "No problem is selected"
-    name = site.problems[site.active_problem].name
+def nothing_to_show(context: bpy.types.Context, number: int) -> str:
+    """Return why the object of a problem cannot be shown, or ""."""
+    problems = context.scene.seip.site.problems
+    if number >= len(problems):
+        return f"there is no problem {number}: check the site again"
+    name = problems[number].name
     if not name:
-        return "This concerns the whole scene"
+        return "this problem concerns the whole scene"
     obj = context.view_layer.objects.get(name)
     if obj is None:
-        return "The object is not in this view layer"
+        return f"the object {name!r} is not in this view layer"
     if not obj.visible_get():
-        return "The object is hidden: show it first"
-    return "" if context.mode == "OBJECT" else "Leave Edit Mode first"
+        return f"the object {name!r} is hidden: show it first"
+    return "" if context.mode == "OBJECT" else "leave Edit Mode first"
 
 
 def _select_alone(context: bpy.types.Context, obj: bpy.types.Object) -> None:

@@ -1,16 +1,14 @@
-"""Operators that estimate and compute visibility."""
+"""Operators that compute visibility and compare a placement with its scene."""
 
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import replace
 
 import bpy
 
 from .. import scene_survey
 from ..core.counts import counted
 from ..core.progress import Progress
-from ..core.workflows.survey import estimate
 from ..session import SceneState, session
 from .base import ForReadyScene, LongWork
 
@@ -32,22 +30,6 @@ class SEIP_OT_compute_visibility(ForReadyScene, LongWork[SceneState], bpy.types.
         site = result.layout.site
         targets, poses = counted(len(site.targets), "target"), counted(len(site.candidates), "pose")
         self.report({"INFO"}, f"visibility of {targets} from {poses} is known")
-
-
-class SEIP_OT_estimate_visibility(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
-    """Estimate how long visibility will take and how much memory, by beginning with it for about a second"""
-
-    bl_idname = "seip.estimate_visibility"
-    bl_label = "Estimate"
-    bl_options = {"REGISTER"}  # nothing in the file changes
-
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Read the scene where it has changed."""
-        return _estimated(scene_survey.survey(scene))
-
-    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
-        """Hold the estimate."""
-        session.keep_state(scene, result)
 
 
 class SEIP_OT_compare_scene(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
@@ -72,10 +54,4 @@ def _seen(surveying: Generator[Progress, None, SceneState]) -> Generator[Progres
     return state
 
 
-def _estimated(surveying: Generator[Progress, None, SceneState]) -> Generator[Progress, None, SceneState]:
-    state = yield from surveying
-    found = yield from estimate(state.layout, state.resources.cores)
-    return replace(state, estimate=found)
-
-
-CLASSES = (SEIP_OT_compute_visibility, SEIP_OT_estimate_visibility, SEIP_OT_compare_scene)
+CLASSES = (SEIP_OT_compute_visibility, SEIP_OT_compare_scene)

@@ -1,4 +1,4 @@
-"""The panel of the placement."""
+"""The step "Placement": the goal, the button, and the answer."""
 
 from __future__ import annotations
 
@@ -9,14 +9,18 @@ import bpy
 from .. import scene_status
 from ..core.choosing.placement.objective import certificate, purpose
 from ..core.choosing.placement.returns_summary import returns_text
+from ..core.counts import counted, duration_text
+from ..core.output.results.answer import answer, status_text
 from ..core.output.results.placement_record import PlacementRecord, parsed_record, relevant_warnings
 from ..core.workflows.traffic_runs import traffic_folder
 from ..operators.placement import SEIP_OT_solve_placement
 from ..operators.results import SEIP_OT_evaluate_sensors, no_placement
+from ..operators.sensors import SEIP_MT_survey_presets, SEIP_OT_add_survey_preset
 from ..operators.visibility import SEIP_OT_compare_scene
 from ..sensor_edits import sensor_edits
 from .run_button import draw_run
-from .sidebar import OfSite, RowList, Sidebar, is_narrow, settings_column
+from .sections import section
+from .sidebar import RowList, is_narrow, settings_column
 from .wrapped_text import draw_sentence
 
 _SHOWN = {
@@ -35,169 +39,210 @@ class SEIP_UL_rules(RowList, bpy.types.UIList):
     def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw a position and what must be there."""
         row = layout.row()
-        row.label(text=item.name, icon="CHECKMARK" if item.rule == "MANDATORY" else "CANCEL")
+        row.label(text=item.name, icon="CHECKMARK" if item.rule == "MANDATORY" else "CANCEL", translate=False)
         row.prop(item, "rule", text="")
 
 
-class SEIP_PT_placement(Sidebar, bpy.types.Panel):
-    """Panel: choice of the sensors."""
+def status(scene: bpy.types.Scene) -> str:
+    """Return quality, price and certificate of the placement, in the words of the header."""
+    if no_placement(scene):
+        return "none yet"
+    text = status_text(parsed_record(scene.seip.result.record))
+    return f"{text} · changed" if _doubts(scene) else text
 
-    bl_idname = "SEIP_PT_placement"
-    bl_label = "Placement"
 
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw the goal and the button."""
-        scene = context.scene
-        if scene_status.has_nothing(scene):
-            draw_sentence(self.layout, scene_status.NO_SITE, icon="INFO")
-            return
-        goal = scene.seip.goal
-        layout = settings_column(self.layout)
+def _doubts(scene: bpy.types.Scene) -> list[str]:
+    """Return why the placement is not of the scene as it is now."""
+    return [sentence for sentence in (scene_status.stale_placement(scene), sensor_edits(scene).describe()) if sentence]
+
+
+def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the goal, the button and the answer, then the closed sections with all other settings."""
+    scene = context.scene
+    if scene_status.has_nothing(scene):
+        draw_sentence(layout, scene_status.NO_SITE, icon="INFO")
+        return
+    goal = scene.seip.goal
+    column = settings_column(layout)
+    row = column.row()
+    row.use_property_split = False  # else there is no room for three words
+    if is_narrow(context):
+        row.prop(goal, "limit", text="")
+    else:
+        row.prop(goal, "limit", expand=True)  # an empty text would leave each segment without its name
+    column.prop(goal, goal.limit.lower())
+    draw_run(layout, SEIP_OT_solve_placement.bl_idname, text=button_text(scene))
+    obstacle = scene_status.obstacle(scene)
+    if obstacle:
+        draw_sentence(layout, obstacle, icon="ERROR")
+    if not no_placement(scene):
+        _draw_answer(layout, scene)
+    for name, draw_body in (
+        ("objective", _draw_objective),
+        ("rules", _draw_rules),
+        ("candidates", _draw_candidates),
+        ("search", _draw_search),
+    ):
+        body = section(layout, name)
+        if body is not None:
+            draw_body(body, scene)
+
+
+def button_text(scene: bpy.types.Scene) -> str:
+    """Return what the button will do, and at most how long it takes, about."""
+    goal = scene.seip.goal
+    what = {
+        "COUNT": f"Place {counted(goal.count, 'Sensor')}",
+        "BUDGET": f"Place for ${goal.budget:,.0f}",
+        "COVERAGE": f"Cover {goal.coverage:g}%",
+    }[goal.limit]
+    seconds = scene_status.expected_seconds(scene)
+    return what if seconds is None else f"{what}, up to {duration_text(5.0 * max(1.0, round(seconds / 5.0)))}"
+
+
+def _draw_objective(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Draw the criterion and the settings of the chosen scenarios."""
+    goal = scene.seip.goal
+    column = settings_column(layout)
+    column.prop(goal, "criterion")
+    column.prop(goal, "scenarios")
+    if goal.scenarios == "traffic":
+        column.prop(goal, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
+    for name in _SHOWN[goal.scenarios]:
+        column.prop(goal, name)
+    if goal.scenarios == "nominal" or goal.risk == "none":
+        return
+    number = f"{goal.instants} instants" if goal.scenarios == "traffic" else "twenty draws"
+    draw_sentence(layout, f"Rays are cast from every candidate in {number}, which takes minutes.", icon="INFO")
+
+
+def _draw_rules(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Draw the weights of regions, and the positions that must, or must not, have a sensor."""
+    goal = scene.seip.goal
+    column = settings_column(layout)
+    row = column.row()
+    row.use_property_split = True  # a list has no room for its name within
+    row.prop(goal, "weighting")
+    if goal.weighting == "VALUE":
+        column.prop(goal, "central_weight")
+    column.prop(goal, "min_distance")
+    if len(goal.rules):
         row = layout.row()
-        row.use_property_split = False  # else there is no room for three words
-        if is_narrow(context):
-            row.prop(goal, "limit", text="")
-        else:
-            row.prop(goal, "limit", expand=True)  # an empty text would leave each segment without its name
-        column = layout.column()
-        column.prop(goal, goal.limit.lower())
-        row = column.row()
-        row.use_property_split = True  # a list has no room for its name within
-        row.prop(goal, "weighting")
-        if goal.weighting == "VALUE":
-            column.prop(goal, "central_weight")
-        column.prop(goal, "min_distance")
-        draw_run(layout, SEIP_OT_solve_placement.bl_idname)
-        obstacle = scene_status.obstacle(scene)
-        if obstacle:
-            draw_sentence(layout, obstacle, icon="ERROR")
-        if not no_placement(scene):
-            _draw_answer(layout, scene)
-
-
-class SEIP_PT_placement_objective(OfSite, bpy.types.Panel):
-    """Panel: criterion, scenarios and risk measure."""
-
-    bl_idname = "SEIP_PT_placement_objective"
-    bl_parent_id = "SEIP_PT_placement"
-    bl_label = "Criterion and Scenarios"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw the criterion and the settings of the chosen scenarios."""
-        goal = context.scene.seip.goal
-        layout = settings_column(self.layout)
-        layout.prop(goal, "criterion")
-        layout.prop(goal, "scenarios")
-        if goal.scenarios == "traffic":
-            layout.prop(goal, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
-        for name in _SHOWN[goal.scenarios]:
-            layout.prop(goal, name)
-        if goal.scenarios == "nominal" or goal.risk == "none":
-            return
-        number = f"{goal.instants} instants" if goal.scenarios == "traffic" else "twenty draws"
-        draw_sentence(layout, f"Rays are cast from every candidate in {number}, which takes minutes.", icon="INFO")
-
-
-class SEIP_PT_placement_rules(OfSite, bpy.types.Panel):
-    """Positions that must, and must not, carry a sensor."""
-
-    bl_idname = "SEIP_PT_placement_rules"
-    bl_parent_id = "SEIP_PT_placement"
-    bl_label = "Position Rules"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw the list, and what adds to it."""
-        goal = context.scene.seip.goal
-        layout = self.layout
-        row = layout.row()
-        row.template_list(SEIP_UL_rules.bl_idname, "", goal, "rules", goal, "active_rule", rows=3)
+        rows = len(goal.rules)
+        row.template_list(SEIP_UL_rules.bl_idname, "", goal, "rules", goal, "active_rule", rows=rows, maxrows=rows)
         row.operator("seip.remove_rule", text="", icon="REMOVE")
-        layout.prop(goal, "position", text="", icon="VIEWZOOM", placeholder="Position, or the selected pole")
-        row = layout.row(align=True)
-        row.operator("seip.add_rule", text="Sensor", icon="CHECKMARK").rule = "MANDATORY"
-        row.operator("seip.add_rule", text="No Sensor", icon="CANCEL").rule = "FORBIDDEN"
+    layout.prop(goal, "position", text="", icon="VIEWZOOM", placeholder="Position, or the selected pole")
+    row = layout.row(align=True)
+    row.operator("seip.add_rule", text="Sensor", icon="CHECKMARK").rule = "MANDATORY"
+    row.operator("seip.add_rule", text="No Sensor", icon="CANCEL").rule = "FORBIDDEN"
 
 
-class SEIP_PT_placement_solver(OfSite, bpy.types.Panel):
-    """How a placement is searched."""
+def _draw_candidates(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Draw how the site is laid out and how rays are cast, with presets of all these settings."""
+    survey = scene.seip.survey
+    row = layout.row(align=True)
+    row.menu(SEIP_MT_survey_presets.__name__, text=SEIP_MT_survey_presets.bl_label)
+    row.operator(SEIP_OT_add_survey_preset.bl_idname, text="", icon="ADD")
+    row.operator(SEIP_OT_add_survey_preset.bl_idname, text="", icon="REMOVE").remove_active = True
+    column = settings_column(layout)
+    for heading, names in (
+        ("", ("grid", "delta")),
+        ("Positions", ("spacing", "setback", "clearance", "bracket", "assumed_poles", "allow")),
+        ("Returns", ("detection", "min_intensity", "rain", "wet_road", "fog")),
+    ):
+        group = column.column(heading=heading)
+        for name in names:
+            group.prop(survey, name)
+    if survey.fog:
+        column.prop(survey, "visibility")
+    column.prop(survey, "engine")
 
-    bl_idname = "SEIP_PT_placement_solver"
-    bl_parent_id = "SEIP_PT_placement"
-    bl_label = "Solver"
-    bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw the solver and its time."""
-        layout = settings_column(self.layout)
-        layout.prop(context.scene.seip.survey, "solver")
-        limits = layout.column(align=True)
-        row = limits.row(align=True)
-        row.active = context.scene.seip.survey.time_limit == 0
-        row.prop(context.scene.seip.survey, "effort")
-        limits.prop(context.scene.seip.survey, "time_limit")
+def _draw_search(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Draw the solver and its limits."""
+    survey = scene.seip.survey
+    column = settings_column(layout)
+    column.prop(survey, "solver")
+    limits = column.column(align=True)
+    row = limits.row(align=True)
+    row.active = survey.time_limit == 0
+    row.prop(survey, "effort")
+    limits.prop(survey, "time_limit")
 
 
 def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
-    """Draw what a placement is worth; what is proven of it as long as it is of the scene as it is, and no longer."""
+    """Draw the answer in three lines and its details, dimmed while it is not of the scene as it is."""
     record = parsed_record(scene.seip.result.record)
-    doubt, by_hand = scene_status.stale_placement(scene), sensor_edits(scene).describe()
     box = layout.box()
-    for sentence in (doubt, by_hand):
-        if sentence:
-            draw_sentence(box, sentence, icon="ERROR")
-    if doubt and doubt != scene_status.ANOTHER_SITE:
+    doubts = _doubts(scene)
+    for sentence in doubts:
+        draw_sentence(box, sentence, icon="ERROR")
+    stale = scene_status.stale_placement(scene)
+    if stale and stale != scene_status.ANOTHER_SITE:
         draw_run(box, SEIP_OT_compare_scene.bl_idname)
-    if by_hand:
+    if sensor_edits(scene).describe():
         draw_run(box, SEIP_OT_evaluate_sensors.bl_idname)
-    column = box.column(align=True)
-    column.active = not (doubt or by_hand)
-    for name, value in figures(record):
-        row = column.split(factor=0.5)
-        row.label(text=name)
-        row.label(text=value)
-    if column.active:
-        objective, notes_of_it = record.objective, record.notes
-        sentence = certificate(objective.status, objective.gap, cheapest=objective.cheapest, notes=notes_of_it)
-        proven = objective.status == "optimal" and not purpose(notes_of_it)  # of the coverage that is shown above
-        draw_sentence(box, sentence, icon="CHECKMARK" if proven else "INFO")
-    notes = box.column()
-    notes.active = column.active
+    column = box.column()
+    column.active = not doubts
+    if scene.seip.result.change:
+        draw_sentence(column, scene.seip.result.change, icon="INFO")
+    for sentence in answer(record):
+        draw_sentence(column, sentence)
+    body = section(box, "details")
+    if body is not None:
+        body.active = not doubts
+        _draw_details(body, record, certain=not doubts)
+
+
+def _draw_details(layout: bpy.types.UILayout, record: PlacementRecord, *, certain: bool) -> None:
+    """Draw all figures by topic, the certificate while it holds, and the notes."""
+    for topic, lines in figures(record).items():
+        if not lines:
+            continue
+        layout.label(text=topic)
+        column = layout.column(align=True)
+        for name, value in lines:
+            row = column.split(factor=0.5)
+            row.label(text=f"  {name}", translate=False)
+            row.label(text=value, translate=False)
+    if certain:
+        objective, notes = record.objective, record.notes
+        proven = objective.status == "optimal" and not purpose(notes)  # of the coverage that is shown above
+        sentence = certificate(objective.status, objective.gap, cheapest=objective.cheapest, notes=notes)
+        draw_sentence(layout, sentence, icon="CHECKMARK" if proven else "INFO")
     for note in (*record.notes, *_warnings(record)):
-        draw_sentence(notes, note, icon="INFO")
+        draw_sentence(layout, note, icon="INFO")
 
 
-def figures(record: PlacementRecord) -> list[tuple[str, str]]:
-    """Return what a placement is evaluated by, as text."""
+def figures(record: PlacementRecord) -> dict[str, list[tuple[str, str]]]:
+    """Return the figures of a placement as text, by topic."""
     coverage, objective = record.coverage, record.objective
-    of_each = {} if record.returns is None else record.returns.of_each
-    lines = [(f"Returns, {name}", returns_text(number)) for name, number in of_each.items()]
-    lines.append(("Coverage", f"{coverage.whole:.2%}"))
-    if coverage.gain_band is not None and coverage.gain_band.sheets:
-        lines.append(("Over plausible gains", f"{coverage.gain_band.low:.0%} to {coverage.gain_band.high:.0%}"))
+    seen = [("Whole road", f"{coverage.whole:.2%}")]
     if coverage.central is not None:
-        lines.append(("Central", f"{coverage.central:.2%}"))
+        seen.append(("Weighted regions", f"{coverage.central:.2%}"))
     if objective.kind == "weighted":
-        lines.append(("Weighted", f"{coverage.weighted:.2%}"))
-    lines += [("Price", record.price_text), ("Sensors", str(len(record.sensors)))]
+        seen.append(("By weight", f"{coverage.weighted:.2%}"))
+    if coverage.gain_band is not None and coverage.gain_band.sheets:
+        seen.append(("Plausible gains", f"{coverage.gain_band.low:.0%} to {coverage.gain_band.high:.0%}"))
+    returns: list[tuple[str, str]] = []
+    if record.returns is not None:
+        returns = [(name.capitalize(), returns_text(number)) for name, number in record.returns.of_each.items()]
+        returns += [(crossing.name, returns_text(crossing.least)) for crossing in record.returns.crossings]
+    proof: list[tuple[str, str]] = []
     if objective.bound is not None and objective.gap is not None:
         unit = "${:,.0f}" if objective.cheapest else "{:,.6g}"
-        lines.append(("Objective", unit.format(objective.value)))
-        lines.append(("Bound", unit.format(objective.bound)))
-        lines.append(("Gap", f"{objective.gap:.2%}"))
-    return lines
+        proof = [
+            ("Objective", unit.format(objective.value)),
+            ("Bound", unit.format(objective.bound)),
+            ("Gap", f"{objective.gap:.2%}"),
+        ]
+    price = [(sensor.id, f"${sensor.price_usd:,.0f}") for sensor in record.sensors]
+    return {"Coverage": seen, "Returns": returns, "Price": [*price, ("Total", record.price_text)], "Proof": proof}
 
 
 def _warnings(record: PlacementRecord) -> list[str]:
-    chosen = [sensor.sensor for sensor in record.sensors]
-    return relevant_warnings(record.warnings, record.request.candidates.sensors, chosen)
+    """Return the warnings about the site; those about a sensor type are shown with the type."""
+    return relevant_warnings(record.warnings, record.request.candidates.sensors, ())
 
 
-CLASSES = (
-    SEIP_UL_rules,
-    SEIP_PT_placement,
-    SEIP_PT_placement_objective,
-    SEIP_PT_placement_rules,
-    SEIP_PT_placement_solver,
-)
+CLASSES = (SEIP_UL_rules,)

@@ -71,6 +71,7 @@ class SEIP_PT_results(Sidebar, bpy.types.Panel):
 
     bl_idname = "SEIP_PT_results"
     bl_label = "Results"
+    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the sensors, and how they are followed when moved."""
@@ -80,13 +81,22 @@ class SEIP_PT_results(Sidebar, bpy.types.Panel):
             draw_sentence(layout, sentence, icon="INFO")
             return
         result = scene.seip.result
-        layout.template_list(SEIP_UL_chosen.bl_idname, "", result, "sensors", result, "active_sensor", rows=4)
-        layout.operator("seip.look_from_sensor", icon="HIDE_OFF")
+        _draw_list(layout, SEIP_UL_chosen, result, "sensors", "active_sensor")
+        label = result.sensors[result.active_sensor].name if 0 <= result.active_sensor < len(result.sensors) else ""
+        layout.operator("seip.look_from_sensor", icon="HIDE_OFF", text=f"View from {label or 'Sensor'}")
         if session.following is None:
             draw_run(layout, results.SEIP_OT_follow_sensors.bl_idname, icon="ORIENTATION_GLOBAL")
         else:
             layout.operator("seip.follow_sensors", text="Stop Following", icon="PAUSE", depress=True)
             _draw_followed(layout, session.following)
+
+
+def _draw_list(
+    layout: bpy.types.UILayout, kind: type[bpy.types.UIList], owner: bpy.types.PropertyGroup, items: str, active: str
+) -> None:
+    """Draw a list with all its rows: a list that scrolls would take the mouse wheel from the sidebar."""
+    rows = max(1, len(getattr(owner, items)))
+    layout.template_list(kind.bl_idname, "", owner, items, owner, active, rows=rows, maxrows=rows)
 
 
 def _draw_followed(layout: bpy.types.UILayout, following: FollowedSensors) -> None:
@@ -110,7 +120,7 @@ class SEIP_PT_results_candidates(_Result, bpy.types.Panel):
         layout.row().prop(result, "order", expand=True)
         draw_run(layout, results.SEIP_OT_rank_candidates.bl_idname)
         if result.ranking:
-            layout.template_list(SEIP_UL_ranked.bl_idname, "", result, "ranking", result, "active_ranked", rows=5)
+            _draw_list(layout, SEIP_UL_ranked, result, "ranking", "active_ranked")
 
 
 class SEIP_PT_results_comparison(_Result, bpy.types.Panel):
@@ -123,7 +133,7 @@ class SEIP_PT_results_comparison(_Result, bpy.types.Panel):
         """Draw the kept placements and the comparison."""
         seip, layout = context.scene.seip, self.layout
         row = layout.row()
-        row.template_list(SEIP_UL_kept.bl_idname, "", seip, "kept", seip, "active_kept", rows=2)
+        _draw_list(row, SEIP_UL_kept, seip, "kept", "active_kept")
         column = row.column(align=True)
         column.operator("seip.keep_placement", text="", icon="ADD")
         column.operator("seip.drop_placement", text="", icon="REMOVE")
@@ -158,24 +168,6 @@ def _share(value: float | None) -> str:
     return "–" if value is None else f"{value:.2%}"
 
 
-class SEIP_PT_results_files(_Result, bpy.types.Panel):
-    """The result as files."""
-
-    bl_idname = "SEIP_PT_results_files"
-    bl_label = "Export"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw where to, and the button."""
-        scene, layout = context.scene, self.layout
-        layout.prop(scene.seip.result, "folder", text="")
-        layout.prop(scene.seip.result, "render")
-        sentence = results.no_folder(scene) or results.not_evaluated(scene)
-        if sentence:
-            draw_sentence(layout, sentence, icon="INFO")
-        draw_run(layout, results.SEIP_OT_export_result.bl_idname, icon="EXPORT")
-        draw_run(layout, results.SEIP_OT_write_report.bl_idname, icon="FILE_TEXT")
-
-
 CLASSES = (
     SEIP_UL_chosen,
     SEIP_UL_ranked,
@@ -183,5 +175,4 @@ CLASSES = (
     SEIP_PT_results,
     SEIP_PT_results_candidates,
     SEIP_PT_results_comparison,
-    SEIP_PT_results_files,
 )

@@ -7,25 +7,27 @@ import time
 import bpy
 
 from .. import scene_status
+from ..core.counts import duration_text
 from ..session import session
 
 
 def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE", text: str | None = None) -> None:
-    """Draw an operator's button, or how far its work is with a button to stop it; the next step's is emphasised."""
+    """Draw an operator's button, or in its place the progress of its work; the button of the next step is emphasised.
+
+    The progress takes one row, as the button does, so that nothing below it moves.
+    """
     running = session.running
+    row = layout.row(align=True)
     if running is None or not is_running(operator):
-        row = layout.row(align=True)
         row.active_default = scene_status.next_step(bpy.context.scene) == operator
         row.operator(operator, icon=icon, text=text)
         return
     progress = running.work.progress
-    column = layout.column(align=True)
-    row = column.row(align=True)
-    row.progress(factor=progress.done / progress.total if progress.total else 0.0, text=progress.what)
-    row.operator("seip.stop", text="", icon="X")
+    times = times_text(time.monotonic() - running.began, running.work.seconds_left)
+    row.progress(factor=progress.done / progress.total if progress.total else 0.0, text=f"{times} · {progress.what}")
     if running.acceptance is not None and running.acceptance.searching:
-        column.operator("seip.accept", icon="CHECKMARK")
-    column.label(text=times_in_words(time.monotonic() - running.began, running.work.seconds_left))
+        row.operator("seip.accept", text="", icon="CHECKMARK")
+    row.operator("seip.stop", text="", icon="X")
 
 
 def is_running(operator: str) -> bool:
@@ -33,13 +35,6 @@ def is_running(operator: str) -> bool:
     return session.running is not None and session.running.operator == operator
 
 
-def in_words(seconds: float) -> str:
-    """Return a time as people say it, no more precisely than they care."""
-    if seconds < 100:
-        return f"{max(seconds, 1):.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
-
-
-def times_in_words(passed: float, left: float | None) -> str:
-    """Return how long work has taken, and how long it will take still where that is known."""
-    return in_words(passed) if left is None else f"{in_words(passed)}, {in_words(left)} left"
+def times_text(passed: float, left: float | None) -> str:
+    """Return how long work has taken, and how long it will still take if that is known."""
+    return duration_text(passed) if left is None else f"{duration_text(left)} left"

@@ -1,4 +1,4 @@
-"""The panel of the sensors: which types to choose from, at which heights, how far tilted and turned."""
+"""The step "Sensors": products to choose from, mounting heights and tilts."""
 
 from __future__ import annotations
 
@@ -6,88 +6,96 @@ import math
 
 import bpy
 
+from .. import sensor_types
+from ..core.output.results.placement_record import parsed_record
 from ..core.sensing.lidar.model import LidarModel
+from ..core.sensing.visibility.ring_resolution import unresolved_from
 from ..core.sensing.visibility.road_range import road_range
 from ..core.sensing.visibility.settings import VisibilitySettings
-from ..operators.sensors import (
-    SEIP_MT_survey_presets,
-    SEIP_OT_add_catalogue,
-    SEIP_OT_add_survey_preset,
-    SEIP_OT_list_sensor_types,
-    SEIP_OT_preview_beams,
-)
+from ..operators.results import no_placement
+from ..operators.sensors import SEIP_OT_about_sensor, SEIP_OT_drop_sensor_type, SEIP_OT_preview_beams
 from ..scene.materials import REFLECTIVITY
 from ..session import session
 from ..viewport import beam_preview
-from .sidebar import RowList, Sidebar, is_narrow, settings_column
+from .sections import section
+from .sensor_table import SEIP_OT_choose_sensors, pedestrian_range
+from .sidebar import is_narrow, settings_column
 from .wrapped_text import draw_sentence
 
 
-class SEIP_UL_sensor_types(RowList, bpy.types.UIList):
-    """Sensor types of the catalogue."""
-
-    bl_idname = "SEIP_UL_sensor_types"
-
-    def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
-        """Draw whether a type is used, its key, and its main figures."""
-        model = session.sensor_types.get(item.name)
-        row = layout.row(align=True)
-        row.prop(item, "use", text="")
-        if is_narrow(bpy.context):  # the figures are under Details as well
-            row.label(text=item.name, icon="NONE" if model else "ERROR", translate=False)
-            return
-        split = row.split(factor=0.38)
-        split.label(text=item.name, icon="NONE" if model else "ERROR", translate=False)
-        split.label(text=_in_short(model) if model else "unknown", translate=False)
+def status(scene: bpy.types.Scene) -> str:
+    """Return the placed sensors, or the types to choose from and their heights, in the words of the header."""
+    survey = scene.seip.survey
+    if not no_placement(scene):
+        placed = parsed_record(scene.seip.result.record).sensors
+        heights = sorted({sensor.height_m for sensor in placed})
+        names = {sensor.sensor for sensor in placed}
+        return f"{len(placed)} × {_names(sorted(names))} at {_span(heights)}"
+    used = survey.used_types()
+    if not used:
+        return "none chosen"
+    return f"{_names(used)} at {'?' if survey.wrong_heights() else _span(survey.parsed_heights())}"
 
 
-def _in_short(model: LidarModel) -> str:
-    beams = model.channels if model.rosette is None else "rosette"
-    return f"{beams} · {model.max_range:g} m · ${model.price / 1000:,.3g}k"
+def _names(keys: list[str]) -> str:
+    model = session.sensor_types.get(keys[0])
+    name = keys[0] if model is None else model.name
+    return name if len(keys) == 1 else f"{len(keys)} types"
 
 
-class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
-    """Panel: sensor types to choose from."""
+def _span(heights: list[float]) -> str:
+    low, high = min(heights), max(heights)
+    return f"{low:g} m" if low == high else f"{low:g}–{high:g} m"
 
-    bl_idname = "SEIP_PT_sensors"
-    bl_label = "Sensors"
 
-    def draw_header_preset(self, _context: bpy.types.Context) -> None:
-        """Draw the presets."""
-        row = self.layout.row(align=True)
-        row.menu(SEIP_MT_survey_presets.__name__, text="", icon="PRESET")
-        row.operator(SEIP_OT_add_survey_preset.bl_idname, text="", icon="ADD")
-        row.operator(SEIP_OT_add_survey_preset.bl_idname, text="", icon="REMOVE").remove_active = True
-        row.separator()
+def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the chosen products, and the heights and tilts at which they may be mounted."""
+    survey = context.scene.seip.survey
+    if session.catalogue_error:
+        draw_sentence(layout, session.catalogue_error, icon="ERROR", alert=True)
+    used = survey.used_types()
+    column = layout.column(align=True)
+    for key in used:
+        _draw_product(column, key)
+    if not used:
+        draw_sentence(column, "Choose at least one sensor.", icon="ERROR", alert=True)
+    layout.operator(SEIP_OT_choose_sensors.bl_idname, icon="ADD")
+    _draw_mounting(layout, context)
+    body = section(layout, "about_sensor")
+    if body is not None:
+        _draw_about(body, context)
+    body = section(layout, "beams")
+    if body is not None:
+        _draw_beams(body, context)
 
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw the list, the heights, the tilts and the yaws."""
-        survey = context.scene.seip.survey
-        layout = self.layout
-        if session.catalogue_error:
-            draw_sentence(layout, session.catalogue_error, icon="ERROR", alert=True)
-        if not len(survey.types):
-            draw_sentence(layout, "Types 1 to 3 of the study are used.", icon="INFO")
-            layout.operator(SEIP_OT_list_sensor_types.bl_idname, text="Choose Types")
-        else:
-            if not is_narrow(context):
-                draw_sentence(layout, "Channels · range · middle price")
-            layout.template_list(SEIP_UL_sensor_types.bl_idname, "", survey, "types", survey, "active_type", rows=5)
-            row = layout.row(align=True)
-            row.operator(SEIP_OT_add_catalogue.bl_idname, icon="ADD")
-            row.operator(SEIP_OT_list_sensor_types.bl_idname, text="", icon="FILE_REFRESH")
-            if not any(one.use for one in survey.types):
-                draw_sentence(layout, "Use at least one type.", icon="ERROR", alert=True)
-        column = settings_column(layout)
-        for name, wrong in (("heights", survey.wrong_heights()), ("tilts", survey.wrong_tilts())):
-            row = column.row()
-            row.use_property_split = True  # a text has no room for its name within
-            row.alert = bool(wrong)
-            row.prop(survey, name, text=name.capitalize() if is_narrow(context) else None)
-            if wrong:
-                draw_sentence(column, wrong, icon="ERROR", alert=True)
-        if any(one.use and _looks_one_way(one.name) for one in survey.types):
-            column.prop(survey, "yaws")
+
+def _draw_product(layout: bpy.types.UILayout, key: str) -> None:
+    model = session.sensor_types.get(key)
+    row = layout.row(align=True)
+    if model is None:
+        row.label(text=f"{key}: not in the catalogue", icon="ERROR", translate=False)
+    else:
+        name = model.name if is_narrow(bpy.context) else sensor_types.title(model)
+        row.label(text=name, translate=False)
+        price = row.row(align=True)
+        price.alignment = "RIGHT"
+        price.label(text=f"${model.price:,.0f}", translate=False)
+    row.operator(SEIP_OT_about_sensor.bl_idname, text="", icon="INFO", emboss=False).key = key
+    row.operator(SEIP_OT_drop_sensor_type.bl_idname, text="", icon="X", emboss=False).key = key
+
+
+def _draw_mounting(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    survey = context.scene.seip.survey
+    column = settings_column(layout)
+    for name, wrong in (("heights", survey.wrong_heights()), ("tilts", survey.wrong_tilts())):
+        row = column.row()
+        row.use_property_split = True  # a text has no room for its name within
+        row.alert = bool(wrong)
+        row.prop(survey, name, text=name.capitalize() if is_narrow(context) else None)
+        if wrong:
+            draw_sentence(column, wrong, icon="ERROR", alert=True)
+    if any(_looks_one_way(key) for key in survey.used_types()):
+        column.prop(survey, "yaws")
 
 
 def _looks_one_way(key: str) -> bool:
@@ -95,38 +103,38 @@ def _looks_one_way(key: str) -> bool:
     return model is not None and not model.all_round
 
 
-class SEIP_PT_sensor_details(Sidebar, bpy.types.Panel):
-    """Panel: properties of the active sensor type."""
+def _draw_about(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the figures of a chosen product, and what they rest on."""
+    survey = context.scene.seip.survey
+    model = session.sensor_types.get(survey.shown_type())
+    if model is None:
+        draw_sentence(layout, "Choose a sensor that is in the catalogue.", icon="INFO")
+        return
+    layout.label(text=sensor_types.title(model), translate=False)
+    for what, value in (*_figures(model), *_on_road(model, survey.parsed_heights(), survey.delta, survey.detection)):
+        split = layout.split(factor=0.42)
+        split.scale_y = 0.8
+        split.label(text=what)
+        split.label(text=value)
+    draw_sentence(layout, f"Detection: {model.evidence}")
+    draw_sentence(layout, f"Figures: {model.source}")
+    if model.assumed:
+        draw_sentence(layout, f"Assumed: {model.assumed}")
+    draw_sentence(layout, f"Price: {model.price_source or 'no source'}")
 
-    bl_idname = "SEIP_PT_sensor_details"
-    bl_parent_id = "SEIP_PT_sensors"
-    bl_label = "Details"
-    bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw its figures and where they are from."""
-        survey = context.scene.seip.survey
-        if not 0 <= survey.active_type < len(survey.types):
-            self.layout.label(text="No type is selected")
-            return
-        key = survey.types[survey.active_type].name
-        model = session.sensor_types.get(key)
-        if model is None:
-            draw_sentence(self.layout, f"{key} is not in the catalogue: add the file that has it, or do not use it.")
-            return
-        draw_sentence(self.layout, f"{model.manufacturer} {model.name}")
-        height = survey.preview_height
-        far = road_range(model, REFLECTIVITY["asphalt"], height, VisibilitySettings(detection=survey.detection))
-        for what, value in (*_figures(model), ("On asphalt", f"{far:.0f} m from {height:g} m height")):
-            split = self.layout.split(factor=0.42)
-            split.scale_y = 0.8
-            split.label(text=what)
-            split.label(text=value)
-        draw_sentence(self.layout, f"Detection: {model.evidence}")
-        draw_sentence(self.layout, f"Figures: {model.source}")
-        if model.assumed:
-            draw_sentence(self.layout, f"Assumed: {model.assumed}")
-        draw_sentence(self.layout, f"Price: {model.price_source or 'no source'}")
+def _on_road(model: LidarModel, heights: list[float], delta: float, detection: float) -> list[tuple[str, str]]:
+    """Return the range on the road, and where the rings of the beams begin to leave gaps, for the greatest height."""
+    if not heights:
+        return []
+    height = max(heights)
+    far = road_range(model, REFLECTIVITY["asphalt"], height, VisibilitySettings(detection=detection))
+    across = math.sqrt(max(model.max_range**2 - height**2, 0.0))
+    dense = unresolved_from(model, height, delta, across)
+    lines = [("Height", f"{height:g} m"), ("On dry asphalt", f"up to {far:.0f} m")]
+    if dense < across:
+        lines.append(("Rings close", f"up to {dense:.0f} m, then gaps"))
+    return lines
 
 
 def _figures(model: LidarModel) -> list[tuple[str, str]]:
@@ -134,6 +142,7 @@ def _figures(model: LidarModel) -> list[tuple[str, str]]:
     cheap, dear = model.price_range
     reach = [
         ("Range", f"{model.min_range:g}…{model.max_range:g} m"),
+        ("On a pedestrian", f"up to {pedestrian_range(model):.0f} m"),
         ("Points", f"{model.points_per_second:,.0f} /s"),
     ]
     if model.rosette is None:
@@ -149,41 +158,24 @@ def _figures(model: LidarModel) -> list[tuple[str, str]]:
     return [
         *beams,
         ("Field of view", f"{math.degrees(model.field_of_view):.4g}°"),
-        ("Price", f"${cheap:,.0f}" if cheap == dear else f"${cheap:,.0f}–{dear:,.0f}"),
+        ("Price", f"${cheap:,.0f}" if cheap == dear else f"${cheap:,.0f}…{dear:,.0f}"),
     ]
 
 
-class SEIP_PT_beam_preview(Sidebar, bpy.types.Panel):
-    """The active type's beams in the viewport."""
-
-    bl_idname = "SEIP_PT_beam_preview"
-    bl_parent_id = "SEIP_PT_sensors"
-    bl_label = "Beam Preview"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw the button and what the colours mean."""
-        shown = beam_preview.is_shown()
-        layout = self.layout
-        column = settings_column(layout)
-        column.prop(context.scene.seip.survey, "preview_height")
-        text = "Hide Beams" if shown else "Show Beams"
-        layout.operator(SEIP_OT_preview_beams.bl_idname, text=text, icon="LIGHT_SPOT", depress=shown)
-        preview = beam_preview.preview_of(context) if shown else None
-        if preview is None:
-            return
-        draw_sentence(layout, f"{preview.model.key} at {preview.height:.3g} m")
-        far = f"{preview.resolved_to():.0f} m"
-        if preview.model.rosette is not None:
-            near = f"all road in view is within δ = {preview.delta:.3g} m of a ray of the frame"
-            apart = "gaps; road in them goes unseen"
-            border = f"On a level road there is no gap up to {far}."
-        else:
-            near = f"within 2δ = {2 * preview.delta:.3g} m of the next ring inwards"
-            apart = "farther apart; road between may go unseen"
-            border = f"On a level road all{' before it' if preview.tilt else ''} is within 2δ up to {far}."
-        draw_sentence(layout, f"Blue: {near}", icon="COLORSET_04_VEC")
-        draw_sentence(layout, f"Orange: {apart}", icon="COLORSET_02_VEC")
-        draw_sentence(layout, border)
-
-
-CLASSES = (SEIP_UL_sensor_types, SEIP_PT_sensors, SEIP_PT_sensor_details, SEIP_PT_beam_preview)
+def _draw_beams(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the button, and what the colours of the rings mean."""
+    shown = beam_preview.is_shown()
+    settings_column(layout).prop(context.scene.seip.survey, "preview_height")
+    text = "Hide Beams" if shown else "Show Beams"
+    layout.operator(SEIP_OT_preview_beams.bl_idname, text=text, icon="LIGHT_SPOT", depress=shown)
+    preview = beam_preview.preview_of(context) if shown else None
+    if preview is None:
+        return
+    rosette = preview.model.rosette is not None
+    gap = preview.delta if rosette else 2 * preview.delta
+    to = "a ray" if rosette else "the next ring inwards"
+    draw_sentence(layout, f"{preview.model.name} at {preview.height:.3g} m")
+    draw_sentence(layout, f"Blue: at most {gap:.3g} m to {to}", icon="COLORSET_04_VEC")
+    draw_sentence(layout, "Orange: more; road between may go unseen", icon="COLORSET_02_VEC")
+    before = " in front" if preview.tilt else ""
+    draw_sentence(layout, f"A level road{before} has no gaps up to {preview.resolved_to():.0f} m.")

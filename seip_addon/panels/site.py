@@ -1,4 +1,4 @@
-"""The panel of the site: where it comes from, what its objects mean, and whether it is sound."""
+"""The step "Site": map or example, roles of objects, and problems that the check found."""
 
 from __future__ import annotations
 
@@ -16,52 +16,63 @@ from ..operators.site import (
     SEIP_OT_show_problem,
     SEIP_OT_take_out_of_role,
     has_site,
+    in_short,
     missing_for_build,
-    why_no_role,
 )
 from ..properties.site import SEIP_PG_site
 from ..scene import roles
 from .run_button import draw_run
-from .sidebar import RowList, Sidebar, is_narrow, settings_column
+from .sections import section
+from .sidebar import is_narrow, settings_column
 from .wrapped_text import draw_sentence
 
-
-class SEIP_PT_site(Sidebar, bpy.types.Panel):
-    """The place that sensors are to watch."""
-
-    bl_idname = "SEIP_PT_site"
-    bl_label = "Site"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Say what there is to begin with."""
-        if not has_site(context.scene):
-            draw_sentence(self.layout, "Begin with a map, or with roles of your own objects.", icon="INFO")
+TARGETS = "Targets"
+"""Count of the check that the header shows."""
+SHOW_WIDTH = 28.0
+"""Width of the button next to a problem, pixels at the usual scale of the interface."""
 
 
-class SEIP_PT_site_map(Sidebar, bpy.types.Panel):
-    """A site from a map."""
+def status(scene: bpy.types.Scene) -> str:
+    """Return the name of the site and its number of targets, in the words of the header."""
+    if scene_status.has_nothing(scene):
+        return "none yet"
+    targets = next((one.value.partition(", ")[0] for one in scene.seip.site.counts if one.name == TARGETS), "")
+    return f"{scene.name} · {targets} points" if targets else scene.name
 
-    bl_idname = "SEIP_PT_site_map"
-    bl_parent_id = "SEIP_PT_site"
-    bl_label = "From a Map"
 
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw the choice of the map and the place."""
-        site = context.scene.seip.site
-        layout = self.layout
-        name = bpy.path.basename(site.source)
-        if not name:
-            draw_run(layout, SEIP_OT_load_example.bl_idname)
-        draw_run(layout, SEIP_OT_choose_map.bl_idname, icon="FILE_FOLDER", text=name or "Choose Map…")
-        if not name:
-            return
-        draw_place(layout, site)
-        missing = missing_for_build(context.scene)
-        if missing:
-            draw_sentence(layout, f"{missing}.", icon="INFO")
-        elif has_site(context.scene):
-            draw_sentence(layout, "This scene has a site: a new scene is made.", icon="INFO")
-        draw_run(layout, SEIP_OT_build_site.bl_idname)
+def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the choice of a map while there is no site, otherwise the check and its problems."""
+    scene = context.scene
+    if scene_status.has_nothing(scene):
+        draw_sentence(layout, "Begin with the example, with a map, or with roles of your own objects.", icon="INFO")
+        draw_run(layout, SEIP_OT_load_example.bl_idname, icon="MOD_BUILD")
+        _draw_map(layout, scene)
+    else:
+        _draw_check(layout, scene)
+        body = section(layout, "contents")
+        if body is not None:
+            _draw_contents(body, scene)
+        body = section(layout, "another_map")
+        if body is not None:
+            _draw_map(body, scene)
+    body = section(layout, "roles")
+    if body is not None:
+        _draw_roles(body, context)
+
+
+def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    site = scene.seip.site
+    name = bpy.path.basename(site.source)
+    draw_run(layout, SEIP_OT_choose_map.bl_idname, icon="FILE_FOLDER", text=name or "Choose Map…")
+    if not name:
+        return
+    draw_place(layout, site)
+    missing = missing_for_build(scene)
+    if missing:
+        draw_sentence(layout, f"{missing}.", icon="INFO")
+    elif has_site(scene):
+        draw_sentence(layout, "The site is built in a new scene; this one stays.", icon="INFO")
+    draw_run(layout, SEIP_OT_build_site.bl_idname)
 
 
 def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
@@ -82,92 +93,62 @@ def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
         draw_sentence(layout, "No junction: the middle of the map.")
 
 
-class SEIP_PT_site_roles(Sidebar, bpy.types.Panel):
-    """Panel: roles of objects."""
+def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Draw the button and one line, and the problems with a button each."""
+    site = scene.seip.site
+    draw_run(layout, SEIP_OT_check_site.bl_idname)
+    if not site.checked:
+        return
+    doubt = scene_status.stale_check(scene)
+    if doubt:
+        draw_sentence(layout, doubt, icon="ERROR")
+    elif not site.problems:
+        draw_sentence(layout, "The site is sound.", icon="CHECKMARK")
+    else:
+        draw_sentence(layout, f"{in_short(site.problems)}:")
+    column = layout.column()
+    column.active = not doubt
+    for number, problem in enumerate(site.problems):
+        row = column.row()
+        draw_sentence(row.column(), problem.text, icon="CANCEL" if problem.is_error else "ERROR", reserved=SHOW_WIDTH)
+        button = row.row()
+        button.enabled = bool(problem.name)
+        button.operator(SEIP_OT_show_problem.bl_idname, text="", icon="ZOOM_SELECTED").number = number
 
-    bl_idname = "SEIP_PT_site_roles"
-    bl_parent_id = "SEIP_PT_site"
-    bl_label = "Roles of Objects"
 
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw what the active object is, and the buttons that change that."""
-        site = context.scene.seip.site
-        layout = self.layout
-        layout.prop(site, "role", text="")
-        row = layout.row(align=True)
-        row.operator(SEIP_OT_assign_role.bl_idname, icon="ADD").role = site.role
-        row.operator(SEIP_OT_take_out_of_role.bl_idname, icon="REMOVE").role = site.role
-        reason = why_no_role(context)
-        if reason:
-            draw_sentence(layout, reason, icon="INFO")
-        if Role[site.role] in roles.AREAS:
-            row = layout.column(align=True) if is_narrow(context) else layout.row(align=True)
-            for place, text in (("CURSOR", "Draw at Cursor"), ("VIEW", "Draw in View")):
-                button = row.operator(SEIP_OT_add_area.bl_idname, text=text)
-                button.role, button.place = site.role, place
-        if context.object is not None:
-            _draw_object(layout, context.scene, context.object)
+def _draw_contents(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    site = scene.seip.site
+    if not site.checked:
+        draw_sentence(layout, "Check the site to count its contents.", icon="INFO")
+    for one in site.counts:
+        draw_sentence(layout, f"{one.name}: {one.value}")
+
+
+def _draw_roles(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the buttons that change roles, then what the active object is: nothing above it moves."""
+    site = context.scene.seip.site
+    layout.prop(site, "role", text="")
+    row = layout.row(align=True)
+    row.operator(SEIP_OT_assign_role.bl_idname, icon="ADD").role = site.role
+    row.operator(SEIP_OT_take_out_of_role.bl_idname, icon="REMOVE").role = site.role
+    if Role[site.role] in roles.AREAS:
+        row = layout.column(align=True) if is_narrow(context) else layout.row(align=True)
+        for place, text in (("CURSOR", "Draw at Cursor"), ("VIEW", "Draw in View")):
+            button = row.operator(SEIP_OT_add_area.bl_idname, text=text)
+            button.role, button.place = site.role, place
+    if context.object is None:
+        draw_sentence(layout, "Select objects to give them a role.", icon="INFO")
+    else:
+        _draw_object(layout, context.scene, context.object)
 
 
 def _draw_object(layout: bpy.types.UILayout, scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
     assigned = roles.roles_of(scene, obj)
-    box = layout.box()
-    box.label(text=obj.name, icon="OBJECT_DATA")
-    draw_sentence(box, ", ".join(role.value for role in assigned).capitalize() or "No role")
-    column = settings_column(box)
+    what = ", ".join(role.value for role in assigned) or "no role"
+    draw_sentence(layout, f"{obj.name}: {what}", icon="OBJECT_DATA")
+    column = settings_column(layout)
     column.enabled = obj.is_editable
     if Role.WEIGHTED_REGIONS in assigned:
         column.prop(obj, "seip_region_weight")
     if Role.POLES in assigned:
         column.prop(obj, "seip_pole_rule")
-
-
-class SEIP_UL_problems(RowList, bpy.types.UIList):
-    """Problems that the check found."""
-
-    bl_idname = "SEIP_UL_problems"
-
-    def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
-        """Draw one."""
-        layout.label(text=item.name or item.text, icon="CANCEL" if item.is_error else "ERROR", translate=False)
-
-
-class SEIP_PT_site_check(Sidebar, bpy.types.Panel):
-    """Whether the site is sound."""
-
-    bl_idname = "SEIP_PT_site_check"
-    bl_parent_id = "SEIP_PT_site"
-    bl_label = "Check"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw what was counted, and the problems."""
-        site = context.scene.seip.site
-        layout = self.layout
-        draw_run(layout, SEIP_OT_check_site.bl_idname)
-        if not site.checked:
-            return
-        doubt = scene_status.stale_check(context.scene)
-        if doubt:
-            draw_sentence(layout, doubt, icon="ERROR")
-        if not site.problems:
-            layout.label(text="No problem found", icon="NONE" if doubt else "CHECKMARK")
-        else:
-            layout.template_list(
-                SEIP_UL_problems.bl_idname,
-                "",
-                site,
-                "problems",
-                site,
-                "active_problem",
-                rows=min(5, len(site.problems)),
-            )
-            if 0 <= site.active_problem < len(site.problems):
-                draw_sentence(layout, site.problems[site.active_problem].text)
-                layout.operator(SEIP_OT_show_problem.bl_idname, icon="ZOOM_SELECTED")
-        counted = layout.column()
-        counted.active = not doubt
-        for one in site.counts:
-            draw_sentence(counted, f"{one.name}: {one.value}")
-
-
-CLASSES = (SEIP_PT_site, SEIP_PT_site_map, SEIP_PT_site_roles, SEIP_UL_problems, SEIP_PT_site_check)

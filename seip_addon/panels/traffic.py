@@ -24,7 +24,8 @@ class SEIP_PT_traffic(Sidebar, bpy.types.Panel):
     """Traffic in the scene."""
 
     bl_idname = "SEIP_PT_traffic"
-    bl_label = "Traffic and Scans"
+    bl_label = "Traffic and Detection"
+    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw where traffic comes from."""
@@ -54,6 +55,7 @@ class SEIP_PT_scan(Sidebar, bpy.types.Panel):
     bl_idname = "SEIP_PT_scan"
     bl_label = "Scan"
     bl_parent_id = SEIP_PT_traffic.bl_idname
+    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw how scans are made, and the last."""

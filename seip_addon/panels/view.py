@@ -1,15 +1,14 @@
-"""The panel of what the viewport shows."""
+"""The panel of colours, sight lines and points in the viewport."""
 
 from __future__ import annotations
 
 import bpy
 
 from ..core.output.pictures.coverage_colours import Aspect
-from ..operators.results import no_placement, not_evaluated
+from ..operators.results import no_placement
 from ..operators.view import (
     SEIP_OT_colour_coverage,
     SEIP_OT_hide_sight_lines,
-    SEIP_OT_save_picture,
     SEIP_OT_show_coverage_colours,
     SEIP_OT_show_sight_lines,
     SEIP_OT_toggle_legend,
@@ -19,6 +18,7 @@ from ..scene.write import ASPECT, aspects_of, coverage_of
 from ..session import session
 from ..viewport import coverage, overlays
 from ..viewport.sight_lines import NAME as SIGHT
+from .results import SEIP_PT_results
 from .run_button import draw_run, is_running
 from .sidebar import Sidebar
 from .wrapped_text import draw_sentence
@@ -31,7 +31,9 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
     """Panel: what the viewport shows."""
 
     bl_idname = "SEIP_PT_view"
-    bl_label = "View"
+    bl_label = "Coverage and Sight Lines"
+    bl_parent_id = SEIP_PT_results.bl_idname
+    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw what can be shown."""
@@ -43,7 +45,6 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
         self._draw_sight(context)
         if session.scan_of(scene) is not None:
             self._draw_cloud(context)
-        self._draw_picture(context)
 
     def _draw_coverage(self, context: bpy.types.Context) -> None:
         column = self.layout.column(align=True)
@@ -87,17 +88,6 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
         column.label(text="Point Cloud")
         column.row(align=True).prop(context.scene.seip.view, "cloud_colour", expand=True)
         column.operator("seip.hide_scan", icon="X")
-
-    def _draw_picture(self, context: bpy.types.Context) -> None:
-        view = context.scene.seip.view
-        column = self.layout.column(align=True)
-        column.label(text="Picture for a Report")
-        column.row(align=True).prop(view, "picture_of", expand=True)
-        column.prop(view, "picture", text="")
-        draw_run(column, SEIP_OT_save_picture.bl_idname, icon="IMAGE_DATA")
-        why_not = no_placement(context.scene) or not_evaluated(context.scene)
-        if why_not:
-            draw_sentence(column, why_not, icon="INFO")
 
 
 CLASSES = (SEIP_PT_view,)

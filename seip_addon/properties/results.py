@@ -30,6 +30,7 @@ class SEIP_PG_placement(bpy.types.PropertyGroup):
 class SEIP_PG_result(SEIP_PG_placement):
     """The placement that stands in the scene, and what is looked at of it."""
 
+    change: StringProperty(name="Change", description="Whether it is better or worse than the placement before it")
     sensors: CollectionProperty(type=SEIP_PG_chosen)
     active_sensor: IntProperty(
         name="Sensor",

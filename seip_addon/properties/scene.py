@@ -9,6 +9,7 @@ from ..scene_status import FILE_VERSION
 from .detection import SEIP_PG_detection
 from .placement import SEIP_PG_goal
 from .results import SEIP_PG_placement, SEIP_PG_result
+from .sections import SEIP_PG_sections
 from .site import SEIP_PG_site
 from .survey import SEIP_PG_survey
 from .traffic import SEIP_PG_traffic
@@ -19,6 +20,7 @@ class SEIP_PG_scene(bpy.types.PropertyGroup):
     """All that SEIP keeps with a scene."""
 
     version: IntProperty(name="Version", default=FILE_VERSION, options={"HIDDEN"})
+    sections: PointerProperty(type=SEIP_PG_sections)
     site: PointerProperty(type=SEIP_PG_site)
     survey: PointerProperty(type=SEIP_PG_survey)
     goal: PointerProperty(type=SEIP_PG_goal)

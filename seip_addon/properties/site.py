@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..core.errors import SeipError
 from ..core.site.scene_geometry import DEFAULT_WEIGHT
@@ -34,12 +34,6 @@ class SEIP_PG_problem(bpy.types.PropertyGroup):
 
     is_error: BoolProperty(name="Error", description="Whether a survey cannot go on")
     text: StringProperty(name="Problem", description="What is wrong, and the cure")
-
-
-def _show_problem(site: SEIP_PG_site, context: bpy.types.Context) -> None:
-    """Select what was clicked at, and frame it; a problem of the scene has nothing to show."""
-    if site.problems[site.active_problem].name and context.area is not None and bpy.ops.seip.show_problem.poll():
-        bpy.ops.seip.show_problem()
 
 
 ROLE_ITEMS = tuple((role.name, role.value.capitalize(), f"{roles.WORDS[role].capitalize()}") for role in roles.ROLES)
@@ -86,11 +80,6 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
     checked: BoolProperty(name="Checked", description="Whether the check has looked at this scene")
     counts: CollectionProperty(type=SEIP_PG_count)
     problems: CollectionProperty(type=SEIP_PG_problem)
-    active_problem: IntProperty(
-        name="Problem",
-        description="Click to select the object and bring it into view",
-        update=_show_problem,
-    )
 
     def is_described(self) -> bool:
         """Return whether a site description says where the place is, and how large."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..core.choosing.placement.search_limits import DEFAULT_EFFORT
 from ..core.errors import SeipError
@@ -16,6 +16,7 @@ from ..core.site.post_rules import RULES
 from ..core.site.weather import Weather
 from ..core.workflows.survey import SurveySettings
 from ..preferences import catalogue_files
+from ..sensor_types import DEFAULT_TYPE
 from .conversion import as_typed, of_setting
 
 _CANDIDATES = CandidateSettings()
@@ -32,7 +33,12 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
     """How the site is laid out and when a target counts as seen."""
 
     types: CollectionProperty(type=SEIP_PG_sensor_type)
-    active_type: IntProperty(name="Sensor type", description="The type whose details are shown")
+    about: StringProperty(name="Sensor", description="Catalogue key of the sensor whose figures and beams are shown")
+    filter: StringProperty(
+        name="Filter",
+        description="Part of a manufacturer's or product's name",
+        options={"SKIP_SAVE", "TEXTEDIT_UPDATE"},
+    )
     preview_height: FloatProperty(
         name="Height",
         description="Of the previewed sensor above the 3D cursor",
@@ -118,6 +124,19 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         soft_max=3600.0,
     )
 
+    def used_types(self) -> list[str]:
+        """Return the catalogue keys of the types to choose from; the default type where none was ever listed."""
+        return [one.name for one in self.types if one.use] if len(self.types) else [DEFAULT_TYPE]
+
+    def shown_type(self) -> str:
+        """Return the key of the type whose figures and beams are shown, or ""."""
+        used = self.used_types()
+        return self.about if self.about in used else next(iter(used), "")
+
+    def parsed_heights(self) -> list[float]:
+        """Return the mounting heights in metres; none where the text is wrong."""
+        return [] if self.wrong_heights() else list(heights_of(self.heights.split()))
+
     def wrong_heights(self) -> str:
         """Say what is wrong with the heights, or nothing."""
         return _complaint(lambda: CandidateSettings(heights=heights_of(self.heights.split())))
@@ -138,10 +157,9 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         SeipError
             It makes no sense.
         """
-        used = tuple(one.name for one in self.types if one.use)
         return SurveySettings(
             candidates=CandidateSettings(
-                sensors=used if len(self.types) else _CANDIDATES.sensors,
+                sensors=tuple(self.used_types()),
                 heights=heights_of(self.heights.split()),
                 tilts=tilts_of(self.tilts.split()),
                 yaws=self.yaws,

@@ -88,6 +88,7 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
         description="Datasets to write beside the frames",
         items=tuple((key, kind.name, f"Write the dataset as {kind.name}") for key, kind in FORMATS.items()),
         options={"ENUM_FLAG"},
+        default={"openpcdet"},
     )
     split: EnumProperty(
         name="Split",

@@ -108,9 +108,7 @@ def preview_of(context: bpy.types.Context) -> Preview | None:
         return Preview(
             session.sensor_types[active[contract.SENSOR]], matrix[:3, 3], axes, float(height), float(survey.delta)
         )
-    if not 0 <= survey.active_type < len(survey.types):
-        return None
-    model = session.sensor_types.get(survey.types[survey.active_type].name)
+    model = session.sensor_types.get(survey.shown_type())
     if model is None:
         return None
     place = np.add(scene.cursor.location, (0.0, 0.0, survey.preview_height))

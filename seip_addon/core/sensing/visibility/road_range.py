@@ -47,6 +47,19 @@ def road_range(model: LidarModel, reflectivity: float, height: float, settings: 
     return min(model.law.reach_on_level(reflectivity, settings.detection, height), model.max_range)
 
 
+def upright_range(model: LidarModel, reflected: float, settings: VisibilitySettings) -> float:
+    """Return the distance in metres up to which a sensor detects an upright body.
+
+    Parameters
+    ----------
+    reflected : float, 0 to 1
+        Reflectivity of the body times the cosine of the angle of incidence; see `returns.bodies.PANELS`.
+    """
+    if not isinstance(model.law, RangeEquation):
+        return model.max_range
+    return min(model.law.reach(reflected, settings.detection), model.max_range)
+
+
 def range_warnings(
     site: Site, models: Mapping[str, LidarModel], reflectivity: float, settings: VisibilitySettings
 ) -> tuple[str, ...]:

@@ -1,0 +1,123 @@
+"""The answer of a placement in short sentences: quality, price, recommendation."""
+
+from __future__ import annotations
+
+import math
+
+from ...choosing.placement.objective import MOVED, purpose
+from ...choosing.placement.returns_summary import FEW_RETURNS, returns_text, share_reached
+from .placement_record import PlacementRecord
+
+LARGE_GAP = 0.05
+"""Possible improvement from which a longer search is recommended."""
+NEEDLESS = 0.01
+"""Share of the road, lost without a sensor, below which leaving that sensor out is recommended."""
+
+
+def status_text(record: PlacementRecord) -> str:
+    """Return quality, price and certificate in a few words: ``94% · $48,000 · proven``."""
+    return " · ".join((_quality(record), f"${record.price_usd:,.0f}", _certificate(record)))
+
+
+def answer(record: PlacementRecord) -> tuple[str, ...]:
+    """Return the achievement of a placement and how much better it could be, its price, and any recommendation.
+
+    Returns
+    -------
+    tuple of str
+        Two or three sentences.
+    """
+    lines = [f"{_achievement(record)} {_outlook(record)}", _price(record)]
+    return tuple(filter(None, (*lines, recommendation(record))))
+
+
+def recommendation(record: PlacementRecord) -> str:
+    """Return the most useful next step to a better or cheaper placement, or "" if none stands out."""
+    more = possible_improvement(record)
+    if more is not None and more >= LARGE_GAP:
+        return "Search longer for a better placement: raise the effort."
+    crossing = min(record.returns.crossings, key=lambda one: one.least, default=None) if record.returns else None
+    if crossing is not None and crossing.least < FEW_RETURNS:
+        return f"Few returns from pedestrians ({returns_text(crossing.least)}) at {crossing.name}: add a sensor there."
+    if record.returns is None and len(record.sensors) > 1:
+        least = min(record.sensors, key=lambda sensor: sensor.coverage_marginal)
+        if least.coverage_marginal < NEEDLESS:
+            return f"Leave out {least.id}: without it {least.coverage_marginal:.1%} less of the road is seen."
+    return ""
+
+
+def change_text(record: PlacementRecord, previous: PlacementRecord) -> str:
+    """Return whether a placement is better or worse than the previous one, or "" if they cannot be compared.
+
+    Placements are compared by what both were chosen for, on the same number of targets: returns from road users, or
+    coverage.
+    """
+    comparable = record.counts.targets == previous.counts.targets and record.site.name == previous.site.name
+    if not comparable or (record.returns is None) != (previous.returns is None):
+        return ""
+    now, before = _value(record), _value(previous)
+    if now == before:
+        return ""
+    word = "Better" if now > before else "Worse"
+    figures = f"{_quality(record, exact=True)} instead of {_quality(previous, exact=True)}"
+    return f"{word} than the previous placement: {figures}."
+
+
+def possible_improvement(record: PlacementRecord) -> float | None:
+    """Return by which share the best placement might be better, or cheaper; None without a bound."""
+    objective = record.objective
+    if objective.bound is None or objective.status == MOVED:
+        return None
+    if objective.cheapest:
+        return max(0.0, 1.0 - objective.bound / objective.value) if objective.value else 0.0
+    of_returns = objective.sought == "most returns"
+    share = share_reached(objective.bound, objective.value, of_returns=of_returns)
+    return max(0.0, share - 1.0) if math.isfinite(share) else None
+
+
+def _value(record: PlacementRecord) -> float:
+    return record.coverage.whole if record.returns is None else record.returns.typical
+
+
+def _quality(record: PlacementRecord, *, exact: bool = False) -> str:
+    if record.returns is not None:
+        return f"{returns_text(record.returns.typical)} returns"
+    return f"{record.coverage.whole:.2%}" if exact else f"{record.coverage.whole:.0%}"
+
+
+def _certificate(record: PlacementRecord) -> str:
+    if record.objective.status == MOVED:
+        return "moved by hand"
+    if record.objective.status == "optimal":
+        return "proven"
+    more = possible_improvement(record)
+    return "not proven" if more is None else f"within {more:.1%}"
+
+
+def _achievement(record: PlacementRecord) -> str:
+    if record.returns is None:
+        return f"{record.coverage.whole:.1%} of the road is seen."
+    return f"{record.returns.describe()}."
+
+
+def _outlook(record: PlacementRecord) -> str:
+    """Return how much better the best placement of these candidates could be."""
+    objective = record.objective
+    if objective.status == MOVED:
+        return "Sensors were moved by hand."
+    what = purpose(record.notes) or ""
+    better = "cheaper" if objective.cheapest else "better"
+    if objective.status == "optimal":
+        return f"No placement of these candidates is {better}{what}."
+    more = possible_improvement(record)
+    return (
+        "How much better it could be is not known."
+        if more is None
+        else f"At most {more:.1%} {better} is possible{what}."
+    )
+
+
+def _price(record: PlacementRecord) -> str:
+    number = len(record.sensors)
+    scope = "with installation" if record.installed else "without installation"
+    return f"${record.price_usd:,.0f} for {number} sensor{'' if number == 1 else 's'}, {scope}."

@@ -1,0 +1,31 @@
+"""Sections of a panel that open and close, each with a title and a status."""
+
+from __future__ import annotations
+
+import bpy
+
+
+def section(layout: bpy.types.UILayout, name: str, status: str = "") -> bpy.types.UILayout | None:
+    """Draw a section's header, and return the layout of its content, or None while it is closed.
+
+    Parameters
+    ----------
+    name : str
+        Property of `SEIP_PG_sections` that holds whether the section is open; its name is the title.
+    status : str
+        Text at the right of the title.
+    """
+    sections = bpy.context.scene.seip.sections
+    header, body = layout.panel_prop(sections, name)
+    title = sections.bl_rna.properties[name].name
+    if not status:
+        header.label(text=title)
+        return body
+    row = header.row()
+    left = row.row()
+    left.alignment = "LEFT"
+    left.label(text=title)
+    right = row.row()
+    right.active = False
+    right.label(text=status, translate=False)
+    return body
