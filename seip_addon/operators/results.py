@@ -361,12 +361,12 @@ class _Writes(ForPlacement, LongWork[Result]):
             cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of Blender's operators
         return not sentence
 
-    @staticmethod
-    def checked_folder(scene: bpy.types.Scene) -> Path:
-        """Return the folder, which can be written."""
-        folder = Path(bpy.path.abspath(scene.seip.result.folder))
-        check_folder(folder)
-        return folder
+
+def _checked_folder(scene: bpy.types.Scene) -> Path:
+    """Return the folder of the result, which can be written."""
+    folder = Path(bpy.path.abspath(scene.seip.result.folder))
+    check_folder(folder)
+    return folder
 
 
 class SEIP_OT_export_result(_Writes[SceneState], bpy.types.Operator):
@@ -378,7 +378,7 @@ class SEIP_OT_export_result(_Writes[SceneState], bpy.types.Operator):
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Save the scene as it is, and find the placement again."""
-        self._folder = self.checked_folder(scene)
+        self._folder = _checked_folder(scene)
         return started(_exported(self._folder, scene))
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
@@ -420,7 +420,7 @@ class SEIP_OT_write_report(_Writes[tuple[SceneState, tuple[Path, ...]]], bpy.typ
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, tuple[Path, ...]]]:
         """Return the work: the export where the folder holds another result, and the report."""
-        folder = self.checked_folder(scene)
+        folder = _checked_folder(scene)
         if _holds(folder, scene.seip.result.record):
             return _reported(folder, scene_survey.with_placement(scene))
         return started(_reported(folder, _exported(folder, scene)))

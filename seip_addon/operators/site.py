@@ -370,9 +370,11 @@ def _checked(
 
 
 def in_short(problems: Iterable[SEIP_PG_problem]) -> str:
-    """Return the number of errors and warnings as text."""
+    """Return the number of errors and warnings as text; "no problem" where there is none."""
     kinds = [problem.is_error for problem in problems]
     errors, warnings = counted(sum(kinds), "error"), counted(len(kinds) - sum(kinds), "warning")
+    if not kinds:
+        return "no problem"
     return f"{errors}, {warnings}" if any(kinds) else warnings
 
 

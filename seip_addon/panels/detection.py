@@ -16,7 +16,7 @@ from ..properties.conversion import absolute
 from .run_button import draw_run
 from .sidebar import Sidebar, settings_column
 from .traffic import SEIP_PT_traffic
-from .wrapped_text import draw_sentence
+from .wrapped_text import BOX, draw_sentence
 
 NAMES = {
     MAIN_RULE: "AP of all",
@@ -67,11 +67,11 @@ def _draw_found(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     try:
         found = parsed_detection(detection.record)
     except SeipError as error:
-        draw_sentence(box, str(error), icon="ERROR")
+        draw_sentence(box, str(error), icon="ERROR", reserved=BOX)
         return
     column = box.column()
     if sensors_key(scene) != detection.sensors:
-        draw_sentence(column, CHANGED, icon="ERROR")
+        draw_sentence(column, CHANGED, icon="ERROR", reserved=BOX)
         column = box.column()
         column.active = False
     table = column.column(align=True)
@@ -79,9 +79,9 @@ def _draw_found(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         row = table.split(factor=0.42)
         row.label(text=name)
         row.label(text=figure)
-    draw_sentence(column, MEANING)
+    draw_sentence(column, MEANING, reserved=BOX)
     for sentence in found.warnings:
-        draw_sentence(column, sentence, icon="INFO")
+        draw_sentence(column, sentence, icon="INFO", reserved=BOX)
     folder = absolute(detection.folder)
     if (folder / ERRORS).is_file():
         row = box.row(align=True)

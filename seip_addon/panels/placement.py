@@ -21,7 +21,7 @@ from ..sensor_edits import sensor_edits
 from .run_button import draw_run
 from .sections import section
 from .sidebar import RowList, is_narrow, settings_column
-from .wrapped_text import draw_sentence
+from .wrapped_text import BOX, draw_sentence
 
 _SHOWN = {
     "nominal": ("failures", "seen_by"),
@@ -176,7 +176,7 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     box = layout.box()
     doubts = _doubts(scene)
     for sentence in doubts:
-        draw_sentence(box, sentence, icon="ERROR")
+        draw_sentence(box, sentence, icon="ERROR", reserved=BOX)
     stale = scene_status.stale_placement(scene)
     if stale and stale != scene_status.ANOTHER_SITE:
         draw_run(box, SEIP_OT_compare_scene.bl_idname)
@@ -185,9 +185,9 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     column = box.column()
     column.active = not doubts
     if scene.seip.result.change:
-        draw_sentence(column, scene.seip.result.change, icon="INFO")
+        draw_sentence(column, scene.seip.result.change, icon="INFO", reserved=BOX)
     for sentence in answer(record):
-        draw_sentence(column, sentence)
+        draw_sentence(column, sentence, reserved=BOX)
     body = section(box, "details")
     if body is not None:
         body.active = not doubts
@@ -209,9 +209,9 @@ def _draw_details(layout: bpy.types.UILayout, record: PlacementRecord, *, certai
         objective, notes = record.objective, record.notes
         proven = objective.status == "optimal" and not purpose(notes)  # of the coverage that is shown above
         sentence = certificate(objective.status, objective.gap, cheapest=objective.cheapest, notes=notes)
-        draw_sentence(layout, sentence, icon="CHECKMARK" if proven else "INFO")
+        draw_sentence(layout, sentence, icon="CHECKMARK" if proven else "INFO", reserved=BOX)
     for note in (*record.notes, *_warnings(record)):
-        draw_sentence(layout, note, icon="INFO")
+        draw_sentence(layout, note, icon="INFO", reserved=BOX)
 
 
 def figures(record: PlacementRecord) -> dict[str, list[tuple[str, str]]]:

@@ -4,6 +4,13 @@ from __future__ import annotations
 
 import bpy
 
+from .wrapped_text import text_width
+
+UNIT = 20.0
+"""Pixels of Blender's unit of width, at the usual scale of the interface."""
+GAP = 0.8
+"""Units of a label's margins."""
+
 
 def section(layout: bpy.types.UILayout, name: str, status: str = "") -> bpy.types.UILayout | None:
     """Draw a section's header, and return the layout of its content, or None while it is closed.
@@ -23,7 +30,7 @@ def section(layout: bpy.types.UILayout, name: str, status: str = "") -> bpy.type
         return body
     row = header.row()
     left = row.row()
-    left.alignment = "LEFT"
+    left.ui_units_x = text_width(title) / UNIT + GAP  # else the row gives title and status equal shares
     left.label(text=title)
     right = row.row()
     right.active = False

@@ -9,6 +9,8 @@ FONT = 0
 """Number of the font of the interface."""
 MARGIN = 46.0
 """Width of a panel's frame, of the tabs and of the scroll bar, pixels at the usual scale of the interface."""
+BOX = 22.0
+"""Width of the frame of a box, pixels at the usual scale."""
 ICON = 22.0
 """Width of an icon before a text, pixels at the usual scale."""
 DEFAULT_WIDTH = 250.0
@@ -42,14 +44,25 @@ def wrapped(text: str, taken: float) -> list[str]:
         Width of the sidebar that the text cannot use.
     """
     context = bpy.context
-    scale = context.preferences.system.ui_scale
-    width = (context.region.width if context.region is not None else DEFAULT_WIDTH * scale) - taken * scale
-    blf.size(FONT, context.preferences.ui_styles[0].widget.points * scale)
+    scale = _scale()
+    width = (context.region.width / scale if context.region is not None else DEFAULT_WIDTH) - taken
     lines: list[str] = []
     for word in text.split():
         longer = f"{lines[-1]} {word}" if lines else word
-        if lines and blf.dimensions(FONT, longer)[0] <= width:
+        if lines and text_width(longer) <= width:
             lines[-1] = longer
         else:
             lines.append(word)
     return lines
+
+
+def text_width(text: str) -> float:
+    """Return the width of a text in the interface, pixels at its usual scale."""
+    scale = _scale()
+    blf.size(FONT, bpy.context.preferences.ui_styles[0].widget.points * scale)
+    return float(blf.dimensions(FONT, text)[0]) / scale
+
+
+def _scale() -> float:
+    """Return the scale of the interface; Blender without a window gives 0."""
+    return float(bpy.context.preferences.system.ui_scale) or 1.0

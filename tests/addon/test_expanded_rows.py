@@ -3,11 +3,11 @@
 import ast
 from pathlib import Path
 from types import SimpleNamespace
-from unittest.mock import MagicMock
 
 import pytest
 
-from seip_addon.panels.placement import SEIP_PT_placement
+from seip_addon.panels import placement
+from tests.builders.drawn_layout import DrawnLayout
 
 ADD_ON = Path(__file__).resolve().parents[2] / "seip_addon"
 
@@ -47,10 +47,11 @@ def test_the_search_finds_rows_without_names(call, wrong):
 
 
 @pytest.mark.parametrize(("width", "expanded"), [(400, True), (120, False)])
-def test_the_goals_are_segments_with_names_or_a_list_where_there_is_no_room(junction, width, expanded):
-    layout = MagicMock()
+def test_the_goals_are_segments_with_names_or_a_list_where_there_is_no_room(junction, monkeypatch, width, expanded):
+    layout = DrawnLayout()
     preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
     context = SimpleNamespace(scene=junction, region=SimpleNamespace(width=width), preferences=preferences)
-    SEIP_PT_placement.draw(SimpleNamespace(layout=layout), context)
-    drawn = [call for call in layout.mock_calls if call.args[1:] == ("limit",)]
-    assert [(call.kwargs.get("expand", False), "text" in call.kwargs) for call in drawn] == [(expanded, not expanded)]
+    monkeypatch.setattr(placement, "settings_column", lambda layout: layout)  # of the window, which there is none of
+    placement.draw(layout, context)
+    drawn = [options for name, options in layout.properties if name == "limit"]
+    assert [(options.get("expand", False), "text" in options) for options in drawn] == [(expanded, not expanded)]

@@ -12,12 +12,13 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from seip_addon import loose_pieces, scene_status
-from seip_addon.panels import front_door
+from seip_addon.panels import front_door, placement, site
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.scene.views import CLIP_END
 from seip_addon.scene.write import write_result
+from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import make_example
@@ -150,11 +151,30 @@ def test_the_example_is_the_shipped_junction(scene):
 def test_the_next_step_leads_to_placed_sensors(junction):
     assert scene_status.next_step(junction) == "seip.check_site"
     bpy.ops.seip.check_site()
-    assert scene_status.next_step(junction) == "seip.compute_visibility"
-    bpy.ops.seip.compute_visibility()
     assert scene_status.next_step(junction) == "seip.solve_placement"
+    for one in junction.seip.survey.types:
+        one.use = False
+    assert scene_status.next_step(junction) == "seip.choose_sensors"
+    junction.seip.survey.types["type1"].use = True
     bpy.ops.seip.solve_placement()
     assert scene_status.next_step(junction) == ""
+
+
+def test_the_current_step_is_open_until_a_user_opens_or_closes_one(junction):
+    sections = junction.seip.sections
+
+    def opened():
+        return [name for name in ("site", "sensors", "placement") if getattr(sections, name)]
+
+    assert opened() == ["site"]
+    bpy.ops.seip.check_site()
+    assert opened() == ["placement"]
+    sections.sensors = True
+    assert opened() == ["sensors", "placement"]
+    sections.placement = False
+    assert opened() == ["sensors"]
+    bpy.ops.seip.solve_placement()
+    assert opened() == ["placement"]
 
 
 def test_a_map_is_the_next_step_where_there_is_nothing(scene):
@@ -203,7 +223,15 @@ def test_the_post_of_a_deleted_sensor_goes_with_it(scene, copied):
     assert {obj.name for obj in scene.objects} == before
 
 
-@pytest.mark.parametrize("name", ["visibility", "placement", "view", "scan", "dataset", "detection"])
+def test_the_steps_state_that_there_is_nothing_yet(scene):
+    assert [step.status(scene) for step in (site, placement)] == ["none yet", "none yet"]
+    layout = DrawnLayout()
+    placement.draw(layout, bpy.context)
+    assert layout.text == scene_status.NO_SITE
+    assert not layout.operators
+
+
+@pytest.mark.parametrize("name", ["results", "export", "view", "scan", "dataset", "detection"])
 def test_a_panel_says_one_line_where_there_is_nothing_yet(scene, name, monkeypatch):
     panel = getattr(bpy.types, f"SEIP_PT_{name}")
     module = sys.modules[panel.__module__]
@@ -214,5 +242,3 @@ def test_a_panel_says_one_line_where_there_is_nothing_yet(scene, name, monkeypat
     panel.draw(own, bpy.context)
     assert len(said) == 1
     assert not layout.operator.called
-    for details in ("visibility_details", "placement_rules", "placement_solver", "placement_objective"):
-        assert not getattr(bpy.types, f"SEIP_PT_{details}").poll(bpy.context)

@@ -2,7 +2,6 @@
 
 import shutil
 from types import SimpleNamespace
-from unittest.mock import MagicMock
 
 from headless import place
 
@@ -11,8 +10,9 @@ import pytest
 
 from seip_addon.core.output.results.placement_record import comparable, load_placement_record, parsed_record
 from seip_addon.operators.placement import SEIP_OT_solve_placement
-from seip_addon.panels.placement import SEIP_PT_placement_objective
+from seip_addon.panels import placement as placement_panel
 from seip_addon.session import session
+from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import make_example
 from tests.builders.small_scene import make_run
@@ -62,15 +62,15 @@ def test_panel_and_batch_place_alike_and_what_it_was_chosen_on_stays_with_it(coa
 
 
 def test_the_panel_shows_what_the_objective_asks_for(coarse):
-    layout = MagicMock()
-    SEIP_PT_placement_objective.draw(SimpleNamespace(layout=layout), bpy.context)
-    column = layout.column.return_value
-    names = [call.args[1] for call in column.prop.call_args_list]
+    layout = DrawnLayout()
+    coarse.seip.sections.objective = True
+    placement_panel.draw(layout, bpy.context)
+    drawn = dict(layout.properties)
+    names = list(drawn)[list(drawn).index("criterion") :]
     assert names == ["criterion", "scenarios", "runs", "risk", "weights_from_traffic", "instants", "held_out"]
     assert all(hasattr(coarse.seip.goal, name) for name in names)
-    assert column.prop.call_args_list[2].kwargs == {"placeholder": "small_traffic"}
-    said = " ".join(call.kwargs["text"] for call in column.column.return_value.label.call_args_list)
-    assert said == "Rays are cast from every candidate in 2 instants, which takes minutes."
+    assert drawn["runs"] == {"placeholder": "small_traffic"}
+    assert "Rays are cast from every candidate in 2 instants, which takes minutes." in layout.text
 
 
 def test_runs_are_read_in_work_that_can_be_stopped(coarse):

@@ -16,6 +16,7 @@ from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.visibility.ray_casting import MAX_THREADS
 from seip_addon.core.sensing.visibility.ring_resolution import unresolved_from
 from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.sensor_types import DEFAULT_TYPE
 from seip_addon.session import session
 from seip_addon.viewport import beam_preview
 
@@ -59,8 +60,8 @@ def used(survey):
 
 def test_the_list_is_the_catalogue_and_the_choice_the_default(survey):
     assert [one.name for one in survey.types] == list(load_catalogue())
-    assert used(survey) == CandidateSettings().sensors
-    assert survey.settings().candidates == CandidateSettings()
+    assert used(survey) == (DEFAULT_TYPE,)
+    assert survey.settings().candidates == CandidateSettings(sensors=(DEFAULT_TYPE,))
 
 
 def test_assumed_poles_are_asked_for_in_the_panel_as_on_the_command_line(survey):
@@ -76,18 +77,18 @@ def test_rules_on_positions_are_allowed_in_the_panel_as_on_the_command_line(surv
     survey.allow = {"islands", "cycle-tracks"}
     parser = argparse.ArgumentParser()
     add_options(parser)
-    typed = parser.parse_args(["-o", "out", "--allow", "cycle-tracks", "islands"])
+    typed = parser.parse_args(["-o", "out", "--allow", "cycle-tracks", "islands", "--sensor", DEFAULT_TYPE])
     assert survey.settings().candidates == read_settings(CandidateSettings, typed)
 
 
 def test_the_choice_is_kept_when_a_file_is_reopened(survey, tmp_path):
-    survey.types["type2"].use = False
+    survey.types[DEFAULT_TYPE].use = False
     survey.types["vlp16"].use = True
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert used(bpy.context.scene.seip.survey) == CandidateSettings().sensors
+    assert used(bpy.context.scene.seip.survey) == (DEFAULT_TYPE,)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
-    assert used(bpy.context.scene.seip.survey) == ("type1", "type3", "vlp16")
+    assert used(bpy.context.scene.seip.survey) == ("vlp16",)
 
 
 def test_an_unknown_type_that_is_used_stays_and_one_that_is_not_goes(survey):
@@ -156,7 +157,7 @@ def test_a_preset_brings_types_heights_and_tilts_back(survey, tmp_path, monkeypa
     survey.tilts = "0"
     bpy.ops.script.execute_preset(filepath=str(file), menu_idname="SEIP_MT_survey_presets")
     assert (survey.heights, survey.grid, survey.tilts) == ("4 6", 2.5, "0 10")
-    assert used(survey) == (*CandidateSettings().sensors, "vlp16")
+    assert used(survey) == ("vlp16", DEFAULT_TYPE)
     assert [one.name for one in survey.types] == list(load_catalogue())
 
 
@@ -176,9 +177,10 @@ def test_beams_are_shown_until_hidden_or_another_file_is_opened(survey):
     bpy.ops.seip.preview_beams()  # and the fixture sees that it goes with the add-on
 
 
-def test_the_preview_is_of_the_active_type_at_the_cursor(survey):
+def test_the_preview_is_of_the_shown_type_at_the_cursor(survey):
     bpy.context.scene.cursor.location = (7.0, 8.0, 1.0)
-    survey.active_type = 3
+    survey.types["vlp16"].use = True
+    survey.about = "vlp16"
     survey.preview_height = 6.0
     preview = beam_preview.preview_of(bpy.context)
     assert preview.model.key == "vlp16"
@@ -200,8 +202,7 @@ def test_the_preview_is_of_the_active_sensor(survey):
 
 
 def test_the_preview_of_an_unknown_type_is_none(survey):
-    survey.types.add().name = "lost"
-    survey.active_type = len(survey.types) - 1
+    survey.types.add().name = survey.about = "lost"  # used, as it is new
     assert beam_preview.preview_of(bpy.context) is None
 
 

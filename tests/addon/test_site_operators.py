@@ -162,14 +162,14 @@ def test_the_check_lists_and_shows(scene):
     site = scene.seip.site
     assert site.checked
     assert {one.name for one in site.counts} >= {"Region", "Roads", "Poles", "Targets", "Positions", "Poses"}
-    site.active_problem = [one.name for one in site.problems].index(pole.name)
-    assert not site.problems[site.active_problem].is_error
-    assert bpy.ops.seip.show_problem() == {"FINISHED"}
+    number = [one.name for one in site.problems].index(pole.name)
+    assert not site.problems[number].is_error
+    assert bpy.ops.seip.show_problem(number=number) == {"FINISHED"}
     assert bpy.context.object == pole
     assert bpy.context.selected_objects == [pole]
     pole.hide_set(True)
-    with pytest.raises(RuntimeError, match="The object is hidden"):
-        bpy.ops.seip.show_problem()
+    with pytest.raises(RuntimeError, match="is hidden"):
+        bpy.ops.seip.show_problem(number=number)
 
 
 def test_the_check_lists_bad_settings(scene):

@@ -21,6 +21,7 @@ from seip_addon.panels import results as results_panel
 from seip_addon.scene import contract
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.session import RunningWork, session
+from tests.builders.drawn_layout import DrawnLayout
 
 
 @pytest.fixture
@@ -99,13 +100,20 @@ def drawn_by(module, panel, monkeypatch):
 
 def test_the_panel_says_what_the_record_holds(placed, monkeypatch):
     record = json.loads(placed.seip.result.record)
-    said = drawn_by(placement_panel, placement_panel.SEIP_PT_placement, monkeypatch)
+    said = []
+    monkeypatch.setattr(placement_panel, "draw_sentence", lambda _, text, **__: said.append(text))
+    placement_panel.draw(DrawnLayout(), bpy.context)
+    share = f"{record['coverage']['whole']:.1%}"
+    assert said[0] == f"{share} of the road is seen. No placement of these candidates is better."
+    assert not set(record["notes"]) & set(said)
+    placed.seip.sections.details = True
+    placement_panel.draw(DrawnLayout(), bpy.context)
     assert set(record["notes"]) < set(said)
     assert "Proven: the best placement that there is among these candidates." in said
-    figures = dict(placement_panel.figures(parsed_record(placed.seip.result.record)))
-    assert figures["Coverage"] == f"{record['coverage']['whole']:.2%}"
-    assert figures["Price"] == f"${record['price_usd']:,.0f}"
-    assert figures["Gap"] == "0.00%"
+    figures = placement_panel.figures(parsed_record(placed.seip.result.record))
+    assert dict(figures["Coverage"])["Whole road"] == f"{record['coverage']['whole']:.2%}"
+    assert dict(figures["Price"])["Total"] == f"${record['price_usd']:,.0f}"
+    assert dict(figures["Proof"])["Gap"] == "0.00%"
 
 
 def test_the_certificate_of_a_placement_for_traffic_is_about_that_and_has_no_tick(placed, monkeypatch):
@@ -116,7 +124,8 @@ def test_the_certificate_of_a_placement_for_traffic_is_about_that_and_has_no_tic
     monkeypatch.setattr(scene_status, "stale_placement", lambda _: "")
     icons = {}
     monkeypatch.setattr(placement_panel, "draw_sentence", lambda _, text, icon="NONE", **__: icons.update({text: icon}))
-    placement_panel.SEIP_PT_placement.draw(SimpleNamespace(layout=MagicMock()), bpy.context)
+    placed.seip.sections.details = True
+    placement_panel.draw(DrawnLayout(), bpy.context)
     (certificate,) = (text for text in icons if text.startswith("Proven"))
     assert certificate.endswith("among these candidates to see the road in traffic, on average over 4 instants.")
     assert icons[certificate] == "INFO"

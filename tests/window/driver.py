@@ -171,6 +171,26 @@ class Window:
         yield from self.press("LEFTMOUSE", place)
         yield 0.2
 
+    def click_in_view(self, what: str) -> Steps:
+        """Click a button that is in view without scrolling."""
+        for columns in ((0.6,), (0.85, 0.2)):
+            place = yield from self._find_here(what, columns)
+            if place:
+                yield from self.press("LEFTMOUSE", place)
+                yield 0.2
+                return
+        raise LookupError(f"there is no button {what} in view")
+
+    def shot(self, name: str) -> Steps:
+        """Save what the window shows without moving the mouse: a dialog closes when it leaves."""
+        from PIL import Image  # noqa: PLC0415  # comes with the extension
+
+        self.pictures.mkdir(parents=True, exist_ok=True)
+        pixels = self.pixels()
+        size = (1200, round(1200 * len(pixels) / len(pixels[0])))
+        Image.fromarray(pixels).resize(size).save(self.pictures / f"{name}.png")
+        yield 0.1
+
     def open_below(self, what: str, inside: str, skip: int = 0) -> Steps:
         """Open the panel whose heading stands below a button, some closed ones between, and that holds another one."""
         for _ in range(TRIES):
@@ -246,6 +266,7 @@ class Window:
     def picture(self, name: str) -> Steps:
         """Save what the window shows."""
         self.event("MOUSEMOVE", "NOTHING", self.middle)  # no tooltip, no button lit
+        self.area.tag_redraw()
         yield 1.0
         path = self.pictures / f"{name}.png"
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -32,7 +32,7 @@ def _import(window: Window) -> Steps:
         bpy.ops.seip.choose_map("INVOKE_DEFAULT", filepath=str(MAP))  # as a dropped file is
     yield from window.until(lambda: session.running is None and _scene().seip.site.source, 60)
     yield 1.0
-    yield from _shot(window, "dialog")
+    yield from window.shot("dialog")
     yield from window.press("RET")
     yield from window.until(lambda: session.running is not None or "SEIP Region" in bpy.data.collections, 10)
     yield from window.until(lambda: session.running is None and "SEIP Region" in bpy.data.collections, 120)
@@ -48,20 +48,11 @@ def _search(window: Window) -> Steps:
     yield 1.0
     yield from window.type("load example")
     yield 1.0
-    yield from _shot(window, "search")
+    yield from window.shot("search")
     yield from window.press("RET")
     yield from window.until(lambda: session.running is None and len(bpy.data.scenes) > before, 120)
     yield 2.0
     yield from window.picture("example")
-
-
-def _shot(window: Window, name: str) -> Steps:
-    """Take a picture without moving the mouse: a dialog closes when it leaves."""
-    from PIL import Image  # noqa: PLC0415  # comes with the extension
-
-    OUT.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(window.pixels()).resize((1200, 675)).save(OUT / f"{name}.png")
-    yield 0.1
 
 
 def _scene() -> bpy.types.Scene:

@@ -10,13 +10,17 @@ from .placement_record import PlacementRecord
 
 LARGE_GAP = 0.05
 """Possible improvement from which a longer search is recommended."""
+WHOLE_THOUSANDS = 10_000.0
+"""Price in dollars from which a header rounds to thousands."""
 NEEDLESS = 0.01
 """Share of the road, lost without a sensor, below which leaving that sensor out is recommended."""
 
 
 def status_text(record: PlacementRecord) -> str:
-    """Return quality, price and certificate in a few words: ``94% · $48,000 · proven``."""
-    return " · ".join((_quality(record), f"${record.price_usd:,.0f}", _certificate(record)))
+    """Return quality, price and certificate in a few words: ``94% · $48k · proven``."""
+    price = record.price_usd
+    rounded = f"${price / 1000:,.0f}k" if price >= WHOLE_THOUSANDS else f"${price:,.0f}"
+    return " · ".join((_quality(record), rounded, _certificate(record)))
 
 
 def answer(record: PlacementRecord) -> tuple[str, ...]:
