@@ -177,6 +177,22 @@ def test_the_current_step_is_open_until_a_user_opens_or_closes_one(junction):
     assert opened() == ["placement"]
 
 
+def test_the_button_states_number_and_time(junction):
+    assert placement.button_text(junction) == "Place 2 Sensors"
+    bpy.ops.seip.check_site()
+    one = scene_status.expected_seconds(junction)
+    assert placement.button_text(junction).startswith("Place 2 Sensors, up to ")
+    junction.seip.survey.heights = "5 8"
+    two, search = scene_status.expected_seconds(junction), junction.seip.survey.effort
+    assert two - search == pytest.approx(2.0 * (one - search))
+    junction.seip.goal.limit = "BUDGET"
+    junction.seip.goal.budget = 40_000.0
+    assert placement.button_text(junction).startswith("Place for $40,000, up to ")
+    junction.seip.survey.heights = "8"
+    bpy.ops.seip.compute_visibility()
+    assert scene_status.expected_seconds(junction) == search
+
+
 def test_a_map_is_the_next_step_where_there_is_nothing(scene):
     assert scene_status.next_step(scene) == "seip.choose_map"
     bpy.ops.seip.choose_map(filepath=str(SCENES / "junction.xodr"))

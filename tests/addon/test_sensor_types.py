@@ -16,9 +16,11 @@ from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.visibility.ray_casting import MAX_THREADS
 from seip_addon.core.sensing.visibility.ring_resolution import unresolved_from
 from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.panels import sensor_table, sensors
 from seip_addon.sensor_types import DEFAULT_TYPE
 from seip_addon.session import session
 from seip_addon.viewport import beam_preview
+from tests.builders.drawn_layout import DrawnLayout
 
 OWN = """
 [corner32]
@@ -175,6 +177,44 @@ def test_beams_are_shown_until_hidden_or_another_file_is_opened(survey):
     bpy.ops.wm.read_homefile(use_empty=True)
     assert not beam_preview.is_shown()
     bpy.ops.seip.preview_beams()  # and the fixture sees that it goes with the add-on
+
+
+def test_the_table_has_every_product_by_manufacturer_and_those_of_the_paper_last(survey):
+    layout = DrawnLayout()
+    sensor_table.draw_table(layout, survey)
+    titles = [options["text"] for name, options in layout.properties if name == "use"]
+    assert len(titles) == len(load_catalogue())
+    assert [title.split()[0] for title in titles[-3:]] == ["Type", "Type", "Type"]
+    assert titles[:-3] == sorted(titles[:-3], key=str.casefold)
+    texts = [text for text, _ in layout.labels]
+    row = texts[texts.index("120° × 25°") - 1 :]
+    assert row[:5] == ["128", "120° × 25°", "200 m", "$1,250", "data sheet"]
+
+
+@pytest.mark.parametrize(("wanted", "number"), [("ouster os1-128", 2), ("HESAI", 7), ("nothing of that name", 0)])
+def test_the_table_is_filtered_by_what_is_typed(survey, wanted, number):
+    survey.filter = wanted
+    layout = DrawnLayout()
+    sensor_table.draw_table(layout, survey)
+    titles = [options["text"] for name, options in layout.properties if name == "use"]
+    assert len(titles) == number
+    assert all(wanted.casefold() in title.casefold() for title in titles)
+    assert ("No product has this in its name." in layout.text) == (number == 0)
+
+
+def test_a_sensor_is_dropped_and_shown(survey):
+    survey.types["vlp16"].use = True
+    assert bpy.ops.seip.drop_sensor_type(key=DEFAULT_TYPE) == {"FINISHED"}
+    assert used(survey) == ("vlp16",)
+    with pytest.raises(RuntimeError, match="no sensor type 'none'"):
+        bpy.ops.seip.drop_sensor_type(key="none")
+    assert bpy.ops.seip.about_sensor(key="vlp16") == {"FINISHED"}
+    assert bpy.context.scene.seip.sections.about_sensor
+    layout = DrawnLayout()
+    bpy.context.scene.seip.sections.sensors = True
+    sensors.draw(layout, bpy.context)
+    assert "Velodyne VLP-16 (Puck)" in layout.text
+    assert sensors.status(bpy.context.scene) == "VLP-16 (Puck) at 3.5–8 m"
 
 
 def test_the_preview_is_of_the_shown_type_at_the_cursor(survey):

@@ -156,6 +156,8 @@ def test_the_check_lists_and_shows(scene):
     scene = bpy.context.scene
     scene.seip.survey.grid, scene.seip.survey.spacing, scene.seip.survey.heights = 4.0, 12.0, "8"
     scene.seip.survey.delta = 20.0
+    for one in scene.seip.survey.types:
+        one.use = one.name == "type1"
     pole = contract.find(scene, contract.POLES).objects[0]
     pole.location.z += 3.0
     assert bpy.ops.seip.check_site() == {"FINISHED"}

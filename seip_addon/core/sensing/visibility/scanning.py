@@ -35,6 +35,7 @@ from .settings import VisibilitySettings
 from .target_index import TargetIndex, is_within, squared_length
 
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
+_PAIRS_AT_ONCE = 1 << 18  # of rays and surfaces: bounds the memory at borders of surfaces
 
 
 class Corners(Protocol):
@@ -115,16 +116,19 @@ class ScanPosition:
         if least == 0:
             return strong
         # Cuts are sorted by target: those of a ray's target are one slice. Each ray is paired with each cut of it, and
-        # the pairs are kept where the ray ends on the cut's triangle, within the tolerance of the caster.
+        # the pairs are kept where the ray ends on the cut's triangle, within the tolerance of the caster. A large δ
+        # gives a target thousands of cuts, so rays are taken in turns that bound the memory of the pairs.
         first = np.searchsorted(cuts.target, target)
         count = np.searchsorted(cuts.target, target, side="right") - first
-        ray, cut = np.repeat(np.arange(len(target)), count), counted(first, count)
-        there = cuts.pick(cut).holds((self.origin + distance[:, None] * directions)[ray], surfaces.tolerance)
-        ray, cut = ray[there], cut[there]
-        # Where surfaces meet it is chance which of their triangles the caster reports. With the weakest of all surfaces
-        # deciding, that does not matter.
-        reflected = cuts.reflectivity[cut] * np.abs((cuts.normal[cut] * directions[ray]).sum(axis=1))
-        strong[ray[model.law.strength(distance[ray], reflected) < least]] = False
+        turn = np.cumsum(count) // _PAIRS_AT_ONCE
+        for rays in np.split(np.arange(len(target)), np.flatnonzero(np.diff(turn)) + 1):
+            ray, cut = np.repeat(rays, count[rays]), counted(first[rays], count[rays])
+            there = cuts.pick(cut).holds((self.origin + distance[:, None] * directions)[ray], surfaces.tolerance)
+            ray, cut = ray[there], cut[there]
+            # Where surfaces meet it is chance which of their triangles the caster reports. With the weakest of all
+            # surfaces deciding, that does not matter.
+            reflected = cuts.reflectivity[cut] * np.abs((cuts.normal[cut] * directions[ray]).sum(axis=1))
+            strong[ray[model.law.strength(distance[ray], reflected) < least]] = False
         return strong
 
 

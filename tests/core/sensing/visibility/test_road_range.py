@@ -7,7 +7,12 @@ import pytest
 
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
-from seip_addon.core.sensing.visibility.road_range import range_warnings, road_range, road_reflectivity
+from seip_addon.core.sensing.visibility.road_range import (
+    range_warnings,
+    road_range,
+    road_reflectivity,
+    upright_range,
+)
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import Mesh
@@ -31,6 +36,14 @@ def test_range_on_a_road_is_that_of_the_law_within_the_longest_range():
     assert model.law.chance(hit, reflected)[0] == pytest.approx(0.9, abs=1e-6)
     assert road_range(replace(model, max_range=12.0), 0.17, 5.4, SIGHT) == 12.0
     assert road_range(CATALOGUE["type1"], 0.17, 5.4, SIGHT) == CATALOGUE["type1"].max_range
+
+
+def test_range_on_an_upright_body_is_that_of_the_law_within_the_longest_range():
+    model = short_sighted(40.0)["type1"]
+    far = upright_range(model, 0.283, SIGHT)
+    assert model.law.chance(np.array([far]), np.array([0.283]))[0] == pytest.approx(0.9, abs=1e-6)
+    assert upright_range(replace(model, max_range=12.0), 0.283, SIGHT) == 12.0
+    assert upright_range(CATALOGUE["type1"], 0.283, SIGHT) == CATALOGUE["type1"].max_range
 
 
 def test_the_reflectivity_of_a_road_is_that_of_most_of_its_area():

@@ -1,0 +1,131 @@
+"""The answer of a placement in short sentences, on records of the small junction."""
+
+import math
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+
+from seip_addon.core.choosing.placement.objective import MOVED, Objective, Solution
+from seip_addon.core.choosing.placement.problem import Placement
+from seip_addon.core.choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
+from seip_addon.core.output.results.answer import (
+    answer,
+    change_text,
+    possible_improvement,
+    recommendation,
+    status_text,
+)
+from seip_addon.core.output.results.placement_record import Provenance, placement_record
+from tests.builders.small_junction import make_example
+
+
+@pytest.fixture(scope="module")
+def record():
+    example = make_example()
+    settings = {"candidates": {"sensors": ("type1",)}, "goal": {"count": 3}}
+    best = Placement(
+        chosen=np.array([sensor.pose for sensor in example.deployment.sensors]),
+        objective=500.0,
+        bound=500.0,
+        gap=0.0,
+        status="optimal",
+        solver="HiGHS",
+        seconds=0.5,
+        covered=500.0,
+        price=0.0,
+        notes=(),
+    )
+    solution = Solution(Objective(count=3), best, None, example.deployment)
+    made = placement_record(
+        example.site,
+        solution,
+        Provenance(datetime(2026, 1, 2, tzinfo=UTC), {}, {}),
+        settings=settings,
+        inputs={},
+        warnings=(),
+    )
+    sensors = tuple(replace(one, coverage_marginal=0.2, price_usd=16_000.0) for one in made.sensors)
+    return replace(made, sensors=sensors, price_usd=48_000.0, coverage=replace(made.coverage, whole=0.9444))
+
+
+def within(record, bound, status="feasible", **changes):
+    gap = abs(bound / record.objective.value - 1.0)
+    return replace(record, objective=replace(record.objective, bound=bound, gap=gap, status=status, **changes))
+
+
+def with_returns(record, least=30.0, typical=150.0):
+    crossings = (CrossingReturns("Rope Lane", 80.0), CrossingReturns("Harbour Road", least))
+    returns = ReturnsSummary(typical, {"car": 494.0, "cyclist": 71.0, "pedestrian": 36.0}, crossings)
+    objective = replace(record.objective, sought="most returns", value=math.log1p(typical), bound=math.log1p(typical))
+    return replace(record, returns=returns, objective=objective)
+
+
+def test_a_proven_placement_has_two_sentences(record):
+    assert status_text(record) == "94% · $48k · proven"
+    assert answer(record) == (
+        "94.4% of the road is seen. No placement of these candidates is better.",
+        "$48,000 for 3 sensors, without installation.",
+    )
+
+
+def test_the_possible_improvement_is_that_of_the_bound(record):
+    one = within(record, 515.0)
+    assert possible_improvement(one) == pytest.approx(0.03)
+    assert status_text(one) == "94% · $48k · within 3.0%"
+    assert "At most 3.0% better is possible" in answer(one)[0]
+    cheapest = within(record, 450.0, sought="least price")
+    assert possible_improvement(cheapest) == pytest.approx(0.1)
+    assert "At most 10.0% cheaper is possible" in answer(cheapest)[0]
+    unknown = replace(record, objective=replace(record.objective, bound=None, gap=None, status="feasible"))
+    assert possible_improvement(unknown) is None
+    assert status_text(unknown).endswith("not proven")
+    moved = within(record, 515.0, status=MOVED)
+    assert possible_improvement(moved) is None
+    assert status_text(moved).endswith("moved by hand")
+
+
+def test_returns_are_compared_as_a_share_of_returns(record):
+    one = with_returns(record)
+    assert status_text(one) == "150 returns · $48k · proven"
+    assert answer(one)[0].startswith("494 returns from a car, 71 from a cyclist and 36 from a pedestrian.")
+    value = one.objective.value
+    better = replace(one, objective=replace(one.objective, bound=value + math.log(1.07), gap=0.01, status="feasible"))
+    assert possible_improvement(better) == pytest.approx(0.07)  # of 1 + returns
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (lambda one: one, ""),
+        (lambda one: within(one, 550.0), "raise the effort"),
+        (lambda one: with_returns(one, least=3.2), "(3.2) at Harbour Road"),
+        (lambda one: with_returns(one, least=5.1), ""),
+        (
+            lambda one: replace(
+                one, sensors=(one.sensors[0], replace(one.sensors[1], coverage_marginal=0.004), *one.sensors[2:])
+            ),
+            "Leave out S2: without it 0.4%",
+        ),
+    ],
+)
+def test_one_recommendation_at_most(record, change, named):
+    sentence = recommendation(change(record))
+    assert named in sentence
+    assert bool(sentence) == bool(named)
+    assert len(answer(change(record))) == 2 + bool(named)
+
+
+def test_a_worse_result_is_called_worse(record):
+    less = replace(record, coverage=replace(record.coverage, whole=0.9))
+    assert change_text(less, record) == "Worse than the previous placement: 90.00% instead of 94.44%."
+    assert change_text(record, less) == "Better than the previous placement: 94.44% instead of 90.00%."
+    assert change_text(record, record) == ""
+    assert change_text(with_returns(record, typical=120.0), with_returns(record)).startswith("Worse")
+
+
+def test_what_cannot_be_compared_is_not(record):
+    other = replace(record, counts=replace(record.counts, targets=record.counts.targets + 1))
+    assert change_text(other, record) == ""
+    assert change_text(with_returns(record), record) == ""
