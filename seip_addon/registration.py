@@ -14,8 +14,7 @@ PARTS = (
     "operators.base", "operators.site", "operators.sensors", "operators.visibility", "operators.placement",
     "live_coverage",
     "operators.results", "operators.view", "operators.traffic", "operators.detection",
-    "panels.sensor_table", "panels.placement", "panels.steps", "panels.results", "panels.view", "panels.traffic",
-    "panels.detection", "panels.export", "panels.front_door",
+    "panels.sensor_table", "panels.placement", "panels.results", "panels.steps", "panels.front_door",
 )  # fmt: skip
 """Modules of the add-on; most have ``CLASSES``.
 

@@ -1,4 +1,4 @@
-"""The panel of detection: what a trained detector finds with the sensors in traffic."""
+"""The section "Detection": average precision of a trained detector with the sensors in traffic."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from ..core.workflows.traffic_runs import traffic_folder
 from ..operators.detection import NO_PYTHON, SEIP_OT_detect, sensors_key, why_no_detection
 from ..properties.conversion import absolute
 from .run_button import draw_run
-from .sidebar import Sidebar, settings_column
-from .traffic import SEIP_PT_traffic
+from .sidebar import settings_column
 from .wrapped_text import BOX, draw_sentence
 
 NAMES = {
@@ -34,31 +33,23 @@ MEANING = (
 CHANGED = "The sensors have changed since: detect again."
 
 
-class SEIP_PT_detection(Sidebar, bpy.types.Panel):
-    """Panel: average precision with the sensors of the scene."""
-
-    bl_idname = "SEIP_PT_detection"
-    bl_label = "Detection"
-    bl_parent_id = SEIP_PT_traffic.bl_idname
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw what is detected with what, and the last figures."""
-        scene, layout = context.scene, self.layout
-        detection = scene.seip.detection
-        why_not = why_no_detection(scene)
-        if why_not:
-            draw_sentence(layout, why_not, icon="INFO")
-            if why_not == NO_PYTHON and preferences.own() is not None:
-                layout.operator("preferences.addon_show", text="Preferences").module = preferences.ADDON_ID
-        else:
-            column = settings_column(layout)
-            column.prop(detection, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
-            column.prop(detection, "detector", placeholder="Shipped")
-            column.prop(detection, "folder")
-            draw_run(layout, SEIP_OT_detect.bl_idname)
-        if detection.record:
-            _draw_found(layout, scene)
+def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw what is detected with what, and the last figures."""
+    scene = context.scene
+    detection = scene.seip.detection
+    why_not = why_no_detection(scene)
+    if why_not:
+        draw_sentence(layout, why_not, icon="INFO")
+        if why_not == NO_PYTHON and preferences.own() is not None:
+            layout.operator("preferences.addon_show", text="Preferences").module = preferences.ADDON_ID
+    else:
+        column = settings_column(layout)
+        column.prop(detection, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
+        column.prop(detection, "detector", placeholder="Shipped")
+        column.prop(detection, "folder")
+        draw_run(layout, SEIP_OT_detect.bl_idname)
+    if detection.record:
+        _draw_found(layout, scene)
 
 
 def _draw_found(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
@@ -98,6 +89,3 @@ def figures(found: DetectionRecord) -> list[tuple[str, str]]:
 
 def _between(interval: tuple[float, float] | None) -> str:
     return "" if interval is None else " ({:.1f}–{:.1f})".format(*(100.0 * end for end in interval))
-
-
-CLASSES = (SEIP_PT_detection,)

@@ -1,4 +1,4 @@
-"""The panel of results: sensors, candidates, comparison, files."""
+"""The section "Results": placed sensors, coverage colours, candidates, comparison."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from ..core.errors import SeipError
 from ..core.output.results.placement_record import PlacementRecord, parsed_record
 from ..operators import results
 from ..session import FollowedSensors, session
+from . import view
 from .run_button import draw_run
-from .sidebar import RowList, Sidebar, is_narrow
+from .sections import section
+from .sidebar import RowList, is_narrow
 from .wrapped_text import draw_sentence
 
 
@@ -54,41 +56,26 @@ class SEIP_UL_kept(RowList, bpy.types.UIList):
         layout.prop(item, "name", text="", emboss=False)
 
 
-class _Result(Sidebar):
-    """A mixin: a part of the results, there once there is a placement."""
-
-    bl_parent_id = "SEIP_PT_results"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is a placement."""
-        return not results.no_placement(context.scene)
-
-
-class SEIP_PT_results(Sidebar, bpy.types.Panel):
-    """The placement, sensor by sensor."""
-
-    bl_idname = "SEIP_PT_results"
-    bl_label = "Results"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw the sensors, and how they are followed when moved."""
-        scene, layout = context.scene, self.layout
-        sentence = results.no_placement(scene)
-        if sentence:
-            draw_sentence(layout, sentence, icon="INFO")
-            return
-        result = scene.seip.result
-        _draw_list(layout, SEIP_UL_chosen, result, "sensors", "active_sensor")
-        label = result.sensors[result.active_sensor].name if 0 <= result.active_sensor < len(result.sensors) else ""
-        layout.operator("seip.look_from_sensor", icon="HIDE_OFF", text=f"View from {label or 'Sensor'}")
-        if session.following is None:
-            draw_run(layout, results.SEIP_OT_follow_sensors.bl_idname, icon="ORIENTATION_GLOBAL")
-        else:
-            layout.operator("seip.follow_sensors", text="Stop Following", icon="PAUSE", depress=True)
-            _draw_followed(layout, session.following)
+def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the sensors and how they are followed when moved, then the closed sections."""
+    scene = context.scene
+    sentence = results.no_placement(scene)
+    if sentence:
+        draw_sentence(layout, sentence, icon="INFO")
+        return
+    result = scene.seip.result
+    _draw_list(layout, SEIP_UL_chosen, result, "sensors", "active_sensor")
+    label = result.sensors[result.active_sensor].name if 0 <= result.active_sensor < len(result.sensors) else ""
+    layout.operator("seip.look_from_sensor", icon="HIDE_OFF", text=f"View from {label or 'Sensor'}")
+    if session.following is None:
+        draw_run(layout, results.SEIP_OT_follow_sensors.bl_idname, icon="ORIENTATION_GLOBAL")
+    else:
+        layout.operator("seip.follow_sensors", text="Stop Following", icon="PAUSE", depress=True)
+        _draw_followed(layout, session.following)
+    for name, draw_body in (("view", view.draw), ("ranking", _draw_ranking), ("comparison", _draw_comparison)):
+        body = section(layout, name)
+        if body is not None:
+            draw_body(body, context)
 
 
 def _draw_list(
@@ -108,46 +95,34 @@ def _draw_followed(layout: bpy.types.UILayout, following: FollowedSensors) -> No
         draw_sentence(layout, f"Moved by hand: {', '.join(following.moved)}.")
 
 
-class SEIP_PT_results_candidates(_Result, bpy.types.Panel):
-    """Candidates by their worth."""
-
-    bl_idname = "SEIP_PT_results_candidates"
-    bl_label = "Candidate Ranking"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw the order, the button and the list."""
-        result, layout = context.scene.seip.result, self.layout
-        layout.row().prop(result, "order", expand=True)
-        draw_run(layout, results.SEIP_OT_rank_candidates.bl_idname)
-        if result.ranking:
-            _draw_list(layout, SEIP_UL_ranked, result, "ranking", "active_ranked")
+def _draw_ranking(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the order, the button and the list of candidates."""
+    result = context.scene.seip.result
+    layout.row().prop(result, "order", expand=True)
+    draw_run(layout, results.SEIP_OT_rank_candidates.bl_idname)
+    if result.ranking:
+        _draw_list(layout, SEIP_UL_ranked, result, "ranking", "active_ranked")
 
 
-class SEIP_PT_results_comparison(_Result, bpy.types.Panel):
-    """The present placement beside a kept one."""
-
-    bl_idname = "SEIP_PT_results_comparison"
-    bl_label = "Compare"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw the kept placements and the comparison."""
-        seip, layout = context.scene.seip, self.layout
-        row = layout.row()
-        _draw_list(row, SEIP_UL_kept, seip, "kept", "active_kept")
-        column = row.column(align=True)
-        column.operator("seip.keep_placement", text="", icon="ADD")
-        column.operator("seip.drop_placement", text="", icon="REMOVE")
-        if not 0 <= seip.active_kept < len(seip.kept):
-            draw_sentence(layout, "Keep this placement with +, place again, and compare the two.", icon="INFO")
-            return
-        try:
-            kept = parsed_record(seip.kept[seip.active_kept].record)
-        except SeipError as error:
-            draw_sentence(layout, str(error), icon="ERROR")
-            return
-        _draw_table(layout, kept, parsed_record(seip.result.record))
-        layout.operator("seip.show_comparison").back = False
-        layout.operator("seip.show_comparison", text="Show Coverage").back = True
+def _draw_comparison(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the kept placements, and the present one beside the active one of them."""
+    seip = context.scene.seip
+    row = layout.row()
+    _draw_list(row, SEIP_UL_kept, seip, "kept", "active_kept")
+    column = row.column(align=True)
+    column.operator("seip.keep_placement", text="", icon="ADD")
+    column.operator("seip.drop_placement", text="", icon="REMOVE")
+    if not 0 <= seip.active_kept < len(seip.kept):
+        draw_sentence(layout, "Keep this placement with +, place again, and compare the two.", icon="INFO")
+        return
+    try:
+        kept = parsed_record(seip.kept[seip.active_kept].record)
+    except SeipError as error:
+        draw_sentence(layout, str(error), icon="ERROR")
+        return
+    _draw_table(layout, kept, parsed_record(seip.result.record))
+    layout.operator("seip.show_comparison").back = False
+    layout.operator("seip.show_comparison", text="Show Coverage").back = True
 
 
 def _draw_table(layout: bpy.types.UILayout, kept: PlacementRecord, present: PlacementRecord) -> None:
@@ -168,11 +143,4 @@ def _share(value: float | None) -> str:
     return "–" if value is None else f"{value:.2%}"
 
 
-CLASSES = (
-    SEIP_UL_chosen,
-    SEIP_UL_ranked,
-    SEIP_UL_kept,
-    SEIP_PT_results,
-    SEIP_PT_results_candidates,
-    SEIP_PT_results_comparison,
-)
+CLASSES = (SEIP_UL_chosen, SEIP_UL_ranked, SEIP_UL_kept)

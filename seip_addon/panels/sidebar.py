@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bpy
 
-from .. import scene_status
 from ..viewport.overlays import TAB
 
 NARROW = 250
@@ -17,15 +16,6 @@ class Sidebar:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = TAB
-
-
-class OfSite(Sidebar):
-    """A mixin: a panel that is there once there is a site."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is."""
-        return not scene_status.has_nothing(context.scene)
 
 
 class RowList:

@@ -1,4 +1,4 @@
-"""The panel of colours, sight lines and points in the viewport."""
+"""The section "Coverage and Sight Lines": what the viewport shows of a placement."""
 
 from __future__ import annotations
 
@@ -18,76 +18,66 @@ from ..scene.write import ASPECT, aspects_of, coverage_of
 from ..session import session
 from ..viewport import coverage, overlays
 from ..viewport.sight_lines import NAME as SIGHT
-from .results import SEIP_PT_results
 from .run_button import draw_run, is_running
-from .sidebar import Sidebar
 from .wrapped_text import draw_sentence
 
 ASPECTS: dict[Aspect, str] = {"returns": "Returns", "seen": "Seen", "times": "Sensors", "weights": "Weights"}
 """What the buttons of the colours say."""
 
 
-class SEIP_PT_view(Sidebar, bpy.types.Panel):
-    """Panel: what the viewport shows."""
-
-    bl_idname = "SEIP_PT_view"
-    bl_label = "Coverage and Sight Lines"
-    bl_parent_id = SEIP_PT_results.bl_idname
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw what can be shown."""
-        scene = context.scene
-        if why_no_coverage(scene) and no_placement(scene) and session.scan_of(scene) is None:
-            draw_sentence(self.layout, "There is nothing to show yet.", icon="INFO")
-            return
-        self._draw_coverage(context)
-        self._draw_sight(context)
-        if session.scan_of(scene) is not None:
-            self._draw_cloud(context)
-
-    def _draw_coverage(self, context: bpy.types.Context) -> None:
-        column = self.layout.column(align=True)
-        head = column.row()
-        head.label(text="Coverage")
-        shown = overlays.find(context.scene, coverage.NAME) is not None
-        head.operator(SEIP_OT_toggle_legend.bl_idname, text="", icon="INFO", depress=shown)
-        obj = coverage_of(context.scene)
-        row = column.row(align=True)
-        possible = ASPECTS if obj is None else aspects_of(obj)
-        for aspect, words in ASPECTS.items():
-            if aspect not in possible:
-                continue
-            now = obj is not None and obj.get(ASPECT) == aspect
-            button = row.operator(SEIP_OT_colour_coverage.bl_idname, text=words, depress=now)
-            button.aspect = aspect
-        why_not = why_no_coverage(context.scene)
-        if why_not:
-            draw_sentence(column, why_not, icon="INFO")
-        elif not coverage.shows_coverage(context.space_data):
-            draw_sentence(column, "This view's shading does not show the colours.", icon="ERROR")
-            column.operator(SEIP_OT_show_coverage_colours.bl_idname)
-
-    def _draw_sight(self, context: bpy.types.Context) -> None:
-        column = self.layout.column(align=True)
-        column.label(text="Sight Lines")
-        overlay = overlays.find(context.scene, SIGHT)
-        row = column.row(align=True)
-        words = "From Sensor" if overlay is None else overlay.about
-        row.operator_menu_enum(SEIP_OT_show_sight_lines.bl_idname, "sensor", text=words, icon="LIGHT_SPOT")
-        if overlay is not None:
-            row.operator(SEIP_OT_hide_sight_lines.bl_idname, text="", icon="X")
-        if is_running(SEIP_OT_show_sight_lines.bl_idname):
-            draw_run(column, SEIP_OT_show_sight_lines.bl_idname)
-        why_not = no_placement(context.scene)
-        if why_not:
-            draw_sentence(column, why_not, icon="INFO")
-
-    def _draw_cloud(self, context: bpy.types.Context) -> None:
-        column = self.layout.column(align=True)
-        column.label(text="Point Cloud")
-        column.row(align=True).prop(context.scene.seip.view, "cloud_colour", expand=True)
-        column.operator("seip.hide_scan", icon="X")
+def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw what can be shown."""
+    scene = context.scene
+    if why_no_coverage(scene) and no_placement(scene) and session.scan_of(scene) is None:
+        draw_sentence(layout, "There is nothing to show yet.", icon="INFO")
+        return
+    _draw_coverage(layout, context)
+    _draw_sight(layout, context)
+    if session.scan_of(scene) is not None:
+        _draw_cloud(layout, context)
 
 
-CLASSES = (SEIP_PT_view,)
+def _draw_coverage(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    column = layout.column(align=True)
+    head = column.row()
+    head.label(text="Coverage")
+    shown = overlays.find(context.scene, coverage.NAME) is not None
+    head.operator(SEIP_OT_toggle_legend.bl_idname, text="", icon="INFO", depress=shown)
+    obj = coverage_of(context.scene)
+    row = column.row(align=True)
+    possible = ASPECTS if obj is None else aspects_of(obj)
+    for aspect, words in ASPECTS.items():
+        if aspect not in possible:
+            continue
+        now = obj is not None and obj.get(ASPECT) == aspect
+        button = row.operator(SEIP_OT_colour_coverage.bl_idname, text=words, depress=now)
+        button.aspect = aspect
+    why_not = why_no_coverage(context.scene)
+    if why_not:
+        draw_sentence(column, why_not, icon="INFO")
+    elif not coverage.shows_coverage(context.space_data):
+        draw_sentence(column, "This view's shading does not show the colours.", icon="ERROR")
+        column.operator(SEIP_OT_show_coverage_colours.bl_idname)
+
+
+def _draw_sight(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    column = layout.column(align=True)
+    column.label(text="Sight Lines")
+    overlay = overlays.find(context.scene, SIGHT)
+    row = column.row(align=True)
+    words = "From Sensor" if overlay is None else overlay.about
+    row.operator_menu_enum(SEIP_OT_show_sight_lines.bl_idname, "sensor", text=words, icon="LIGHT_SPOT")
+    if overlay is not None:
+        row.operator(SEIP_OT_hide_sight_lines.bl_idname, text="", icon="X")
+    if is_running(SEIP_OT_show_sight_lines.bl_idname):
+        draw_run(column, SEIP_OT_show_sight_lines.bl_idname)
+    why_not = no_placement(context.scene)
+    if why_not:
+        draw_sentence(column, why_not, icon="INFO")
+
+
+def _draw_cloud(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    column = layout.column(align=True)
+    column.label(text="Point Cloud")
+    column.row(align=True).prop(context.scene.seip.view, "cloud_colour", expand=True)
+    column.operator("seip.hide_scan", icon="X")

@@ -54,6 +54,15 @@ class SEIP_PG_sections(bpy.types.PropertyGroup):
     rules: _section("Weights and Positions")
     candidates: _section("Candidates and Rays")
     search: _section("Search")
+    results: _section("Results")
+    view: _section("Coverage and Sight Lines")
+    ranking: _section("Candidate Ranking")
+    comparison: _section("Compare")
+    traffic: _section("Traffic and Detection")
+    scan: _section("Scan")
+    dataset: _section("Dataset")
+    detection: _section("Detection")
+    export: _section("Export")
 
     def follow_steps(self) -> None:
         """Open the current step and close the others, now and from now on."""

@@ -77,7 +77,7 @@ def drawn(monkeypatch):
     said, layout = [], MagicMock()
     labels = layout.box().column().column().split().label
     monkeypatch.setattr(detection_panel, "draw_sentence", lambda _, text, **__: said.append(text))
-    detection_panel.SEIP_PT_detection.draw(SimpleNamespace(layout=layout), bpy.context)
+    detection_panel.draw(layout, bpy.context)
     return said, [call.kwargs["text"] for call in labels.call_args_list]
 
 

@@ -12,7 +12,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from seip_addon import loose_pieces, scene_status
-from seip_addon.panels import front_door, placement, site
+from seip_addon.panels import detection, export, front_door, placement, results, site, view
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import placed_sensors
@@ -118,12 +118,12 @@ def test_the_start_up_cube_is_no_part_of_a_site_and_the_view_shows_it_all(fresh)
     assert not {"Cube", "Light", "Camera"} & set(fresh.objects.keys())
     assert views()
     middle = np.mean([obj.location[:2] for obj in contract.find(fresh, contract.POLES).objects], axis=0)
-    for view in views():
-        assert view.clip_end == CLIP_END
-        assert view.shading.color_type == "MATERIAL"
-        assert view.region_3d.view_perspective == "PERSP"
-        assert np.hypot(*(np.array(view.region_3d.view_location[:2]) - middle)) < 60
-        assert 50 < view.region_3d.view_distance < 1000
+    for space in views():
+        assert space.clip_end == CLIP_END
+        assert space.shading.color_type == "MATERIAL"
+        assert space.region_3d.view_perspective == "PERSP"
+        assert np.hypot(*(np.array(space.region_3d.view_location[:2]) - middle)) < 60
+        assert 50 < space.region_3d.view_distance < 1000
     assert scene_status.next_step(fresh) == "seip.check_site"
 
 
@@ -247,14 +247,41 @@ def test_the_steps_state_that_there_is_nothing_yet(scene):
     assert not layout.operators
 
 
-@pytest.mark.parametrize("name", ["results", "export", "view", "scan", "dataset", "detection"])
-def test_a_panel_says_one_line_where_there_is_nothing_yet(scene, name, monkeypatch):
-    panel = getattr(bpy.types, f"SEIP_PT_{name}")
-    module = sys.modules[panel.__module__]
+@pytest.mark.parametrize("part", [results, export, view, detection])
+def test_a_section_has_one_sentence_where_there_is_nothing_yet(scene, part, monkeypatch):
     said = []
-    monkeypatch.setattr(module, "draw_sentence", lambda _, text, **__: said.append(text))
-    layout = MagicMock()
-    own = SimpleNamespace(layout=layout)
-    panel.draw(own, bpy.context)
+    monkeypatch.setattr(part, "draw_sentence", lambda _, text, **__: said.append(text))
+    layout = DrawnLayout()
+    part.draw(layout, bpy.context)
     assert len(said) == 1
-    assert not layout.operator.called
+    assert not layout.operators
+
+
+def test_all_sections_open_without_and_with_a_placement(junction, monkeypatch):
+    for name in [one.identifier for one in junction.seip.sections.bl_rna.properties]:
+        if not name.endswith("_state") and name not in {"rna_type", "name"}:
+            setattr(junction.seip.sections, name, True)
+    monkeypatch.setattr(view.coverage, "shows_coverage", lambda _: True)  # there is no 3D view
+    panel = SimpleNamespace(layout=DrawnLayout())
+    bpy.types.SEIP_PT_steps.draw(panel, bpy.context)
+    bpy.ops.seip.solve_placement()
+    bpy.ops.seip.keep_placement(name="kept")
+    for name in ("site", "sensors", "placement"):
+        setattr(junction.seip.sections, name, True)
+    panel.layout = DrawnLayout()
+    bpy.types.SEIP_PT_steps.draw(panel, bpy.context)
+    drawn = {name for name, _ in panel.layout.operators}
+    assert {"seip.check_site", "seip.choose_sensors", "seip.solve_placement", "seip.rank_candidates"} <= drawn
+    assert {"seip.write_report", "seip.save_picture", "seip.show_comparison"} <= drawn
+
+
+def test_no_list_scrolls_since_it_would_take_the_mouse_wheel(junction):
+    bpy.ops.seip.solve_placement()
+    bpy.ops.seip.rank_candidates()
+    for number in range(3):
+        bpy.ops.seip.keep_placement(name=f"kept {number}")
+    sections = junction.seip.sections
+    sections.results = sections.ranking = sections.comparison = True
+    panel = SimpleNamespace(layout=DrawnLayout())
+    bpy.types.SEIP_PT_steps.draw(panel, bpy.context)
+    assert [(one["rows"], one["maxrows"]) for one in panel.layout.lists] == [(2, 2), (10, 10), (3, 3)]

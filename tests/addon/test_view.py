@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 import seip_addon
-from seip_addon.panels.view import SEIP_PT_view
+from seip_addon.panels import view as view_section
 from seip_addon.scene import render
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.session import session
@@ -44,9 +44,8 @@ def test_coverage_is_coloured_with_a_legend(placed, aspect):
 def test_one_of_the_buttons_of_colours_is_always_pressed(placed):
     def pressed():
         layout = MagicMock()
-        panel = SimpleNamespace(layout=layout)
         context = SimpleNamespace(scene=placed, space_data=SimpleNamespace(shading=SimpleNamespace(type="MATERIAL")))
-        SEIP_PT_view._draw_coverage(panel, context)  # noqa: SLF001  # of the panel, which cannot be made
+        view_section._draw_coverage(layout, context)  # noqa: SLF001  # the part with the buttons
         calls = layout.column().row().operator.call_args_list
         return [call.kwargs["text"] for call in calls if call.kwargs.get("depress") and call.kwargs["text"]]
 

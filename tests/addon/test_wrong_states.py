@@ -3,7 +3,6 @@
 import builtins
 import json
 import re
-from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import bpy
@@ -83,18 +82,19 @@ def test_a_damaged_record_is_not_shown_and_has_its_sentence(placed, change, word
 
 def test_a_damaged_kept_record_has_its_sentence_in_place_of_the_comparison(placed, monkeypatch):
     bpy.ops.seip.keep_placement(name="kept")
-    said = drawn_by(results_panel, results_panel.SEIP_PT_results_comparison, monkeypatch)
+    placed.seip.sections.comparison = True
+    said = drawn_by(results_panel, monkeypatch)
     assert said == []
     placed.seip.kept[0].record = "{"
-    (sentence,) = drawn_by(results_panel, results_panel.SEIP_PT_results_comparison, monkeypatch)
+    (sentence,) = drawn_by(results_panel, monkeypatch)
     assert "damaged" in sentence
 
 
-def drawn_by(module, panel, monkeypatch):
-    """Return the sentences that a panel draws."""
+def drawn_by(module, monkeypatch):
+    """Return the sentences that a section draws."""
     said = []
     monkeypatch.setattr(module, "draw_sentence", lambda _, text, **__: said.append(text))
-    panel.draw(SimpleNamespace(layout=MagicMock()), bpy.context)
+    module.draw(DrawnLayout(), bpy.context)
     return said
 
 
