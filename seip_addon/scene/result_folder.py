@@ -34,8 +34,11 @@ FILES = (
     *("scene.glb", "placed.blend", "placement.json"),
 )
 """In the order in which they take their places: where ``placement.json`` stands, everything else does."""
-MAY_BE_MISSING = (*LOCATED_FILES, *REPORT_FILES)
-"""Files of where the map's projection is known, and reports, which are written later: those on an earlier result go."""
+ATTRIBUTION_FILE = "ATTRIBUTION.txt"
+"""Credits for the files whose formats have no place for them, such as CSV tables."""
+MAY_BE_MISSING = (ATTRIBUTION_FILE, *LOCATED_FILES, *REPORT_FILES)
+"""Files of sites whose sources demand credits, and of where the map's projection is known; and reports, which are
+written later: those on an earlier result go."""
 
 
 @contextmanager
@@ -115,6 +118,8 @@ def write_tables(
     save_candidate_table(part["candidates.csv"], site, models, survey.grid.visible, deployment)
     problem = placement_constraints(site, models, solution.objective)
     save_site_file(part["site.npz"], record.inputs["visibility"], geometry, site, solution, problem)
+    if site.attribution:
+        part[ATTRIBUTION_FILE].write_text("\n".join(site.attribution) + "\n", encoding="utf-8", newline="\n")
     placed = located(geometry, site, deployment)
     if placed is not None:
         save_geojson(part["placement.geojson"], placed)

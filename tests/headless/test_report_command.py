@@ -53,6 +53,7 @@ def test_a_report_is_written_and_named(folder, capsys):
 def test_everything_that_is_shared_names_the_sources(folder):
     report.main([str(folder), "--effort", "0"])
     assert load_placement(folder / "placement.json").site.attribution == (CREDIT, "Surveyors & Sons")
+    assert (folder / "ATTRIBUTION.txt").read_text(encoding="utf-8") == f"{CREDIT}\nSurveyors & Sons\n"
     assert json.loads((folder / "placement.geojson").read_text(encoding="utf-8"))["attribution"][0] == CREDIT
     assert f"{CREDIT}; Surveyors &amp; Sons" in (folder / "report.html").read_text(encoding="utf-8")
     assert f"<description>{CREDIT}\nSurveyors &amp; Sons" in (folder / "placement.kml").read_text(encoding="utf-8")
