@@ -54,9 +54,9 @@ MAKER_PROBABILITY = 0.9
 DROPOFF_REFLECTIVITY = 0.2
 """Reflectivity, between asphalt and walls, for which `RangeEquation.as_dropoff` is correct."""
 
+# Least ratio of the ranges at 80 and at 10 %: at this one the air leaves 1/178 of the light on the way to the shorter
+# range and back, and with less it would leave even less, which clear air does not.
 LEAST_RATIO = 1.3
-"""Least ratio of the ranges at 80 and at 10 %. With it the air leaves 1/178 of the light at the shorter range, out and
-back; with less it would leave even less, which no clear air does."""
 
 _TINY = 1e-300
 _STANDARD = NormalDist()
