@@ -3,12 +3,12 @@
 import json
 import sys
 
-from seip_addon.core.output.results.placement_record import comparable, load_placement_record
+from seip_addon.core.output.results.placement_file import comparable, load_placement
 
 
 def lines(path: str) -> list[str]:
     """Lines of a record, without what differs from one machine and run to the next."""
-    record = load_placement_record(path)
+    record = load_placement(path)
     if record.objective.status != "optimal":
         sys.exit(f"{path} is not proven optimal, so that it depends on the machine's speed")
     return json.dumps(comparable(record), indent=1, sort_keys=True).splitlines()

@@ -159,12 +159,9 @@ def save_solution(surveyed: Survey, watch: Stopwatch, solution: Solution, folder
     write_result_folder(
         folder,
         bpy.context.scene,
-        surveyed.geometry,
-        surveyed.site,
+        surveyed,
         solution,
         record_of(surveyed, solution, now, render=render),
-        visible=surveyed.grid.visible,
-        models=surveyed.models,
         render=render,
     )
 

@@ -28,8 +28,8 @@ DELAY = 0.02  # seconds from a movement to the look at it: a drag reports many
 def start(scene: bpy.types.Scene, state: SceneState, visibility: VisibilityModel) -> None:
     """Follow the sensors of a scene from now on, from what the placement's own see."""
     stop()
-    survey, solution = state.placed()
-    known = _as_placed(solution.deployment, survey.grid.visible)
+    _, solution = state.placed()
+    known = _as_placed(solution.deployment)
     session.following = FollowedSensors(scene.session_uid, state, visibility, known)
     for event, handler in _handlers():
         getattr(bpy.app.handlers, event).append(handler)
@@ -85,10 +85,10 @@ def _moved(followed: FollowedSensors, sensors: dict[str, MountedSensor]) -> tupl
     )
 
 
-def _as_placed(deployment: Deployment, visible: Boolean) -> dict[str, tuple[MountedSensor, Boolean]]:
+def _as_placed(deployment: Deployment) -> dict[str, tuple[MountedSensor, Boolean]]:
     """Return the visibility of sensors at candidate poses; that of the others is computed again."""
-    there = [(sensor, sensor.pose) for sensor in deployment.sensors if sensor.pose is not None]
-    return {sensor.label: (sensor.mounted, visible[pose]) for sensor, pose in there}
+    seen = zip(deployment.sensors, deployment.rows, strict=True)
+    return {sensor.label: (sensor.mounted, row) for sensor, row in seen if sensor.pose is not None}
 
 
 def _same(one: MountedSensor, other: MountedSensor) -> bool:

@@ -7,11 +7,11 @@ from dataclasses import replace
 import bpy
 
 from .core.errors import SeipError
-from .core.output.results.placement_record import PlacementRecord, parsed_record
+from .core.output.results.placement_file import parsed_record
 from .core.sensing.lidar.range_equation import RangeEquation
 from .core.workflows.survey import SurveySettings
 from .scene import contract
-from .session import SceneState, session
+from .session import session
 
 FILE_VERSION = 1
 """Of what the add-on keeps with a scene: a file with a higher one was saved by a newer add-on."""
@@ -127,7 +127,8 @@ def stale_placement(scene: bpy.types.Scene) -> str:
     state = session.state_of(scene)
     if state is None:
         return NOT_COMPARED
-    return stale_survey(scene) or ("" if is_of(parsed_record(scene.seip.result.record), state) else ANOTHER_SITE)
+    record = parsed_record(scene.seip.result.record)
+    return stale_survey(scene) or ("" if record.is_of(state.inputs) else ANOTHER_SITE)
 
 
 def stale_check(scene: bpy.types.Scene) -> str:
@@ -151,11 +152,6 @@ def checked_settings(scene: bpy.types.Scene) -> SurveySettings | str:
 def same_grid(one: SurveySettings, other: SurveySettings) -> bool:
     """Return whether settings differ in how a placement is searched at most."""
     return _without_search(one) == _without_search(other)
-
-
-def is_of(record: PlacementRecord, state: SceneState) -> bool:
-    """Return whether a record's placement was made on a survey; an older record holds fewer digests."""
-    return all(state.inputs.get(name) == key for name, key in record.inputs.items())
 
 
 def _without_search(settings: SurveySettings) -> SurveySettings:

@@ -16,16 +16,15 @@ from pathlib import Path
 import bpy
 
 from . import preferences
-from .core.choosing.placement.objective import MOVED
 from .core.errors import SeipError
-from .core.output.results.placement_record import PlacementRecord, parsed_record
+from .core.output.results.placement_file import parsed_record
+from .core.output.results.placement_record import PlacementRecord
 from .core.progress import Progress
-from .core.workflows.moved_sensors import restored_by_hand
-from .core.workflows.records import restored_solution
-from .core.workflows.survey import Survey, SurveySettings, inputs_of, lay_out, see
+from .core.workflows.records import inputs_of, restored_solution
+from .core.workflows.survey import Survey, SurveySettings, lay_out, see
 from .scene.changes import Watch, on_update, watch
 from .scene.read import SceneReading, read_scene
-from .scene_status import FILE_VERSION, is_of, obstacle, same_grid
+from .scene_status import FILE_VERSION, obstacle, same_grid
 from .session import Resources, SceneState, session
 
 LOAD_DELAY = 0.2
@@ -112,7 +111,7 @@ def _grid_again(
     surveying: Generator[Progress, None, SceneState], record: PlacementRecord
 ) -> Generator[Progress, None, tuple[SceneState, Survey]]:
     state = yield from surveying
-    if not is_of(record, state):
+    if not record.is_of(state.inputs):
         raise SeipError("the scene or its settings have changed since the placement: place again")
     if state.survey is None and not state.resources.grid_file(state.inputs["visibility"]).exists():
         raise SeipError("the cache no longer holds the visibility of this placement: place again")
@@ -124,10 +123,7 @@ def _restored(surveying: Generator[Progress, None, SceneState], text: str) -> Ge
     state, survey = yield from _grid_again(surveying, record)
     if state.record == text and state.solution is not None:
         return state
-    if record.objective.status == MOVED:
-        solution = yield from restored_by_hand(survey, record)
-    else:
-        solution = restored_solution(survey, record)
+    solution = yield from restored_solution(survey, record)
     return replace(state, solution=solution, record=text)
 
 

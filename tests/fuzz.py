@@ -590,9 +590,9 @@ def _mutate_record(random: Random, content: bytes) -> Case:
 
 
 def _read_record(path: Path, _: bytes) -> None:
-    from seip_addon.core.output.results.placement_record import load_placement_record  # noqa: PLC0415
+    from seip_addon.core.output.results.placement_file import load_placement  # noqa: PLC0415
 
-    record = load_placement_record(path)
+    record = load_placement(path)
     require_physical(record.as_json() | {"settings": None}, "placement.json")
     assert len({sensor.id for sensor in record.sensors}) == len(record.sensors), "two sensors of one label"
 

@@ -18,12 +18,8 @@ from ..core.errors import SeipError
 from ..core.output.report.write import write_report
 from ..core.output.results.answer import change_text
 from ..core.output.results.comparison import compare, packed_counts, unpacked_counts
-from ..core.output.results.placement_record import (
-    PlacementRecord,
-    Provenance,
-    load_placement_record,
-    parsed_record,
-)
+from ..core.output.results.placement_file import load_placement, parsed_record
+from ..core.output.results.placement_record import PlacementRecord, Provenance
 from ..core.output.results.ranking import Ranked, rank_added, rank_alone
 from ..core.output.results.versions import versions
 from ..core.progress import Progress
@@ -403,8 +399,8 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
         survey, solution = state.placed()
         record = parsed_record(state.record)
         record = replace(record, settings={**record.settings, "render": render})
-        site, visible = survey.site, survey.grid.visible
-        yield from write_tables(part, survey.geometry, site, solution, record, visible, survey.models)
+        site = survey.site
+        yield from write_tables(part, survey, solution, record)
         if render:
             yield from render_elsewhere(part["view.png"], part["placed.blend"], name, site, solution.deployment, legend)
     survey.grid.save(folder / "visibility.npz")
@@ -442,7 +438,7 @@ def _reported(
 def _holds(folder: Path, record: str) -> bool:
     """Return whether a folder holds the export of a placement."""
     try:
-        written = load_placement_record(folder / "placement.json")
+        written = load_placement(folder / "placement.json")
     except SeipError:
         return False
     present = parsed_record(record)

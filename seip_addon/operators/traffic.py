@@ -14,7 +14,7 @@ from ..core.choosing.placement.objective import target_weights
 from ..core.choosing.robustness.traffic_instants import check_runs, spread_instants
 from ..core.choosing.robustness.traffic_study import IN_TRAFFIC, traffic_message
 from ..core.counts import counted
-from ..core.output.results.placement_record import parsed_record
+from ..core.output.results.placement_file import parsed_record
 from ..core.output.results.versions import versions
 from ..core.progress import Progress, finish
 from ..core.sensing.scans.run_folder import Record, Run, check_run_folder

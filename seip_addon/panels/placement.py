@@ -11,7 +11,8 @@ from ..core.choosing.placement.objective import certificate, purpose
 from ..core.choosing.placement.returns_summary import returns_text
 from ..core.counts import counted, duration_text
 from ..core.output.results.answer import answer, status_text
-from ..core.output.results.placement_record import PlacementRecord, parsed_record, relevant_warnings
+from ..core.output.results.placement_file import parsed_record
+from ..core.output.results.placement_record import PlacementRecord, relevant_warnings
 from ..core.workflows.traffic_runs import traffic_folder
 from ..operators.placement import SEIP_OT_solve_placement
 from ..operators.results import SEIP_OT_evaluate_sensors, no_placement

@@ -5,7 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ..core.errors import SeipError
-from ..core.output.results.placement_record import PlacementRecord, parsed_record
+from ..core.output.results.placement_file import parsed_record
+from ..core.output.results.placement_record import PlacementRecord
 from ..operators import results
 from ..session import FollowedSensors, session
 from . import view

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import bpy
 
-from ..core.arrays import Boolean
-from ..core.choosing.placement.objective import Solution, placement_problem
+from ..core.choosing.placement.objective import Solution, placement_constraints
 from ..core.errors import SeipError
 from ..core.output.pictures.plan_view import save_plan_view
 from ..core.output.results.candidate_table import save_candidate_table
@@ -17,14 +16,13 @@ from ..core.output.results.carla import save_carla_spawns
 from ..core.output.results.geojson import save_geojson
 from ..core.output.results.kml import save_kml
 from ..core.output.results.located import LOCATED_FILES, located
-from ..core.output.results.placement_record import PlacementRecord, relevant_warnings, save_placement_record
+from ..core.output.results.placement_file import save_placement
+from ..core.output.results.placement_record import PlacementRecord, relevant_warnings
 from ..core.output.results.report_files import REPORT_FILES
 from ..core.output.results.site_file import save_site_file
 from ..core.progress import Progress, finish
-from ..core.sensing.lidar.model import LidarModel
-from ..core.site.scene_geometry import SceneGeometry
-from ..core.site.site import Site
 from ..core.storage.files import unfinished_name
+from ..core.workflows.survey import Survey
 from .blend_file import save_blend
 from .gltf import save_glb
 from .pieces import tidy_pieces
@@ -36,8 +34,11 @@ FILES = (
     *("scene.glb", "placed.blend", "placement.json"),
 )
 """In the order in which they take their places: where ``placement.json`` stands, everything else does."""
-MAY_BE_MISSING = (*LOCATED_FILES, *REPORT_FILES)
-"""Files of where the map's projection is known, and reports, which are written later: those on an earlier result go."""
+ATTRIBUTION_FILE = "ATTRIBUTION.txt"
+"""Credits for the files whose formats have no place for them, such as CSV tables."""
+MAY_BE_MISSING = (ATTRIBUTION_FILE, *LOCATED_FILES, *REPORT_FILES)
+"""Files of sites whose sources demand credits, and of where the map's projection is known; and reports, which are
+written later: those on an earlier result go."""
 
 
 @contextmanager
@@ -74,16 +75,13 @@ def result_files(folder: Path) -> Iterator[dict[str, Path]]:
             temporary.unlink(missing_ok=True)
 
 
-def write_result_folder(  # noqa: PLR0913  # everything that a result is made of
+def write_result_folder(
     folder: Path,
     scene: bpy.types.Scene,
-    geometry: SceneGeometry,
-    site: Site,
+    survey: Survey,
     solution: Solution,
     record: PlacementRecord,
     *,
-    visible: Boolean,
-    models: Mapping[str, LidarModel],
     render: bool = True,
 ) -> None:
     """Write a solution into the scene and all its files into a folder, in place of earlier ones.
@@ -92,44 +90,36 @@ def write_result_folder(  # noqa: PLR0913  # everything that a result is made of
     ----------
     scene : bpy.types.Scene
         Receives the sensors and the coverage.
-    geometry : SceneGeometry
-        What was read from the scene.
     record : PlacementRecord
-        What ``placement.json`` will hold.
-    visible : (c, t) bool
-        The visibility grid.
+        Content of ``placement.json``.
     render : bool
         Whether to render ``view.png``, which takes the longest.
     """
-    deployment = solution.deployment
+    site, deployment = survey.site, solution.deployment
     with result_files(folder) as part:
         tidy_pieces(scene)
         write_result(scene, site, deployment)
         save_blend(part["placed.blend"])
         save_glb(part["scene.glb"], site.attribution)
-        finish(write_tables(part, geometry, site, solution, record, visible, models))
+        finish(write_tables(part, survey, solution, record))
         if render:
             save_rendered_view(part["view.png"], scene, site, deployment)
 
 
-def write_tables(  # noqa: PLR0913, PLR0917  # as above
-    part: Mapping[str, Path],
-    geometry: SceneGeometry,
-    site: Site,
-    solution: Solution,
-    record: PlacementRecord,
-    visible: Boolean,
-    models: Mapping[str, LidarModel],
+def write_tables(
+    part: Mapping[str, Path], survey: Survey, solution: Solution, record: PlacementRecord
 ) -> Generator[Progress, None, None]:
-    """Write all of a result that takes no look at Blender's data; see `write_result_folder`."""
-    deployment = solution.deployment
+    """Write the files of a result that do not depend on Blender's data; see `write_result_folder`."""
+    geometry, site, models, deployment = survey.geometry, survey.site, survey.models, solution.deployment
     yield Progress(0, 3, "writing tables", counted=False)
-    save_placement_record(part["placement.json"], record)
+    save_placement(part["placement.json"], record)
     save_carla_spawns(part["carla_spawn.json"], deployment, site.origin)
     yield Progress(1, 3, "writing tables", counted=False)
-    save_candidate_table(part["candidates.csv"], site, models, visible, deployment)
-    problem = placement_problem(site, visible, models, solution.objective)
+    save_candidate_table(part["candidates.csv"], site, models, survey.grid.visible, deployment)
+    problem = placement_constraints(site, models, solution.objective)
     save_site_file(part["site.npz"], record.inputs["visibility"], geometry, site, solution, problem)
+    if site.attribution:
+        part[ATTRIBUTION_FILE].write_text("\n".join(site.attribution) + "\n", encoding="utf-8", newline="\n")
     placed = located(geometry, site, deployment)
     if placed is not None:
         save_geojson(part["placement.geojson"], placed)

@@ -12,7 +12,7 @@ import pytest
 from seip_addon import live_coverage, selection
 from seip_addon.core.choosing.placement.objective import MOVED, MOVED_MESSAGE
 from seip_addon.core.output.results.comparison import unpacked_counts
-from seip_addon.core.output.results.placement_record import comparable, load_placement_record, parsed_record
+from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
 from seip_addon.scene import result_folder
 from seip_addon.scene.result_folder import FILES
 from seip_addon.sensor_edits import sensor_edits
@@ -123,7 +123,7 @@ def test_a_judged_deployment_is_kept_compared_ranked_and_exported(placed, tmp_pa
     assert bpy.ops.seip.export_result() == {"FINISHED"}
     assert {name: obj.matrix_world for name, obj in selection.sensor_empties(placed).items()} == there
     out = tmp_path / "out"
-    written = load_placement_record(out / "placement.json")
+    written = load_placement(out / "placement.json")
     assert comparable(written) == comparable(parsed_record(placed.seip.result.record))
     rows = list(csv.DictReader((out / "candidates.csv").read_text(encoding="utf-8").splitlines()))
     chosen = {row["chosen"]: row for row in rows if row["chosen"]}
@@ -138,7 +138,7 @@ def test_a_judged_deployment_is_kept_compared_ranked_and_exported(placed, tmp_pa
     assert {name: obj.matrix_world for name, obj in selection.sensor_empties(scene).items()} == there
     assert not sensor_edits(scene)
     assert bpy.ops.seip.export_result() == {"FINISHED"}  # found again from the file and the cache
-    assert comparable(load_placement_record(out / "placement.json")) == comparable(written)
+    assert comparable(load_placement(out / "placement.json")) == comparable(written)
     again = list(csv.DictReader((out / "candidates.csv").read_text(encoding="utf-8").splitlines()))
     assert again == rows
     assert session.state_of(scene).solution.certificate == MOVED_MESSAGE
@@ -206,4 +206,4 @@ def test_the_view_is_rendered_elsewhere_and_ends_with_who_asked(placed, tmp_path
     assert rendering == sorted(rendering)
     assert rendering[-1] > rendering[0] == 0
     assert (tmp_path / "out" / "view.png").stat().st_size > 50_000
-    assert load_placement_record(tmp_path / "out" / "placement.json").settings["render"] is True
+    assert load_placement(tmp_path / "out" / "placement.json").settings["render"] is True

@@ -8,7 +8,7 @@ from headless import place
 import bpy
 import pytest
 
-from seip_addon.core.output.results.placement_record import comparable, load_placement_record, parsed_record
+from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
 from seip_addon.operators.placement import SEIP_OT_solve_placement
 from seip_addon.panels import placement as placement_panel
 from seip_addon.session import session
@@ -58,7 +58,7 @@ def test_panel_and_batch_place_alike_and_what_it_was_chosen_on_stays_with_it(coa
     bpy.ops.seip.try_in_traffic()
     assert parsed_record(seip.result.record).notes[:-1] == panel.notes
     place.main([str(small_scene), *OPTIONS, "-o", str(tmp_path)])
-    assert comparable(panel) == comparable(load_placement_record(tmp_path / "placement.json"))
+    assert comparable(panel) == comparable(load_placement(tmp_path / "placement.json"))
 
 
 def test_the_panel_shows_what_the_objective_asks_for(coarse):

@@ -14,7 +14,7 @@ import pytest
 
 from seip_addon import scene_status, selection
 from seip_addon import session as session_data
-from seip_addon.core.output.results.placement_record import comparable, load_placement_record, parsed_record
+from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.visibility.grid import VisibilityGrid
 from seip_addon.core.sensing.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
@@ -39,7 +39,7 @@ def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scen
     assert "start from this placement" in (tmp_path / "panel" / "report.html").read_text(encoding="utf-8")
     key = session.state_of(junction).survey.grid.key
     place.main([str(small_scene), *OPTIONS, "-o", str(tmp_path / "batch")])
-    panel, batch = (load_placement_record(tmp_path / name / "placement.json") for name in ("panel", "batch"))
+    panel, batch = (load_placement(tmp_path / name / "placement.json") for name in ("panel", "batch"))
     assert comparable(panel) == comparable(batch)
     assert VisibilityGrid.load(tmp_path / "batch" / "visibility.npz").key == key
     for name in ("candidates.csv", "carla_spawn.json", "site.npz", "visibility.npz"):
@@ -53,7 +53,7 @@ def test_pose_errors_are_only_evaluated_where_that_is_the_risk_measure(junction,
     panel = parsed_record(junction.seip.result.record)
     assert any("in one of twenty cases" in note for note in panel.notes)
     place.main([str(small_scene), *OPTIONS, "--pose-errors", "--risk", "none", "-o", str(tmp_path)])
-    assert comparable(panel) == comparable(load_placement_record(tmp_path / "placement.json"))
+    assert comparable(panel) == comparable(load_placement(tmp_path / "placement.json"))
 
 
 def test_a_placement_with_the_grid_at_hand_casts_no_ray(junction, monkeypatch):
@@ -88,7 +88,7 @@ def test_a_stopped_placement_does_not_reach_the_export(junction, tmp_path):
     finish(work_of("SEIP_OT_solve_placement", junction))  # and stopped
     junction.seip.result.folder = str(tmp_path)
     bpy.ops.seip.export_result()
-    record = load_placement_record(tmp_path / "placement.json")
+    record = load_placement(tmp_path / "placement.json")
     rows = list(csv.DictReader((tmp_path / "candidates.csv").read_text(encoding="utf-8").splitlines()))
     assert {int(row["pose"]) for row in rows if row["chosen"]} == {sensor.pose for sensor in record.sensors}
     assert len(json.loads((tmp_path / "carla_spawn.json").read_text(encoding="utf-8"))) == 2
@@ -116,7 +116,7 @@ def test_a_saved_placement_goes_on_without_computing(junction, tmp_path, monkeyp
     assert len(scene.seip.result.ranking) > 0
     scene.seip.result.folder = "//out/"
     assert bpy.ops.seip.export_result() == {"FINISHED"}
-    assert comparable(load_placement_record(tmp_path / "out" / "placement.json")) == comparable(parsed_record(before))
+    assert comparable(load_placement(tmp_path / "out" / "placement.json")) == comparable(parsed_record(before))
 
 
 def test_an_emptied_cache_is_said(junction, tmp_path):
@@ -254,7 +254,7 @@ def test_panel_and_batch_place_alike_over_pose_errors(junction, tmp_path, risk, 
     options = ["--heights", "8", "--grid", "8", "--spacing", "25", "--count", "2", "--no-render", "--sensor", "type1"]
     wrong = ["--position-error", "0.5", "--tilt-error", "3", "--failures", "mean", "--risk", risk]
     place.main([str(small_scene), *options, *wrong, "-o", str(tmp_path)])
-    batch = load_placement_record(tmp_path / "placement.json")
+    batch = load_placement(tmp_path / "placement.json")
     assert comparable(panel) == comparable(replace(batch, settings={**batch.settings, "render": False}))
     assert any("in nineteen of twenty" in note for note in panel.notes)
 

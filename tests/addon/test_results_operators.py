@@ -7,7 +7,7 @@ import pytest
 from seip_addon import live_coverage, preferences, selection
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.comparison import unpacked_counts
-from seip_addon.core.output.results.placement_record import parsed_record
+from seip_addon.core.output.results.placement_file import parsed_record
 from seip_addon.session import scene_of, session
 
 

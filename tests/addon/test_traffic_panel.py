@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon.core.output.results.placement_record import load_placement_record
+from seip_addon.core.output.results.placement_file import load_placement
 from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.scene.write import write_result
 from seip_addon.session import session
@@ -58,7 +58,7 @@ def test_what_traffic_leaves_of_a_placement_stands_with_it(placed, tmp_path):
     assert notes[-1].endswith(f"{coverage:.2%} when it is empty")
     placed.seip.result.folder = str(tmp_path)
     bpy.ops.seip.export_result()
-    assert list(load_placement_record(tmp_path / "placement.json").notes) == notes
+    assert list(load_placement(tmp_path / "placement.json").notes) == notes
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ import pytest
 from seip_addon import live_coverage, preferences, registration, scene_status, scene_survey
 from seip_addon.background import Background
 from seip_addon.core.choosing.placement.search_limits import Acceptance, SolverLimits
-from seip_addon.core.output.results.placement_record import parsed_record
+from seip_addon.core.output.results.placement_file import parsed_record
 from seip_addon.core.progress import Progress, finish
 from seip_addon.operators import base, results
 from seip_addon.panels import missing_package

@@ -10,11 +10,12 @@ import numpy as np
 import shapely
 
 from seip_addon.core.choosing.placement.deployment import deploy
-from seip_addon.core.choosing.placement.objective import Objective, Solution, placement_problem
+from seip_addon.core.choosing.placement.objective import Objective, Solution, placement_constraints
 from seip_addon.core.choosing.placement.problem import Placement, relative_gap
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.output.pictures.plan_view import save_plan_view
-from seip_addon.core.output.results.placement_record import Provenance, placement_record, save_placement_record
+from seip_addon.core.output.results.placement_file import save_placement
+from seip_addon.core.output.results.placement_record import Provenance, placement_record
 from seip_addon.core.output.results.site_file import save_site_file
 from seip_addon.core.sensing.visibility.grid import VisibilityGrid
 from seip_addon.core.site.scene_geometry import NamedArea
@@ -58,8 +59,8 @@ def make_folder(folder: Path, *, goal: Objective | None = None, place: GeoRefere
         warnings=("type2: sees <far>",),
     )
     folder.mkdir(parents=True, exist_ok=True)
-    save_placement_record(folder / "placement.json", record)
-    problem = placement_problem(example.site, example.visible, example.models, goal)
+    save_placement(folder / "placement.json", record)
+    problem = placement_constraints(example.site, example.models, goal)
     save_site_file(folder / "site.npz", KEY, example.geometry, example.site, solution, problem)
     VisibilityGrid(np.packbits(example.visible, axis=1), example.visible.shape, KEY, {}).save(folder / "visibility.npz")
     save_plan_view(folder / "plan.png", example.geometry, example.site, example.deployment)
@@ -71,7 +72,7 @@ def make_solution(example: Example, goal: Objective, **found) -> Solution:
     deployment = example.deployment
     if "chosen" in found:
         chosen = found.pop("chosen")
-        deployment = deploy(example.site, example.models, example.visible, chosen)
+        deployment = deploy(example.site, example.models, example.visible[chosen], chosen)
     value = float(np.count_nonzero(deployment.seen_by))
     values = {"objective": value, "bound": value, "status": "optimal", **found}
     values.setdefault("gap", relative_gap(values["objective"], values["bound"]))

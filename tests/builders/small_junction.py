@@ -53,7 +53,8 @@ def make_example(spacing: float = 2.0, reach: float = 55.0, heights: tuple[float
     site = make_site(geometry, spacing, heights)
     models = load_catalogue()
     visible = lines_of_sight(site, models)
-    return Example(geometry, site, models, visible, deploy(site, models, visible, greedy(site, visible, 3)))
+    chosen = greedy(site, visible, 3)
+    return Example(geometry, site, models, visible, deploy(site, models, visible[chosen], chosen))
 
 
 def greedy(site: Site, visible: np.ndarray, count: int) -> list[int]:

@@ -19,7 +19,7 @@ import pytest
 
 from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.results.placement_record import comparable, load_placement_record
+from seip_addon.core.output.results.placement_file import comparable, load_placement
 from seip_addon.core.sensing.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
 from seip_addon.core.workflows.placing import ACCEPTED_MESSAGE
 
@@ -32,7 +32,7 @@ QUICK = ["--sensor", "type1", "--heights", "3.5", "--grid", "4", "--spacing", "1
 def run(small_scene):
     def run(folder, *options):
         place.main([str(small_scene), "-o", str(folder), *QUICK, *options])
-        return load_placement_record(folder / "placement.json")
+        return load_placement(folder / "placement.json")
 
     return run
 
@@ -59,7 +59,7 @@ def test_the_folder_holds_every_result(folder):
 
 
 def test_the_record_says_how_far_it_can_be_trusted(folder):
-    record = load_placement_record(folder / "placement.json")
+    record = load_placement(folder / "placement.json")
     assert any("within 1% of the best" in note for note in record.notes)
     assert record.request.goal.scenarios == Scenarios()
     assert not any("in one of twenty cases" in note for note in record.notes)
@@ -67,7 +67,7 @@ def test_the_record_says_how_far_it_can_be_trusted(folder):
 
 
 def test_tables_agree_with_the_record(folder):
-    record = load_placement_record(folder / "placement.json")
+    record = load_placement(folder / "placement.json")
     rows = list(csv.DictReader((folder / "candidates.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == record.counts.poses
     chosen = {int(row["pose"]) for row in rows if row["chosen"]}
@@ -77,7 +77,7 @@ def test_tables_agree_with_the_record(folder):
 
 def test_the_saved_scene_holds_the_sensors(folder):
     bpy.ops.wm.open_mainfile(filepath=str(folder / "placed.blend"))
-    record = load_placement_record(folder / "placement.json")
+    record = load_placement(folder / "placement.json")
     empties = [item for item in bpy.data.collections["SEIP Sensors"].objects if item.type == "EMPTY"]
     assert len(empties) == len(record.sensors)
     assert {item["seip_sensor"] for item in empties} == {"type1"}
@@ -93,7 +93,7 @@ def test_the_glb_holds_the_sensors_and_the_coverage(folder):
 
 def test_the_same_run_gives_the_same_bytes(folder, tmp_path, run):
     again = run(tmp_path / "again", "--count", "2")
-    assert comparable(again) == comparable(load_placement_record(folder / "placement.json"))
+    assert comparable(again) == comparable(load_placement(folder / "placement.json"))
     for name in ("candidates.csv", "carla_spawn.json", "site.npz", "scene.glb", "plan.png"):
         assert (tmp_path / "again" / name).read_bytes() == (folder / name).read_bytes()
 
@@ -103,7 +103,7 @@ def test_eight_sensors_at_the_shipped_junction_are_proven_the_best(tmp_path):
     """A change of the branch and bound that cuts less than this one does ends at the limit without a proof."""
     options = ["--sensor", "type1", "--count", "8", "--effort", "120", "--no-render"]
     place.main([str(SCENE), *options, "-o", str(tmp_path)])
-    objective = load_placement_record(tmp_path / "placement.json").objective
+    objective = load_placement(tmp_path / "placement.json").objective
     assert (objective.status, objective.gap) == ("optimal", 0.0)
 
 
@@ -341,6 +341,6 @@ def test_enter_ends_the_search_with_the_best_placement_so_far(tmp_path):
     os.close(ours)
     assert process.wait(60) == 0
     assert b"press Enter to end the search" in shown
-    record = load_placement_record(tmp_path / "placement.json")
+    record = load_placement(tmp_path / "placement.json")
     assert record.objective.status == "feasible"
     assert ACCEPTED_MESSAGE in record.notes

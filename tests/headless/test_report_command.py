@@ -13,7 +13,7 @@ import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.report.repeat import repeating_command
-from seip_addon.core.output.results.placement_record import comparable, load_placement_record
+from seip_addon.core.output.results.placement_file import comparable, load_placement
 from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import open_blend, save_blend
@@ -44,7 +44,7 @@ def test_a_report_is_written_and_named(folder, capsys):
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "Mill Lane" in page
     assert "Prices include installation" in page
-    price = load_placement_record(folder / "placement.json").price_usd
+    price = load_placement(folder / "placement.json").price_usd
     headline = f"2 sensors see [^.]*\\.[^.]*\\.?[^.]*, for \\${price:,.0f} installed\\."
     assert re.search(headline, page)
     assert "Installed price, $" in page
@@ -52,7 +52,8 @@ def test_a_report_is_written_and_named(folder, capsys):
 
 def test_everything_that_is_shared_names_the_sources(folder):
     report.main([str(folder), "--effort", "0"])
-    assert load_placement_record(folder / "placement.json").site.attribution == (CREDIT, "Surveyors & Sons")
+    assert load_placement(folder / "placement.json").site.attribution == (CREDIT, "Surveyors & Sons")
+    assert (folder / "ATTRIBUTION.txt").read_text(encoding="utf-8") == f"{CREDIT}\nSurveyors & Sons\n"
     assert json.loads((folder / "placement.geojson").read_text(encoding="utf-8"))["attribution"][0] == CREDIT
     assert f"{CREDIT}; Surveyors &amp; Sons" in (folder / "report.html").read_text(encoding="utf-8")
     assert f"<description>{CREDIT}\nSurveyors &amp; Sons" in (folder / "placement.kml").read_text(encoding="utf-8")
@@ -68,7 +69,7 @@ def test_an_impossible_effort_is_refused(folder, effort):
 
 
 def test_the_record_and_the_maps_agree(folder):
-    record = load_placement_record(folder / "placement.json")
+    record = load_placement(folder / "placement.json")
     features = json.loads((folder / "placement.geojson").read_text(encoding="utf-8"))["features"]
     points = [one["geometry"]["coordinates"] for one in features if one["properties"]["kind"] == "sensor"]
     assert points == [[one.longitude_deg, one.latitude_deg, round(one.altitude_m, 3)] for one in record.sensors]
@@ -79,12 +80,12 @@ def test_the_record_and_the_maps_agree(folder):
 
 
 def test_the_command_of_a_record_asks_for_the_same_again(folder, tmp_path, monkeypatch):
-    record = load_placement_record(folder / "placement.json")
+    record = load_placement(folder / "placement.json")
     words = shlex.split(repeating_command(record))
     assert words[:3] == ["seip", "place", "placed.blend"]
     monkeypatch.chdir(folder)
     place.main([*words[2:-1], str(tmp_path)])
-    assert comparable(load_placement_record(tmp_path / "placement.json")) == comparable(record)
+    assert comparable(load_placement(tmp_path / "placement.json")) == comparable(record)
 
 
 @pytest.mark.parametrize(
@@ -116,7 +117,7 @@ def test_every_option_survives_the_record(folder, typed):
     parse = place._parser().parse_args  # noqa: SLF001  # what the command itself reads options with
     asked = parse(["a.blend", "-o", "out", *typed])
     settings = surveys._settings(asked)  # noqa: SLF001  # as above
-    record = load_placement_record(folder / "placement.json")
+    record = load_placement(folder / "placement.json")
     goal = read_objective(asked)
     content = record.as_json()
     content["settings"] = {
@@ -125,7 +126,7 @@ def test_every_option_survives_the_record(folder, typed):
         "render": not asked.no_render,
     }
     (folder.parent / "typed.json").write_text(json.dumps(content), encoding="utf-8")
-    words = shlex.split(repeating_command(load_placement_record(folder.parent / "typed.json")))
+    words = shlex.split(repeating_command(load_placement(folder.parent / "typed.json")))
     again = parse(words[2:])
     assert surveys._settings(again) == settings  # noqa: SLF001  # as above
     assert read_objective(again) == goal
@@ -139,7 +140,7 @@ def test_a_new_placement_takes_the_report_on_the_old_one_away(folder, small_scen
     place.main([str(small_scene), "-o", str(tmp_path), *QUICK, "--count", "2"])
     assert not (tmp_path / "report.html").exists()
     assert not (tmp_path / "placement.kml").exists()
-    notes = load_placement_record(tmp_path / "placement.json").notes
+    notes = load_placement(tmp_path / "placement.json").notes
     assert "placement.geojson and placement.kml are not written: the scene's map names no projection" in notes
 
 

@@ -145,7 +145,7 @@ def test_a_second_result_replaces_the_first(example, scene):
     write_result(scene, example.site, example.deployment)
     assert counts() == first
     assert sorted(obj.name for obj in bpy.data.objects) == names
-    write_result(scene, example.site, deploy(example.site, example.models, example.visible, [5]))
+    write_result(scene, example.site, deploy(example.site, example.models, example.visible[[5]], [5]))
     assert len(empties(scene)) == 1
     clear_result(scene)
     assert not contract.find(scene, contract.SENSORS).objects
@@ -213,7 +213,7 @@ def test_a_sensor_behind_a_building_is_marked_as_hidden(example, scene, tmp_path
     clear = int(np.argmin(np.hypot(*(position[:, :2] - (47.0, 9.0)).T)))  # open to the south
     shaded = int(np.argmin(np.hypot(*(position[:, :2] - (-13.0, -9.0)).T)))  # north of a building
     poses = [names.index(example.site.candidates.position_name[place]) for place in (clear, shaded)]
-    deployment = deploy(example.site, example.models, example.visible, poses)
+    deployment = deploy(example.site, example.models, example.visible[poses], poses)
     write_result(scene, example.site, deployment)
     save_rendered_view(tmp_path / "view.png", scene, example.site, deployment)
     hidden = dict(zip([sensor.pose for sensor in deployment.sensors], seen["sight"].hidden.tolist(), strict=True))

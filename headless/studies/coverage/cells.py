@@ -171,5 +171,5 @@ def solve_cell(
     objective = Objective(count=cell.count, central_weight=None if cell.weight == 1.0 else cell.weight)
     problem = replace(placement_problem(site, visible, models, objective), forbidden=~allowed)
     placement = yield from solve(problem, limits)
-    deployment = deploy(site, models, visible, placement.chosen)
+    deployment = deploy(site, models, visible[placement.chosen], placement.chosen)
     return Case(**vars(cell), placement=placement, greedy=solve_greedy(problem), deployment=deployment)

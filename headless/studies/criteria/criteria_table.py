@@ -137,7 +137,7 @@ def choose_placements(
         configurations = tuple(
             SensorConfiguration(
                 f"{kind} {number}",
-                deploy(survey.site, survey.models, survey.grid.visible, poses),
+                deploy(survey.site, survey.models, survey.grid.rows(poses), poses),
                 next(iter(survey.models)),
                 count,
                 kind,

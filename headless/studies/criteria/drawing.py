@@ -153,7 +153,7 @@ def draw_placements(
     def configurations(kind: str, chosen: Sequence[Integer]) -> tuple[SensorConfiguration, ...]:
         return tuple(
             SensorConfiguration(
-                f"{kind} {number}", deploy(site, survey.models, visible, poses), sensor, count, kind, np.inf
+                f"{kind} {number}", deploy(site, survey.models, visible[poses], poses), sensor, count, kind, np.inf
             )
             for number, poses in enumerate(chosen, start=1)
         )
@@ -162,7 +162,7 @@ def draw_placements(
     others = [
         SensorConfiguration(
             f"optimal for {one.name}",
-            deploy(site, survey.models, visible, one.chosen),
+            deploy(site, survey.models, visible[one.chosen], one.chosen),
             sensor,
             count,
             one.status,

@@ -59,15 +59,15 @@ def site_criteria(
 
     Those of the literature go by channels, and are left out for rosettes.
     """
-    site, grid = survey.site, survey.grid
+    site, visible = survey.site, survey.grid.visible
     users = road_users(survey.geometry)
     returns = yield from stored_returns(survey.returns_path, site, users, survey.models, survey.settings.engine, 1)
     often = vehicle_occupancy(site.targets, runs)
     literature = () if not set(keys) & set(OF_LITERATURE) else (yield from _of_literature(survey, runs))
     criteria = (
-        SeenShare("coverage", "coverage", grid.visible, np.ones(len(site.targets))),
+        SeenShare("coverage", "coverage", visible, np.ones(len(site.targets))),
         LogReturns(returns.returns, user_weights(users, Objective())),
-        SeenShare("occupancy_entropy", "S-MIG", grid.visible, entropy(often)),
+        SeenShare("occupancy_entropy", "S-MIG", visible, entropy(often)),
         *literature,
     )
     return tuple(one for one in criteria if one.key in {"coverage", *keys})

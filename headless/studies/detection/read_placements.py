@@ -9,7 +9,8 @@ import numpy as np
 
 from seip_addon.core.choosing.placement.objective import Objective
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.results.placement_record import PlacementRecord, load_placement_record
+from seip_addon.core.output.results.placement_file import load_placement
+from seip_addon.core.output.results.placement_record import PlacementRecord
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
 from seip_addon.core.site.site import Site
@@ -33,7 +34,7 @@ def records_in(folders: Sequence[Path]) -> dict[str, PlacementRecord]:
         name = folder.resolve().name
         if name in records:
             raise SeipError(f"two placements are called {name!r}, after their folders: rename one of the folders")
-        record = load_placement_record(folder / FILE)
+        record = load_placement(folder / FILE)
         if not record.sensors:
             raise SeipError(f"the placement in {folder} has no sensors: optimise a placement with `seip place` first")
         records[name] = record

@@ -207,7 +207,7 @@ def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
         around, scene.problem(scene.sensor), scene.scope.robust, limits=survey.settings.limits
     )
     chosen = study.nominal[0].placement.chosen
-    deployment = deploy(survey.site, survey.models, survey.grid.visible, chosen)
+    deployment = deploy(survey.site, survey.models, survey.grid.rows(chosen), chosen)
     under_errors = yield from pose_study(around, deployment, scene.scope.poses)
     pose_error_charts.save_spread_chart(scene.charts / "spread.png", study, f"{scene.placed} under pose errors")
     pose_error_charts.save_loss_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
@@ -251,7 +251,7 @@ def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     )
     study = yield from steps
     chosen = study.traffic.placement.chosen
-    deployment = deploy(survey.site, survey.models, survey.grid.visible, chosen)
+    deployment = deploy(survey.site, survey.models, survey.grid.rows(chosen), chosen)
     title = f"{scene.placed} in traffic"
     traffic_charts.save_time_map(
         scene.charts / "time_seen.png", survey.geometry, survey.site, deployment, study.traffic, title
@@ -291,7 +291,7 @@ def weather(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     survey = scene.survey
     study = yield from weather_study(survey.geometry, survey.settings)
     best = yield from solve(scene.problem(scene.sensor), survey.settings.limits)
-    deployment = deploy(survey.site, survey.models, survey.grid.visible, best.chosen)
+    deployment = deploy(survey.site, survey.models, survey.grid.rows(best.chosen), best.chosen)
     sensors = deployment.mounted
     rows = weather_rows(study, untouched_types(survey, scene.placed, sensors))
     limits_charts.save_weather_chart(scene.charts / "weather.png", study, f"{scene.name} in rain and fog")

@@ -16,9 +16,7 @@ from ..errors import SeipError
 from ..geometry.orientation import angles_of
 from ..geometry.plan import surface_height
 from ..output.results.headings import degrees, tilt_degrees
-from ..output.results.placement_record import PlacementRecord
 from ..progress import Progress
-from ..sensing.lidar.catalogue import find_models, load_catalogue
 from ..sensing.scans.sensor import MountedSensor
 from ..sensing.visibility.sight_lines import pose_at
 from ..sensing.visibility.visibility_model import VisibilityModel, visibility_model
@@ -92,15 +90,6 @@ def evaluate_moved_sensors(
         price=deployment.price,
     )
     return Solution(objective, placement, None, deployment)
-
-
-def restored_by_hand(survey: Survey, record: PlacementRecord) -> Generator[Progress, None, Solution]:
-    """Evaluate the sensors of a record again, on the survey of the record."""
-    sensors = record.sensors
-    models = find_models(load_catalogue(survey.settings.catalogue), sorted({one.sensor for one in sensors}))
-    mounted = [one.mounted(models[one.sensor]) for one in sensors]
-    places = {one.id: one.position for one in sensors}
-    return (yield from evaluate_moved_sensors(survey, record.request.goal, mounted, places))
 
 
 def _off_candidates(layout: Layout, one: MountedSensor, place: str) -> Sensor:

@@ -85,9 +85,9 @@ def place(
 
 def _nominal(survey: Survey, objective: Objective, limits: SolverLimits) -> Generator[Progress, None, Solution]:
     """Optimise for nominal poses on the empty road."""
-    site, models, visible = survey.site, survey.models, survey.grid.visible
-    if criterion_of(objective, models) == "returns":
+    if criterion_of(objective, survey.models) == "returns":
         return (yield from place_by_returns(survey, objective, limits))
+    site, models, visible = survey.site, survey.models, survey.grid.visible
     solution = yield from optimise(site, visible, models, objective, limits)
     placement = solution.placement
     if placement.status != "optimal" or objective.cheapest:
@@ -101,12 +101,13 @@ def _under_risk(
     survey: Survey, objective: Objective, limits: SolverLimits, measure: Risk
 ) -> Generator[Progress, None, Solution]:
     """Optimise a risk measure over pose errors, or over sensor failures in the nominal scenario."""
-    site, models, visible = survey.site, survey.models, survey.grid.visible
+    site, models, grid = survey.site, survey.models, survey.grid
     around, scenarios = surroundings(survey), objective.scenarios
-    problem = placement_problem(site, visible, models, objective)
+    problem = placement_problem(site, grid.visible, models, objective)
     study = yield from robust_study(around, problem, scenarios, [measure], limits)
     (chosen,) = study.robust
-    deployment = deploy(site, models, visible, chosen.placement.chosen)
+    poses = chosen.placement.chosen
+    deployment = deploy(site, models, grid.rows(poses), poses)
     under_errors = None
     if scenarios.errs:
         draws = scenarios.evaluated
@@ -124,10 +125,10 @@ def _in_traffic(
     survey: Survey, objective: Objective, limits: SolverLimits, measure: Risk, runs: TrafficRuns
 ) -> Generator[Progress, None, Solution]:
     """Optimise a risk measure over instants of traffic, whose vehicles block the view."""
-    site, models, visible = survey.site, survey.models, survey.grid.visible
+    site, models, grid = survey.site, survey.models, survey.grid
     around, scenarios = surroundings(survey), objective.scenarios
     layer: TrafficLayer = "height" if objective.criterion == "height" else "road"
-    problem = placement_problem(site, visible, models, objective)
+    problem = placement_problem(site, grid.visible, models, objective)
     if scenarios.weights_from_traffic:
         seconds = yield from road_user_seconds(site.targets, runs.optimisation)
         problem = replace(problem, weights=problem.weights * seconds)
@@ -142,7 +143,7 @@ def _in_traffic(
     weights = ("targets are weighted by the time that road users are there",) if scenarios.weights_from_traffic else ()
     placement = study.traffic.placement
     placement = replace(placement, notes=(note, *weights, *placement.notes, *study.messages()))
-    deployment = deploy(site, models, visible, placement.chosen)
+    deployment = deploy(site, models, grid.rows(placement.chosen), placement.chosen)
     return Solution(with_count(objective, site), placement, None, deployment, study)
 
 

@@ -1,17 +1,50 @@
-"""Records of placements: what ``placement.json`` holds of a solution, and the solution of a record."""
+"""Records of placements: from a solution to the content of ``placement.json``, and back."""
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import replace
 
-from ..choosing.placement.deployment import deploy_rows
-from ..choosing.placement.objective import Solution, target_weights
+from ..choosing.placement.deployment import deploy, pose_prices
+from ..choosing.placement.objective import MOVED, Solution, target_weights
 from ..errors import SeipError
 from ..output.results.located import LOCATED_FILES, missing_sentence
 from ..output.results.placement_record import PlacementRecord, Provenance, placement_record
+from ..progress import Progress
+from ..sensing.lidar.catalogue import find_models, load_catalogue
+from ..sensing.returns.returns_grid import returns_key
+from ..sensing.returns.road_users import road_users
+from ..sensing.visibility.ray_casting import engine_name
+from ..storage.files import digest
 from ..storage.json_dataclass import as_json
-from .returns import stored_pedestrian_returns
-from .survey import Survey, inputs_of
+from .moved_sensors import evaluate_moved_sensors
+from .returns import CROSSING_SHARE, stored_pedestrian_returns
+from .survey import Layout, Survey, grid_key
+
+STALE = "the placement is stale, as the scene or its settings have changed: place again"
+_RETURNS = "returns"
+"""Name of the digest of what only a placement by returns depends on."""
+
+
+def inputs_of(layout: Layout) -> dict[str, str]:
+    """Return digests of the inputs of a placement: of the visibility grid, of the rest of the site, of the returns.
+
+    Two layouts with the same digests have the same solution for the same objective. Those of the visibility grid and
+    of the site are enough for objectives other than returns.
+    """
+    targets, candidates = layout.site.targets, layout.site.candidates
+    site = digest(
+        *(targets.weight, targets.central, candidates.position_name, candidates.position_of),
+        *(candidates.mandatory, candidates.mandatory_name, pose_prices(candidates, layout.models)),
+    )
+    users = road_users(layout.geometry)
+    returns = digest(
+        returns_key(layout.site, users, layout.models, engine_name(layout.settings.engine)),
+        *(users.weight, users.central, users.crossing),
+        *users.crossings,
+        CROSSING_SHARE,
+    )
+    return {"visibility": grid_key(layout), "site": site, _RETURNS: returns}
 
 
 def record_of(survey: Survey, solution: Solution, provenance: Provenance, *, render: bool = False) -> PlacementRecord:
@@ -25,18 +58,23 @@ def record_of(survey: Survey, solution: Solution, provenance: Provenance, *, ren
     objective = {"goal": as_json(solution.objective), "render": render}
     missing = missing_sentence(survey.site, LOCATED_FILES)
     notes = (*solution.notes, *([missing] if missing else []))
+    inputs = inputs_of(survey)
+    if solution.deployment.returns is None:
+        del inputs[_RETURNS]
     return placement_record(
         survey.site,
         replace(solution, placement=replace(solution.placement, notes=notes)),
         provenance,
         settings={**survey.settings.as_record(), **objective},
-        inputs=inputs_of(survey) | {"visibility": survey.grid.key},
+        inputs=inputs,
         warnings=survey.warnings,
     )
 
 
-def restored_solution(survey: Survey, record: PlacementRecord) -> Solution:
+def restored_solution(survey: Survey, record: PlacementRecord) -> Generator[Progress, None, Solution]:
     """Return the solution in a record of `record_of`, without solving again.
+
+    Sensors that were moved by hand are evaluated at their poses.
 
     Parameters
     ----------
@@ -48,16 +86,29 @@ def restored_solution(survey: Survey, record: PlacementRecord) -> Solution:
     Raises
     ------
     SeipError
-        The record belongs to a different grid, or contains a pose that is not a candidate.
+        The record belongs to a different survey, or contains a pose that is not a candidate.
     """
     site, grid = survey.site, survey.grid
+    if record.inputs.get("visibility") != grid.key or not record.is_of(inputs_of(survey)):
+        raise SeipError(STALE)
+    if record.objective.status == MOVED:
+        return (yield from _restored_by_hand(survey, record))
     poses = range(len(site.candidates))
-    if record.inputs.get("visibility") != grid.key or not all(sensor.pose in poses for sensor in record.sensors):
-        raise SeipError("the placement is stale, as the scene or its settings have changed: place again")
+    if not all(sensor.pose in poses for sensor in record.sensors):
+        raise SeipError(STALE)
     objective, chosen = record.request.goal, record.poses
     covered = float(target_weights(site, objective)[grid.times_seen(chosen) > 0].sum())
-    deployment = deploy_rows(site, survey.models, grid.rows(chosen), chosen)
+    deployment = deploy(site, survey.models, grid.rows(chosen), chosen)
     known = replace(deployment, gain_band=record.coverage.gain_band, returns=record.returns)
     if record.returns is not None:
         known = replace(known, pedestrian_returns=stored_pedestrian_returns(survey, chosen))
     return Solution(objective, record.placement(covered), None, known)
+
+
+def _restored_by_hand(survey: Survey, record: PlacementRecord) -> Generator[Progress, None, Solution]:
+    """Evaluate the sensors of a record again, on the survey of the record."""
+    sensors = record.sensors
+    models = find_models(load_catalogue(survey.settings.catalogue), sorted({one.sensor for one in sensors}))
+    mounted = [one.mounted(models[one.sensor]) for one in sensors]
+    places = {one.id: one.position for one in sensors}
+    return (yield from evaluate_moved_sensors(survey, record.request.goal, mounted, places))

@@ -42,14 +42,11 @@ def place_by_returns(survey: Survey, objective: Objective, limits: SolverLimits)
     SeipError
         Same as for `placement_problem` and `solve_returns`.
     """
-    site, models, visible = survey.site, survey.models, survey.grid.visible
+    site, models = survey.site, survey.models
     users = road_users(survey.geometry)
     grid = yield from stored_returns(survey.returns_path, site, users, models, survey.settings.engine)
-    problem = replace(
-        placement_problem(site, visible, models, objective),
-        visible=grid.returns > 0,
-        weights=user_weights(users, objective),
-    )
+    problem = placement_problem(site, grid.returns > 0, models, objective)
+    problem = replace(problem, weights=user_weights(users, objective))
     placement = yield from solve_returns(problem, grid.returns, limits)
     greedy = yield from greedy_returns(problem, grid.returns)
     summary = summarised(grid, users, objective, placement.chosen)
@@ -59,7 +56,7 @@ def place_by_returns(survey: Survey, objective: Objective, limits: SolverLimits)
         replace(placement, notes=(note, *summary.warnings(), *placement.notes)),
         greedy,
         replace(
-            deploy(site, models, visible, placement.chosen),
+            deploy(site, models, survey.grid.rows(placement.chosen), placement.chosen),
             returns=summary,
             pedestrian_returns=_near_targets(site.targets, users, grid, placement.chosen),
         ),

@@ -1,4 +1,4 @@
-"""Surveys: site layout and visibility grid, and the record of a placement on them."""
+"""Surveys: site layout and visibility grid."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ..choosing.placement.deployment import pose_prices
 from ..choosing.placement.integer_program import check_solver
 from ..choosing.placement.search_limits import DEFAULT_EFFORT, SolverLimits
 from ..output.results.headings import tilt_degrees
@@ -35,7 +34,6 @@ from ..site.obstruction import bareness_warnings
 from ..site.scene_geometry import SceneGeometry
 from ..site.site import Site, make_site
 from ..site.weather import Weather
-from ..storage.files import digest
 
 
 @dataclass(frozen=True)
@@ -225,19 +223,6 @@ def grid_key(layout: Layout) -> str:
     """Return the key of the visibility grid of a survey, by which it is stored."""
     settings = layout.settings
     return visibility_key(layout.site, layout.models, settings.visibility, engine_name(settings.engine))
-
-
-def inputs_of(layout: Layout) -> dict[str, str]:
-    """Return digests of the inputs of a placement: of the visibility grid, and of the rest of the site.
-
-    Two layouts with the same digests have the same solution for the same objective.
-    """
-    targets, candidates = layout.site.targets, layout.site.candidates
-    site = digest(
-        *(targets.weight, targets.central, candidates.position_name, candidates.position_of),
-        *(candidates.mandatory, candidates.mandatory_name, pose_prices(candidates, layout.models)),
-    )
-    return {"visibility": grid_key(layout), "site": site}
 
 
 def see(

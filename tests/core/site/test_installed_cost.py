@@ -49,7 +49,7 @@ def test_the_problem_and_the_deployment_count_the_same_prices(example):
     there = counted(example, load_installed_cost())
     problem = placement_problem(there.site, example.visible, example.models, Objective(count=3))
     chosen = [sensor.pose for sensor in example.deployment.sensors]
-    deployment = deploy(there.site, example.models, example.visible, chosen)
+    deployment = deploy(there.site, example.models, example.visible[chosen], chosen)
     assert deployment.price == pytest.approx(math.fsum(problem.prices[chosen]))
     for sensor in deployment.sensors:
         assert sensor.price == sensor.model.price + sensor.installation == problem.prices[sensor.pose]

@@ -6,19 +6,11 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from seip_addon.core.choosing.placement.objective import Objective
-from seip_addon.core.errors import SeipError
-from seip_addon.core.output.results.placement_record import (
-    Provenance,
-    load_placement_record,
-    save_placement_record,
-)
+from seip_addon.core.output.results.placement_record import Provenance
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.visibility_model import visibility_model
-from seip_addon.core.workflows.placing import place
-from seip_addon.core.workflows.records import record_of, restored_solution
-from seip_addon.core.workflows.survey import grid_key, inputs_of, lay_out, see
+from seip_addon.core.workflows.survey import grid_key, lay_out, see
 
 MADE = Provenance(datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC), {"placement": 1.0}, {"seip": "0"})
 
@@ -60,29 +52,3 @@ def test_a_stored_grid_is_read_and_not_computed_again(small_survey, small_layout
 def test_other_settings_have_another_key(small_layout, change):
     settings = replace(small_layout.settings, **change)
     assert grid_key(lay_out(small_layout.geometry, settings)) != grid_key(small_layout)
-
-
-def test_weights_change_the_site_but_not_the_visibility(small_layout):
-    targets = small_layout.site.targets
-    heavier = replace(targets, weight=np.where(targets.central, 5.0, 1.0))
-    changed = replace(small_layout, site=replace(small_layout.site, targets=heavier))
-    assert inputs_of(changed)["visibility"] == inputs_of(small_layout)["visibility"]
-    assert inputs_of(changed)["site"] != inputs_of(small_layout)["site"]
-
-
-def test_a_solution_is_restored_from_its_record(small_survey, tmp_path):
-    solution = finish(place(small_survey, Objective(count=2)))
-    save_placement_record(tmp_path / "placement.json", record_of(small_survey, solution, MADE))
-    restored = restored_solution(small_survey, load_placement_record(tmp_path / "placement.json"))
-    np.testing.assert_array_equal(restored.placement.chosen, solution.placement.chosen)
-    assert restored.placement.objective == solution.placement.objective
-    assert restored.placement.status == solution.placement.status == "optimal"
-    assert restored.deployment.coverage == solution.deployment.coverage
-    assert restored.objective == solution.objective
-
-
-def test_a_record_of_another_grid_is_refused(small_survey):
-    record = record_of(small_survey, finish(place(small_survey, Objective(count=1))), MADE)
-    other = replace(record, inputs={**record.inputs, "visibility": "another"})
-    with pytest.raises(SeipError, match="place again"):
-        restored_solution(small_survey, other)

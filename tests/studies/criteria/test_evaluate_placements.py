@@ -14,7 +14,7 @@ from headless.studies.detection import command as evaluate
 from matplotlib.image import imread
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.results.placement_record import save_placement_record
+from seip_addon.core.output.results.placement_file import save_placement
 
 COARSE = ["--heights", "5.4", "--grid", "8", "--spacing", "20"]
 BRIEF = ["--every", "14", "--steps", "2", "--from-scratch"]
@@ -36,9 +36,9 @@ def study(run, tmp_path_factory):
     return folder
 
 
-def record_alone(folder, scene, geometry, site, solution, record, **_):
+def record_alone(folder, scene, surveyed, solution, record, **_):
     """Write of a result what is read again."""
-    save_placement_record(folder / "placement.json", record)
+    save_placement(folder / "placement.json", record)
 
 
 @pytest.fixture(scope="module")

@@ -245,7 +245,7 @@ def test_criteria_by_hand():
     everything = np.zeros((len(site.candidates), 3), dtype=bool)
     everything[[0, 1, 2], [0, 1, 2]] = True
     placements = [
-        SensorConfiguration(f"{pose}", deploy(site, models, everything, [pose]), "type1", 1, "random", np.inf)
+        SensorConfiguration(f"{pose}", deploy(site, models, everything[[pose]], [pose]), "type1", 1, "random", np.inf)
         for pose in (0, 1, 2)
     ]
     simulator = SimpleNamespace(static=StaticScene(GROUND, np.full(2, 0.3), site.region), settings=ScanSettings())

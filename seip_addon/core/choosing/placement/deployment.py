@@ -207,33 +207,19 @@ def pose_prices(candidates: Candidates, models: Mapping[str, LidarModel]) -> Flo
     return prices if installation is None else prices + installation[candidates.position_of]
 
 
-def deploy(
-    site: Site, models: Mapping[str, LidarModel], visible: Boolean, chosen: Sequence[int] | Integer
-) -> Deployment:
+def deploy(site: Site, models: Mapping[str, LidarModel], rows: Boolean, chosen: Sequence[int] | Integer) -> Deployment:
     """Return the chosen poses as sensors, with their coverage.
-
-    Parameters
-    ----------
-    visible : (c, t) bool
-    chosen : (k,) int
-        Indices of the chosen poses; their order breaks ties between labels.
-    """
-    poses = np.asarray(chosen, dtype=np.int64)
-    return deploy_rows(site, models, visible[poses], poses)
-
-
-def deploy_rows(site: Site, models: Mapping[str, LidarModel], rows: Boolean, chosen: Integer) -> Deployment:
-    """Return the chosen poses as sensors, given only their rows of the visibility grid.
 
     Parameters
     ----------
     rows : (k, t) bool
         Visibility of each target from each chosen pose.
-    chosen : (k,) int64
+    chosen : (k,) int
         Indices of the chosen poses; their order breaks ties between labels.
     """
     order = _by_added_coverage(rows)
-    mounted = [sensor_at(site, models, f"S{rank + 1}", int(pose)) for rank, pose in enumerate(chosen[order])]
+    poses = np.asarray(chosen, dtype=np.int64)[order]
+    mounted = [sensor_at(site, models, f"S{rank + 1}", int(pose)) for rank, pose in enumerate(poses)]
     return deployment_of(site, mounted, rows[order])
 
 

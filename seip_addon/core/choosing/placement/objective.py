@@ -332,12 +332,17 @@ def placement_problem(
     SeipError
         The objective contradicts itself or the site.
     """
-    constraints = _constraints(site, models, objective)
-    return PlacementProblem(visible=visible, **vars(constraints))
+    return PlacementProblem(visible=visible, **vars(placement_constraints(site, models, objective)))
 
 
-def _constraints(site: Site, models: Mapping[str, LidarModel], objective: Objective) -> PlacementConstraints:
-    """Return the constraints and weights of an objective on a site, checked."""
+def placement_constraints(site: Site, models: Mapping[str, LidarModel], objective: Objective) -> PlacementConstraints:
+    """Return the constraints and weights of an objective on a site.
+
+    Raises
+    ------
+    SeipError
+        The objective contradicts itself or the site.
+    """
     candidates = site.candidates
     demanded = np.array([_named(candidates, name) for name in objective.mandatory], dtype=bool)
     groups = np.concatenate((candidates.mandatory, demanded.reshape(-1, len(candidates.position))))
@@ -361,7 +366,7 @@ def _constraints(site: Site, models: Mapping[str, LidarModel], objective: Object
 
 def check_objective(site: Site, models: Mapping[str, LidarModel], objective: Objective) -> None:
     """Raise SeipError if a site cannot meet an objective, before any ray is cast."""
-    _constraints(site, models, objective)
+    placement_constraints(site, models, objective)
 
 
 def optimise(
@@ -389,7 +394,8 @@ def optimise(
     else:
         placement = yield from solve(problem, limits)
         greedy = solve_greedy(problem)
-    return Solution(with_count(objective, site), placement, greedy, deploy(site, models, visible, placement.chosen))
+    deployment = deploy(site, models, visible[placement.chosen], placement.chosen)
+    return Solution(with_count(objective, site), placement, greedy, deployment)
 
 
 def with_count(objective: Objective, site: Site) -> Objective:

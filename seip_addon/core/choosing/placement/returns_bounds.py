@@ -39,10 +39,14 @@ import numpy as np
 from ...arrays import Float
 from .bounds import Selection, select
 from .returns_instance import ReturnsInstance, row_blocks
+from .search_limits import Clock
 
 HALVINGS = 8  # halvings of the interval in which the best c of a road user lies
 LEAST_SHARE = 0.02  # candidates with less than this part of the largest share in a choice do not affect the parameters
 ROUNDING = 2e-6  # relative and absolute error that single precision may cause in a bound, with room to spare
+OPERATIONS_PER_LOGARITHM = 20  # multiplications that take as long as one logarithm in a row of returns
+OPERATIONS_PER_SLOPE = 40  # those that take as long as the slope at one entry, in one halving of the interval
+OPERATIONS_PER_LOOKUP = 340  # those that take as long as looking up one parameter in the table, in one halving
 _TABLE = np.concatenate([[0.0], np.geomspace(1e-4, 1e7, 4000)])
 _TABLE_INTERCEPT = np.log1p(_TABLE) - _TABLE / (1 + _TABLE)
 
@@ -105,7 +109,7 @@ class Completion:
         # single precision may have made the scores too small, and a bound must not be
         return ReturnsBound((fixed + selection.value) * (1 + ROUNDING) + ROUNDING, fixed, selection)
 
-    def falling_bounds(self, share: Float) -> Iterator[tuple[ReturnsBound, Float]]:
+    def falling_bounds(self, share: Float, clock: Clock) -> Iterator[tuple[ReturnsBound, Float]]:
         """Yield bounds, each with the fractional choice of candidates from which it was computed.
 
         The parameters t minimise the bound for a fractional choice. The selection of that bound then joins the choice,
@@ -115,19 +119,22 @@ class Completion:
         ----------
         share : (c,) float64
             Fractional choice to begin from.
+        clock : Clock
+            Clock on which each bound is recorded as work.
         """
         # The smallest bound over t is a minimum over t of a maximum over choices. Each t gives a valid bound, however
         # rough the fractional choice is: it only decides how small the bound becomes, never whether it holds.
         step = 0
         while True:
-            bound = self.bound_at(self._parameters(share))
+            bound = self.bound_at(self._parameters(share, clock))
+            clock.spend(OPERATIONS_PER_LOGARITHM * self.rules.returns.size)
             yield bound, share
             weight = 2.0 / (step + 3.0)
             share = share * (1.0 - weight)
             share[bound.selection.picked] += weight
             step += 1
 
-    def _parameters(self, share: Float) -> Float:
+    def _parameters(self, share: Float, clock: Clock) -> Float:
         """Return nearly the parameters t (m,) that minimise the bound for a fractional choice of candidates.
 
         The bound is smallest where its derivative by c is zero: where r/t of small r and r/(exp(c) + r) of large r,
@@ -141,6 +148,7 @@ class Completion:
         part = share[used].astype(np.float32)
         returns = self.rules.returns[used] * (1.0 / (1.0 + self.base)).astype(np.float32)
         low, high = np.zeros(returns.shape[1]), np.log1p(part @ returns).astype(np.float64)
+        clock.spend(HALVINGS * (OPERATIONS_PER_SLOPE * returns.size + OPERATIONS_PER_LOOKUP * returns.shape[1]))
         for _ in range(HALVINGS):
             intercept = (low + high) / 2
             t = np.interp(intercept, _TABLE_INTERCEPT, _TABLE)

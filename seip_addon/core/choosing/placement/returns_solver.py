@@ -18,7 +18,7 @@ from .greedy import addable
 from .integer_program import check_solver, fits
 from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
 from .reduced_problem import make_instance
-from .returns_bounds import Completion, ReturnsBound
+from .returns_bounds import OPERATIONS_PER_LOGARITHM, Completion, ReturnsBound
 from .returns_instance import ReturnsInstance, make_returns_instance
 from .returns_program import ReturnsProgram, entries_of
 from .returns_summary import returns_text
@@ -28,7 +28,6 @@ STARTS = 6  # number of greedy choices, each from a different first candidate, t
 ROOT_STEPS, NODE_STEPS = 60, 6  # steps of the bound at the root, with all candidates, and at each other node
 BRANCHING_SHARE = 0.5  # share of the limits for branch and bound before the integer program
 PROGRAM_SHARE = 0.5  # share of what is left then for the integer program, where it is small enough
-OPERATIONS_PER_LOGARITHM = 20  # multiplications that take as long as one logarithm
 UNPROVEN = (
     "the limit was reached before this placement was proven the best: the gap is the most by which it may fall short; "
     "a higher limit may close it"
@@ -68,7 +67,7 @@ def solve_returns(
     clock = limits.clock()
     instance = make_returns_instance(problem, returns)
     start = yield from _starting_choice(problem, instance, limits.solver)
-    standing = Standing(instance, start)
+    standing = Standing(instance, start, clock)
     chosen = yield from improved_greedy(instance, start, clock, standing)
     search = _Search(instance, chosen, clock, standing)
     solver, by_program = "branch and bound", limits.solver != "auto"
@@ -100,12 +99,12 @@ class Standing:
         Candidates that serve the mandatory groups; the greedy choice from there has the first bound.
     """
 
-    def __init__(self, instance: ReturnsInstance, start: Integer) -> None:
-        chosen = greedy(instance, start)
+    def __init__(self, instance: ReturnsInstance, start: Integer, clock: Clock) -> None:
+        chosen = greedy(instance, start, clock)
         share = np.zeros(len(instance))
         share[chosen] = 1.0
         everything = Completion(instance, np.zeros(len(instance.weight)))
-        first, _ = next(everything.falling_bounds(share))  # as quick as one swap, and so not counted as work
+        first, _ = next(everything.falling_bounds(share, clock))
         self.value, self.bound = instance.value(chosen), first.value
 
     def note(self, value: float, bound: float = math.inf) -> None:
@@ -123,7 +122,8 @@ def greedy_returns(problem: PlacementProblem, returns: NDArray[np.float32]) -> G
     clock = Clock(math.inf)
     instance = make_returns_instance(problem, returns)
     start = yield from _starting_choice(problem, instance, "highs")
-    chosen = max((greedy(instance, start, per_price=per_price) for per_price in _orders(instance)), key=instance.value)
+    choices = [greedy(instance, start, clock, per_price=per_price) for per_price in _orders(instance)]
+    chosen = max(choices, key=instance.value)
     return assess(
         problem,
         instance.original[chosen],
@@ -159,11 +159,17 @@ def _stand_in(instance: ReturnsInstance, problem: PlacementProblem, candidate: i
     return int(there[serves & cheap][0])
 
 
-def greedy(instance: ReturnsInstance, start: Integer, *, per_price: bool = False) -> Integer:
+def _gains(instance: ReturnsInstance, base: Float, clock: Clock, among: Integer | None = None) -> Float:
+    """Return `ReturnsInstance.added`, recorded as work."""
+    clock.spend(OPERATIONS_PER_LOGARITHM * (len(instance) if among is None else len(among)) * len(base))
+    return instance.added(base, among)
+
+
+def greedy(instance: ReturnsInstance, start: Integer, clock: Clock, *, per_price: bool = False) -> Integer:
     """Add the candidate of largest gain, or gain per price, until none can be added; return the choice, ascending."""
     chosen = start
     while True:
-        gain = np.where(addable(instance, chosen), instance.added(instance.together(chosen)), 0.0)
+        gain = np.where(addable(instance, chosen), _gains(instance, instance.together(chosen), clock), 0.0)
         score = gain / np.maximum(instance.price, TIE_TOLERANCE * instance.price.max()) if per_price else gain
         best = int(np.argmax(score))
         if gain[best] <= 0:
@@ -175,14 +181,15 @@ def improved_greedy(
     instance: ReturnsInstance, start: Integer, clock: Clock, standing: Standing
 ) -> Generator[Progress, None, Integer]:
     """Return the best of several greedy choices after swaps, ascending."""
-    best = yield from swapped(instance, greedy(instance, start), clock, standing)
+    best = yield from swapped(instance, greedy(instance, start, clock), clock, standing)
     if True in _orders(instance):
-        other = yield from swapped(instance, greedy(instance, start, per_price=True), clock, standing)
+        other = yield from swapped(instance, greedy(instance, start, clock, per_price=True), clock, standing)
         best = max(best, other, key=instance.value)
-    first = np.where(addable(instance, start), instance.added(instance.together(start)), 0.0)
+    first = np.where(addable(instance, start), _gains(instance, instance.together(start), clock), 0.0)
     for candidate in np.argsort(-first, kind="stable")[1:STARTS]:
         if first[candidate] > 0:
-            other = yield from swapped(instance, greedy(instance, np.append(start, candidate)), clock, standing)
+            choice = greedy(instance, np.append(start, candidate), clock)
+            other = yield from swapped(instance, choice, clock, standing)
             best = max(best, other, key=instance.value)
     return best
 
@@ -202,14 +209,14 @@ def swapped(
         best, chosen_then = value, chosen
         for gone in chosen:
             rest = chosen[chosen != gone]
-            clock.spend(OPERATIONS_PER_LOGARITHM * instance.returns.size)
-            gain = np.where(addable(instance, rest), instance.added(instance.together(rest)), -np.inf)
+            gain = np.where(addable(instance, rest), _gains(instance, instance.together(rest), clock), -np.inf)
             gain[gone] = -np.inf
             # The best replacement. Under a budget also the best one of each price, followed by what the rest of the
             # budget buys: one cheap sensor in place of an expensive one loses value unless a second one joins it.
             rivals = [np.append(rest, int(np.argmax(gain)))] if np.isfinite(gain).any() else []
             if math.isfinite(instance.budget):
-                rivals += [greedy(instance, np.append(rest, cheap)) for cheap in _best_of_each_price(instance, gain)]
+                cheapest = _best_of_each_price(instance, gain)
+                rivals += [greedy(instance, np.append(rest, one), clock) for one in cheapest]
             for rival in rivals:
                 reached = instance.value(rival)
                 if reached > best + TIE_TOLERANCE and instance.feasible(rival):
@@ -346,7 +353,7 @@ class _Search:
         # is left, at those of the largest gains. A start near the optimum gives a small bound after few steps.
         share = np.zeros(len(left)) if node.share is None else node.share[np.searchsorted(node.left, left)]
         if not share.any():
-            gain = whole.added(base, left)
+            gain = _gains(whole, base, self._clock, left)
             share[np.argsort(-gain, kind="stable")[: rules.count]] = 1.0
         # The root's bound sorts the whole tree and is worth many steps; its selection, and those of nodes, are
         # placements too, which often improve the best one.
@@ -358,8 +365,7 @@ class _Search:
         """Return the smallest of several bounds, and the fractional choice from which it was computed."""
         # The bounds of successive steps need not fall. The steps end early once the node can be cut.
         best: tuple[ReturnsBound, Float] | None = None
-        for step, (bound, own) in enumerate(part.falling_bounds(share)):
-            self._clock.spend(OPERATIONS_PER_LOGARITHM * part.rules.returns.size)
+        for step, (bound, own) in enumerate(part.falling_bounds(share, self._clock)):
             if best is None or bound.value < best[0].value:
                 best = bound, own
             if step + 1 == steps or reached + best[0].value <= self._least or self._clock.left <= 0:
@@ -395,8 +401,7 @@ class _Search:
         self._offer(chosen)
         if not len(left):
             return
-        self._clock.spend(OPERATIONS_PER_LOGARITHM * len(left) * len(base))
-        gain = self.instance.added(base, left)
+        gain = _gains(self.instance, base, self._clock, left)
         serves = self.instance.mandatory[:, chosen].any(axis=1)[:, None] | self.instance.mandatory[:, left]
         gain = np.where(serves.all(axis=0), gain, -np.inf)
         best = int(np.argmax(gain))

@@ -14,7 +14,8 @@ from ...arrays import Boolean, Integer
 from ...errors import SeipError
 from ...geometry.geo_reference import GeoReference
 from ...sensing.visibility.grid import VisibilityGrid
-from ..results.placement_record import PlacementRecord, RecordedSensor, load_placement_record
+from ..results.placement_file import load_placement
+from ..results.placement_record import PlacementRecord, RecordedSensor
 from ..results.site_file import SiteFile, load_site_file
 
 PICTURES = ("view.png", "plan.png")
@@ -82,7 +83,7 @@ def load_evidence(folder: Path) -> Evidence:
         raise SeipError(f"there is no folder {folder}: name the one that `seip place` has written its result to")
     if not (folder / "placement.json").is_file():
         raise SeipError(f"{folder} holds no placement.json: name a folder that `seip place` has written its result to")
-    record, site = load_placement_record(folder / "placement.json"), load_site_file(folder / "site.npz")
+    record, site = load_placement(folder / "placement.json"), load_site_file(folder / "site.npz")
     key = record.inputs.get("visibility")
     if site.key != key or len(site.seen) != len(record.sensors):
         raise SeipError(f"{folder} holds files of different placements: place the sensors again")
@@ -101,7 +102,7 @@ def _grid(path: Path, site: SiteFile) -> VisibilityGrid | None:
     if not path.is_file():
         return None
     grid = VisibilityGrid.load(path)
-    fits = grid.key == site.key and grid.shape == site.problem.visible.shape
+    fits = grid.key == site.key and grid.shape == (len(site.problem.prices), len(site.targets))
     return grid if fits else None
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from ...arrays import Boolean, Integer
 from ...choosing.placement.cheapest import SAME_PRICE
 from ...choosing.placement.objective import CHOSEN_FOR, MOVED
-from ...choosing.placement.problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
+from ...choosing.placement.problem import TIE_TOLERANCE, Placement, PlacementConstraints, PlacementProblem, assess
 from ...choosing.placement.search_limits import SolverLimits
 from ...choosing.placement.solver import solve
 from ...errors import SeipError
@@ -113,7 +113,7 @@ def front(evidence: Evidence, effort: float) -> Generator[Progress, None, tuple[
     return tuple(_point(count, found, known, caps, whole) for count in found)
 
 
-def equal_prices(problem: PlacementProblem) -> bool:
+def equal_prices(problem: PlacementConstraints) -> bool:
     """Return whether all sensors cost the same, so that a price is a number of sensors."""
     prices = problem.prices[problem.allowed]
     return bool(len(prices) and np.ptp(prices) == 0)

@@ -1,13 +1,11 @@
-"""``placement.json``: a placement with all that it takes to read it, check it and make it again."""
+"""Content of ``placement.json``: a placement with the data to read, check and repeat it."""
 
 import json
 import math
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
-from functools import cached_property, lru_cache
-from pathlib import Path
+from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -18,17 +16,14 @@ from ...choosing.placement.deployment import GainBand, Sensor, TypeBand, price_t
 from ...choosing.placement.objective import Objective, Solution
 from ...choosing.placement.problem import Placement
 from ...choosing.placement.returns_summary import ReturnsSummary, share_reached
-from ...errors import SeipError
 from ...geometry.geo_reference import GeoReference
 from ...geometry.orientation import orientation
 from ...sensing.lidar.model import LidarModel
 from ...sensing.scans.sensor import MountedSensor
 from ...site.site import Site
 from ...site.sources import SourceCount
-from ...storage.files import save_json
 from ...storage.json_dataclass import from_json
 from .headings import degrees, tilt_degrees
-from .record_check import check_consistency
 
 Coordinate = Annotated[float, limits.LOCAL_COORDINATE]
 MapCoordinate = Annotated[float, limits.MAP_COORDINATE]
@@ -299,6 +294,10 @@ class PlacementRecord:
             notes=self.notes,
         )
 
+    def is_of(self, inputs: Mapping[str, str]) -> bool:
+        """Return whether the placement was made from inputs with these digests; older records hold fewer digests."""
+        return all(inputs.get(name) == digest for name, digest in self.inputs.items())
+
     @property
     def installed(self) -> bool:
         """Whether its prices count posts, mounting, power and backhaul."""
@@ -375,67 +374,6 @@ def placement_record(
         ),
         returns=deployment.returns and _rounded_returns(deployment.returns),
     )
-
-
-@lru_cache(maxsize=8)
-def parsed_record(text: str) -> PlacementRecord:
-    """Return the record that a scene keeps as a text; panels ask for it at every redraw.
-
-    Raises
-    ------
-    SeipError
-        It is no placement of a version that this program knows.
-    """
-    return _read(text.encode(), "the placement that this scene keeps")
-
-
-def comparable(record: PlacementRecord) -> dict[str, Any]:
-    """Return `PlacementRecord.as_json` without the parts that differ between machines and runs.
-
-    That are times and versions.
-    """
-    return {key: value for key, value in record.as_json().items() if key not in {"times", "versions"}}
-
-
-def save_placement_record(path: str | os.PathLike[str], record: PlacementRecord) -> None:
-    """Write ``placement.json``."""
-    save_json(path, record.as_json())
-
-
-def load_placement_record(path: str | os.PathLike[str]) -> PlacementRecord:
-    """Read ``placement.json``.
-
-    Raises
-    ------
-    SeipError
-        There is no such file, or it is no placement of a version that this program knows.
-    """
-    try:
-        content = Path(path).read_bytes()
-    except OSError as error:
-        raise SeipError(f"cannot read {path}: {error.strerror}; name the placement.json of a finished run") from error
-    return _read(content, str(path))
-
-
-def _read(text: bytes, where: str) -> PlacementRecord:
-    try:
-        content = json.loads(text.decode(), parse_float=_finite, parse_constant=_finite)
-        schema = content.get("schema") if isinstance(content, dict) else None
-        if schema == SCHEMA:
-            record = from_json(PlacementRecord, content)
-            _ = record.request, record.text().encode()  # refused if these cannot be read or written again
-            check_consistency(record)
-            return record
-    except (SeipError, ValueError, RecursionError) as error:
-        raise SeipError(f"{where} is damaged or no placement: {error}; place the sensors again") from error
-    raise SeipError(f"{where} has the schema {schema!r}, not {SCHEMA!r}; place the sensors again with this version")
-
-
-def _finite(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise ValueError(f"{text} is no finite number")
-    return value
 
 
 def _without_absent(items: list[tuple[str, Any]]) -> dict[str, Any]:

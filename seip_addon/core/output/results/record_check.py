@@ -1,15 +1,11 @@
 """Consistency of a ``placement.json``: figures of a record that follow from each other must agree."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Sequence
 from datetime import datetime
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from .placement_record import PlacementRecord
+from .placement_record import PlacementRecord
 
 _CENT = 0.01  # dollars to which prices are rounded
 _SHARE_ERROR = 2e-9  # by which a rounded share may exceed another

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ import shapely
 from ... import limits
 from ...arrays import Boolean, Float
 from ...choosing.placement.objective import Solution
-from ...choosing.placement.problem import PlacementProblem
+from ...choosing.placement.problem import PlacementConstraints, PlacementProblem
 from ...sensing.visibility.grid import VisibilityGrid
 from ...site.scene_geometry import NamedArea, SceneGeometry
 from ...site.site import Site, Targets
@@ -60,7 +60,7 @@ class Area:
 
 @dataclass(frozen=True, eq=False)
 class SiteFile:
-    """Targets, named areas, what each chosen sensor sees, and the problem that was solved.
+    """Targets, named areas, visibility from each chosen sensor, and the problem that was solved.
 
     Parameters
     ----------
@@ -68,19 +68,19 @@ class SiteFile:
         Key of the visibility grid that this belongs to.
     seen : (k, t) bool
         Targets that each sensor sees, in the order of the record.
-    problem : PlacementProblem
-        Without its visibility; see `with_visibility`.
+    problem : PlacementConstraints
+        The problem without its visibility; see `with_visibility`.
     """
 
     key: str
     targets: Targets
     areas: tuple[Area, ...]
     seen: Boolean
-    problem: PlacementProblem
+    problem: PlacementConstraints
 
     def with_visibility(self, grid: VisibilityGrid) -> PlacementProblem:
         """Return the problem as it was solved."""
-        return replace(self.problem, visible=grid.visible)
+        return PlacementProblem(visible=grid.visible, **vars(self.problem))
 
 
 def save_site_file(
@@ -89,7 +89,7 @@ def save_site_file(
     geometry: SceneGeometry,
     site: Site,
     solution: Solution,
-    problem: PlacementProblem,
+    problem: PlacementConstraints,
 ) -> None:
     """Write ``site.npz``.
 
@@ -97,8 +97,8 @@ def save_site_file(
     ----------
     key : str
         Key of the visibility grid.
-    problem : PlacementProblem
-        Placement problem of the solution's objective.
+    problem : PlacementConstraints
+        Constraints and weights of the solution's objective.
     """
     targets = site.targets
     areas = [(WEIGHTED, area) for area in geometry.weighted_regions] + [(PLACE, area) for area in geometry.places]
@@ -145,8 +145,7 @@ def load_site_file(path: str | os.PathLike[str]) -> SiteFile:
         if len(named) != len(arrays["within"]) or not len(targets):
             raise ContentError("its areas or targets are not those that it names")
         _check_header(header, len(arrays["mandatory"]), len(arrays["price"]), len(arrays["seen"]))
-        problem = PlacementProblem(
-            visible=np.broadcast_to(np.zeros(1, dtype=bool), (len(arrays["price"]), len(targets))),
+        problem = PlacementConstraints(
             weights=arrays["counted"],
             prices=arrays["price"],
             positions=arrays["position"],

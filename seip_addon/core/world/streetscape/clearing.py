@@ -16,6 +16,7 @@ from .description import Building, Poles, SiteDescription, Slab, Trees, Wall
 CLEARANCE = 4.5  # metres above the road from which on objects may extend over it
 NEAR_EDGE = 3.0  # metres inside the carriageway up to which trees and posts are moved to its edge
 SETBACK = 0.2  # metres that they then stand from it
+AT_EDGE = 1e-6  # metres from the edge below which the direction to it is only that of rounding
 MAX_IN_LANE = 0.5  # metres inside the carriageway up to which a post is taken to stand at its edge
 MIN_OVERLAP, MIN_REST = 0.1, 2.0  # m²: smaller overlaps with the carriageway are ignored, smaller rests left out
 
@@ -92,9 +93,14 @@ def _beside(row: Row, carriageway: BaseGeometry, edge: BaseGeometry, counted: Co
     ways = shapely.get_coordinates(found).reshape(-1, 2, 2)
     outwards = ways[:, 1] - ways[:, 0]
     depth = np.hypot(*outwards.T)
-    # The vector to the edge, made longer by the setback. Very near to the edge the vector only doubles: its direction
-    # is that of rounding, and the division stays finite.
-    places[inside] += outwards * (1.0 + SETBACK / np.maximum(depth, SETBACK))[:, None]
+    # The vector to the edge, made longer by the setback. At the edge itself the vector has no direction: there the
+    # nearest point that is set back from the carriageway is taken.
+    places[inside] += outwards * (1.0 + SETBACK / np.maximum(depth, AT_EDGE))[:, None]
+    at_edge = np.flatnonzero(inside)[depth < AT_EDGE]
+    if len(at_edge):
+        set_back = shapely.boundary(carriageway.buffer(SETBACK))
+        nearest = shapely.shortest_line(shapely.points(row.positions[at_edge]), set_back)
+        places[at_edge] = shapely.get_coordinates(nearest).reshape(-1, 2, 2)[:, 1]
     lost = inside.copy()
     lost[inside] = depth > NEAR_EDGE
     counted[_DROPPED] += int(lost.sum())

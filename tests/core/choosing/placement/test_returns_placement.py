@@ -9,8 +9,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seip_addon.core.choosing.placement.problem import PlacementProblem, relative_gap
-from seip_addon.core.choosing.placement.returns_solver import greedy_returns, solve_returns
-from seip_addon.core.choosing.placement.search_limits import SolverLimits
+from seip_addon.core.choosing.placement.returns_bounds import (
+    HALVINGS,
+    OPERATIONS_PER_LOGARITHM,
+    OPERATIONS_PER_SLOPE,
+    Completion,
+)
+from seip_addon.core.choosing.placement.returns_instance import make_returns_instance
+from seip_addon.core.choosing.placement.returns_solver import greedy, greedy_returns, solve_returns
+from seip_addon.core.choosing.placement.search_limits import (
+    OPERATIONS_PER_UNIT,
+    OVERHEAD_OPERATIONS,
+    Clock,
+    SolverLimits,
+)
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 
@@ -156,3 +168,37 @@ def test_without_returns_there_is_nothing_to_choose():
     problem, returns = problem_of(5)
     with pytest.raises(SeipError, match="no candidate has returns from any road user"):
         finish(solve_returns(problem, np.zeros_like(returns)))
+
+
+def instance_of(poses, users, **limits):
+    """An instance in which each pose is at a position of its own and none is dominated."""
+    returns = np.random.default_rng(1).lognormal(1.0, 1.0, (poses, users)).astype(np.float32)
+    xyz = np.arange(3.0 * poses).reshape(poses, 3)
+    problem = PlacementProblem(
+        visible=returns > 0,
+        weights=np.ones(users),
+        prices=np.full(poses, 1000.0),
+        positions=np.arange(poses),
+        xyz=xyz,
+        labels=np.full(poses, "lidar"),
+        **limits,
+    )
+    return make_returns_instance(problem, returns)
+
+
+def test_greedy_counts_the_gains_of_each_step_as_work():
+    instance, clock = instance_of(12, 40, count=3), Clock(math.inf)
+    assert len(greedy(instance, np.zeros(0, dtype=np.int64), clock)) == 3
+    steps = 4  # the last one finds that no further sensor is allowed
+    of_each = OPERATIONS_PER_LOGARITHM * 12 * 40 + OVERHEAD_OPERATIONS
+    assert clock.work == pytest.approx(steps * of_each / OPERATIONS_PER_UNIT)
+
+
+def test_the_work_of_a_bound_includes_the_choice_that_it_begins_from():
+    instance, work = instance_of(12, 40, count=3), []
+    for chosen in (1, 11):
+        clock, share = Clock(math.inf), np.zeros(12)
+        share[:chosen] = 1.0
+        next(Completion(instance, np.zeros(40)).falling_bounds(share, clock))
+        work.append(clock.work * OPERATIONS_PER_UNIT)
+    assert work[1] - work[0] == pytest.approx(10 * 40 * HALVINGS * OPERATIONS_PER_SLOPE)

@@ -147,7 +147,7 @@ def test_a_mean_is_within_its_interval(values):
 def placed():
     site = junction_site(positions=16, sensors=("type1",), heights=(5.4,), spacing=3.0)
     grid = finish(compute_visibility(site, MODELS, VisibilitySettings(delta=2.0), ANY))
-    return site, deploy(site, MODELS, grid.visible, [0, 5])
+    return site, deploy(site, MODELS, grid.rows([0, 5]), [0, 5])
 
 
 def study_of(placed, **changed):

@@ -158,7 +158,8 @@ def test_poses_of_one_place_err_alike(laid_out):
 @pytest.mark.slow
 def test_charts_are_drawn(laid_out, study, tmp_path):
     around, problem = laid_out
-    deployment = deploy(around.site, MODELS, problem.visible, study.nominal[0].placement.chosen)
+    chosen = study.nominal[0].placement.chosen
+    deployment = deploy(around.site, MODELS, problem.visible[chosen], chosen)
     judged = finish(pose_study(around, deployment, PoseStudySettings(PoseErrors(tilt=math.radians(5)), 10, 4)))
     save_spread_chart(tmp_path / "spread.png", study, "spread")
     save_frontier_chart(tmp_path / "frontier.png", study, "frontier")

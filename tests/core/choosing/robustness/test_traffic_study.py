@@ -222,7 +222,8 @@ def test_traffic_elsewhere_gives_no_weights():
 def test_charts_are_drawn_and_the_same_twice(tmp_path, laid_out, study):
     around, problem = laid_out
     _, found = study
-    deployment = deploy(around.site, MODELS, problem.visible, found.traffic.placement.chosen)
+    chosen = found.traffic.placement.chosen
+    deployment = deploy(around.site, MODELS, problem.visible[chosen], chosen)
     for name in ("one.png", "two.png"):
         save_time_map(tmp_path / name, make_geometry(80.0), around.site, deployment, found.traffic, "A title")
         save_traffic_chart(tmp_path / f"chart {name}", [("1 × a", found), ("2 × a", found)], "A title")

@@ -9,7 +9,7 @@ import pytest
 import shapely
 from shapely.geometry import shape
 
-from seip_addon.core.choosing.placement.objective import Objective, Solution, placement_problem
+from seip_addon.core.choosing.placement.objective import Objective, Solution, placement_constraints
 from seip_addon.core.choosing.placement.problem import Placement
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
@@ -18,6 +18,7 @@ from seip_addon.core.output.results.geojson import save_geojson
 from seip_addon.core.output.results.kml import NAMESPACE, save_kml
 from seip_addon.core.output.results.located import located, missing_sentence
 from seip_addon.core.output.results.site_file import load_site_file, save_site_file
+from seip_addon.core.sensing.visibility.grid import VisibilityGrid
 from seip_addon.core.site.scene_geometry import NamedArea
 from tests.builders.small_junction import Example, make_example
 
@@ -160,7 +161,7 @@ def make_solution(example, goal) -> Solution:
 def test_the_site_file_holds_the_problem_as_it_was_solved(example, tmp_path):
     goal = Objective(count=3, central_weight=2.5, forbidden=("signal pole 1",), mandatory=("signal pole 2",))
     geometry = replace(example.geometry, places=(NamedArea("Mill Lane", shapely.box(-100, -7, 0, 7)),))
-    problem = placement_problem(example.site, example.visible, example.models, goal)
+    problem = placement_constraints(example.site, example.models, goal)
     path = tmp_path / "site.npz"
     save_site_file(path, "the key", geometry, example.site, make_solution(example, goal), problem)
     found = load_site_file(path)
@@ -173,7 +174,9 @@ def test_the_site_file_holds_the_problem_as_it_was_solved(example, tmp_path):
     np.testing.assert_array_equal(found.areas[0].within, central)
     np.testing.assert_array_equal(found.seen, example.deployment.rows)
     np.testing.assert_array_equal(found.targets.xyz, example.site.targets.xyz)
-    again = replace(found.problem, visible=example.visible)
+    grid = VisibilityGrid(np.packbits(example.visible, axis=1), example.visible.shape, "the key", {})
+    again = found.with_visibility(grid)
+    np.testing.assert_array_equal(again.visible, example.visible)
     for name in ("weights", "prices", "positions", "xyz", "labels", "mandatory_groups", "allowed"):
         np.testing.assert_array_equal(getattr(again, name), getattr(problem, name))
     assert (again.count, again.budget, again.min_distance) == (3, None, 0.0)

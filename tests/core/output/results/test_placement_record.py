@@ -15,15 +15,8 @@ from seip_addon.core.choosing.placement.problem import Placement
 from seip_addon.core.choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
-from seip_addon.core.output.results.placement_record import (
-    PlacementRecord,
-    Provenance,
-    comparable,
-    load_placement_record,
-    parsed_record,
-    placement_record,
-    save_placement_record,
-)
+from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record, save_placement
+from seip_addon.core.output.results.placement_record import PlacementRecord, Provenance, placement_record
 from seip_addon.core.output.results.versions import versions
 from tests.builders.small_junction import Example, make_example
 from tests.oracles.json_schema import violations
@@ -149,9 +142,9 @@ def is_open(place: tuple) -> bool:
 
 def test_the_record_is_what_the_schema_says_and_json_can_hold_it(example, run, tmp_path):
     record = make_record(example, run)
-    save_placement_record(tmp_path / "placement.json", record)
+    save_placement(tmp_path / "placement.json", record)
     assert violations(json.loads((tmp_path / "placement.json").read_text(encoding="utf-8")), SCHEMA) == []
-    loaded = load_placement_record(tmp_path / "placement.json")
+    loaded = load_placement(tmp_path / "placement.json")
     assert loaded.objective.value == 512.0
     assert loaded.greedy.gap_to_placement == pytest.approx(12 / 512)
     assert loaded.settings["candidates"]["heights"] == [3.5, 5.4]
@@ -168,9 +161,9 @@ def test_what_greedy_loses_of_returns_is_a_share_of_returns(example, run):
 
 
 def test_a_record_is_written_as_it_was_read(record, tmp_path):
-    save_placement_record(tmp_path / "one.json", record)
-    read = load_placement_record(tmp_path / "one.json")
-    save_placement_record(tmp_path / "other.json", read)
+    save_placement(tmp_path / "one.json", record)
+    read = load_placement(tmp_path / "one.json")
+    save_placement(tmp_path / "other.json", read)
     assert (tmp_path / "other.json").read_bytes() == (tmp_path / "one.json").read_bytes()
     assert parsed_record(record.text()) == read
     assert read.text() == record.text()
@@ -362,13 +355,13 @@ def test_the_same_run_gives_the_same_bytes_but_for_times_and_versions(example, r
     assert first != second
     assert comparable(first) == comparable(second)
     for name in ("a.json", "b.json"):
-        save_placement_record(tmp_path / name, first)
+        save_placement(tmp_path / name, first)
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
 
 
 def test_a_bound_that_was_not_found_is_null(example, run, tmp_path):
     record = make_record(example, run, bound=math.inf, gap=math.inf)
-    save_placement_record(tmp_path / "placement.json", record)
+    save_placement(tmp_path / "placement.json", record)
     assert record.objective.bound is None
     assert violations(content_of(record), SCHEMA) == []
 
@@ -391,12 +384,12 @@ def test_a_foreign_file_is_refused_in_one_sentence(tmp_path, content, says):
     path = tmp_path / "placement.json"
     path.write_bytes(content.encode("latin-1"))
     with pytest.raises(SeipError, match=says):
-        load_placement_record(path)
+        load_placement(path)
 
 
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(SeipError, match="No such file"):
-        load_placement_record(tmp_path / "nothing.json")
+        load_placement(tmp_path / "nothing.json")
 
 
 def test_versions_name_the_program_and_its_libraries():

@@ -293,7 +293,7 @@ def test_a_chosen_sensor_is_turned_as_its_candidate_and_judged_so():
     candidates = generate_candidates(geometry, replace(CHOICE, tilts=(math.radians(20),)))
     site = street_site(candidates)
     visible = grid_of(site).visible
-    deployment = deploy(site, MODELS, visible, [0, 5])
+    deployment = deploy(site, MODELS, visible[[0, 5]], [0, 5])
     for sensor in deployment.sensors:
         assert sensor.tilt == pytest.approx(math.radians(20))
         assert (sensor.orientation == candidates.orientation(sensor.pose)).all()
