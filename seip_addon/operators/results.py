@@ -137,7 +137,7 @@ class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[SceneState, list[Rank
             line = ranking.add()
             line.pose, line.share = one.pose, one.share
             sensor = sensor_at(layout.site, layout.models, "", one.pose)
-            line.name = f"{sensor.model.key} {sensor.height:g} m{sensor.turned} {sensor.position_name}"
+            line.name = f"{sensor.model.name} {sensor.height:g} m{sensor.turned} {sensor.position_name}"
 
 
 def _ranked(

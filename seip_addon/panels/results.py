@@ -31,7 +31,7 @@ class SEIP_UL_chosen(RowList, bpy.types.UIList):
         narrow = is_narrow(bpy.context)
         row = layout.split(factor=0.55 if narrow else 0.75)
         where = "" if narrow else f" {sensor.height_m:g} m {sensor.position}"
-        row.label(text=f"{item.name}  {sensor.sensor}{where}")
+        row.label(text=f"{item.name}  {sensor.sensor_name}{where}")
         row.label(text=f"{sensor.coverage_alone:.1%}")
 
 

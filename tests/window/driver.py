@@ -27,13 +27,6 @@ Steps = Generator[float, None, None]
 
 ROW = 10
 """Pixels between two places that are asked: buttons are 20 high."""
-HEADING = 38
-"""Pixels from near the upper edge of a button down to the heading below it."""
-CLOSED = 26
-"""Pixels that a closed panel takes."""
-FOOT = 200
-"""Pixels at the foot of the sidebar in which a button is too near to it for a panel below."""
-TRIES = 3
 EDGE, STEP, STOP = 24, 6, 16
 """Pixels from the sidebar's edge to its buttons, between two places of a row, and from a Stop button to its bar."""
 BLUE = 40
@@ -191,22 +184,11 @@ class Window:
         Image.fromarray(pixels).resize(size).save(self.pictures / f"{name}.png")
         yield 0.1
 
-    def open_below(self, what: str, inside: str, skip: int = 0) -> Steps:
-        """Open the panel whose heading stands below a button, some closed ones between, and that holds another one."""
-        for _ in range(TRIES):
-            x, y = yield from self.find(what)
-            if y < self.region("UI").y + FOOT:  # bring into view what is below
-                yield from self._scroll(1)
-                x, y = yield from self.find(what)
-            heading = (x, y - HEADING - skip * CLOSED)
-            yield from self._hover(heading, 10 * BEAT)
-            yield from self.press("LEFTMOUSE", heading)
-            yield 0.5
-            for pages in (0, 1):  # what opens may lie below the foot
-                yield from self._scroll(pages)
-                if (yield from self._find_here(inside, (0.6,))):
-                    return
-        raise LookupError(f"there is no panel with {inside} below {what}")
+    def open_section(self, name: str) -> Steps:
+        """Open a section of the sidebar; a header is not a button that the mouse could be asked for."""
+        setattr(self.window.scene.seip.sections, name, True)
+        self.area.tag_redraw()
+        yield 0.5
 
     def beside(self, place: tuple[int, int], what: str) -> Generator[float, None, tuple[int, int]]:
         """Return the place of a button in the row of a place, or next to that row, from the right."""

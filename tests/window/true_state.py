@@ -11,7 +11,6 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Generator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +66,10 @@ def _begin(window: Window) -> Steps:
     seip.survey.heights, seip.survey.grid, seip.survey.spacing = "5", 2.0, 12.0
     seip.goal.count = 2
     seip.result.folder = str(FOLDER)
+    for one in seip.survey.types:
+        one.use = one.name in {"type1", "type2", "type3"}
+    seip.sections.details = True
+    yield from window.open_section("placement")
 
 
 def _open(window: Window, path: Path) -> Steps:
@@ -84,8 +87,8 @@ def _press(window: Window, what: str, seconds: float = 200) -> Steps:
 
 
 def _pose_errors_are_asked_for(window: Window) -> Steps:
-    yield from window.open_below("seip.solve_placement(", "seip.goal.scenarios")
-    yield from _press(window, "seip.compute_visibility(")
+    yield from window.open_section("objective")
+    bpy.ops.seip.compute_visibility()
     rays = _counted_rays()
     yield from _press(window, "seip.solve_placement(")
     assert len(_sensors()) == 2
@@ -100,7 +103,7 @@ def _pose_errors_are_asked_for(window: Window) -> Steps:
 
 def _traffic_is_placed_on(window: Window) -> Steps:
     goal = _scene().seip.goal
-    yield from window.open_below("seip.solve_placement(", "seip.goal.scenarios")
+    yield from window.open_section("objective")
     goal.scenarios, goal.risk, goal.runs = "traffic", "auto", str((Path("scenes") / "junction_traffic").resolve())
     yield from window.enter("seip.goal.instants", "4")
     yield from window.enter("seip.goal.held_out", "8")
@@ -129,7 +132,7 @@ def _stopped_work_leaves_no_trace(window: Window) -> Steps:
 
 def _escape_is_for_the_animation(window: Window) -> Steps:
     _scene().seip.survey.heights, _scene().seip.survey.grid = "3:8:0.5", 0.5  # a minute and more
-    yield from window.click("seip.compute_visibility(")
+    yield from window.click("seip.solve_placement(")
     yield from window.until(lambda: session.running is not None, 10)
     work = session.running.work
     yield from window.press("SPACE")
@@ -165,8 +168,11 @@ def _changes_show_after_opening(window: Window) -> Steps:
 
 
 def _checks_grow_old(window: Window) -> Steps:
+    yield from window.open_section("site")
     yield from _press(window, "seip.check_site(")
+    yield from window.open_section("site")
     assert not (yield from _says(window, "since the check"))
+    yield from window.open_section("sensors")
     yield from window.enter("seip.survey.heights", "8")
     assert (yield from _says(window, "The settings have changed since the check"))
     yield from window.find("seip.check_site(")
@@ -174,7 +180,7 @@ def _checks_grow_old(window: Window) -> Steps:
 
 
 def _poles_have_feet(window: Window) -> Steps:
-    yield from _press(window, "seip.compute_visibility(")
+    bpy.ops.seip.compute_visibility()
     candidates = session.state_of(_scene()).layout.site.candidates
     foot = next(
         place for place, on_pole in zip(candidates.position.tolist(), candidates.on_pole, strict=True) if not on_pole
@@ -182,10 +188,12 @@ def _poles_have_feet(window: Window) -> Steps:
     with bpy.context.temp_override(window=window.window, area=window.area, region=window.region("WINDOW")):
         bpy.ops.mesh.primitive_cylinder_add(radius=0.1, depth=6.0, location=(foot[0], foot[1], foot[2] + 3.0))
     _scene().seip.site.role = "POLES"
+    yield from window.open_section("site")
+    yield from window.open_section("roles")
     yield from window.click("seip.assign_role(")
     yield from _press(window, "seip.check_site(")
     assert any("'Cylinder' is not at the foot" in problem.text for problem in _scene().seip.site.problems)
-    yield from _press(window, "seip.compute_visibility(")
+    bpy.ops.seip.compute_visibility()
     candidates = session.state_of(_scene()).layout.site.candidates
     names = candidates.position_name[candidates.position_of].tolist()
     heights = {z for name, z in zip(names, candidates.xyz[:, 2].tolist(), strict=True) if name == "Cylinder"}
@@ -257,7 +265,8 @@ def _detection_runs_in_another_python(window: Window) -> Steps:
     _scene().seip.traffic.file, asked.runs = str(runs / "run-1.npz"), str(runs)
     asked.folder = str(OUT / "detection")
     shutil.rmtree(OUT / "detection", ignore_errors=True)
-    yield from window.open_below("seip.scan_frame(", "preferences.addon_show(", skip=1)
+    yield from window.open_section("traffic")
+    yield from window.open_section("detection")
     assert (yield from _says(window, "needs a Python with PyTorch"))
     yield from window.picture("no-torch")
     package, python = OUT / "project" / "headless", OUT / "project" / ".venv" / "bin" / "python"
@@ -301,8 +310,7 @@ class _Gaps:
 
 
 def _export(window: Window) -> Steps:
-    with suppress(LookupError):  # open already
-        yield from window.open_below("seip.follow_sensors(", "seip.export_result(", skip=2)
+    yield from window.open_section("export")
     yield from _press(window, "seip.export_result(")
 
 

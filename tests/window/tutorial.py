@@ -30,7 +30,7 @@ def _noted(times: Callable[..., str]) -> Callable[..., str]:
     return times_and_note
 
 
-run_button.times_in_words = _noted(run_button.times_in_words)
+run_button.times_text = _noted(run_button.times_text)
 
 OUT = Path(sys.argv[sys.argv.index("--") + 1])
 RUN = "junction_traffic/run-1.npz"
@@ -38,11 +38,10 @@ RUN = "junction_traffic/run-1.npz"
 
 
 def scenario(window: Window) -> Steps:
-    """Check, compute, stop, compute, place, look, undo, save, reopen, and scan traffic."""
+    """Check, choose sensors, place, stop, place, look, undo, save, reopen, and scan traffic."""
     yield from _begin(window)
     yield from _check(window)
     yield from _choose(window)
-    yield from _compute(window)
     yield from _place(window)
     yield from _look(window)
     yield from _undo_and_redo(window)
@@ -68,36 +67,25 @@ def _begin(window: Window) -> Steps:
 def _check(window: Window) -> Steps:
     yield from window.click("seip.check_site(")
     yield from window.until(lambda: session.running is None, 60)
-    yield from window.find("seip.check_site(")
+    yield from window.open_section("site")
+    yield from window.open_section("contents")
     yield from window.picture("2-check")
+    _scene().seip.sections.site = False
 
 
 def _choose(window: Window) -> Steps:
+    sections = _scene().seip.sections
+    yield from window.open_section("sensors")
     yield from window.enter("seip.survey.heights", "8")
+    yield from window.click("seip.choose_sensors(")
+    yield 1.0
+    yield from window.shot("3-table")
+    yield from window.press("ESC")
+    yield from window.open_section("beams")
     yield from window.click("seip.preview_beams(")
-    yield from window.picture("3-beams")
+    yield from window.picture("4-beams")
     yield from window.click("seip.preview_beams(")
-
-
-def _compute(window: Window) -> Steps:
-    button = yield from window.find("seip.compute_visibility(")
-    yield from window.press("LEFTMOUSE", button)
-    yield from window.until(lambda: session.running is not None, 10)
-    stop = yield from _bar_moves(window, button)
-    yield from window.press("LEFTMOUSE", stop)
-    yield from window.until(lambda: session.running is None, 0.5)
-    yield 0.5  # until the sidebar is drawn anew, with the button back in its place
-    yield from window.press("LEFTMOUSE", button)
-    yield from window.until(lambda: session.running is not None, 10)
-    bpy.ops.seip.stop()
-    yield from window.until(lambda: session.running is None, 0.5)
-    assert _known() is None or _known().survey is None, "the run that was stopped went on"
-    yield from window.click("seip.estimate_visibility(")
-    yield from window.until(lambda: session.running is None and _known() and _known().estimate, 60)
-    yield from window.click("seip.compute_visibility(")
-    yield from window.until(lambda: session.running is None and _known().survey is not None, 120)
-    yield from window.find("seip.compute_visibility(")
-    yield from window.picture("4-visibility")
+    sections.beams = sections.sensors = False
 
 
 def _bar_moves(window: Window, button: tuple[int, int]) -> Generator[float, None, tuple[int, int]]:
@@ -112,15 +100,25 @@ def _bar_moves(window: Window, button: tuple[int, int]) -> Generator[float, None
 
 def _place(window: Window) -> Steps:
     yield from window.enter("seip.goal.count", "2")
-    yield from window.click("seip.solve_placement(")
-    yield from window.until(lambda: _scene().seip.result.record, 200)
+    button = yield from window.find("seip.solve_placement(")
+    yield from window.press("LEFTMOUSE", button)
+    yield from window.until(lambda: session.running is not None, 10)
+    stop = yield from _bar_moves(window, button)
+    yield from window.press("LEFTMOUSE", stop)
+    yield from window.until(lambda: session.running is None, 0.5)
+    yield 0.5  # until the sidebar is drawn again, with the button back in its place
+    assert not _scene().seip.result.record
+    assert _known() is None or _known().survey is None, "the run that was stopped went on"
+    yield from window.press("LEFTMOUSE", button)
+    yield from window.until(lambda: _scene().seip.result.record, 300)
     assert len(_empties()) == 2, _empties()
     (OUT / "placement.json").write_text(_scene().seip.result.record, encoding="utf-8")
-    yield from window.find("seip.solve_placement(")
     yield from window.picture("5-placement")
 
 
 def _look(window: Window) -> Steps:
+    yield from window.open_section("results")
+    yield from window.open_section("view")
     yield from window.click("seip.colour_coverage(aspect='times'")
     yield from window.picture("6-coverage")
     yield from window.click("seip.look_from_sensor(")
@@ -147,7 +145,8 @@ def _save_and_reopen(window: Window) -> Steps:
     assert _scene().seip.result.record == record
     yield from window.until(lambda: session.running is None and _known() is not None, 30)  # compared with the scene
     assert not scene_status.stale_placement(_scene())
-    yield from window.open_below("seip.follow_sensors(", "seip.rank_candidates(")
+    yield from window.open_section("results")
+    yield from window.open_section("ranking")
     yield from window.click("seip.rank_candidates(")
     yield from window.until(lambda: len(_scene().seip.result.ranking), 60)
     yield from window.find("seip.rank_candidates(")
@@ -156,6 +155,8 @@ def _save_and_reopen(window: Window) -> Steps:
 
 def _scan(window: Window) -> Steps:
     _scene().seip.traffic.file = f"//{RUN}"  # in place of the file browser
+    yield from window.open_section("traffic")
+    yield from window.open_section("scan")
     yield from window.click("seip.load_traffic(")
     yield from window.until(lambda: session.running is None and "SEIP Traffic" in bpy.data.collections, 60)
     _scene().frame_set(600)
@@ -166,6 +167,7 @@ def _scan(window: Window) -> Steps:
 
 
 def _take_picture(window: Window) -> Steps:
+    yield from window.open_section("export")
     yield from window.click("seip.save_picture(")
     yield from window.until((OUT / "placement.png").exists, 60)
 
