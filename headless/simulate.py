@@ -25,10 +25,11 @@ from seip_addon.core.output.datasets.formats import FORMATS
 from seip_addon.core.output.datasets.sample import SPLITS
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.scans.run_folder import Record, Run, check_no_placement, check_run_folder
+from seip_addon.core.sensing.scans.run_folder import Record, Run, check_run_folder
 from seip_addon.core.sensing.scans.simulation import ScanSettings
-from seip_addon.core.sensing.traffic.source import load_trajectories
+from seip_addon.core.sensing.traffic.site_traffic import load_trajectories
 from seip_addon.core.site.weather import weather_of
+from seip_addon.core.storage.folder_contents import check_no_placement
 from seip_addon.core.workflows.recording import RecordingSettings, dataset_folder, make_run, record, simulation_of
 from seip_addon.core.workflows.survey import SurveySettings
 from seip_addon.scene.materials import set_reflectivity

@@ -21,11 +21,9 @@ import numpy as np
 from seip_addon.core.choosing.placement.deployment import Sensor
 from seip_addon.core.choosing.placement.objective import Solution
 from seip_addon.core.counts import counted
-from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.placement_record import Provenance
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.sensing.scans.run_folder import MANIFEST
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.triangle_culling import culling_message
 from seip_addon.core.site.candidates import CandidateSettings
@@ -33,6 +31,7 @@ from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
 from seip_addon.core.site.weather import weather_of
+from seip_addon.core.storage.folder_contents import check_no_run
 from seip_addon.core.workflows.records import record_of
 from seip_addon.core.workflows.survey import Layout, Survey, SurveySettings, lay_out, see
 from seip_addon.core.workflows.traffic_runs import runs_in, traffic_folder
@@ -132,10 +131,7 @@ def survey(
     settings = _settings(options)
     settings.models()  # refuses unknown types before the scene is read
     runtime.check_folder(options.output)
-    if (options.output / MANIFEST).exists():
-        raise SeipError(
-            f"{options.output} holds a run of scans, which a placement is not written to: name another folder"
-        )
+    check_no_run(options.output)
     runtime.open_scene(options.scene)
 
     set_reflectivity(options.reflectivity)

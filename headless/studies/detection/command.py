@@ -38,7 +38,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import COUNT, SEED, SENSORS, TIME_STEP, Limits
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.sensing.scans.simulation import ScanSettings
-from seip_addon.core.sensing.traffic.source import require_own_traffic
+from seip_addon.core.sensing.traffic.site_traffic import require_own_traffic
 from seip_addon.core.workflows.survey import Survey
 
 STEPS, TRAININGS = Limits(1, 10_000_000), Limits(0, 1_000)

@@ -33,7 +33,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import TIME_STEP
 from seip_addon.core.progress import Progress, side_by_side
 from seip_addon.core.sensing.scans.simulation import ScanSettings
-from seip_addon.core.sensing.traffic.source import require_own_traffic
+from seip_addon.core.sensing.traffic.site_traffic import require_own_traffic
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.site import make_site
 from seip_addon.core.workflows.survey import SurveySettings
