@@ -47,7 +47,7 @@ from seip_addon.core.sensing.traffic.run_overlap import require_independent, veh
 from seip_addon.core.sensing.traffic.site_traffic import require_own_traffic
 from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.files import digest, save_json, whole_file
-from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import changed_beams, read_sensors

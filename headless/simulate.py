@@ -31,7 +31,7 @@ from seip_addon.core.sensing.traffic.site_traffic import load_trajectories
 from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.folder_contents import check_no_placement
 from seip_addon.core.workflows.recording import RecordingSettings, dataset_folder, make_run, record, simulation_of
-from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import changed_beams, read_sensors

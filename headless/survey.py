@@ -33,7 +33,8 @@ from seip_addon.core.site.site import Site
 from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.folder_contents import check_no_run
 from seip_addon.core.workflows.records import record_of
-from seip_addon.core.workflows.survey import Layout, Survey, SurveySettings, lay_out, see
+from seip_addon.core.workflows.survey import Layout, Survey, lay_out, see
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.core.workflows.traffic_runs import runs_in, traffic_folder
 from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene

@@ -22,7 +22,8 @@ from .core.output.results.placement_record import PlacementRecord, parsed_record
 from .core.progress import Progress
 from .core.workflows.moved_sensors import restored_by_hand
 from .core.workflows.records import restored_solution
-from .core.workflows.survey import Survey, SurveySettings, inputs_of, lay_out, see
+from .core.workflows.survey import Survey, inputs_of, lay_out, see
+from .core.workflows.survey_settings import SurveySettings
 from .scene.changes import Watch, on_update, watch
 from .scene.read import SceneReading, read_scene
 from .scene_status import FILE_VERSION, is_of, obstacle, same_grid

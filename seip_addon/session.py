@@ -28,7 +28,8 @@ from .core.sensing.traffic.trajectories import Trajectories
 from .core.sensing.visibility.estimate import Estimate
 from .core.sensing.visibility.visibility_model import VisibilityModel
 from .core.storage.files import check_folder
-from .core.workflows.survey import Layout, Survey, SurveySettings
+from .core.workflows.survey import Layout, Survey
+from .core.workflows.survey_settings import SurveySettings
 from .overlay import Overlay
 from .scene.changes import Watch
 

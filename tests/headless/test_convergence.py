@@ -29,7 +29,7 @@ from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.ring_resolution import unresolved_from
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from tests.builders.small_junction import make_geometry
 from tests.builders.synthetic_junction import rectangle
 from tests.engines import ANY, needs_any

@@ -21,7 +21,8 @@ import numpy as np
 from seip_addon.core.progress import Progress, finish, side_by_side
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import SceneGeometry
-from seip_addon.core.workflows.survey import SurveySettings, lay_out, see
+from seip_addon.core.workflows.survey import lay_out, see
+from seip_addon.core.workflows.survey_settings import SurveySettings
 
 from .variants import FEW_SITES, Ingredients, ScanIngredients, with_bodies
 

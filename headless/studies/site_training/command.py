@@ -36,7 +36,7 @@ from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.site_traffic import require_own_traffic
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.site import make_site
-from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.scene.read import read_scene
 
 HEIGHTS = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)  # metres

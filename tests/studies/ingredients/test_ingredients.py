@@ -32,7 +32,8 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.workflows.survey import SurveySettings, lay_out
+from seip_addon.core.workflows.survey import lay_out
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from tests.builders.sloping_road import hill
 from tests.builders.small_junction import make_geometry
 from tests.builders.small_scene import make_run

@@ -43,7 +43,7 @@ from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
 from seip_addon.core.site.site import Site, Targets
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
-from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from tests.builders.synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity
 from tests.engines import ANY, each_engine
 from tests.oracles.float64_rays import nearest_return
