@@ -95,18 +95,6 @@ def within(whole: Progress, steps: Generator[Progress, None, Result]) -> Generat
         yield whole
 
 
-def in_detail(whole: Progress, steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
-    """Run work as one of several equally long units of a whole, yielding progress that includes that of the unit."""
-    while True:
-        try:
-            step = next(steps)
-        except StopIteration as stop:
-            result: Result = stop.value
-            return result
-        done, total = whole.done * step.total + step.done, whole.total * step.total
-        yield Progress(done, total, step.what, whole.counted and step.counted)
-
-
 def in_thread(work: Callable[[threading.Event], Result], what: str) -> Generator[Progress, None, Result]:
     """Run work that cannot yield, such as a call of a library, in a separate thread.
 

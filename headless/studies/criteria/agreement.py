@@ -9,10 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
+from headless.studies.rank_correlation import rank_agreements
+
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer
-from seip_addon.core.estimates import IntervalEstimate, percentiles, rank_agreements
+from seip_addon.core.estimates import IntervalEstimate, percentiles
 
 from .criteria import Criterion
 from .drawing import MIN_PLACEMENTS, NEAR

@@ -11,7 +11,6 @@ from itertools import combinations
 from pathlib import Path
 
 from headless.detection.average_precision import ADVISED_TEST_RUNS, Evaluation, balanced_score, evaluate
-from headless.detection.breakdown import false_positives
 from headless.detection.detector import Detector
 from headless.detection.frame_results import FrameResult
 from headless.detection.frames import SampledRecording
@@ -23,6 +22,7 @@ from headless.detection.suitability import suitability_warnings
 from headless.detection.training import TrainedDetector, deterministic, train
 from headless.studies.coverage.cells import COUNTS, Case, Cell, solve_cell
 from headless.studies.detection.sensor_configuration import SensorConfiguration
+from headless.studies.false_positives import false_positives
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError

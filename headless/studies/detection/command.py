@@ -14,7 +14,7 @@ from headless import runtime, survey
 from headless.detection.average_precision import too_few_runs
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
 from headless.detection.recordings import Simulator
-from headless.detection.settings import FINE_TUNING, NetworkSettings, TrainingSettings
+from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.options import add_rolling_shutter, new_parser, real_number, whole_number
 from headless.studies.claims import save_claims
 from headless.studies.coverage.cells import COUNTS
@@ -42,6 +42,9 @@ from seip_addon.core.sensing.traffic.site_traffic import require_own_traffic
 from seip_addon.core.workflows.survey import Survey
 
 STEPS, TRAININGS = Limits(1, 10_000_000), Limits(0, 1_000)
+
+FINE_TUNING = TrainingSettings(steps=450, learning_rate=2e-3, validate_every=75, patience=6)
+"""Training of the shipped detector's weights on a site; not stopped early, because precision drops at first."""
 
 
 def main(argv: list[str]) -> None:

@@ -6,36 +6,22 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from headless.charts.detection import (
-    BinnedFigure,
-    PrecisionCell,
-    save_count_chart,
-    save_coverage_chart,
-    save_parts_chart,
-    save_precision_recall_chart,
-    save_price_chart,
-    save_training_chart,
-)
+from headless.charts.detection import BinnedFigure, save_parts_chart, save_precision_recall_chart, save_training_chart
 from headless.charts.error_view import save_error_view
-from headless.detection.breakdown import (
-    DENSITY_EDGES,
-    DISTANCE_EDGES,
-    POINT_EDGES,
-    VISIBILITY_EDGES,
-    Bin,
-    average_precision_by,
-    false_by,
-    recall_by,
-)
+from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, Bin, average_precision_by, recall_by
 from headless.detection.chart_data import curve, error_view, parts
 from headless.detection.recordings import Simulator
 from headless.detection.rules import MAIN_RULE, RULES
 from headless.detection.training import LearningCurve, TrainedDetector
 from headless.studies.claims import Claim
+from headless.studies.false_positives import DENSITY_EDGES, false_by
+from headless.studies.mean_over_seeds import mean_interval
+from headless.studies.precision_charts import PrecisionCell, save_count_chart, save_coverage_chart, save_price_chart
+from headless.studies.rank_correlation import rank_correlation, rank_correlation_interval
 
 import numpy as np
 
-from seip_addon.core.estimates import SHARE, Interval, mean_interval, rank_correlation, rank_correlation_interval
+from seip_addon.core.estimates import SHARE, Interval
 from seip_addon.core.storage.csv_table import save_csv
 from seip_addon.core.storage.files import save_json
 
@@ -43,6 +29,7 @@ from .case_study import DetectorOutcome, ModelConfiguration, Traffic
 from .claims import SeedResult
 
 SCHEMA = "seip-evaluation/2"
+VISIBILITY_EDGES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.95, np.inf)
 
 _NO_ENDS = (math.nan, math.nan)
 

@@ -1,4 +1,4 @@
-"""What a folder of results contains, a placement or a run of scans: each has a folder of its own."""
+"""Contents of a folder of results, a placement or a run of scans: each has a folder of its own."""
 
 from pathlib import Path
 

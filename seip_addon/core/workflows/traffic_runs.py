@@ -9,7 +9,6 @@ from itertools import product
 from pathlib import Path
 from typing import TypeVar
 
-from ..arrays import Float
 from ..choosing.robustness.traffic_instants import check_runs
 from ..errors import SeipError
 from ..progress import Progress
@@ -83,11 +82,6 @@ def found_runs(folder: Path) -> list[Path]:
             "seip traffic, each with its own seed"
         )
     return paths
-
-
-def load_runs(paths: Sequence[Path], origin: Float) -> list[Trajectories]:
-    """Read runs, in the local axes of an origin."""
-    return [Trajectories.load(path).moved_to(origin) for path in paths]
 
 
 def read_runs(paths: Sequence[Path], layout: Layout) -> Generator[Progress, None, TrafficRuns]:

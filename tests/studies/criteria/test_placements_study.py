@@ -10,7 +10,7 @@ pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless.detection.frame_results import FrameResult
 from headless.detection.recordings import SampledRun
-from headless.studies.criteria.criteria import criteria_of
+from headless.studies.criteria.criteria import cars_at, criteria_of
 from headless.studies.criteria.drawing import (
     BETWEEN,
     NEAR,
@@ -40,7 +40,6 @@ from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.noisy_returns import return_chance
 from seip_addon.core.sensing.returns.bodies import PANELS
 from seip_addon.core.sensing.returns.expected_returns import expected_returns
-from seip_addon.core.sensing.returns.road_users import cars_at
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.scans.static_scene import StaticScene

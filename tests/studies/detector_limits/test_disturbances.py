@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from headless.detection.detector import Detector, keeping_at_most
+from headless.detection.detector import Detector
 from headless.detection.settings import NetworkSettings
 from headless.studies.detector_limits.disturbances import (
     DROP_INTENSITY,
@@ -21,6 +21,7 @@ from headless.studies.detector_limits.disturbances import (
     Thinned,
     TiltError,
     YawError,
+    keeping_at_most,
     range_in,
 )
 
