@@ -49,7 +49,7 @@ def main(argv: list[str]) -> None:
     settings = _settings(options)
     run = _run(options, settings)
     check_run_folder(options.output, run)
-    runtime.LOG.info(_in_words(run))
+    runtime.LOG.info(_describe(run))
     simulation = runtime.finish_with_bar(simulation_of(run))
     runtime.warn(simulation.warnings)
     manifest = runtime.finish_with_bar(record(options.output, run, simulation, settings))
@@ -90,7 +90,7 @@ def _run(options: argparse.Namespace, settings: RecordingSettings) -> Run:
     )
 
 
-def _in_words(run: Run) -> str:
+def _describe(run: Run) -> str:
     lines = [
         f"{sensor.label}  {sensor.model.key} at ({', '.join(f'{value:.2f}' for value in sensor.xyz)})"
         for sensor in run.sensors

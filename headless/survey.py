@@ -142,7 +142,7 @@ def survey(
         settings = watch.run("spacings", refine(reading.geometry, settings)).settings
         LOG.info(settings.spacings_because)
     layout = watch.time("lay out the site", lambda: lay_out(reading.geometry, settings, reading.warnings))
-    LOG.info(_in_words(layout.site))
+    LOG.info(_describe_site(layout.site))
     runtime.warn(layout.warnings)
     check(layout)
     surveyed = watch.run("visibility", see(layout, options.output / "visibility.npz", options.scheduler))
@@ -186,7 +186,7 @@ def _settings(options: argparse.Namespace) -> SurveySettings:
     )
 
 
-def _in_words(site: Site) -> str:
+def _describe_site(site: Site) -> str:
     candidates = site.candidates
     dropped = ", ".join(f"{count} {reason}" for reason, count in candidates.dropped.items())
     poles = np.count_nonzero(candidates.on_pole)

@@ -30,7 +30,7 @@ def street(runs=4):
     return told
 
 
-def test_moving_and_parked_are_judged_apart_and_neither_punishes_the_other():
+def test_moving_and_parked_are_evaluated_apart_and_neither_punishes_the_other():
     found = precisions(street())
     assert {name: (found[name].value, found[name].road_users) for name in ("bev_0.7_moving", "bev_0.7_parked")} == {
         "bev_0.7_moving": (1.0, 12),
@@ -39,7 +39,7 @@ def test_moving_and_parked_are_judged_apart_and_neither_punishes_the_other():
     assert found["bev_0.7"].value == pytest.approx(4 / 5)
 
 
-def test_each_class_is_judged_at_its_own_overlap():
+def test_each_class_is_evaluated_at_its_own_overlap():
     found = precisions(street())
     assert (found["car_van_0.7"].road_users, found["pedestrian_0.5"].road_users) == (20, 4)
     assert found["pedestrian_0.5"].value == 1.0

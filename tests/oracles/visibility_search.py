@@ -287,11 +287,11 @@ def _poses(random: np.random.Generator, triangles: Float, targets: Float, half: 
 # ---- the oracle ------------------------------------------------------------------------------------------------------
 
 
-def judge(case: Case) -> Verdict:
+def assess(case: Case) -> Verdict:
     """Cast every ray of every pose in float64, and keep open what float32 may decide otherwise."""
     poses = case.site.candidates
     rows = [
-        _judge_pose(case, poses.xyz[pose], float(poses.yaw[pose]), float(poses.tilt[pose]), case.models[key])
+        _assess_pose(case, poses.xyz[pose], float(poses.yaw[pose]), float(poses.tilt[pose]), case.models[key])
         for pose, key in enumerate(poses.sensor.tolist())
     ]
     seen, possible = (np.array(part) for part in zip(*rows, strict=True))
@@ -337,7 +337,7 @@ def behind_prisms(rosette: Rosette, points_per_second: float, frame_rate: float)
     return np.array(rays)
 
 
-def _judge_pose(case: Case, origin: Float, yaw: float, tilt: float, model: LidarModel) -> tuple[Boolean, Boolean]:
+def _assess_pose(case: Case, origin: Float, yaw: float, tilt: float, model: LidarModel) -> tuple[Boolean, Boolean]:
     triangles, targets = case.site.triangles, case.site.targets.xyz
     delta = case.settings.delta
     points = triangles.reshape(-1, 3)
@@ -483,7 +483,7 @@ def search(engines: Sequence[Engine], scenes: int, first_seed: int = 0, minutes:
     until, said = time.monotonic() + 60 * minutes, 0.0
     for seed in range(first_seed, first_seed + scenes):
         case = draw_case(seed)
-        verdict = judge(case)
+        verdict = assess(case)
         for engine in engines:
             found = differences(case, engine, verdict)
             total += found

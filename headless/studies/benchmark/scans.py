@@ -71,8 +71,8 @@ def scan_costs(site: Site, static: StaticScene, model: LidarModel, frames: int) 
     Returns
     -------
     dict of str to ScanCost
-        Costs by method and engine: ``kept bvh`` and ``kept embree`` (cached returns), ``anew bvh`` and
-        ``anew embree`` (full scans).
+        Costs by method and engine: ``cached bvh`` and ``cached embree`` (cached returns), ``full bvh`` and
+        ``full embree`` (full scans).
 
     Raises
     ------
@@ -85,11 +85,11 @@ def scan_costs(site: Site, static: StaticScene, model: LidarModel, frames: int) 
     ]
     traffic = driving(site)
     bodies = [fitted_body(user) for user in traffic.users]
-    costs = {f"{way} {engine}": ScanCost() for engine in ENGINES for way in ("kept", "anew")}
+    costs = {f"{way} {engine}": ScanCost() for engine in ENGINES for way in ("cached", "full")}
     for engine in ENGINES:
         simulation = finish(prepare(static, sensors, traffic, bodies, ScanSettings(engine=engine)))
         rescan = Rescan(simulation, static, bodies, engine)
-        cached, full = costs[f"kept {engine}"], costs[f"anew {engine}"]
+        cached, full = costs[f"cached {engine}"], costs[f"full {engine}"]
         for number in range(frames):
             snapshot = traffic.at(number / model.rotation_rate)
             cached.expense.time(partial(simulation.frame, number, snapshot.time))

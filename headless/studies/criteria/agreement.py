@@ -44,7 +44,7 @@ class Correlation:
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedCriterion:
+class AssessedCriterion:
     """A criterion beside coverage.
 
     Parameters
@@ -103,17 +103,17 @@ def correlate(criterion: Criterion, precise: Precisions, which: Boolean | None =
     return Correlation(len(rows), spearman, kendall, resampled[0])
 
 
-def judge(criteria: Sequence[Criterion], precise: Precisions) -> tuple[JudgedCriterion, ...]:
+def assess(criteria: Sequence[Criterion], precise: Precisions) -> tuple[AssessedCriterion, ...]:
     """Set each criterion beside the first, which is coverage."""
     correlations = [correlate(one, precise) for one in criteria]
     coverage, reference = correlations[0], int(np.argmax(criteria[0].values))
-    judged = []
+    assessed = []
     for criterion, correlation in zip(criteria, correlations, strict=True):
         best = int(np.argmax(criterion.values))
         gain = float(precise.values[best] - precise.values[reference])
         gains = precise.resampled[best] - precise.resampled[reference]
-        judged.append(
-            JudgedCriterion(
+        assessed.append(
+            AssessedCriterion(
                 criterion,
                 correlation,
                 _difference(correlation, coverage),
@@ -121,7 +121,7 @@ def judge(criteria: Sequence[Criterion], precise: Precisions) -> tuple[JudgedCri
                 IntervalEstimate(gain, *percentiles(gains)) if precise.has_intervals else _open(gain),
             )
         )
-    return tuple(judged)
+    return tuple(assessed)
 
 
 def noise_ceiling(precise: Precisions) -> NoiseCeiling:

@@ -151,7 +151,7 @@ def detectors_of(
     return [
         ModelConfiguration(
             f"detector-{seed}",
-            drawn.learnt,
+            drawn.training,
             NetworkSettings(),
             replace(training, steps=settings.steps, seed=seed),
             start,
@@ -160,11 +160,11 @@ def detectors_of(
     ]
 
 
-def learnt_clouds(
+def training_clouds(
     simulator: Simulator, drawn: DrawnPlacements, traffic: Traffic
 ) -> Generator[Progress, None, TrainingSet]:
     """Simulate what the placements to learn from measure."""
-    return (yield from simulate_training_set(simulator, drawn.learnt, traffic, NetworkSettings()))
+    return (yield from simulate_training_set(simulator, drawn.training, traffic, NetworkSettings()))
 
 
 def precisions(

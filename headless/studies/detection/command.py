@@ -21,7 +21,7 @@ from headless.studies.coverage.cells import COUNTS
 from headless.studies.criteria.criteria import WEIGHTED, criteria_of, weights_of_targets
 from headless.studies.criteria.drawing import PlacementsStudySettings, draw_placements
 from headless.studies.criteria.occupancy import require_vehicles
-from headless.studies.criteria.precision import detectors_of, learnt_clouds, precisions
+from headless.studies.criteria.precision import detectors_of, precisions, training_clouds
 from headless.studies.criteria.results import PlacementsStudy, save_study
 from headless.studies.criteria.site_criteria import best_of, problem_of, site_criteria
 from headless.studies.detection import case_study
@@ -83,7 +83,7 @@ def main(argv: list[str]) -> None:
             folder / "evaluation.json", results, claims, settings, versions(blender=bpy.app.version_string)
         )
         save_claims(folder / "claims_5_to_9.md", claims, site.name)
-    for line in study_results.in_words(results):
+    for line in study_results.describe(results):
         runtime.print_line(line)
     for claim in claims:
         runtime.print_line(claim.describe())
@@ -106,7 +106,7 @@ def _evaluate_placements(options: argparse.Namespace) -> None:
     settings = PlacementsStudySettings(
         placements=options.placements,
         count=options.count,
-        learnt=options.learnt_placements if options.trainings else 0,
+        training_placements=options.training_placements if options.trainings else 0,
         trainings=options.trainings,
         steps=training.steps,
         seed=options.placement_seed,
@@ -124,16 +124,16 @@ def _evaluate_placements(options: argparse.Namespace) -> None:
     simulator = site.simulator
     if options.trainings:
         models = detectors_of(drawn, settings, training, start)
-        training_set = watch.run("simulation", learnt_clouds(simulator, drawn, site.traffic))
+        training_set = watch.run("simulation", training_clouds(simulator, drawn, site.traffic))
         trained = watch.run("training", case_study.train_all(models, training_set, folder, device=options.device))
         detectors = [one.detector for one in trained]
     else:
         detectors = [Detector.load(SHIPPED_DETECTOR, options.device)]
     precise = watch.run("evaluation", precisions(simulator, drawn.evaluated, detectors, site.traffic, folder))
-    judged = watch.run(
+    criteria = watch.run(
         "criteria", criteria_of(site.surveyed, simulator, drawn.evaluated, site.traffic, precise, others)
     )
-    study = PlacementsStudy(site.surveyed.site.name, settings, options.sensor[0], drawn, precise, judged)
+    study = PlacementsStudy(site.surveyed.site.name, settings, options.sensor[0], drawn, precise, criteria)
     with runtime.incomplete_if_interrupted(folder):
         asked = site.surveyed.settings.as_record() | {"frames_every_s": options.every}
         asked["from_scratch"] = options.from_scratch
@@ -276,7 +276,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     drawn.add_argument("--count", type=whole_number(SENSORS), default=2, metavar="N", help="sensors of each")
     drawn.add_argument(
-        "--learnt-placements", type=whole_number(COUNT), default=12, metavar="N", help="others, to learn from"
+        "--training-placements", type=whole_number(COUNT), default=12, metavar="N", help="placements to train on"
     )
     drawn.add_argument("--placement-seed", type=whole_number(SEED), default=0, metavar="SEED", help="of what is drawn")
     return parser

@@ -224,7 +224,7 @@ def save_record(
     )
 
 
-def in_words(results: StudyResults) -> Iterator[str]:
+def describe(results: StudyResults) -> Iterator[str]:
     """Yield lines for each configuration, and one on the correlation of coverage and average precision."""
     for cell in cells([outcome.seed_result for outcome in results.masked]):
         yield (

@@ -24,7 +24,7 @@ from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import train
 from headless.options import add_settings, new_parser, read_settings, real_number
 from headless.studies.detection.case_study import simulated
-from headless.studies.site_training.training_site import LearntSite
+from headless.studies.site_training.training_site import TrainingSite
 
 import bpy
 import numpy as np
@@ -112,7 +112,7 @@ class LearningSettings:
     seed: int = 1
 
 
-def read_site(scene: Path, learning: LearningSettings) -> LearntSite:
+def read_site(scene: Path, learning: LearningSettings) -> TrainingSite:
     """Read a scene with the runs of traffic next to it.
 
     Raises
@@ -135,7 +135,7 @@ def read_site(scene: Path, learning: LearningSettings) -> LearntSite:
     for run in runs:
         require_own_traffic(run.trajectories, geometry, run.name)
     simulator = Simulator(geometry, ScanSettings(seed=learning.seed))
-    return LearntSite(f"{scene.parent.name}/{scene.stem}", geometry, candidates, models, runs, simulator)
+    return TrainingSite(f"{scene.parent.name}/{scene.stem}", geometry, candidates, models, runs, simulator)
 
 
 def set_aside(sites: Sequence[Site]) -> tuple[Sequence[Site], Sequence[Site]]:
@@ -153,7 +153,7 @@ def set_aside(sites: Sequence[Site]) -> tuple[Sequence[Site], Sequence[Site]]:
 
 
 def _sampled(
-    site: LearntSite, number: int, network: NetworkSettings, learning: LearningSettings
+    site: TrainingSite, number: int, network: NetworkSettings, learning: LearningSettings
 ) -> Generator[Progress, None, list[SampledRecording]]:
     """Simulate scans of random placements in all runs of a site."""
     area = site.simulator.area(network.pillar)

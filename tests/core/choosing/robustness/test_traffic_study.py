@@ -77,13 +77,13 @@ def test_the_empty_road_is_where_both_begin(laid_out, study):
 
 
 @pytest.mark.slow
-def test_both_are_judged_at_instants_that_nothing_was_chosen_on(laid_out, study):
+def test_both_are_evaluated_at_instants_that_nothing_was_chosen_on(laid_out, study):
     around, _ = laid_out
     _, found = study
-    judged = spread_instants([queue(3)], 8, 1)
+    evaluated = spread_instants([queue(3)], 8, 1)
     for placed in (found.empty, found.traffic):
         for layer, seen in placed.seen.items():
-            views = finish(visibility_in_traffic(around, placed.placement.chosen, judged.obstacles(), layer))
+            views = finish(visibility_in_traffic(around, placed.placement.chosen, evaluated.obstacles(), layer))
             rows = np.array([views.seen(instant).any(axis=0) for instant in range(8)])
             assert seen.at == pytest.approx(rows.mean(axis=1), abs=1e-12)
             assert seen.time == pytest.approx(rows.mean(axis=0), abs=1e-12)

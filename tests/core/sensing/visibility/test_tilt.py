@@ -288,7 +288,7 @@ def test_a_draw_turns_a_tilted_pose_about_itself():
     assert hangs == pytest.approx(orientations(np.array(1.05), np.array(0.28), np.array(0.03)), abs=1e-12)
 
 
-def test_a_chosen_sensor_is_turned_as_its_candidate_and_judged_so():
+def test_a_chosen_sensor_is_turned_as_its_candidate_and_evaluated_so():
     geometry = street()
     candidates = generate_candidates(geometry, replace(CHOICE, tilts=(math.radians(20),)))
     site = street_site(candidates)
@@ -301,7 +301,7 @@ def test_a_chosen_sensor_is_turned_as_its_candidate_and_judged_so():
         assert (looks.see(sensor.model, sensor.xyz, sensor.orientation) == visible[sensor.pose]).all()
 
 
-def test_a_placement_of_tilted_sensors_is_judged_as_they_hang():
+def test_a_placement_of_tilted_sensors_is_evaluated_as_they_are_mounted():
     settings = SurveySettings(candidates=replace(CHOICE, heights=(5.0,), tilts=(math.radians(20),)), engine=ANY)
     evaluator = Evaluator(street(), settings, Objective(count=1))
     solution = finish(evaluator.solve(street_site(generate_candidates(street(), settings.candidates)), settings))

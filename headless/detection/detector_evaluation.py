@@ -21,7 +21,7 @@ from .training import deterministic
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement:
+class DetectorEvaluation:
     """Frames of some runs with the detections of a detector.
 
     Parameters
@@ -57,9 +57,9 @@ class Judgement:
                 yield name, found.value, found.interval, found.road_users
 
 
-def judge(
+def evaluate_detector(
     detector: Detector, simulator: Simulator, placed: MountedSensors, runs: Sequence[SampledRun]
-) -> Generator[Progress, None, Judgement]:
+) -> Generator[Progress, None, DetectorEvaluation]:
     """Detect road users in every frame of runs of traffic, scanned by given sensors.
 
     Raises
@@ -78,10 +78,10 @@ def judge(
     fullest = users.index(max(users))
     instants = [(run, number) for run in runs for number in range(len(run.times))]
     scan = simulator.frame(placed, *instants[fullest])
-    return Judgement(frames, evaluation, fullest, scan, balanced_score(evaluation))
+    return DetectorEvaluation(frames, evaluation, fullest, scan, balanced_score(evaluation))
 
 
-def figures(judgement: Judgement) -> Mapping[str, Any]:
+def figures(outcome: DetectorEvaluation) -> Mapping[str, Any]:
     """Return the figures for the record."""
     return {
         name: {
@@ -89,5 +89,5 @@ def figures(judgement: Judgement) -> Mapping[str, Any]:
             "interval": None if interval is None else list(interval),
             "road_users": users,
         }
-        for name, value, interval, users in judgement.precisions()
+        for name, value, interval, users in outcome.precisions()
     }
