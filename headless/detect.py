@@ -24,7 +24,7 @@ from headless.detection.average_precision import precision_recall, too_few_runs
 from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
 from headless.detection.chart_data import error_view, parts
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
-from headless.detection.detector_evaluation import DetectorEvaluation, evaluate_detector, figures
+from headless.detection.detector_evaluation import DetectorEvaluation, evaluate_detector
 from headless.detection.inference import seconds_of
 from headless.detection.recordings import MountedSensors, Simulator, sampled_runs
 from headless.detection.rules import MAIN_RULE
@@ -47,6 +47,7 @@ from seip_addon.core.sensing.traffic.run_overlap import require_independent, veh
 from seip_addon.core.sensing.traffic.site_traffic import require_own_traffic
 from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.files import digest, save_json, whole_file
+from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
@@ -85,6 +86,7 @@ def main(argv: list[str]) -> None:
     doubts = suitability_warnings(detector, placed.types, area, outcome.scan)
     doubts = (*doubts, *filter(None, [too_few_runs(len(runs))]))
     runtime.warn(doubts)
+    precisions = outcome.precisions
     with runtime.incomplete_if_interrupted(options.output):
         _save(options.output, outcome, simulator, sensors)
         record = {
@@ -94,19 +96,19 @@ def main(argv: list[str]) -> None:
             "traffic": [{"name": run.name, "key": run.key, "frames": len(run.times)} for run in runs],
             "detector": detector.description() | {"digest": digest(options.detector.read_bytes())},
             "scans": {"seed": scans.seed, "rolling_shutter": scans.rolling_shutter},
-            "average_precision": figures(outcome),
+            "average_precision": {name: as_json(found) for name, found in precisions.items()},
             "score": outcome.score,
             "recall": outcome.recall,
             "warnings": [*changed, *doubts],
             "versions": versions(blender=bpy.app.version_string),
         }
         save_json(options.output / "detection.json", record)
-    for name, value, interval, users in outcome.precisions():
-        between = "" if interval is None else f" ({interval[0]:.1%} to {interval[1]:.1%})"
-        runtime.print_line(f"{name}: AP {value:.1%}{between} of {users:,} road users")
-    found = (f"{name} {one['recall']:.0%} of {one['road_users']:,}" for name, one in outcome.recall.items())
+    for name, found in precisions.items():
+        between = "" if found.interval is None else " ({:.1%} to {:.1%})".format(*found.interval)
+        runtime.print_line(f"{name}: AP {found.average_precision:.1%}{between} of {found.road_users:,} road users")
+    recall = (f"{name} {one['recall']:.0%} of {one['road_users']:,}" for name, one in outcome.recall.items())
     runtime.print_line(
-        f"found at an overlap of {MAIN_RULE.iou:g} with a score of {outcome.score:.2f} or more: {', '.join(found)}"
+        f"found at an overlap of {MAIN_RULE.iou:g} with a score of {outcome.score:.2f} or more: {', '.join(recall)}"
     )
     cores = os.cpu_count() or 1
     with deterministic(cores):

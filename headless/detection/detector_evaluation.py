@@ -1,13 +1,12 @@
 """Detections of a trained detector with the sensors of a placement, on runs of traffic."""
 
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from headless.detection.run_detection import AT_ONCE, detect_in_runs
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import Interval
+from seip_addon.core.output.results.detection_record import Precision
 from seip_addon.core.progress import Progress, side_by_side
 from seip_addon.core.sensing.scans.frame import Frame
 
@@ -50,11 +49,10 @@ class DetectorEvaluation:
             for name, (share, users) in recall_by_category(self.evaluation, self.score).items()
         }
 
-    def precisions(self) -> Iterator[tuple[str, float, Interval | None, int]]:
-        """Yield name, average precision, interval and number of road users by each rule by which there are any."""
-        for name, found in precisions(self.frames).items():
-            if found.road_users:
-                yield name, found.value, found.interval, found.road_users
+    @property
+    def precisions(self) -> dict[str, Precision]:
+        """Average precision by the name of each rule by which road users count."""
+        return {name: found for name, found in precisions(self.frames).items() if found.road_users}
 
 
 def evaluate_detector(
@@ -79,15 +77,3 @@ def evaluate_detector(
     instants = [(run, number) for run in runs for number in range(len(run.times))]
     scan = simulator.frame(placed, *instants[fullest])
     return DetectorEvaluation(frames, evaluation, fullest, scan, balanced_score(evaluation))
-
-
-def figures(outcome: DetectorEvaluation) -> Mapping[str, Any]:
-    """Return the figures for the record."""
-    return {
-        name: {
-            "average_precision": value,
-            "interval": None if interval is None else list(interval),
-            "road_users": users,
-        }
-        for name, value, interval, users in outcome.precisions()
-    }

@@ -186,7 +186,9 @@ def precisions(
         results = yield from side_by_side(works, AT_ONCE)
     runs: Text = np.repeat([run.name for run in traffic.test], [len(run.times) for run in traffic.test])
     of_classes: dict[str, Float] = {
-        name: np.array([np.mean([precision_by(frames, RULES[rule]).value for frames in own]) for own in results])
+        name: np.array(
+            [np.mean([precision_by(frames, RULES[rule]).average_precision for frames in own]) for own in results]
+        )
         for name, rule in CLASSES.items()
     }
     return Precisions(runs, tuple(tuple(evaluate(frames, MAIN_RULE) for frames in own) for own in results), of_classes)

@@ -162,7 +162,9 @@ def _row(outcome: DetectorOutcome) -> dict[str, str]:
         **{
             f"ap_{name}{end}": "" if math.isnan(value) else f"{value:.4f}"
             for name, found in outcome.precisions.items()
-            for end, value in zip(("", "_low", "_high"), (found.value, *(found.interval or _NO_ENDS)), strict=True)
+            for end, value in zip(
+                ("", "_low", "_high"), (found.average_precision, *(found.interval or _NO_ENDS)), strict=True
+            )
         },
         **{f"road_users_{name}": f"{found.road_users}" for name, found in outcome.precisions.items()},
         "ap_kitti_ap40": f"{by_kitti.ap40:.4f}",
@@ -243,7 +245,7 @@ def _by_rules(results: StudyResults, name: str) -> str:
     tables = [one.precisions for one in results.masked if one.configuration.name == name]
     words = []
     for rule in RULES:
-        values = [table[rule].value for table in tables]
+        values = [table[rule].average_precision for table in tables]
         if RULES[rule] is not MAIN_RULE and tables[0][rule].road_users:
             interval = mean_interval(values, SHARE) if len(values) > 1 else None
             words.append(f"{rule} {np.mean(values):.1%}{_between(interval)}")
