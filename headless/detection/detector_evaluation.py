@@ -4,10 +4,11 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
 from headless.detection.run_detection import AT_ONCE, detect_in_runs
+from headless.side_by_side import side_by_side
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.detection_record import Precision
-from seip_addon.core.progress import Progress, side_by_side
+from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.scans.frame import Frame
 
 from .average_precision import Evaluation, balanced_score, evaluate

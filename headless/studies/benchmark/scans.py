@@ -14,11 +14,11 @@ import numpy as np
 
 from seip_addon.core.arrays import Float, Integer
 from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.orientation import rotations
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.lidar.noisy_returns import return_chance
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame
-from seip_addon.core.sensing.scans.motion import rotations
 from seip_addon.core.sensing.scans.scanner import ReflectiveSurface, Scan, Scanner
 from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
 from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, prepare

@@ -20,6 +20,7 @@ from headless.detection.rules import MAIN_RULE, RULES, precision_by
 from headless.detection.run_detection import AT_ONCE, detect_in_runs
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import deterministic
+from headless.side_by_side import side_by_side
 from headless.studies.detection.case_study import ModelConfiguration, Traffic, TrainingSet, simulate_training_set
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 
@@ -27,7 +28,7 @@ import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Text
 from seip_addon.core.estimates import RESAMPLES, Interval, percentiles
-from seip_addon.core.progress import Progress, side_by_side
+from seip_addon.core.progress import Progress
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
 

@@ -20,6 +20,7 @@ from headless.detection.run_detection import AT_ONCE, detect_in_runs
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import TrainedDetector, deterministic, train
+from headless.side_by_side import side_by_side
 from headless.studies.coverage.cells import COUNTS, Case, Cell, solve_cell
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 from headless.studies.false_positives import false_positives
@@ -27,7 +28,7 @@ from headless.studies.false_positives import false_positives
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.detection_record import Precision
-from seip_addon.core.progress import Progress, side_by_side, within
+from seip_addon.core.progress import Progress, within
 from seip_addon.core.sensing.traffic.parked import shared_bays
 from seip_addon.core.sensing.traffic.run_overlap import MATCH_RADIUS, require_independent, vehicle_positions
 from seip_addon.core.workflows.survey import Survey

@@ -12,13 +12,14 @@ from headless.detection.frames import LazyFrames, Recording, SampledRecording
 from headless.detection.run_detection import AT_ONCE
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import TrainedDetector, deterministic, train
+from headless.side_by_side import side_by_side
 from headless.studies.coverage.cells import Cell, solve_cell
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 from headless.studies.site_training.training_site import TrainingSite
 
 import numpy as np
 
-from seip_addon.core.progress import Progress, finish, side_by_side
+from seip_addon.core.progress import Progress, finish
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.workflows.survey import lay_out, see

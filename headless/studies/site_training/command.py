@@ -23,6 +23,7 @@ from headless.detection.run_detection import AT_ONCE
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import train
 from headless.options import add_settings, new_parser, read_settings, real_number
+from headless.side_by_side import side_by_side
 from headless.studies.detection.case_study import simulated
 from headless.studies.site_training.training_site import TrainingSite
 
@@ -31,7 +32,7 @@ import numpy as np
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import TIME_STEP
-from seip_addon.core.progress import Progress, side_by_side
+from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.site_traffic import require_own_traffic
 from seip_addon.core.site.candidates import CandidateSettings

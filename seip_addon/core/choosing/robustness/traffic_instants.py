@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Float, Integer
 from ...errors import SeipError
-from ...sensing.scans.motion import rotations
+from ...geometry.orientation import rotations
 from ...sensing.traffic.bodies import fitted_body
 from ...sensing.traffic.trajectories import Snapshot, Trajectories
 

@@ -3,9 +3,11 @@
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
+from headless.side_by_side import side_by_side
+
 import pytest
 
-from seip_addon.core.progress import Progress, finish, side_by_side
+from seip_addon.core.progress import Progress, finish
 
 
 def counting(steps, name, seen=None):
