@@ -14,9 +14,9 @@ import bpy
 import numpy as np
 
 from .background import Background
+from .core.acceptance import Acceptance
 from .core.arrays import Boolean
 from .core.choosing.placement.objective import Solution
-from .core.choosing.placement.search_limits import Acceptance
 from .core.errors import SeipError
 from .core.sensing.lidar.model import LidarModel
 from .core.sensing.scans.frame import Frame

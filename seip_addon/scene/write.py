@@ -19,9 +19,6 @@ from .materials import linear, matt
 from .meshes import mesh_of
 from .pieces import attach_piece, rename_whole
 
-MARK = "seip_result"
-"""Custom property of every object made here, so that the next result replaces it and nothing else."""
-
 SEEN_BY, TARGET_WEIGHT, RETURNS, COLOUR = "seip_seen", "seip_weight", "seip_returns", "seip_colour"
 """Attributes of the coverage mesh, all but the last of each target's square; returns only where they were maximised."""
 CLASS_WORDS, CLASS_COLOURS, SHARES, ASPECT = "seip_classes", "seip_class_colours", "seip_shares", "seip_aspect"
@@ -86,7 +83,7 @@ def clear_result(scene: bpy.types.Scene) -> None:
     for name in (contract.SENSORS, contract.COVERAGE):
         collection = contract.find(scene, name)
         if collection is not None:
-            for obj in [obj for obj in collection.objects if MARK in obj]:
+            for obj in [obj for obj in collection.objects if contract.WRITTEN in obj]:
                 _remove(obj)
 
 
@@ -103,7 +100,7 @@ def _write_sensors(collection: bpy.types.Collection, sensors: Sequence[Sensor]) 
         collection.objects.link(empty)
         name = f"{sensor.label} body"
         body = bpy.data.objects.new(name, mesh_of(name, _hardware(sensor)))
-        body[MARK] = True
+        body[contract.WRITTEN] = True
         attach_piece(body, empty)
         collection.objects.link(body)
 
@@ -126,7 +123,7 @@ def _name(sensor: Sensor) -> str:
 def _describe(empty: bpy.types.Object, sensor: Sensor) -> None:
     """Write the sensor, its position and its coverage to the properties of an empty."""
     properties = {
-        MARK: True,
+        contract.WRITTEN: True,
         contract.LABEL: sensor.label,
         contract.SENSOR: sensor.model.key,
         "seip_sensor_name": sensor.model.name,
@@ -167,7 +164,7 @@ def _hardware(sensor: Sensor) -> Solid:
 def coverage_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """Return the mesh that shows the coverage, None where no result has been written."""
     collection = contract.find(scene, contract.COVERAGE)
-    own = [] if collection is None else [obj for obj in collection.objects if MARK in obj]
+    own = [] if collection is None else [obj for obj in collection.objects if contract.WRITTEN in obj]
     return own[0] if own else None
 
 
@@ -208,7 +205,7 @@ def paint(obj: bpy.types.Object, colours: Colouring) -> None:
 
 def _write_coverage(collection: bpy.types.Collection, targets: Targets, deployment: Deployment) -> None:
     obj = bpy.data.objects.new("Coverage", _coverage_mesh(targets, deployment))
-    obj[MARK] = True
+    obj[contract.WRITTEN] = True
     paint(obj, of_placement(deployment))
     obj[ASPECT] = aspects_of(obj)[0]
     obj["seip_coverage"] = deployment.coverage
