@@ -35,7 +35,6 @@ from headless.options import add_optics, add_rolling_shutter, add_settings, new_
 import bpy
 import numpy as np
 
-from seip_addon.core.choosing.robustness.traffic_instants import check_runs
 from seip_addon.core.limits import TIME_STEP
 from seip_addon.core.output.datasets.detection_files import kitti_results, openpcdet_results
 from seip_addon.core.output.results.detection_record import FORMATS, SCHEMA
@@ -44,7 +43,7 @@ from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.run_overlap import require_independent, vehicle_positions
-from seip_addon.core.sensing.traffic.site_traffic import require_own_traffic
+from seip_addon.core.sensing.traffic.site_traffic import check_runs, require_own_traffic
 from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.files import digest, save_json, whole_file
 from seip_addon.core.storage.json_dataclass import as_json

@@ -33,12 +33,11 @@ from headless.studies.detection.sensor_configuration import SensorConfiguration
 import bpy
 
 from seip_addon.core.choosing.placement.objective import Objective, check_objective
-from seip_addon.core.choosing.robustness.traffic_instants import check_runs
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import COUNT, SEED, SENSORS, TIME_STEP, Limits
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.sensing.scans.simulation import ScanSettings
-from seip_addon.core.sensing.traffic.site_traffic import require_own_traffic
+from seip_addon.core.sensing.traffic.site_traffic import check_runs, require_own_traffic
 from seip_addon.core.workflows.survey import Survey
 
 STEPS, TRAININGS = Limits(1, 10_000_000), Limits(0, 1_000)

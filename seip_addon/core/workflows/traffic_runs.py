@@ -9,11 +9,10 @@ from itertools import product
 from pathlib import Path
 from typing import TypeVar
 
-from ..choosing.robustness.traffic_instants import check_runs
 from ..errors import SeipError
 from ..progress import Progress
 from ..sensing.traffic.run_overlap import require_independent, vehicle_positions
-from ..sensing.traffic.site_traffic import load_trajectories
+from ..sensing.traffic.site_traffic import check_runs, load_trajectories
 from ..sensing.traffic.trajectories import Trajectories
 from ..site.site import Site
 from .survey import Layout

@@ -231,15 +231,11 @@ class CoverProgram(PlacementProgram):
         return [self.number_among(np.flatnonzero(column)) for column in self.instance.visible.T]
 
 
-def root_operations(instance: Instance) -> float:
-    """Return the work of the first linear relaxation of an instance's program, in multiplications.
+def _root_operations(entries: int) -> float:
+    """Return the work of the first linear relaxation of a program, in multiplications.
 
     The benchmark measures it against the entries of V (`seip study benchmark`, under “Growth”).
     """
-    return _root_operations(np.count_nonzero(instance.visible))
-
-
-def _root_operations(entries: int) -> float:
     return ROOT_OPERATIONS * float(entries) ** 2
 
 

@@ -1,9 +1,11 @@
 """Trajectories of a scene's own traffic: read from a file, and checked against the road of the scene."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from ...errors import SeipError
 from ...site.scene_geometry import SceneGeometry, joined
@@ -88,3 +90,13 @@ def share_on_road(local: Trajectories, geometry: SceneGeometry) -> float:
     sample = local.position[near[np.linspace(0, len(near) - 1, min(len(near), MAX_SAMPLES)).astype(np.int64)]]
     height = RoadSurface(joined(geometry.roads)).height(sample[:, :2], sample[:, 2])
     return float(np.mean(np.abs(height - sample[:, 2]) <= ROAD_TOLERANCE))
+
+
+def check_runs(runs: Sequence[Trajectories], region: BaseGeometry) -> None:
+    """Raise SeipError if a run has no road user in the region of interest: it then belongs to another site."""
+    for run in runs:
+        if not shapely.contains_xy(region, run.position[:, 0], run.position[:, 1]).any():
+            raise SeipError(
+                f"no road user of {run.description} is ever in the region of interest: use traffic of this site, or "
+                "set the scene's seip_origin to that of its map"
+            )

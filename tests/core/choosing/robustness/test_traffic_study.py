@@ -14,7 +14,7 @@ from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.choosing.robustness.robust_placement import at_least
-from seip_addon.core.choosing.robustness.traffic_instants import NO_TRAFFIC, WARM_UP, spread_instants
+from seip_addon.core.choosing.robustness.traffic_instants import NO_TRAFFIC, spread_instants
 from seip_addon.core.choosing.robustness.traffic_presence import road_user_seconds
 from seip_addon.core.choosing.robustness.traffic_study import LAYER_NAMES, traffic_scenarios, traffic_study
 from seip_addon.core.choosing.robustness.visibility_in_traffic import visibility_in_traffic
@@ -22,7 +22,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import IntervalEstimate, mean_of, mean_over_time
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.traffic.trajectories import RoadUser
+from seip_addon.core.sensing.traffic.trajectories import WARM_UP, RoadUser
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.surroundings import Surroundings
