@@ -24,12 +24,13 @@ from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
 from seip_addon.core.sensing.lidar.model import DetectionLaw, LidarModel
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.lidar.rosette import Rosette
-from seip_addon.core.sensing.visibility.grid import compute_visibility, full_scan_visibility
+from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.near_surfaces import caster_tolerance
 from seip_addon.core.sensing.visibility.ray_casting import Engine, make_ray_caster
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.site import Site, Targets
+from tests.oracles.full_scan import full_scan
 
 Float = NDArray[np.float64]
 Boolean = NDArray[np.bool_]
@@ -462,7 +463,7 @@ def differences(case: Case, engine: Engine, verdict: Verdict) -> Counter[str]:
     """Count the entries of a case's grid, and where it is not what the references say."""
     lazy = finish(compute_visibility(case.site, case.models, case.settings, engine, threads=1)).visible
     caster = make_ray_caster(case.site.triangles, engine)
-    full = finish(full_scan_visibility(case.site, case.models, case.settings, caster)).visible
+    full, _ = full_scan(case.site, case.models, case.settings, caster)
     return Counter(
         {
             "entries": lazy.size,
