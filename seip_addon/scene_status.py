@@ -8,7 +8,7 @@ import bpy
 
 from .core.errors import SeipError
 from .core.output.results.placement_file import parsed_record
-from .core.workflows.survey import SurveySettings
+from .core.workflows.survey_settings import SurveySettings
 from .scene import contract
 from .session import session
 

@@ -10,7 +10,7 @@ import bpy
 from .. import scene_survey
 from ..core.counts import counted
 from ..core.progress import Progress
-from ..core.workflows.survey import estimate
+from ..core.workflows.visibility_estimate import estimate
 from ..session import SceneState, session
 from .base import ForReadyScene, LongWork
 

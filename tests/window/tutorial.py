@@ -86,7 +86,7 @@ def _compute(window: Window) -> Steps:
     stop = yield from _bar_moves(window, button)
     yield from window.press("LEFTMOUSE", stop)
     yield from window.until(lambda: session.running is None, 0.5)
-    yield 0.5  # until the sidebar is drawn anew, with the button back in its place
+    yield 0.5  # until the sidebar is drawn again, with the button back in its place
     yield from window.press("LEFTMOUSE", button)
     yield from window.until(lambda: session.running is not None, 10)
     bpy.ops.seip.stop()
