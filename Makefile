@@ -6,13 +6,13 @@
 # make detection   install PyTorch, for the detector; make test-detection tests it
 # make study       redo the study on the shipped junction: coverage and detection (make -j2 study: ten minutes)
 # make detector    train the detector that ships: random placements at 20 random sites (half an hour)
-# make ingredients what each ingredient of its training gains at sites never learnt from (an hour)
+# make ingredients what each ingredient of its training gains at sites not trained on (an hour)
 # make settings    chart what other settings of the detector cost and gain (an hour)
 # make stability   drive every method to where it fails, and write docs/stability.md (two hours)
 # make traffic     simulate the shipped traffic again (installs Eclipse SUMO in the environment: 230 MB)
 # make benchmark   measure speed and error again, and write docs/benchmark.md (20 minutes; 40 with PyTorch)
 # make extension   build the Blender extension in dist/
-# make lock        write wheels.lock anew, the digests of all pinned packages, after a pin has changed
+# make lock        write wheels.lock again, the digests of all pinned packages, after a pin has changed
 # make clean       remove what was built; make distclean removes the environment and the wheels as well
 #
 # Another Python: make PYTHON=python3.13 VENV=.venv313 test

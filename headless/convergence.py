@@ -20,7 +20,7 @@ from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel, visibility_model
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site, make_site
-from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.core.workflows.survey_settings import SurveySettings
 
 GRID_SPACINGS = (4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)
 """Metres between targets, from coarse to fine: each halves the square that a target stands for."""

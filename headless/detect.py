@@ -24,8 +24,8 @@ from headless.detection.average_precision import precision_recall, too_few_runs
 from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
 from headless.detection.chart_data import error_view, parts
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
+from headless.detection.detector_evaluation import DetectorEvaluation, evaluate_detector
 from headless.detection.inference import seconds_of
-from headless.detection.judgement import Judgement, figures, judge
 from headless.detection.recordings import MountedSensors, Simulator, sampled_runs
 from headless.detection.rules import MAIN_RULE
 from headless.detection.suitability import suitability_warnings
@@ -35,7 +35,6 @@ from headless.options import add_optics, add_rolling_shutter, add_settings, new_
 import bpy
 import numpy as np
 
-from seip_addon.core.choosing.robustness.traffic_instants import check_runs
 from seip_addon.core.limits import TIME_STEP
 from seip_addon.core.output.datasets.detection_files import kitti_results, openpcdet_results
 from seip_addon.core.output.results.detection_record import FORMATS, SCHEMA
@@ -44,10 +43,11 @@ from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.run_overlap import require_independent, vehicle_positions
-from seip_addon.core.sensing.traffic.source import require_own_traffic
+from seip_addon.core.sensing.traffic.site_traffic import check_runs, require_own_traffic
 from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.files import digest, save_json, whole_file
-from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.core.storage.json_dataclass import as_json
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import changed_beams, read_sensors
@@ -80,13 +80,14 @@ def main(argv: list[str]) -> None:
     )
     simulator, placed = Simulator(geometry, scans, sensors), MountedSensors("sensors", tuple(sensors))
     check_runs([run.trajectories for run in runs], simulator.static.region)
-    judgement = runtime.finish_with_bar(judge(detector, simulator, placed, runs))
+    outcome = runtime.finish_with_bar(evaluate_detector(detector, simulator, placed, runs))
     area = simulator.area(detector.settings.pillar)
-    doubts = suitability_warnings(detector, placed.types, area, judgement.scan)
+    doubts = suitability_warnings(detector, placed.types, area, outcome.scan)
     doubts = (*doubts, *filter(None, [too_few_runs(len(runs))]))
     runtime.warn(doubts)
+    precisions = outcome.precisions
     with runtime.incomplete_if_interrupted(options.output):
-        _save(options.output, judgement, simulator, sensors)
+        _save(options.output, outcome, simulator, sensors)
         record = {
             "schema": SCHEMA,
             "site": geometry.name,
@@ -94,31 +95,31 @@ def main(argv: list[str]) -> None:
             "traffic": [{"name": run.name, "key": run.key, "frames": len(run.times)} for run in runs],
             "detector": detector.description() | {"digest": digest(options.detector.read_bytes())},
             "scans": {"seed": scans.seed, "rolling_shutter": scans.rolling_shutter},
-            "average_precision": figures(judgement),
-            "score": judgement.score,
-            "recall": judgement.recall,
+            "average_precision": {name: as_json(found) for name, found in precisions.items()},
+            "score": outcome.score,
+            "recall": outcome.recall,
             "warnings": [*changed, *doubts],
             "versions": versions(blender=bpy.app.version_string),
         }
         save_json(options.output / "detection.json", record)
-    for name, value, interval, users in judgement.precisions():
-        between = "" if interval is None else f" ({interval[0]:.1%} to {interval[1]:.1%})"
-        runtime.print_line(f"{name}: AP {value:.1%}{between} of {users:,} road users")
-    found = (f"{name} {one['recall']:.0%} of {one['road_users']:,}" for name, one in judgement.recall.items())
+    for name, found in precisions.items():
+        between = "" if found.interval is None else " ({:.1%} to {:.1%})".format(*found.interval)
+        runtime.print_line(f"{name}: AP {found.average_precision:.1%}{between} of {found.road_users:,} road users")
+    recall = (f"{name} {one['recall']:.0%} of {one['road_users']:,}" for name, one in outcome.recall.items())
     runtime.print_line(
-        f"found at an overlap of {MAIN_RULE.iou:g} with a score of {judgement.score:.2f} or more: {', '.join(found)}"
+        f"found at an overlap of {MAIN_RULE.iou:g} with a score of {outcome.score:.2f} or more: {', '.join(recall)}"
     )
     cores = os.cpu_count() or 1
     with deterministic(cores):
-        seconds = seconds_of(detector, area, judgement.scan)
+        seconds = seconds_of(detector, area, outcome.scan)
     where = options.device if options.device != "cpu" else f"{cores} cores"
-    runtime.print_line(f"detection in the fullest frame, {len(judgement.scan):,} returns: {seconds:.2f} s on {where}")
+    runtime.print_line(f"detection in the fullest frame, {len(outcome.scan):,} returns: {seconds:.2f} s on {where}")
     runtime.print_line(f"written to {options.output}/")
 
 
-def _save(folder: Path, judgement: Judgement, simulator: Simulator, sensors: list[MountedSensor]) -> None:
+def _save(folder: Path, outcome: DetectorEvaluation, simulator: Simulator, sensors: list[MountedSensor]) -> None:
     """Write the charts, and the detections of each frame."""
-    evaluation, score, name = judgement.evaluation, judgement.score, simulator.site
+    evaluation, score, name = outcome.evaluation, outcome.score, simulator.site
     far = "distance to the nearest sensor (m)"
     panels = [
         parts(far, "average precision", {name: average_precision_by(evaluation, "distance", DISTANCE_EDGES)}),
@@ -130,17 +131,17 @@ def _save(folder: Path, judgement: Judgement, simulator: Simulator, sensors: lis
     types = " + ".join(sorted({sensor.model.key for sensor in sensors}))
     line = PrecisionRecallLine(types, len(sensors), found.recall, found.precision, evaluation.average_precision)
     save_precision_recall_chart(folder / "precision_recall.png", [line], name)
-    frame = judgement.frames[judgement.fullest]
+    frame = outcome.frames[outcome.fullest]
     places = np.array([sensor.xyz for sensor in sensors])
     title = f"{len(sensors)} × {types}: AP {evaluation.average_precision:.2f} over all frames"
-    cloud = judgement.scan.points
+    cloud = outcome.scan.points
     view = error_view(title, frame, MAIN_RULE, score=score, cloud=cloud, region=simulator.static.region, sensors=places)
     where = f"{name}, {frame.run} at {frame.time:.1f} s"
     save_error_view(folder / "errors.png", [view], where, simulator.static.attribution)
     for form in FORMATS:
         for stale in (folder / form).glob("*.txt"):  # of an earlier, longer run
             stale.unlink()
-    for number, one in enumerate(judgement.frames):
+    for number, one in enumerate(outcome.frames):
         boxes, categories, scores = one.detected.boxes, one.detected.category.tolist(), one.detected.score
         for form, lines in zip(FORMATS, (kitti_results, openpcdet_results), strict=True):
             with whole_file(folder / form / f"{number:06d}.txt") as temporary:

@@ -52,14 +52,14 @@ def main(argv: list[str]) -> None:
         runtime.LOG.info(runs.overlap)
     acceptance = runtime.accepted_by_enter()
     solution = watch.run("placement", place(surveyed, objective, runs, acceptance))
-    runtime.print_line(_in_words(solution))
+    runtime.print_line(_describe(solution))
     with runtime.incomplete_if_interrupted(options.output):
         save_evaluation_charts(options.output, surveyed, solution)
         survey.save_solution(surveyed, watch, solution, options.output, render=not options.no_render)
     runtime.print_line(f"written to {options.output}/")
 
 
-def _in_words(solution: Solution) -> str:
+def _describe(solution: Solution) -> str:
     placement, deployment = solution.placement, solution.deployment
     lines = [
         f"{survey.describe_sensor(sensor)}: sees {sensor.alone:.1%} of the targets, {sensor.marginal:.1%} alone"

@@ -21,7 +21,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from headless.system_libraries import complaint, missing_libraries
 
-from seip_addon.core.choosing.placement.search_limits import Acceptance
+from seip_addon.core.acceptance import Acceptance
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Pace, Progress, finish
 from seip_addon.core.storage import files as storage

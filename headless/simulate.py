@@ -25,12 +25,13 @@ from seip_addon.core.output.datasets.formats import FORMATS
 from seip_addon.core.output.datasets.sample import SPLITS
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.scans.run_folder import Record, Run, check_no_placement, check_run_folder
+from seip_addon.core.sensing.scans.run_folder import Record, Run, check_run_folder
 from seip_addon.core.sensing.scans.simulation import ScanSettings
-from seip_addon.core.sensing.traffic.source import load_trajectories
+from seip_addon.core.sensing.traffic.site_traffic import load_trajectories
 from seip_addon.core.site.weather import weather_of
+from seip_addon.core.storage.folder_contents import check_no_placement
 from seip_addon.core.workflows.recording import RecordingSettings, dataset_folder, make_run, record, simulation_of
-from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import changed_beams, read_sensors
@@ -48,7 +49,7 @@ def main(argv: list[str]) -> None:
     settings = _settings(options)
     run = _run(options, settings)
     check_run_folder(options.output, run)
-    runtime.LOG.info(_in_words(run))
+    runtime.LOG.info(_describe(run))
     simulation = runtime.finish_with_bar(simulation_of(run))
     runtime.warn(simulation.warnings)
     manifest = runtime.finish_with_bar(record(options.output, run, simulation, settings))
@@ -89,7 +90,7 @@ def _run(options: argparse.Namespace, settings: RecordingSettings) -> Run:
     )
 
 
-def _in_words(run: Run) -> str:
+def _describe(run: Run) -> str:
     lines = [
         f"{sensor.label}  {sensor.model.key} at ({', '.join(f'{value:.2f}' for value in sensor.xyz)})"
         for sensor in run.sensors

@@ -21,11 +21,9 @@ import numpy as np
 from seip_addon.core.choosing.placement.deployment import Sensor
 from seip_addon.core.choosing.placement.objective import Solution
 from seip_addon.core.counts import counted
-from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.placement_record import Provenance
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.sensing.scans.run_folder import MANIFEST
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.triangle_culling import culling_message
 from seip_addon.core.site.candidates import CandidateSettings
@@ -33,8 +31,10 @@ from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
 from seip_addon.core.site.weather import weather_of
+from seip_addon.core.storage.folder_contents import check_no_run
 from seip_addon.core.workflows.records import record_of
-from seip_addon.core.workflows.survey import Layout, Survey, SurveySettings, lay_out, see
+from seip_addon.core.workflows.survey import Layout, Survey, lay_out, see
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.core.workflows.traffic_runs import runs_in, traffic_folder
 from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
@@ -132,10 +132,7 @@ def survey(
     settings = _settings(options)
     settings.models()  # refuses unknown types before the scene is read
     runtime.check_folder(options.output)
-    if (options.output / MANIFEST).exists():
-        raise SeipError(
-            f"{options.output} holds a run of scans, which a placement is not written to: name another folder"
-        )
+    check_no_run(options.output)
     runtime.open_scene(options.scene)
 
     set_reflectivity(options.reflectivity)
@@ -145,7 +142,7 @@ def survey(
         settings = watch.run("spacings", refine(reading.geometry, settings)).settings
         LOG.info(settings.spacings_because)
     layout = watch.time("lay out the site", lambda: lay_out(reading.geometry, settings, reading.warnings))
-    LOG.info(_in_words(layout.site))
+    LOG.info(_describe_site(layout.site))
     runtime.warn(layout.warnings)
     check(layout)
     surveyed = watch.run("visibility", see(layout, options.output / "visibility.npz", options.scheduler))
@@ -186,7 +183,7 @@ def _settings(options: argparse.Namespace) -> SurveySettings:
     )
 
 
-def _in_words(site: Site) -> str:
+def _describe_site(site: Site) -> str:
     candidates = site.candidates
     dropped = ", ".join(f"{count} {reason}" for reason, count in candidates.dropped.items())
     poles = np.count_nonzero(candidates.on_pole)

@@ -54,7 +54,7 @@ def _make(options: argparse.Namespace) -> None:
     if options.animate is not None:
         animate(bpy.context.scene, trajectories)
         save_blend(options.animate)
-    runtime.print_line(f"{options.output}: {_in_words(trajectories)}")
+    runtime.print_line(f"{options.output}: {_describe(trajectories)}")
 
 
 def _imported(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
@@ -80,7 +80,7 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
     return run.trajectories
 
 
-def _in_words(trajectories: Trajectories) -> str:
+def _describe(trajectories: Trajectories) -> str:
     begin, end = trajectories.span
     present = len(trajectories.at((begin + end) / 2.0))
     return (

@@ -47,7 +47,8 @@ from .core.site.candidates import CandidateSettings
 from .core.site.scene_geometry import SceneGeometry
 from .core.workflows.placing import place as _place
 from .core.workflows.recording import RecordingSettings, frame_number, make_run, simulation_of
-from .core.workflows.survey import Layout, Survey, SurveySettings, lay_out, with_grid
+from .core.workflows.survey import Layout, Survey, lay_out, with_grid
+from .core.workflows.survey_settings import SurveySettings
 from .core.workflows.traffic_runs import independent_runs
 
 __all__ = [

@@ -17,8 +17,8 @@ from .core.errors import SeipError
 from .core.sensing.scans.sensor import MountedSensor
 from .core.sensing.visibility.visibility_model import VisibilityModel
 from .scene import contract
+from .scene.coverage_colours import show_seen_by
 from .scene.sensors import read_sensors
-from .scene.write import show_seen_by
 from .sensor_edits import same_pose
 from .session import FollowedSensors, SceneState, scene_of, session
 

@@ -9,7 +9,7 @@ import bpy
 from .core.errors import SeipError
 from .core.output.results.placement_file import parsed_record
 from .core.sensing.lidar.range_equation import RangeEquation
-from .core.workflows.survey import SurveySettings
+from .core.workflows.survey_settings import SurveySettings
 from .scene import contract
 from .session import session
 

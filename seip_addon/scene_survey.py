@@ -21,7 +21,8 @@ from .core.output.results.placement_file import parsed_record
 from .core.output.results.placement_record import PlacementRecord
 from .core.progress import Progress
 from .core.workflows.records import inputs_of, restored_solution
-from .core.workflows.survey import Survey, SurveySettings, lay_out, see
+from .core.workflows.survey import Survey, lay_out, see
+from .core.workflows.survey_settings import SurveySettings
 from .scene.changes import Watch, on_update, watch
 from .scene.read import SceneReading, read_scene
 from .scene_status import FILE_VERSION, obstacle, same_grid

@@ -14,9 +14,9 @@ import bpy
 import numpy as np
 
 from .background import Background
+from .core.acceptance import Acceptance
 from .core.arrays import Boolean
 from .core.choosing.placement.objective import Solution
-from .core.choosing.placement.search_limits import Acceptance
 from .core.errors import SeipError
 from .core.sensing.lidar.model import LidarModel
 from .core.sensing.scans.frame import Frame
@@ -28,7 +28,8 @@ from .core.sensing.traffic.trajectories import Trajectories
 from .core.sensing.visibility.estimate import Estimate
 from .core.sensing.visibility.visibility_model import VisibilityModel
 from .core.storage.files import check_folder
-from .core.workflows.survey import Layout, Survey, SurveySettings
+from .core.workflows.survey import Layout, Survey
+from .core.workflows.survey_settings import SurveySettings
 from .overlay import Overlay
 from .scene.changes import Watch
 

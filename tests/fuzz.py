@@ -638,7 +638,8 @@ def _read_site_file(path: Path, _: bytes) -> None:
 def _runs(folder: Path) -> list[bytes]:
     """Return manifests of a run whose frames lie in the folder."""
     from seip_addon.core.sensing.scans.frame import Frame  # noqa: PLC0415
-    from seip_addon.core.sensing.scans.run_folder import MANIFEST, _frame_record  # noqa: PLC0415
+    from seip_addon.core.sensing.scans.run_folder import _frame_record  # noqa: PLC0415
+    from seip_addon.core.storage.folder_contents import MANIFEST  # noqa: PLC0415
 
     frames = folder / "run" / "frames"
     _arrays(folder)

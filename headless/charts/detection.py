@@ -1,4 +1,4 @@
-"""Charts of average precision against number, price, coverage and time."""
+"""Charts of a detector: precision and recall, parts of the road users, and a training."""
 
 import math
 import os
@@ -9,76 +9,29 @@ from typing import Any
 
 from headless.charts.style import (
     COLOURS,
-    DASHED,
     FAINT_COLOUR,
-    add_legend,
     colour,
     mark,
     new_figure,
     save_chart,
-    set_title,
     style_axes,
 )
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.pictures.callouts import place_callouts
-from seip_addon.core.output.pictures.drawing import save_png
 from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
 
 PANEL_SIZE = (6.0, 4.4)  # inches
-TYPE_SHIFT, SEED_SHIFT = 0.09, 0.035  # of the step between two numbers: from type to type, from mark to seeds
-SEED_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 3.4, "alpha": 0.55, "mew": 0.0, "zorder": 2}
 RING_MARK: dict[str, Any] = {"linestyle": "none", "marker": "o", "mfc": "none", "mec": INK}
-LABEL: dict[str, Any] = {"size": 8.0, "color": INK, "ha": "center", "va": "center", "zorder": 5, "parse_math": False}
-
 LINE_STYLES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
 
 PRECISION_LABEL = "average precision"
 
 Interval = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class PrecisionCell:
-    """Average precision of one type and number of sensors, by seed.
-
-    Parameters
-    ----------
-    sensor : str
-        Catalogue key.
-    count : int
-        N, the largest number of sensors allowed.
-    price : float, US dollars
-    coverage : float, 0 to 1
-    values : tuple of float
-        Average precision by seed.
-    interval : (float, float) or None
-        95 % interval of their mean, or None.
-    """
-
-    sensor: str
-    count: int
-    price: float
-    coverage: float
-    values: tuple[float, ...]
-    interval: Interval | None = None
-
-    @property
-    def mean(self) -> float:
-        """Mean over the seeds."""
-        return float(np.mean(self.values))
-
-    @property
-    def name(self) -> str:
-        """Name in charts."""
-        return _named(self.count, self.sensor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +41,7 @@ class PrecisionRecallLine:
     Parameters
     ----------
     sensor, count
-        As in `PrecisionCell`.
+        Catalogue key, and N, the largest number of sensors allowed.
     recall, precision : (s,) float64, 0 to 1
         Recall and precision at each score, the highest first.
     """
@@ -123,125 +76,17 @@ class BinnedFigure:
     road_users: Sequence[int] = ()
 
 
-@dataclass(frozen=True)
-class DetectorSetting:
-    """One setting of the detector with its cost.
-
-    Parameters
-    ----------
-    name : str
-        Difference from the default: ``pillars 0.32 m``.
-    family : str
-        Group of settings; settings of one family have the same colour.
-    training : float, seconds
-    inference : float, milliseconds
-        Time for one merged frame.
-    average_precision : float, 0 to 1
-    interval : (float, float) or None
-    """
-
-    name: str
-    family: str
-    training: float
-    inference: float
-    average_precision: float
-    interval: Interval | None = None
-    default: bool = False
-
-
-def save_count_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell], title: str) -> None:
-    """Draw average precision against the number of sensors, a line for each type, as PNG.
-
-    Small dots are single seeds, marks their means, bars the intervals of the means.
-    """
-    _check(cells, "average precision against the number of sensors")
-    figure, (panel,) = new_figure(*PANEL_SIZE)
-    counts = sorted({cell.count for cell in cells})
-    sensors = _sensors(cells)
-    for row, sensor in enumerate(sensors):
-        own = sorted((cell for cell in cells if cell.sensor == sensor), key=lambda cell: cell.count)
-        x = [counts.index(cell.count) + TYPE_SHIFT * (row - (len(sensors) - 1) / 2) for cell in own]
-        panel.plot(x, [cell.mean for cell in own], label=sensor, linewidth=1.6, **_mark(row))
-        for place, cell in zip(x, own, strict=True):
-            _bar(panel, place, cell.interval, row)
-            panel.plot([place + SEED_SHIFT] * len(cell.values), cell.values, color=colour(row), marker="o", **SEED_MARK)
-    panel.set_xticks(range(len(counts)), [f"{count}" for count in counts])
-    panel.set_xlim(-0.4, len(counts) - 0.6)
-    _precision_axis(panel, _reached(cells), "number of sensors N")
-    save_chart(path, figure, title, [panel])
-
-
-def save_price_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell], title: str) -> None:
-    """Draw average precision against price, with the front named, as PNG."""
-    _check(cells, "average precision against price")
-    figure, (panel,) = new_figure(PANEL_SIZE[0] * 1.25, PANEL_SIZE[1])
-    best = _front(cells)
-    _scatter(panel, cells, [cell.price for cell in cells])
-    panel.step(
-        [cell.price for cell in best],
-        [cell.mean for cell in best],
-        where="post",  # a higher price never gives less: cheaper placements can be chosen, too
-        color=SOFT_INK,
-        linewidth=1.1,
-        linestyle=DASHED,
-        zorder=1,
-        label="front: nothing cheaper detects as well",
-    )
-    panel.set_xscale("log")
-    panel.margins(x=0.12)
-    panel.xaxis.set_major_formatter(FuncFormatter(lambda price, _: f"${price / 1000:,.0f}k"))
-    panel.xaxis.set_minor_formatter(NullFormatter())
-    prices = [cell.price for cell in cells]
-    ticks = [step * 10.0**decade for decade in range(7) for step in (1, 2, 5)]
-    panel.set_xticks([tick for tick in ticks if min(prices) / 1.5 <= tick <= max(prices) * 1.5])
-    _precision_axis(panel, _reached(cells), "price of all sensors")
-    add_legend(figure, [panel])
-    set_title(figure, title)
-    _name(figure, panel, [(cell.price, cell.mean, cell.name, cell in best) for cell in cells])
-    save_png(path, figure)
-
-
-def save_coverage_chart(
-    path: str | os.PathLike[str],
-    cells: Sequence[PrecisionCell],
-    correlation: float,
-    interval: Interval | None,
-    title: str,
-) -> None:
-    """Draw average precision against coverage, with their rank correlation, as PNG.
-
-    Parameters
-    ----------
-    correlation : float
-        Spearman's rank correlation of coverage and mean average precision.
-    interval : (float, float) or None
-        Its 95 % interval, where there is one.
-    """
-    _check(cells, "average precision against coverage")
-    figure, (panel,) = new_figure(*PANEL_SIZE)
-    _scatter(panel, cells, [cell.coverage for cell in cells])
-    panel.margins(x=0.1)
-    panel.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:.0f} %"))
-    _precision_axis(panel, _reached(cells), "coverage: share of the road that the placement sees")
-    between = "" if interval is None else f" ({interval[0]:.2f} to {interval[1]:.2f})"
-    panel.set_title(f"rank correlation ρ = {correlation:.2f}{between}", color=SOFT_INK, fontsize=9.5)
-    add_legend(figure, [panel])
-    set_title(figure, title)
-    _name(figure, panel, [(cell.coverage, cell.mean, cell.name, False) for cell in cells])
-    save_png(path, figure)
-
-
 def save_precision_recall_chart(
     path: str | os.PathLike[str], curves: Sequence[PrecisionRecallLine], title: str
 ) -> None:
     """Draw precision against recall, a colour for each type and a stroke for each number of sensors, as PNG."""
-    _check(curves, "precision against recall")
+    check_drawn(curves, "precision against recall")
     figure, (panel,) = new_figure(*PANEL_SIZE)
     sensors = list(dict.fromkeys(curve.sensor for curve in curves))
     counts = sorted({curve.count for curve in curves}, reverse=True)
     for curve in curves:
         stroke = LINE_STYLES[counts.index(curve.count) % len(LINE_STYLES)]
-        label = f"{_named(curve.count, curve.sensor)}: AP {curve.average_precision:.2f}"
+        label = f"{placement_name(curve.count, curve.sensor)}: AP {curve.average_precision:.2f}"
         style: dict[str, Any] = {"color": colour(sensors.index(curve.sensor)), "linestyle": stroke, "linewidth": 1.6}
         panel.plot(curve.recall, curve.precision, label=label, **style)
     panel.set(xlim=(0, 1.01), ylim=(0, 1.02))
@@ -251,14 +96,14 @@ def save_precision_recall_chart(
 
 def save_parts_chart(path: str | os.PathLike[str], panels: Sequence[BinnedFigure], title: str) -> None:
     """Draw figures in bins of road users, with one panel for each binned quantity, as PNG."""
-    _check(panels, "detection by parts of the road users")
+    check_drawn(panels, "detection by parts of the road users")
     figure, axes = new_figure(PANEL_SIZE[0] * 0.85 * len(panels), PANEL_SIZE[1], len(panels))
     for panel, parts in zip(axes, panels, strict=True):
         places = range(len(parts.edges) - 1)
         if parts.road_users:
             _draw_road_users(panel, parts.road_users)
         for row, (name, values) in enumerate(parts.lines.items()):
-            panel.plot(places, values, label=name, linewidth=1.6, **_mark(row))
+            panel.plot(places, values, label=name, linewidth=1.6, **mark_style(row))
         panel.set_xticks(places, _spans(parts.edges), fontsize=8)
         panel.set_xlim(-0.5, len(places) - 0.5)
         panel.set_ylim(bottom=0)
@@ -280,7 +125,7 @@ def save_training_chart(
     validation : mapping of int to float
         Average precision by number of steps; the best is marked.
     """
-    _check(loss, "a training")
+    check_drawn(loss, "a training")
     figure, (panel,) = new_figure(PANEL_SIZE[0] * 1.25, PANEL_SIZE[1])
     each = np.arange(1, len(loss) + 1)
     panel.plot(each, loss, color=FAINT_COLOUR, linewidth=0.7, label="loss")
@@ -308,84 +153,20 @@ def save_training_chart(
     save_chart(path, figure, title, panels)
 
 
-def save_setting_chart(path: str | os.PathLike[str], settings: Sequence[DetectorSetting], title: str) -> None:
-    """Draw average precision against training seconds and inference milliseconds, the default marked, as PNG."""
-    _check(settings, "settings of the detector")
-    figure, axes = new_figure(PANEL_SIZE[0] * 2.2, PANEL_SIZE[1], 2)
-    families = list(dict.fromkeys(setting.family for setting in settings))
-    costs = [[one.training for one in settings], [one.inference for one in settings]]
-    for panel, cost, what in zip(
-        axes, costs, ("training, one core (s)", "inference on one merged frame, one core (ms)"), strict=True
-    ):
-        for row, family in enumerate(families):
-            own = [(x, one) for x, one in zip(cost, settings, strict=True) if one.family == family]
-            for x, one in own:
-                _bar(panel, x, one.interval, row)
-            values = [one.average_precision for _, one in own]
-            panel.plot([x for x, _ in own], values, label=family, linestyle="none", **_mark(row))
-        chosen = [(x, one.average_precision) for x, one in zip(cost, settings, strict=True) if one.default]
-        panel.plot([x for x, _ in chosen], [y for _, y in chosen], label="default", markersize=14, mew=1.4, **RING_MARK)
-        panel.margins(x=0.15)
-        panel.set_xlim(left=0)
-        _precision_axis(panel, [v for one in settings for v in (one.average_precision, *(one.interval or ()))], what)
-    add_legend(figure, axes[:1])
-    set_title(figure, title)
-    for panel, cost in zip(axes, costs, strict=True):
-        named = [(x, one.average_precision, one.name, one.default) for x, one in zip(cost, settings, strict=True)]
-        _name(figure, panel, named)
-    save_png(path, figure)
-
-
-def _check(drawn: Sequence[object] | Mapping[str, object], what: str) -> None:
+def check_drawn(drawn: Sequence[object] | Mapping[str, object], what: str) -> None:
+    """Raise SeipError if there is nothing to draw in a chart of `what`."""
     if not drawn:
         raise SeipError(f"there are no data for a chart of {what}: evaluate a detector first")
 
 
-def _named(count: int, sensor: str) -> str:
+def placement_name(count: int, sensor: str) -> str:
+    """Return the name of a type and number of sensors in charts."""
     return f"{count} × {sensor}"
 
 
-def _sensors(cells: Sequence[PrecisionCell]) -> list[str]:
-    return list(dict.fromkeys(cell.sensor for cell in cells))
-
-
-def _scatter(panel: Axes, cells: Sequence[PrecisionCell], x: Sequence[float]) -> None:
-    """Mark each cell's mean with its interval, a colour and a mark for each type."""
-    for row, sensor in enumerate(_sensors(cells)):
-        own = [(place, cell) for place, cell in zip(x, cells, strict=True) if cell.sensor == sensor]
-        for place, cell in own:
-            _bar(panel, place, cell.interval, row)
-        places, means = [place for place, _ in own], [cell.mean for _, cell in own]
-        panel.plot(places, means, label=sensor, linestyle="none", **_mark(row))
-
-
-def _bar(panel: Axes, x: float, interval: Interval | None, row: int) -> None:
-    if interval is not None:
-        panel.plot((x, x), interval, color=colour(row), linewidth=1.1, marker="_", markersize=5, zorder=3)
-
-
-def _mark(row: int) -> dict[str, Any]:
+def mark_style(row: int) -> dict[str, Any]:
+    """Return the colour and mark of a series, by its number."""
     return {"color": colour(row), "marker": mark(row), "markersize": 6, "mec": PAPER, "mew": 0.7, "zorder": 4}
-
-
-def _front(cells: Sequence[PrecisionCell]) -> list[PrecisionCell]:
-    """Return the Pareto front of cells by price and average precision, the cheapest first."""
-    best: list[PrecisionCell] = []
-    for cell in sorted(cells, key=lambda cell: (cell.price, -cell.mean)):
-        if not best or cell.mean > best[-1].mean:
-            best.append(cell)
-    return best
-
-
-def _reached(cells: Sequence[PrecisionCell]) -> list[float]:
-    return [value for cell in cells for value in (*cell.values, *(cell.interval or ()))]
-
-
-def _precision_axis(panel: Axes, reached: Sequence[float], x: str) -> None:
-    """Scale the axis to the values; on an axis from 0, differences near 1 would not be visible."""
-    lowest = min(value for value in reached if math.isfinite(value))
-    panel.set_ylim(max(0.0, math.floor(10 * lowest - 0.3) / 10), 1.005 if max(reached) <= 1 else None)
-    style_axes(panel, x, PRECISION_LABEL, "y")
 
 
 def _draw_road_users(panel: Axes, counts: Sequence[int]) -> None:
@@ -409,33 +190,3 @@ def _smoothed(values: Float) -> Float:
     first, last = np.maximum(places - reach, 0), np.minimum(places + reach + 1, len(values))
     mean: Float = (total[last] - total[first]) / (last - first)
     return mean
-
-
-def _name(figure: Figure, panel: Axes, named: Sequence[tuple[float, float, str, bool]]) -> None:
-    """Write names (x, y, name, whether highlighted) next to their marks, without overlaps."""
-    figure.draw_without_rendering()  # fixes the positions and limits of panels, which names are placed by
-    figure.set_layout_engine("none")
-    texts = [panel.text(x, y, words, weight="bold" if out else "normal", **LABEL) for x, y, words, out in named]
-    extents = [text.get_window_extent() for text in texts]
-    sizes = np.array([(extent.width, extent.height) for extent in extents])
-    points = panel.transData.transform([(x, y) for x, y, _, _ in named])
-    radius, frame = 4.0 * figure.dpi / 72, panel.get_window_extent()
-    lines = np.concatenate([_along(panel, line) for line in panel.get_lines()])
-    centres = place_callouts(points, sizes, frame.extents, radius, lines)
-    back = panel.transData.inverted()
-    for text, point, centre, size in zip(texts, points, centres, sizes, strict=True):
-        text.set(x=back.transform(centre)[0], y=back.transform(centre)[1])
-        gap = np.maximum(np.abs(point - centre) - size / 2, 0)
-        if np.hypot(*gap) > 2.5 * radius:  # so far that the name could be attributed to another mark
-            panel.plot(*back.transform([point, centre]).T, color=FAINT_COLOUR, linewidth=0.7, zorder=1)
-            text.set_bbox({"facecolor": PAPER, "edgecolor": "none", "pad": 0.8})
-
-
-def _along(panel: Axes, line: Line2D) -> Float:
-    """Return points along a drawn line in pixels, (n, 2) float64."""
-    corners: Float = panel.transData.transform(line.get_xydata())
-    corners = corners[np.isfinite(corners).all(axis=1)]
-    if len(corners) < 2:
-        return corners
-    along: Float = np.linspace(corners[:-1], corners[1:], 20).reshape(-1, 2)
-    return along

@@ -11,7 +11,7 @@ from seip_addon.core.choosing.placement.objective import Solution
 from seip_addon.core.choosing.robustness.pose_error_evaluation import PoseErrorEvaluation
 from seip_addon.core.choosing.robustness.traffic_study import TrafficStudy
 from seip_addon.core.counts import counted
-from seip_addon.core.output.report.evidence import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
+from seip_addon.core.output.results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
 from seip_addon.core.workflows.survey import Survey
 
 

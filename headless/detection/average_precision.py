@@ -4,12 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TypeVar
 
+from headless.detection.jackknife import share_interval
+
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer, Text
 from seip_addon.core.counts import counted
 from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import Interval, share_interval
+from seip_addon.core.estimates import Interval
 
 from .frame_results import FrameResult
 from .matching import Match, Rule, match

@@ -11,7 +11,7 @@ import threading
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, cast
 
@@ -143,14 +143,6 @@ class Detector(nn.Module):
             detector = cls(settings, training_record=training_record)
             detector.load_state_dict(state["weights"])
         return detector.to(device).eval()
-
-
-def keeping_at_most(detector: Detector, points: int) -> Detector:
-    """Return the detector with another limit on the points in a pillar."""
-    settings = replace(detector.settings, most_points=points)
-    other = Detector(settings, training_record=detector.training_record)
-    other.load_state_dict(detector.state_dict())
-    return other.to(detector.device).eval()
 
 
 def has_bfloat16(device: torch.device) -> bool:

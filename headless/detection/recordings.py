@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float
-from seip_addon.core.choosing.robustness.traffic_instants import WARM_UP
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import FRAMES, TIME_STEP
 from seip_addon.core.output.results.versions import versions
@@ -23,7 +22,7 @@ from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, p
 from seip_addon.core.sensing.scans.static_scene import static_scene
 from seip_addon.core.sensing.traffic.bodies import fitted_body
 from seip_addon.core.sensing.traffic.parked import parked_users
-from seip_addon.core.sensing.traffic.trajectories import Trajectories
+from seip_addon.core.sensing.traffic.trajectories import WARM_UP, Trajectories
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import digest
 

@@ -1,12 +1,11 @@
 """Rules of average precision, one table for every command."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import Interval
+from seip_addon.core.output.results.detection_record import Precision
 
 from .average_precision import average_precision_interval, evaluate
 from .frame_results import FrameResult
@@ -35,25 +34,6 @@ RULES = {
 """How average precision is taken; the first is the study's own."""
 
 MAIN_RULE = next(iter(RULES.values()))
-
-
-@dataclass(frozen=True)
-class Precision:
-    """Average precision by one rule.
-
-    Parameters
-    ----------
-    value : float, 0 to 1
-        NaN where no road user counts.
-    interval : (float, float) or None
-        Its 95 % interval over other traffic, where there are runs enough.
-    road_users : int
-        That count, over all frames.
-    """
-
-    value: float
-    interval: Interval | None
-    road_users: int
 
 
 def precision_by(frames: Sequence[FrameResult], rule: Rule) -> Precision:

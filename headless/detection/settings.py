@@ -80,10 +80,6 @@ class NetworkSettings:
         _require(rules)
 
 
-PUBLISHED_NETWORK = NetworkSettings(pillar=0.24, most_points=32, width=64, blocks=(3, 5, 5), head="anchor")
-"""The network of the study: 0.24 m pillars of 32 points, blocks of 3, 5, 5 at 64, 128, 256 channels, anchors."""
-
-
 @dataclass(frozen=True)
 class TrainingSettings:
     """Settings of the training of a detector.
@@ -139,7 +135,3 @@ class TrainingSettings:
             "torch needs 1 thread or more": self.threads >= 1,
         }
         _require(rules)
-
-
-FINE_TUNING = TrainingSettings(steps=450, learning_rate=2e-3, validate_every=75, patience=6)
-"""Of a training that begins with the weights of the detector that ships: not stopped early, as it forgets at first."""

@@ -9,13 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import Float, Integer
-from .errors import SeipError
 
 Interval = tuple[float, float]  # lower and upper end of a 95 % interval
-ANYTHING: Interval = (-math.inf, math.inf)  # range of a figure without bounds
 SHARE: Interval = (0.0, 1.0)  # range of a share or an average precision
-COUNT: Interval = (0.0, math.inf)
-CHANGE_OF_SHARE: Interval = (-1.0, 1.0)
 TAIL_PROBABILITY = 0.025  # probability on either side of an interval
 NORMAL_QUANTILE = 1.959963984540054  # value that a standard normal variable exceeds with a probability of 2.5 %
 RESAMPLES = 2000  # number of resamples of a bootstrap
@@ -111,80 +107,6 @@ def student_reach(values: Float | Sequence[float]) -> float:
     return student_quantile(len(values) - 1) * float(np.std(values, ddof=1)) / math.sqrt(len(values))
 
 
-def mean_interval(values: Sequence[float], possible: Interval = ANYTHING) -> Interval:
-    """Return the 95 % interval of the mean over repetitions (seeds); see `student_reach`.
-
-    Impossible values are cut off, which does not change the probability that the interval contains the mean.
-
-    Parameters
-    ----------
-    values : sequence of float
-        Values of the repetitions.
-    possible : (float, float)
-        Least and largest possible value of the figure.
-
-    Raises
-    ------
-    SeipError
-        There are fewer than two values.
-    """
-    if len(values) < 2:
-        raise SeipError(
-            f"{len(values)} seed gives no interval: repeat the study with at least two, better three or more"
-        )
-    mean, reach = float(np.mean(values)), student_reach(values)
-    return within((mean - reach, mean + reach), possible)
-
-
-def within(interval: Interval, possible: Interval) -> Interval:
-    """Return the part of an interval that is possible."""
-    return max(interval[0], possible[0]), min(interval[1], possible[1])
-
-
-def jackknife_reach(left_out: Float) -> float:
-    """Return half the width of the 95 % jackknife interval of a figure.
-
-    The delete-one jackknife (Tukey 1958) with Student's quantile of n − 1 degrees of freedom. A bootstrap over few
-    samples gives intervals that are too narrow: with 4 or 8 runs of traffic its percentiles contain the true figure in
-    77 to 89 of 100 cases instead of 95.
-
-    Parameters
-    ----------
-    left_out : (n,) float64
-        Values of the figure without each of n independent samples, at least two.
-    """
-    number = len(left_out)
-    spread = (number - 1) / number * float(((left_out - left_out.mean()) ** 2).sum())
-    return student_quantile(number - 1) * math.sqrt(spread)
-
-
-def share_interval(share: float, left_out: Float, count: float) -> Interval:
-    """Return the 95 % jackknife interval of a share.
-
-    This is `jackknife_reach` on the scale of log odds, on which shares near 0 and 1 have symmetric errors. The interval
-    lies between 0 and 1, and has the stated coverage near both ends, too.
-
-    Parameters
-    ----------
-    share : float, 0 to 1
-        Share of all samples.
-    left_out : (n,) float64, 0 to 1
-        Shares without each of n independent samples, at least two.
-    count : float
-        Number of items that the share refers to; log odds are limited to half an item from 0 and 1.
-    """
-    edge = 0.5 / count
-
-    def log_odds(value: Float | float) -> Float:
-        kept = np.clip(value, edge, 1.0 - edge)
-        odds: Float = np.log(kept / (1.0 - kept))
-        return odds
-
-    middle, reach = float(log_odds(share)), jackknife_reach(log_odds(left_out))
-    low, high = (float(0.5 + 0.5 * math.tanh(end / 2.0)) for end in (middle - reach, middle + reach))
-    return min(low, share), max(high, share)
-
-
 def student_quantile(freedom: int) -> float:
     """Return the value that Student's t with `freedom` degrees of freedom exceeds with a probability of 2.5 %."""
     low, high = 1.0, 13.0  # between the normal quantile, 1.96, and that of one degree, 12.706
@@ -212,65 +134,6 @@ def percentiles(values: Float) -> Interval:
     """Return the interval that leaves 2.5 % of the values on either side; NaN is ignored."""
     low, high = np.nanquantile(values, (TAIL_PROBABILITY, 1 - TAIL_PROBABILITY))
     return float(low), float(high)
-
-
-def rank_correlation(x: Float | Sequence[float], y: Float | Sequence[float]) -> float:
-    """Return Spearman's (1904) rank correlation; equal values share their mean rank; NaN if all are equal."""
-    ranks = np.array([_ranks(np.asarray(values, dtype=np.float64)) for values in (x, y)])
-    centred = ranks - ranks.mean(axis=1, keepdims=True)
-    scale = math.sqrt(float((centred[0] ** 2).sum() * (centred[1] ** 2).sum()))
-    return float(centred[0] @ centred[1]) / scale if scale else math.nan
-
-
-def rank_agreements(x: Float, y: Float) -> tuple[Float, Float]:
-    """Return Spearman's and Kendall's (tau-b, 1945) rank correlation along the last axis; NaN if all are equal.
-
-    Both follow from the signs of all pairwise differences; equal values share their mean rank.
-
-    Parameters
-    ----------
-    x, y : (…, n) float64
-
-    Returns
-    -------
-    spearman, kendall : (…) float64
-    """
-    # The sum of a value's signs against all others is twice its centred rank: hence Spearman's from the sums, and
-    # Kendall's from the signs themselves.
-    of_x, of_y = (np.sign(values[..., :, None] - values[..., None, :]) for values in (x, y))
-    return _cosine(of_x.sum(axis=-1), of_y.sum(axis=-1), (-1,)), _cosine(of_x, of_y, (-2, -1))
-
-
-def _cosine(one: Float, other: Float, axes: tuple[int, ...]) -> Float:
-    scale = np.sqrt((one**2).sum(axis=axes) * (other**2).sum(axis=axes))
-    return np.divide((one * other).sum(axis=axes), scale, out=np.full(scale.shape, np.nan), where=scale > 0)
-
-
-def rank_correlation_interval(x: Sequence[float], y: Sequence[float], seed: int) -> Interval | None:
-    """Return the 95 % interval of the rank correlation, or None if there are too few pairs.
-
-    Bootstrap (Efron 1979) over pairs. Give one pair for each configuration, with the mean over its seeds, because seeds
-    of one configuration are not additional evidence of a correlation.
-
-    Parameters
-    ----------
-    x, y : sequence of float
-        Values of the pairs.
-    seed : int
-        Seed of the resamples.
-    """
-    if len(x) < 4 or math.isnan(rank_correlation(x, y)):
-        return None
-    left, right = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    drawn = np.random.default_rng(seed).integers(len(left), size=(RESAMPLES, len(left)))
-    return percentiles(np.array([rank_correlation(left[rows], right[rows]) for rows in drawn]))
-
-
-def _ranks(values: Float) -> Float:
-    """Return ranks from 0, with the mean rank for equal values."""
-    ordered = np.sort(values)
-    ranks: Float = (np.searchsorted(ordered, values) + np.searchsorted(ordered, values, side="right") - 1) / 2
-    return ranks
 
 
 def quantile_of(values: Float, share: float) -> IntervalEstimate:

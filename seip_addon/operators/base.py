@@ -9,7 +9,7 @@ import bpy
 
 from .. import scene_status
 from ..background import Background
-from ..core.choosing.placement.search_limits import Acceptance
+from ..core.acceptance import Acceptance
 from ..core.errors import SeipError
 from ..core.progress import Progress, finish
 from ..session import RunningWork, scene_of, session

@@ -12,8 +12,8 @@ from typing import Literal
 import bpy
 
 from .. import scene_survey, selection
+from ..core.acceptance import Acceptance
 from ..core.choosing.placement.objective import Objective, check_objective
-from ..core.choosing.placement.search_limits import Acceptance
 from ..core.errors import SeipError
 from ..core.output.results.placement_record import Provenance
 from ..core.output.results.versions import versions

@@ -30,13 +30,14 @@ from ..core.workflows.moved_sensors import evaluate_moved_sensors
 from ..core.workflows.records import record_of
 from ..core.workflows.survey import Survey
 from ..scene.blend_file import save_blend
+from ..scene.coverage_colours import recolour, show_seen_by
 from ..scene.gltf import save_glb
 from ..scene.pieces import tidy_pieces
 from ..scene.read import attribution_of
-from ..scene.render import render_elsewhere
+from ..scene.render_elsewhere import render_elsewhere
 from ..scene.result_folder import result_files, write_tables
 from ..scene.sensors import labelled_sensors, read_sensors
-from ..scene.write import coverage_of, recolour, show_seen_by, shown_legend, take_over
+from ..scene.write import coverage_of, shown_legend, take_over
 from ..sensor_edits import position_names, sensor_edits
 from ..session import SceneState, session
 from .base import LongWork, Outcome, Result, attempt, started

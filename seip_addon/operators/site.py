@@ -20,7 +20,9 @@ from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
 from ..core.workflows.site_building import BuiltSite, SiteRequest, build_site
 from ..core.workflows.site_places import SitePlaces, site_places
-from ..core.workflows.survey import Layout, SurveySettings, estimate, lay_out
+from ..core.workflows.survey import Layout, lay_out
+from ..core.workflows.survey_settings import SurveySettings
+from ..core.workflows.visibility_estimate import estimate
 from ..core.world.streetscape.description import DESCRIPTION_SUFFIX
 from ..properties.site import ROLE_ITEMS, SEIP_PG_problem, SEIP_PG_site
 from ..scene import contract, roles

@@ -11,7 +11,7 @@ import bpy
 
 from .. import live_scan, preferences, scene_status, scene_survey
 from ..core.choosing.placement.objective import target_weights
-from ..core.choosing.robustness.traffic_instants import check_runs, spread_instants
+from ..core.choosing.robustness.traffic_instants import spread_instants
 from ..core.choosing.robustness.traffic_study import IN_TRAFFIC, traffic_message
 from ..core.counts import counted
 from ..core.output.results.placement_file import parsed_record
@@ -19,6 +19,7 @@ from ..core.output.results.versions import versions
 from ..core.progress import Progress, finish
 from ..core.sensing.scans.run_folder import Record, Run, check_run_folder
 from ..core.sensing.scans.sensor import MountedSensor
+from ..core.sensing.traffic.site_traffic import check_runs
 from ..core.sensing.traffic.source import TrafficFiles, load_traffic
 from ..core.sensing.traffic.trajectories import CATEGORIES, LoadedTraffic, Trajectories
 from ..core.site.scene_geometry import SceneGeometry

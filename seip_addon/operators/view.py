@@ -17,8 +17,9 @@ from ..core.progress import Progress
 from ..core.sensing.visibility.sight_lines import pose_at, sight_lines
 from ..scene import contract
 from ..scene.blend_file import save_blend
+from ..scene.coverage_colours import colour_coverage
 from ..scene.sensors import placed_sensors, pose_of
-from ..scene.write import colour_coverage, coverage_of, shown_legend
+from ..scene.write import coverage_of, shown_legend
 from ..session import SceneState, session
 from ..viewport import coverage, overlays
 from ..viewport.sight_lines import NAME as SIGHT
@@ -202,7 +203,7 @@ def _rendered_sheet(path: Path, scene: bpy.types.Scene) -> Generator[Progress, N
     """Write the rendered view that batch commands make, and the plan beside it; the scene is saved before the rest."""
     from PIL import Image  # noqa: PLC0415  # as above
 
-    from ..scene.render import render_elsewhere  # noqa: PLC0415  # as above
+    from ..scene.render_elsewhere import render_elsewhere  # noqa: PLC0415  # as above
 
     finding, name, legend = scene_survey.with_placement(scene), scene.name, shown_legend(scene)
     with TemporaryDirectory(prefix="seip-") as folder:

@@ -14,7 +14,7 @@ from ..core.sensing.visibility.settings import VisibilitySettings
 from ..core.site.candidates import MAX_SENSOR_HEIGHT, CandidateSettings, heights_of, tilts_of
 from ..core.site.post_rules import RULES
 from ..core.site.weather import Weather
-from ..core.workflows.survey import SurveySettings
+from ..core.workflows.survey_settings import SurveySettings
 from ..preferences import catalogue_files
 from ..sensor_types import DEFAULT_TYPE
 from .conversion import as_typed, of_setting

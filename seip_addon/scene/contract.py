@@ -47,6 +47,8 @@ ATTRIBUTION = "seip_attribution"
 CATEGORY = "seip_category"
 PAINT = "seip_paint"
 SHAPE = "seip_shape"
+WRITTEN = "seip_result"
+"""Mark of every object that this program writes as a result or from trajectories: the next ones replace it only."""
 
 NUMBER = re.compile(r"\.\d{3,}$")
 

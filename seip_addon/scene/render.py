@@ -6,10 +6,9 @@ import importlib
 import json
 import math
 import os
-import re
 import sys
 import tempfile
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,13 +18,10 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ..core.arrays import Boolean, Float
-from ..core.child_process import run_logged
 from ..core.choosing.placement.deployment import Deployment
 from ..core.errors import SeipError
-from ..core.output.pictures.coverage_colours import Legend
 from ..core.output.pictures.labelled_view import Sight, save_labelled_view
 from ..core.output.pictures.viewpoint import Viewpoint, frame
-from ..core.progress import Progress
 from ..core.site.site import Site
 from . import contract
 from .daylight import add_daylight
@@ -38,8 +34,6 @@ AZIMUTH, ELEVATION = math.radians(-115.0), math.radians(52.0)  # of the camera, 
 FIELD_OF_VIEW = math.radians(35.0)  # across the picture
 ROOM = 1.04  # around the region
 SENSOR_ROOM = 0.5  # metres round a sensor that its own body and bracket take up
-SAMPLE = re.compile(r"Sample (\d+)/")
-"""How Cycles tells of its progress."""
 UNSEEN_TYPES = {"LIGHT", "CAMERA", "SPEAKER", "LIGHT_PROBE"}
 
 
@@ -92,69 +86,12 @@ def save_rendered_view(
     deployment : Deployment
         The chosen sensors and what they see.
     """
-    shot = _shot(site, deployment)
+    shot = shot_of(site, deployment)
     with tempfile.TemporaryDirectory(prefix="seip-") as folder:
         raw = Path(folder) / "view.png"
         with _silence():
             hidden = take(shot, scene, raw)
-        save_labelled_view(path, raw, site, deployment, shown_legend(scene), _sight(shot, hidden, site))
-
-
-def render_elsewhere(
-    path: Path, blend: Path, scene: str, site: Site, deployment: Deployment, legend: Legend | None
-) -> Generator[Progress, None, None]:
-    """Render a scene as `save_rendered_view` does, in a Blender of its own: the one that asks goes on answering.
-
-    Parameters
-    ----------
-    path : path
-        The picture to write.
-    blend : path
-        Holds the scene.
-    scene : str
-        Its name.
-    deployment : Deployment
-        The sensors and what they see.
-    legend : Legend or None
-        What the colours on the road of the scene mean.
-
-    Yields
-    ------
-    Progress
-        Samples rendered; closing the generator ends the other Blender.
-
-    Raises
-    ------
-    SeipError
-        The other Blender failed.
-    """
-    shot = _shot(site, deployment)
-    with tempfile.TemporaryDirectory(prefix="seip-") as folder:
-        raw, job, log = (Path(folder) / name for name in ("view.png", "job.json", "log"))
-        job.write_text(
-            json.dumps({"path": sys.path, "blend": str(blend), "scene": scene, "raw": str(raw), "shot": shot.as_json()})
-        )
-        yield from run_logged(_command(job), log, _samples)
-        try:
-            hidden = np.array(json.loads(raw.with_suffix(".json").read_text()), dtype=bool)
-        except OSError as error:
-            last = log.read_text(errors="replace").strip().splitlines()[-1:]
-            raise SeipError(f"the view could not be rendered ({' '.join(last)}): export without it") from error
-        save_labelled_view(path, raw, site, deployment, legend, _sight(shot, hidden, site))
-
-
-def _command(job: Path) -> list[str]:
-    """Return what starts a Blender without a window, or the bpy module, on a job of `render_job`."""
-    script = str(Path(__file__).with_name("render_job.py"))
-    if bpy.app.binary_path:
-        tell = ["--log", "*render*", "--log-level", "info"] if bpy.app.version >= (5, 0) else []  # others tell unasked
-        return [bpy.app.binary_path, "-b", "--factory-startup", *tell, "-P", script, "--", str(job)]
-    return [sys.executable, script, "--", str(job)]
-
-
-def _samples(line: str) -> Progress:
-    counts = SAMPLE.findall(line)
-    return Progress(int(counts[-1]) if counts else 0, sample_count(), "rendering")
+        save_labelled_view(path, raw, site, deployment, shown_legend(scene), sight_of(shot, hidden, site))
 
 
 def take(shot: Shot, scene: bpy.types.Scene, raw: Path) -> Boolean:
@@ -214,7 +151,7 @@ def _rendered_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     ]
 
 
-def _shot(site: Site, deployment: Deployment) -> Shot:
+def shot_of(site: Site, deployment: Deployment) -> Shot:
     """Return a shot that has the whole region in its picture."""
     slope = math.tan(FIELD_OF_VIEW / 2.0)
     slopes = np.array((slope, slope * HEIGHT / WIDTH))
@@ -280,6 +217,6 @@ def _hidden(stage: bpy.types.Scene, shot: Shot) -> Boolean:
     return np.array(hits, dtype=bool)
 
 
-def _sight(shot: Shot, hidden: Boolean, site: Site) -> Sight:
+def sight_of(shot: Shot, hidden: Boolean, site: Site) -> Sight:
     """Return where sensors and targets are on the picture, and which sensors something stands in front of."""
     return Sight(shot.viewpoint.project(shot.sensors), hidden, shot.viewpoint.project(site.targets.xyz))

@@ -1,4 +1,4 @@
-"""Renders a scene's view in a Blender of its own; `render.render_elsewhere` starts it.
+"""Renders a scene's view in a Blender of its own; `render_elsewhere.render_elsewhere` starts it.
 
 blender -b --factory-startup -P render_job.py -- job.json
 """

@@ -13,12 +13,12 @@ from ..core.errors import SeipError
 from ..core.output.pictures.plan_view import save_plan_view
 from ..core.output.results.candidate_table import save_candidate_table
 from ..core.output.results.carla import save_carla_spawns
+from ..core.output.results.file_names import REPORT_FILES
 from ..core.output.results.geojson import save_geojson
 from ..core.output.results.kml import save_kml
 from ..core.output.results.located import LOCATED_FILES, located
 from ..core.output.results.placement_file import save_placement
 from ..core.output.results.placement_record import PlacementRecord, relevant_warnings
-from ..core.output.results.report_files import REPORT_FILES
 from ..core.output.results.site_file import save_site_file
 from ..core.progress import Progress, finish
 from ..core.storage.files import unfinished_name

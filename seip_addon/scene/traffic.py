@@ -19,7 +19,6 @@ from ..core.sensing.traffic.trajectories import CATEGORIES, MAX_BEND, RoadUser, 
 from . import contract
 from .meshes import mesh_of
 from .read import origin_of
-from .write import MARK
 
 LAST_FRAME = 1048574
 """Blender's timeline ends here."""
@@ -81,14 +80,14 @@ def clear_traffic(scene: bpy.types.Scene) -> None:
     collection = contract.find(scene, contract.TRAFFIC)
     if collection is None:
         return
-    objects = [obj for obj in collection.objects if MARK in obj]
+    objects = [obj for obj in collection.objects if contract.WRITTEN in obj]
     actions = {obj.animation_data.action for obj in objects if obj.animation_data} - {None}
     meshes = {obj.data for obj in objects}
     materials = {material for mesh in meshes for material in mesh.materials if material}
     bpy.data.batch_remove(objects)
     for owned in (actions, meshes, materials):  # what a user has put to another use stays
         bpy.data.batch_remove([data for data in owned if not data.users])
-    if MARK in collection and not collection.all_objects and not collection.children:
+    if contract.WRITTEN in collection and not collection.all_objects and not collection.children:
         bpy.data.collections.remove(collection)
 
 
@@ -163,7 +162,7 @@ def _frame_rate(scene: bpy.types.Scene) -> float:
 
 def _new_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     collection = contract.find_or_make(scene, contract.TRAFFIC)
-    collection[MARK] = True
+    collection[contract.WRITTEN] = True
     return collection
 
 
@@ -187,7 +186,7 @@ def _shared_mesh(meshes: dict[tuple[object, ...], bpy.types.Mesh], user: RoadUse
 
 def _road_user(user: RoadUser, mesh: bpy.types.Mesh) -> bpy.types.Object:
     obj = bpy.data.objects.new(user.name, mesh)
-    obj[MARK] = True
+    obj[contract.WRITTEN] = True
     obj[contract.CATEGORY] = user.category
     obj[contract.PAINT] = user.paint
     if any(user.shape):

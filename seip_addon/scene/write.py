@@ -8,11 +8,9 @@ from collections.abc import Mapping, Sequence
 import bpy
 import numpy as np
 
-from ..core.arrays import Integer
 from ..core.choosing.placement.deployment import Deployment, Sensor
-from ..core.errors import SeipError
 from ..core.geometry.solids import Solid, join, prism, tube
-from ..core.output.pictures.coverage_colours import Aspect, Colouring, Legend, as_placed, colouring, of_placement
+from ..core.output.pictures.coverage_colours import Aspect, Colouring, Legend, of_placement
 from ..core.site.roles import AREA_OVERLAYS
 from ..core.site.site import Site, Targets
 from ..core.site.target_squares import target_squares
@@ -20,9 +18,6 @@ from . import contract
 from .materials import linear, matt
 from .meshes import mesh_of
 from .pieces import attach_piece, rename_whole
-
-MARK = "seip_result"
-"""Custom property of every object made here, so that the next result replaces it and nothing else."""
 
 SEEN_BY, TARGET_WEIGHT, RETURNS, COLOUR = "seip_seen", "seip_weight", "seip_returns", "seip_colour"
 """Attributes of the coverage mesh, all but the last of each target's square; returns only where they were maximised."""
@@ -88,7 +83,7 @@ def clear_result(scene: bpy.types.Scene) -> None:
     for name in (contract.SENSORS, contract.COVERAGE):
         collection = contract.find(scene, name)
         if collection is not None:
-            for obj in [obj for obj in collection.objects if MARK in obj]:
+            for obj in [obj for obj in collection.objects if contract.WRITTEN in obj]:
                 _remove(obj)
 
 
@@ -105,7 +100,7 @@ def _write_sensors(collection: bpy.types.Collection, sensors: Sequence[Sensor]) 
         collection.objects.link(empty)
         name = f"{sensor.label} body"
         body = bpy.data.objects.new(name, mesh_of(name, _hardware(sensor)))
-        body[MARK] = True
+        body[contract.WRITTEN] = True
         attach_piece(body, empty)
         collection.objects.link(body)
 
@@ -128,7 +123,7 @@ def _name(sensor: Sensor) -> str:
 def _describe(empty: bpy.types.Object, sensor: Sensor) -> None:
     """Write the sensor, its position and its coverage to the properties of an empty."""
     properties = {
-        MARK: True,
+        contract.WRITTEN: True,
         contract.LABEL: sensor.label,
         contract.SENSOR: sensor.model.key,
         "seip_sensor_name": sensor.model.name,
@@ -169,79 +164,14 @@ def _hardware(sensor: Sensor) -> Solid:
 def coverage_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """Return the mesh that shows the coverage, None where no result has been written."""
     collection = contract.find(scene, contract.COVERAGE)
-    own = [] if collection is None else [obj for obj in collection.objects if MARK in obj]
+    own = [] if collection is None else [obj for obj in collection.objects if contract.WRITTEN in obj]
     return own[0] if own else None
-
-
-def recolour(scene: bpy.types.Scene, colours: Colouring) -> None:
-    """Colour the squares of the coverage by classes of one's own.
-
-    Parameters
-    ----------
-    colours : Colouring
-        Of the targets that the coverage was written for, in their order.
-
-    Raises
-    ------
-    SeipError
-        There is no coverage, or it is of other targets.
-    """
-    obj = _shown_coverage(scene)
-    if len(obj.data.polygons) != len(colours.of):
-        raise SeipError(f"scene {scene.name!r} shows the coverage of other targets: place sensors again")
-    _paint(obj, colours)
 
 
 def aspects_of(obj: bpy.types.Object) -> tuple[Aspect, ...]:
     """Return the aspects that a coverage mesh can show, first the one that a new placement is coloured by."""
     others: tuple[Aspect, ...] = ("times", "seen", "weights")
     return ("returns", *others) if RETURNS in obj.data.attributes else others
-
-
-def show_seen_by(scene: bpy.types.Scene, seen_by: Integer, *, moved: bool = False) -> None:
-    """Show how many sensors see each target, under the aspect that is shown.
-
-    Parameters
-    ----------
-    seen_by : (t,) int64
-        How many sensors see each target, in the order of those that the coverage was written for.
-    moved : bool
-        Whether sensors are not where they were placed: the returns of the placement are not theirs.
-
-    Raises
-    ------
-    SeipError
-        There is no coverage, or it is of other targets.
-    """
-    obj = _shown_coverage(scene)
-    aspect = obj.get(ASPECT) or aspects_of(obj)[0]  # nothing is compared any longer
-    aspect = "times" if moved and aspect == "returns" else aspect
-    recolour(scene, as_placed(seen_by))
-    obj.data.attributes[SEEN_BY].data.foreach_set("value", seen_by.astype(np.int32))
-    colour_coverage(scene, aspect)
-
-
-def colour_coverage(scene: bpy.types.Scene, aspect: Aspect) -> None:
-    """Colour the coverage by one aspect, from what the mesh itself knows of its targets.
-
-    Raises
-    ------
-    SeipError
-        There is no coverage, or it has no returns to show.
-    """
-    obj = _shown_coverage(scene)
-    attributes = obj.data.attributes
-    seen_by = np.empty(len(obj.data.polygons), dtype=np.int32)
-    weight = np.ones(len(seen_by), dtype=np.float32)  # a mesh of an earlier version has none
-    attributes[SEEN_BY].data.foreach_get("value", seen_by)
-    if TARGET_WEIGHT in attributes:
-        attributes[TARGET_WEIGHT].data.foreach_get("value", weight)
-    returns = None
-    if RETURNS in attributes:
-        returns = np.empty(len(seen_by), dtype=np.float32)
-        attributes[RETURNS].data.foreach_get("value", returns)
-    _paint(obj, colouring(aspect, seen_by.astype(np.int64), weight.astype(np.float64), returns))
-    obj[ASPECT] = aspect
 
 
 def shown_legend(scene: bpy.types.Scene) -> Legend | None:
@@ -253,14 +183,7 @@ def shown_legend(scene: bpy.types.Scene) -> Legend | None:
     return Legend(obj.get(TITLE, "Coverage"), tuple(obj[CLASS_WORDS]), tuple(obj[CLASS_COLOURS]), shares)
 
 
-def _shown_coverage(scene: bpy.types.Scene) -> bpy.types.Object:
-    obj = coverage_of(scene)
-    if obj is None:
-        raise SeipError(f"scene {scene.name!r} shows no coverage: place sensors first")
-    return obj
-
-
-def _paint(obj: bpy.types.Object, colours: Colouring) -> None:
+def paint(obj: bpy.types.Object, colours: Colouring) -> None:
     """Colour squares: ``seip_colour`` serves the viewport's Attribute colours, materials serve all others.
 
     The words and the shares of the classes stay with the object, for the legend.
@@ -282,8 +205,8 @@ def _paint(obj: bpy.types.Object, colours: Colouring) -> None:
 
 def _write_coverage(collection: bpy.types.Collection, targets: Targets, deployment: Deployment) -> None:
     obj = bpy.data.objects.new("Coverage", _coverage_mesh(targets, deployment))
-    obj[MARK] = True
-    _paint(obj, of_placement(deployment))
+    obj[contract.WRITTEN] = True
+    paint(obj, of_placement(deployment))
     obj[ASPECT] = aspects_of(obj)[0]
     obj["seip_coverage"] = deployment.coverage
     obj["seip_seen_twice"] = deployment.seen_twice

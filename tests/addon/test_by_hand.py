@@ -1,4 +1,4 @@
-"""Sensors that hands have moved: nothing puts them back, and they are judged, kept and exported as what they are."""
+"""Sensors that hands have moved: nothing puts them back, and they are evaluated, kept and exported as what they are."""
 
 import csv
 import json
@@ -76,7 +76,7 @@ def test_moved_sensors_are_neither_exported_nor_kept_as_what_they_were(placed):
             operator()
 
 
-def test_moved_sensors_are_judged_where_they_hang(placed):
+def test_moved_sensors_are_evaluated_where_they_are_mounted(placed):
     before = record(placed)
     move(placed)
     pose = selection.sensor_empties(placed)["S1"].matrix_world.copy()
@@ -110,7 +110,7 @@ def test_moved_sensors_are_judged_where_they_hang(placed):
 
 
 @pytest.mark.slow
-def test_a_judged_deployment_is_kept_compared_ranked_and_exported(placed, tmp_path):
+def test_an_evaluated_deployment_is_kept_compared_ranked_and_exported(placed, tmp_path):
     bpy.ops.seip.keep_placement(name="placed")
     move(placed)
     bpy.ops.seip.evaluate_sensors()
@@ -164,7 +164,7 @@ def test_undo_brings_the_placement_back_that_was_moved(placed):
     move(placed)
     bpy.ops.ed.undo_push(message="moved")
     bpy.ops.seip.evaluate_sensors()
-    bpy.ops.ed.undo_push(message="judged")
+    bpy.ops.ed.undo_push(message="evaluated")
     bpy.ops.ed.undo()
     bpy.ops.ed.undo()
     scene = bpy.context.scene

@@ -28,7 +28,7 @@ PRECISION = {
     "car_van_0.7": {"average_precision": 0.8, "interval": None, "road_users": 1000},
     "pedestrian_0.5": {"average_precision": 0.25, "interval": None, "road_users": 234},
 }
-RECORD = {"schema": "seip-detection/1", "average_precision": PRECISION, "warnings": ["other types were learnt"]}
+RECORD = {"schema": "seip-detection/1", "average_precision": PRECISION, "warnings": ["it was trained on other types"]}
 
 STAND_IN = """
 import json, os, pathlib, sys, time
@@ -113,7 +113,7 @@ def test_the_figures_stand_in_the_panel_and_the_files_in_the_folder(placed, stan
         "Cars, vans": "80.0%",
         "Pedestrians": "25.0%",
     }
-    assert said == [detection_panel.MEANING, "other types were learnt"]
+    assert said == [detection_panel.MEANING, "it was trained on other types"]
 
 
 def test_the_command_is_given_what_the_panel_shows(placed, stand_in, small_scene, tmp_path):

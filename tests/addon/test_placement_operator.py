@@ -18,7 +18,7 @@ from seip_addon.core.output.results.placement_file import comparable, load_place
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.visibility.grid import VisibilityGrid
 from seip_addon.core.sensing.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
-from seip_addon.scene.write import MARK
+from seip_addon.scene.contract import WRITTEN
 from seip_addon.session import session
 
 OPTIONS = ["--heights", "8", "--grid", "4", "--spacing", "12", "--count", "2", "--sensor", "type1", "--no-render"]
@@ -163,7 +163,7 @@ def test_each_scene_keeps_its_own(junction):
 
 def test_nothing_of_the_users_is_changed(junction):
     def users() -> dict[str, object]:
-        return {obj.name: obj.matrix_world.copy() for obj in bpy.data.objects if MARK not in obj}
+        return {obj.name: obj.matrix_world.copy() for obj in bpy.data.objects if WRITTEN not in obj}
 
     before = users()
     bpy.ops.seip.solve_placement()

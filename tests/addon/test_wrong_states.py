@@ -10,7 +10,8 @@ import pytest
 
 from seip_addon import live_coverage, preferences, registration, scene_status, scene_survey
 from seip_addon.background import Background
-from seip_addon.core.choosing.placement.search_limits import Acceptance, SolverLimits
+from seip_addon.core.acceptance import Acceptance
+from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.output.results.placement_file import parsed_record
 from seip_addon.core.progress import Progress, finish
 from seip_addon.operators import base, results

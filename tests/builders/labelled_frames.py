@@ -5,6 +5,7 @@ import math
 from headless.detection.frame_results import EvaluatedBoxes, FrameResult, GroundTruth
 
 import numpy as np
+import pytest
 
 SIZES = {"car": (4.5, 1.8, 1.5), "van": (5.5, 2.0, 2.2), "truck": (9.0, 2.5, 3.5), "pedestrian": (0.6, 0.6, 1.7)}
 
@@ -77,3 +78,26 @@ def traffic(seed, *, frames=20, cars=12, noise=0.15, false=0.3, seconds=0.5, run
             )
         )
     return told
+
+
+def near_and_far():
+    """Return a frame. Near: found, found; one false at 0.8. Far: found at 0.5, missed, one false at 0.7."""
+    there = truth(
+        [box(0), box(20), box(40), box(60)],
+        distance=[5, 15, 45, 55],
+        points=[300, 200, 30, 0],
+        visibility=[1.0, 0.9, 0.4, 0.0],
+    )
+    found = detected(
+        [box(0), box(20), box(40), box(200), box(300)],
+        [0.9, 0.6, 0.5, 0.8, 0.7],
+        distance=[6, 14, 39, 10, 50],
+        points=[300, 200, 30, 7, 2],
+        density=[40, 30, 8, 10, 0.5],
+    )
+    return frame(there, found)
+
+
+def values(bins):
+    """Return the values of bins, None for a bin without a value."""
+    return [None if math.isnan(one.value) else pytest.approx(one.value) for one in bins]

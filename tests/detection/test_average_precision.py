@@ -189,7 +189,7 @@ def records(frames, *, is_truth):
 @pytest.mark.slow
 @pytest.mark.parametrize("iou", [0.5, 0.7])
 def test_agrees_with_the_lyft_kit(iou):
-    """Lyft's kit judges in space; its cars stand apart, where its rule and ours are the same."""
+    """Lyft's kit evaluates in space; its cars stand apart, where its rule and ours are the same."""
     kit = pytest.importorskip(
         "lyft_dataset_sdk.eval.detection.mAP_evaluation",
         reason="pip install --no-deps --group second-opinion",
@@ -321,7 +321,7 @@ def test_repeated_frames_give_no_certainty():
 
 
 def test_interval_leaves_out_each_run():
-    """Runs left out and judged again, one by one; Student's interval on the scale of log odds."""
+    """Runs left out and evaluated again, one by one; Student's interval on the scale of log odds."""
     frames = runs_of(7, frames=3)
     names = sorted({told.run for told in frames})
     left_out = scipy.special.logit([average_precision([told for told in frames if told.run != name]) for name in names])

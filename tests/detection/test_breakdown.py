@@ -4,44 +4,15 @@ import math
 
 import pytest
 
-from tests.builders.labelled_frames import box, detected, frame, traffic, truth
+from tests.builders.labelled_frames import box, detected, frame, near_and_far, traffic, truth, values
 
 pytest.importorskip("torch", reason="the detector's torch is optional")
 
 from headless.detection.average_precision import evaluate
-from headless.detection.breakdown import (
-    DISTANCE_EDGES,
-    average_precision_by,
-    false_by,
-    false_positives,
-    recall_by,
-    recall_by_category,
-)
+from headless.detection.breakdown import DISTANCE_EDGES, average_precision_by, recall_by, recall_by_category
 from headless.detection.matching import Rule
 
 AT_07 = Rule()
-
-
-def told():
-    """Near: found, found; one false at 0.8. Far: found at 0.5, missed, one false at 0.7."""
-    there = truth(
-        [box(0), box(20), box(40), box(60)],
-        distance=[5, 15, 45, 55],
-        points=[300, 200, 30, 0],
-        visibility=[1.0, 0.9, 0.4, 0.0],
-    )
-    found = detected(
-        [box(0), box(20), box(40), box(200), box(300)],
-        [0.9, 0.6, 0.5, 0.8, 0.7],
-        distance=[6, 14, 39, 10, 50],
-        points=[300, 200, 30, 7, 2],
-        density=[40, 30, 8, 10, 0.5],
-    )
-    return frame(there, found)
-
-
-def values(bins):
-    return [None if math.isnan(one.value) else pytest.approx(one.value) for one in bins]
 
 
 def test_recall_by_category():
@@ -55,14 +26,14 @@ def test_recall_by_category():
 def test_average_precision_by_distance():
     """Near: hit, false, hit of two: 1/2 · 1 + 1/2 · 2/3. Far: false, hit of two: 1/2 · 1/2. The box of the far hit
     lies at 39 m, but the car it found at 45 m."""
-    bins = average_precision_by(evaluate([told()], AT_07), "distance", (0, 40, 60, 100))
+    bins = average_precision_by(evaluate([near_and_far()], AT_07), "distance", (0, 40, 60, 100))
     assert [(one.low, one.high, one.wanted) for one in bins] == [(0, 40, 2), (40, 60, 2), (60, 100, 0)]
     assert values(bins) == [5 / 6, 1 / 4, None]
 
 
 def test_average_precision_by_returns():
     """Up to 100 returns: false 0.8 with 7 returns, false 0.7 with 2, hit 0.5 of two: 1/2 · 1/3; the rest is perfect."""
-    bins = average_precision_by(evaluate([told()], AT_07), "points", (0, 100, math.inf))
+    bins = average_precision_by(evaluate([near_and_far()], AT_07), "points", (0, 100, math.inf))
     assert values(bins) == [1 / 6, 1]
 
 
@@ -75,30 +46,7 @@ def test_the_parts_hold_everything():
 
 
 def test_recall_by_visibility_at_a_score():
-    evaluation = evaluate([told()], AT_07)
+    evaluation = evaluate([near_and_far()], AT_07)
     assert values(recall_by(evaluation, "visibility", (0, 0.5, 0.95, 2), 0.1)) == [1 / 2, 1, 1]
     assert values(recall_by(evaluation, "visibility", (0, 0.5, 0.95, 2), 0.6)) == [0, 1, 1]
     assert values(recall_by(evaluation, "visibility", (2, 3), 0.1)) == [None]
-
-
-def test_false_detections_by_density_and_distance():
-    evaluation = evaluate([told(), told()], AT_07)
-    assert values(false_by(evaluation, "density", (0, 1, 20), 0.1)) == [1, 1]
-    assert values(false_by(evaluation, "density", (0, 1, 20), 0.75)) == [0, 1]
-    assert values(false_by(evaluation, "distance", (0, 20, 60), 0.1)) == [1, 1]
-
-
-def test_false_positives_and_how_many_are_in_sparse_places():
-    """Around half of the hits the density is under 30: both false ones are in sparser places."""
-    evaluation = evaluate([told()], AT_07)
-    found = false_positives(evaluation, 0.1)
-    assert (found.per_frame, found.sparse) == (2, 1)
-    # From 0.9 on there is one hit with density 40, and nothing is false.
-    found = false_positives(evaluation, 0.9)
-    assert found.per_frame == 0
-    assert math.isnan(found.sparse)
-
-
-def test_density_that_says_nothing_gives_a_half():
-    frames = traffic(2, frames=200)
-    assert false_positives(evaluate(frames, AT_07), 0.2).sparse == pytest.approx(0.5, abs=0.06)

@@ -12,11 +12,12 @@ from tests.builders.labelled_frames import box, detected, frame, truth
 pytest.importorskip("torch", reason="the detector's torch is optional")
 
 from headless.detection.average_precision import evaluate
-from headless.detection.breakdown import average_precision_by, false_by
+from headless.detection.breakdown import average_precision_by
 from headless.detection.chart_data import curve, error_view, parts
 from headless.detection.matching import Rule
 from headless.studies.detection.claims import SeedResult
 from headless.studies.detection.results import cells
+from headless.studies.false_positives import false_by
 
 RULE = Rule()
 TOLD = frame(

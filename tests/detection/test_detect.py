@@ -1,4 +1,4 @@
-"""The command that judges a placement by what a trained detector finds."""
+"""The command that evaluates a placement by what a trained detector finds."""
 
 import json
 import re
@@ -28,7 +28,7 @@ from tests.builders.small_junction import make_example
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A placed scene, two runs of traffic and a detector that has learnt nothing."""
+    """A placed scene, two runs of traffic and a detector that was trained on nothing."""
     folder = tmp_path_factory.mktemp("detect")
     example = make_example()
     write_result(make_scene(example.geometry), example.site, example.deployment)

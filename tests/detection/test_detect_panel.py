@@ -26,7 +26,7 @@ def test_the_panel_names_rules_that_there_are():
 
 @pytest.fixture
 def placed(small_scene, tmp_path):
-    """The small junction with two sensors, open and saved, with the add-on, and a detector that has learnt nothing."""
+    """The small junction with two sensors, open and saved, with the add-on, and an untrained detector."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     seip_addon.register()
     bpy.ops.wm.open_mainfile(filepath=str(small_scene))

@@ -58,7 +58,7 @@ CHANGES = {
     "a width out of range": (_set("settings", "width", 10**6), "width must lie between"),
     "a width in halves": (_set("settings", "width", 8.5), "width must lie between"),
     "a setting that nobody knows": (_set("settings", "depth", 3), "damaged"),
-    "a number for what it has learnt from": (_experience(3), "damaged"),
+    "a number for what it has been trained on": (_experience(3), "damaged"),
     "numbers for sensors": (_experience({"sensors": [1, 2]}), "no names"),
     "letters for sensors": (_experience({"sensors": "type1"}), "no names"),
 }

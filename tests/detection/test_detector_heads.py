@@ -21,11 +21,11 @@ GRID = PillarGrid(west=-8.0, south=-6.4, bottom=-1.0, top=4.0, columns=40, rows=
 CAR, TRUCK, CYCLE, PEDESTRIAN = range(4)
 
 
-def targets(*rows, learnt=None):
+def targets(*rows, trained=None):
     """TrainingTargets from rows of class and box."""
     boxes = torch.tensor([row[1:] for row in rows], dtype=torch.float32).reshape(-1, 7)
     category = torch.tensor([row[0] for row in rows], dtype=torch.int64)
-    kept = torch.ones(len(rows), dtype=torch.bool) if learnt is None else torch.tensor(learnt)
+    kept = torch.ones(len(rows), dtype=torch.bool) if trained is None else torch.tensor(trained)
     return TrainingTargets(boxes, category, kept)
 
 
@@ -88,7 +88,7 @@ def test_anchors_are_assigned_as_a_slow_loop_does(seed):  # noqa: C901  # a loop
 
 
 def test_no_anchor_is_held_against_a_road_user_that_nobody_saw():
-    hidden = targets((CAR, 0.4, 0.0, 0.8, 4.5, 1.8, 1.6, 0.0), learnt=[False])
+    hidden = targets((CAR, 0.4, 0.0, 0.8, 4.5, 1.8, 1.6, 0.0), trained=[False])
     got = assignment(hidden, GRID)
     assert (got != BACKGROUND).any()
     assert (got[got != BACKGROUND] == IGNORED).all()
@@ -217,11 +217,11 @@ def test_gradients_of_the_losses_are_their_slopes(make, places):
 
 
 @pytest.mark.parametrize("make", [lambda: CentreHead(3, 4), lambda: AnchorHead(3)])
-def test_the_border_and_the_unseen_are_learnt_from_by_nobody(make):
+def test_the_border_and_the_unseen_are_trained_on_by_nobody(make):
     torch.manual_seed(3)
     head = make()
     output = head(torch.randn(1, 3, 16, 20)).detach().requires_grad_()
-    hidden = targets((CAR, 0.4, 0.0, 0.8, 4.5, 1.8, 1.6, 0.0), learnt=[False])
+    hidden = targets((CAR, 0.4, 0.0, 0.8, 4.5, 1.8, 1.6, 0.0), trained=[False])
     torch.stack(list(head.loss(output, [hidden], GRID, 1.6).values())).sum().backward()
     slope = output.grad[0].abs().sum(dim=0)
     assert (slope[:2] == 0).all()

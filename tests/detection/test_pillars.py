@@ -164,7 +164,7 @@ def test_what_no_grid_can_be_laid_over_is_refused():
         grid_over((0.0, 0.0, 9000.0, 9000.0), (0.0, 3.0), 0.4)
 
 
-def test_a_detector_meets_in_whole_clouds_what_it_learnt_from_chosen_points():
+def test_a_detector_meets_in_whole_clouds_what_it_was_trained_on_chosen_points():
     points = cloud(3000, 4)
     whole = fill_pillars(points, GRID, 3)
     again = fill_pillars(points[np.sort(whole.chosen)], GRID, 3)

@@ -30,26 +30,25 @@ def street(runs=4):
     return told
 
 
-def test_moving_and_parked_are_judged_apart_and_neither_punishes_the_other():
+def test_moving_and_parked_are_evaluated_apart_and_neither_punishes_the_other():
     found = precisions(street())
-    assert {name: (found[name].value, found[name].road_users) for name in ("bev_0.7_moving", "bev_0.7_parked")} == {
-        "bev_0.7_moving": (1.0, 12),
-        "bev_0.7_parked": (0.5, 8),
-    }
-    assert found["bev_0.7"].value == pytest.approx(4 / 5)
+    moving, parked = found["bev_0.7_moving"], found["bev_0.7_parked"]
+    assert (moving.average_precision, moving.road_users) == (1.0, 12)
+    assert (parked.average_precision, parked.road_users) == (0.5, 8)
+    assert found["bev_0.7"].average_precision == pytest.approx(4 / 5)
 
 
-def test_each_class_is_judged_at_its_own_overlap():
+def test_each_class_is_evaluated_at_its_own_overlap():
     found = precisions(street())
     assert (found["car_van_0.7"].road_users, found["pedestrian_0.5"].road_users) == (20, 4)
-    assert found["pedestrian_0.5"].value == 1.0
+    assert found["pedestrian_0.5"].average_precision == 1.0
     assert (RULES["motorcycle_bicycle_0.5"].iou, RULES["pedestrian_0.5"].iou, RULES["truck_bus_0.7"].iou) == (
         0.5,
         0.5,
         0.7,
     )
     assert found["truck_bus_0.7"].road_users == 0
-    assert math.isnan(found["truck_bus_0.7"].value)
+    assert math.isnan(found["truck_bus_0.7"].average_precision)
     assert found["truck_bus_0.7"].interval is None
 
 
@@ -58,7 +57,7 @@ def test_every_rule_has_its_interval():
     for name, precision in found.items():
         if precision.road_users:
             low, high = precision.interval
-            assert 0.0 <= low <= precision.value <= high <= 1.0, name
+            assert 0.0 <= low <= precision.average_precision <= high <= 1.0, name
     assert all(precision.interval is None for precision in precisions(street(3)).values())
 
 

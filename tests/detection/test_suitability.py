@@ -1,4 +1,4 @@
-"""A detector says what it has learnt from, and what speaks against using it beyond."""
+"""A detector says what it has been trained on, and what speaks against using it beyond."""
 
 from dataclasses import replace
 
@@ -68,7 +68,7 @@ def test_what_is_not_known_is_not_held_against_it():
     assert suitability_warnings(detector(TrainingRecord()), ["type9"], AREA, cloud_frame(NOTHING)) == ()
 
 
-def test_the_file_keeps_what_was_learnt_from(tmp_path):
+def test_the_file_keeps_what_it_was_trained_on(tmp_path):
     detector().save(tmp_path / "detector.pt")
     assert Detector.load(tmp_path / "detector.pt").training_record == KNOWN
 

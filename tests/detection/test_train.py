@@ -73,7 +73,7 @@ def test_a_detector_its_curve_and_its_figures_are_written(folder, capsys):
 
 def test_clouds_of_other_sensor_types_are_warned_of(folder, capsys):
     train.main(arguments(folder, "at-home"))
-    learnt = Detector.load(folder / "at-home" / "detector.pt").training_record
+    trained = Detector.load(folder / "at-home" / "detector.pt").training_record
     assert "warning" not in capsys.readouterr().out
     shutil.copytree(folder / "third", folder / "foreign")
     manifest = folder / "foreign" / "manifest.json"
@@ -83,7 +83,7 @@ def test_clouds_of_other_sensor_types_are_warned_of(folder, capsys):
     manifest.write_text(json.dumps(record), encoding="utf-8")
     train.main(arguments(folder, "away", test="foreign"))
     said = capsys.readouterr().out
-    assert f"foreign: the detector was trained on clouds of {' and '.join(learnt.sensors)}, not of another:" in said
+    assert f"foreign: the detector was trained on clouds of {' and '.join(trained.sensors)}, not of another:" in said
 
 
 def test_a_finished_training_is_not_done_again(folder):

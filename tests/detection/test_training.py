@@ -56,7 +56,7 @@ def bytes_of(path):
 
 
 @pytest.mark.parametrize(("head", "steps"), [("centre", 300), pytest.param("anchor", 400, marks=pytest.mark.slow)])
-def test_a_frame_can_be_learnt_by_heart(head, steps):
+def test_a_frame_can_be_memorised(head, steps):
     frame = street_frame(11, users=6, kinds=("car",))
     same, again = (sampled("frame", traffic, [frame]) for traffic in ("run 1", "run 1 by another name"))
     network = replace(SMALL, head=head, width=24)
@@ -150,7 +150,7 @@ def test_there_must_be_something_to_learn_from(aside):
         next(train([sampled("empty", "run 1", [])], aside, SMALL, BRIEF))
 
 
-def test_frames_without_road_users_and_without_points_are_learnt_from_too(aside):
+def test_frames_without_road_users_and_without_points_are_trained_on_too(aside):
     empty = street_frame(5, users=0)
     blind = replace(
         empty, **{name: getattr(empty, name)[:0] for name in ("points", "intensity", "instance", "foreground")}

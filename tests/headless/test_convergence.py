@@ -29,7 +29,7 @@ from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.ring_resolution import unresolved_from
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from tests.builders.small_junction import make_geometry
 from tests.builders.synthetic_junction import rectangle
 from tests.engines import ANY, needs_any
@@ -38,20 +38,20 @@ GEOMETRY = make_geometry(24.0)
 SETTINGS = SurveySettings(candidates=CandidateSettings(sensors=("type2",), heights=(5.4,)), engine=ANY)
 
 
-def answers(judged: dict[float, float]):
+def answers(evaluated: dict[float, float]):
     """Stand in for answers: what they cover by spacing of the candidates."""
 
     def answer(_, settings):
         yield from ()
         spacing = settings.candidates.spacing
-        value = judged[spacing]
+        value = evaluated[spacing]
         return Answer(settings.grid_spacing, spacing, 100, 10, value, value)
 
     return patch.object(Evaluator, "answer", answer)
 
 
-def picked(judged: dict[float, float], tolerance: float = 0.01) -> float:
-    with answers(judged):
+def picked(evaluated: dict[float, float], tolerance: float = 0.01) -> float:
+    with answers(evaluated):
         return finish(coarsest_settings(GEOMETRY, SETTINGS, Objective(count=2), tolerance)).settings.candidates.spacing
 
 

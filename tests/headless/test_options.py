@@ -18,7 +18,7 @@ from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.settings import settings_of
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.core.workflows.survey_settings import SurveySettings
 
 ALL = (CandidateSettings, VisibilitySettings, SurveySettings, Objective, Scenarios, ScanSettings)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.report.evidence import TRAFFIC_PICTURES
+from seip_addon.core.output.results.file_names import TRAFFIC_PICTURES
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.scene.result_folder import FILES
 from tests.builders.small_junction import ORIGIN

@@ -7,7 +7,7 @@ from headless import place
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.report.evidence import POSE_ERROR_PICTURES
+from seip_addon.core.output.results.file_names import POSE_ERROR_PICTURES
 from seip_addon.scene.result_folder import FILES
 
 COARSE = ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--delta", "6", "--no-render"]

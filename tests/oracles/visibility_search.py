@@ -24,12 +24,13 @@ from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
 from seip_addon.core.sensing.lidar.model import DetectionLaw, LidarModel
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.lidar.rosette import Rosette
-from seip_addon.core.sensing.visibility.grid import compute_visibility, full_scan_visibility
+from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.near_surfaces import caster_tolerance
 from seip_addon.core.sensing.visibility.ray_casting import Engine, make_ray_caster
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.site import Site, Targets
+from tests.oracles.full_scan import full_scan
 
 Float = NDArray[np.float64]
 Boolean = NDArray[np.bool_]
@@ -287,11 +288,11 @@ def _poses(random: np.random.Generator, triangles: Float, targets: Float, half: 
 # ---- the oracle ------------------------------------------------------------------------------------------------------
 
 
-def judge(case: Case) -> Verdict:
+def assess(case: Case) -> Verdict:
     """Cast every ray of every pose in float64, and keep open what float32 may decide otherwise."""
     poses = case.site.candidates
     rows = [
-        _judge_pose(case, poses.xyz[pose], float(poses.yaw[pose]), float(poses.tilt[pose]), case.models[key])
+        _assess_pose(case, poses.xyz[pose], float(poses.yaw[pose]), float(poses.tilt[pose]), case.models[key])
         for pose, key in enumerate(poses.sensor.tolist())
     ]
     seen, possible = (np.array(part) for part in zip(*rows, strict=True))
@@ -337,7 +338,7 @@ def behind_prisms(rosette: Rosette, points_per_second: float, frame_rate: float)
     return np.array(rays)
 
 
-def _judge_pose(case: Case, origin: Float, yaw: float, tilt: float, model: LidarModel) -> tuple[Boolean, Boolean]:
+def _assess_pose(case: Case, origin: Float, yaw: float, tilt: float, model: LidarModel) -> tuple[Boolean, Boolean]:
     triangles, targets = case.site.triangles, case.site.targets.xyz
     delta = case.settings.delta
     points = triangles.reshape(-1, 3)
@@ -462,7 +463,7 @@ def differences(case: Case, engine: Engine, verdict: Verdict) -> Counter[str]:
     """Count the entries of a case's grid, and where it is not what the references say."""
     lazy = finish(compute_visibility(case.site, case.models, case.settings, engine, threads=1)).visible
     caster = make_ray_caster(case.site.triangles, engine)
-    full = finish(full_scan_visibility(case.site, case.models, case.settings, caster)).visible
+    full, _ = full_scan(case.site, case.models, case.settings, caster)
     return Counter(
         {
             "entries": lazy.size,
@@ -483,7 +484,7 @@ def search(engines: Sequence[Engine], scenes: int, first_seed: int = 0, minutes:
     until, said = time.monotonic() + 60 * minutes, 0.0
     for seed in range(first_seed, first_seed + scenes):
         case = draw_case(seed)
-        verdict = judge(case)
+        verdict = assess(case)
         for engine in engines:
             found = differences(case, engine, verdict)
             total += found

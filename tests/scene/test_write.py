@@ -11,18 +11,11 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.output.pictures.coverage_colours import Colouring, colouring, of_placement
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.scene import contract
+from seip_addon.scene.coverage_colours import colour_coverage, recolour, show_seen_by
 from seip_addon.scene.materials import linear
 from seip_addon.scene.render import save_rendered_view
 from seip_addon.scene.traffic import animate
-from seip_addon.scene.write import (
-    LIFT,
-    clear_result,
-    colour_coverage,
-    recolour,
-    show_seen_by,
-    shown_legend,
-    write_result,
-)
+from seip_addon.scene.write import LIFT, clear_result, shown_legend, write_result
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import make_example
 

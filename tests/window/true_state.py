@@ -339,7 +339,7 @@ _said: list[str] = []
 
 
 def _says(window: Window, words: str) -> Generator[float, None, bool]:
-    """Tell whether the sidebar, drawn anew, says something."""
+    """Tell whether the sidebar, drawn again, says something."""
     window.area.tag_redraw()
     yield 0.3
     _said.clear()

@@ -54,7 +54,8 @@ from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.obstruction import bareness_warnings
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site, make_site
-from seip_addon.core.workflows.survey import SurveySettings, lay_out, with_grid
+from seip_addon.core.workflows.survey import lay_out, with_grid
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.scene.read import read_scene
 
 LOG = logging.getLogger(__name__)

@@ -14,11 +14,11 @@ import numpy as np
 
 from seip_addon.core.arrays import Float, Integer
 from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.orientation import rotations
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.lidar.noisy_returns import return_chance
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame
-from seip_addon.core.sensing.scans.motion import rotations
 from seip_addon.core.sensing.scans.scanner import ReflectiveSurface, Scan, Scanner
 from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
 from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, prepare
@@ -71,8 +71,8 @@ def scan_costs(site: Site, static: StaticScene, model: LidarModel, frames: int) 
     Returns
     -------
     dict of str to ScanCost
-        Costs by method and engine: ``kept bvh`` and ``kept embree`` (cached returns), ``anew bvh`` and
-        ``anew embree`` (full scans).
+        Costs by method and engine: ``cached bvh`` and ``cached embree`` (cached returns), ``full bvh`` and
+        ``full embree`` (full scans).
 
     Raises
     ------
@@ -85,11 +85,11 @@ def scan_costs(site: Site, static: StaticScene, model: LidarModel, frames: int) 
     ]
     traffic = driving(site)
     bodies = [fitted_body(user) for user in traffic.users]
-    costs = {f"{way} {engine}": ScanCost() for engine in ENGINES for way in ("kept", "anew")}
+    costs = {f"{way} {engine}": ScanCost() for engine in ENGINES for way in ("cached", "full")}
     for engine in ENGINES:
         simulation = finish(prepare(static, sensors, traffic, bodies, ScanSettings(engine=engine)))
         rescan = Rescan(simulation, static, bodies, engine)
-        cached, full = costs[f"kept {engine}"], costs[f"anew {engine}"]
+        cached, full = costs[f"cached {engine}"], costs[f"full {engine}"]
         for number in range(frames):
             snapshot = traffic.at(number / model.rotation_rate)
             cached.expense.time(partial(simulation.frame, number, snapshot.time))

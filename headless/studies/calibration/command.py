@@ -22,7 +22,7 @@ from headless.studies.calibration.reference import load_reference
 from headless.studies.calibration.report import describe, save_calibration
 
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.core.workflows.survey_settings import SurveySettings
 
 CHARTS = {
     "ground.png": save_ground_chart,

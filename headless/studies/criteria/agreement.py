@@ -9,10 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
+from headless.studies.rank_correlation import rank_agreements
+
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer
-from seip_addon.core.estimates import IntervalEstimate, percentiles, rank_agreements
+from seip_addon.core.estimates import IntervalEstimate, percentiles
 
 from .criteria import Criterion
 from .drawing import MIN_PLACEMENTS, NEAR
@@ -42,7 +44,7 @@ class Correlation:
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedCriterion:
+class AssessedCriterion:
     """A criterion beside coverage.
 
     Parameters
@@ -101,17 +103,17 @@ def correlate(criterion: Criterion, precise: Precisions, which: Boolean | None =
     return Correlation(len(rows), spearman, kendall, resampled[0])
 
 
-def judge(criteria: Sequence[Criterion], precise: Precisions) -> tuple[JudgedCriterion, ...]:
+def assess(criteria: Sequence[Criterion], precise: Precisions) -> tuple[AssessedCriterion, ...]:
     """Set each criterion beside the first, which is coverage."""
     correlations = [correlate(one, precise) for one in criteria]
     coverage, reference = correlations[0], int(np.argmax(criteria[0].values))
-    judged = []
+    assessed = []
     for criterion, correlation in zip(criteria, correlations, strict=True):
         best = int(np.argmax(criterion.values))
         gain = float(precise.values[best] - precise.values[reference])
         gains = precise.resampled[best] - precise.resampled[reference]
-        judged.append(
-            JudgedCriterion(
+        assessed.append(
+            AssessedCriterion(
                 criterion,
                 correlation,
                 _difference(correlation, coverage),
@@ -119,7 +121,7 @@ def judge(criteria: Sequence[Criterion], precise: Precisions) -> tuple[JudgedCri
                 IntervalEstimate(gain, *percentiles(gains)) if precise.has_intervals else _open(gain),
             )
         )
-    return tuple(judged)
+    return tuple(assessed)
 
 
 def noise_ceiling(precise: Precisions) -> NoiseCeiling:

@@ -29,12 +29,11 @@ from headless.studies.detection.case_study import split_untrained
 import bpy
 
 from seip_addon.core.choosing.placement.objective import Objective, check_objective
-from seip_addon.core.choosing.robustness.traffic_instants import check_runs
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import COUNT, SEED, SENSORS, TIME_STEP
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.sensing.scans.simulation import ScanSettings
-from seip_addon.core.sensing.traffic.source import require_own_traffic
+from seip_addon.core.sensing.traffic.site_traffic import check_runs, require_own_traffic
 from seip_addon.core.storage.csv_table import save_csv
 from seip_addon.core.storage.files import digest, save_json
 from seip_addon.core.storage.source_digest import source_digest

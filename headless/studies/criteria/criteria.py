@@ -13,7 +13,7 @@ from seip_addon.core.arrays import Float
 from seip_addon.core.choosing.placement.deployment import weighted_share
 from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.returns.expected_returns import expected_returns
-from seip_addon.core.sensing.returns.road_users import RoadUsers, cars_at
+from seip_addon.core.sensing.returns.road_users import BODIES, RoadUsers
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.workflows.survey import Survey
 
@@ -129,3 +129,10 @@ def _returns(
             row += known[key]
         rows.append(row)
     return np.array(rows)
+
+
+def cars_at(points: Float, spacing: float) -> RoadUsers:
+    """Return a car at each of some points (m, 3), metres."""
+    count = len(points)
+    body, none = np.full(count, BODIES.index("car")), np.full(count, -1)
+    return RoadUsers(points, body, np.ones(count), np.zeros(count, dtype=bool), none, (), spacing)

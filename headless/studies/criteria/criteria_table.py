@@ -10,6 +10,7 @@ from typing import Any
 from headless.detection.average_precision import Evaluation, average_precisions_without_each_run, evaluate
 from headless.detection.detector import Detector
 from headless.detection.frame_results import FrameResult
+from headless.detection.jackknife import jackknife_reach, share_interval
 from headless.detection.recordings import SampledRun, Simulator
 from headless.detection.rules import RULES, precision_by
 from headless.studies.detection.sensor_configuration import SensorConfiguration
@@ -19,7 +20,7 @@ import numpy as np
 from seip_addon.core.arrays import Integer, Text
 from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import IntervalEstimate, jackknife_reach, share_interval
+from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.progress import Progress
 from seip_addon.core.workflows.survey import Survey
 

@@ -38,10 +38,11 @@ class PlacementsStudySettings:
         Evaluated ones, the optimal one included; the optimal ones of other weights come on top.
     count : int
         Sensors of each.
-    learnt : int
+    training_placements : int
         Placements whose clouds the detector learns from; none of them is evaluated.
     trainings : int
-        Number of trainings, each with its own seed; with 0 the shipped detector is evaluated, and ``learnt`` is 0.
+        Number of trainings, each with its own seed; with 0 the shipped detector is evaluated, and there are no
+        training placements.
     steps : int
         Steps of each training.
     seed : int
@@ -50,7 +51,7 @@ class PlacementsStudySettings:
 
     placements: int
     count: int = 2
-    learnt: int = 12
+    training_placements: int = 12
     trainings: int = 2
     steps: int = 1800
     seed: int = 0
@@ -67,8 +68,8 @@ class PlacementsStudySettings:
             raise SeipError(
                 f"{self.placements} placements say nothing of a correlation: ask for {MIN_PLACEMENTS} or more"
             )
-        if self.learnt < 1 <= self.trainings:
-            raise SeipError(f"the detector must be trained on 1 placement or more, not {self.learnt}")
+        if self.training_placements < 1 <= self.trainings:
+            raise SeipError(f"the detector must be trained on 1 placement or more, not {self.training_placements}")
         if self.seed < 0:
             raise SeipError(f"the seed of the placements must be 0 or more, not {self.seed}")
         if len(sensors) != 1:
@@ -86,13 +87,13 @@ class DrawnPlacements:
     kind : tuple of str
         Of each: `OPTIMAL`, `RANDOM`, `BETWEEN`, or `OTHERWISE` for the best one by other weights of targets or by
         another criterion.
-    learnt : tuple of SensorConfiguration
+    training : tuple of SensorConfiguration
         None of them is among the evaluated.
     """
 
     evaluated: tuple[SensorConfiguration, ...]
     kind: tuple[str, ...]
-    learnt: tuple[SensorConfiguration, ...]
+    training: tuple[SensorConfiguration, ...]
 
 
 def draw_placements(
@@ -147,8 +148,8 @@ def draw_placements(
     )
     random = drawing.random(settings.placements // 2)
     between = drawing.between(settings.placements - 1 - len(random))
-    learnt = drawing.random((settings.learnt + 1) // 2)
-    learnt += drawing.between(settings.learnt - len(learnt))
+    training = drawing.random((settings.training_placements + 1) // 2)
+    training += drawing.between(settings.training_placements - len(training))
 
     def configurations(kind: str, chosen: Sequence[Integer]) -> tuple[SensorConfiguration, ...]:
         return tuple(
@@ -173,7 +174,7 @@ def draw_placements(
     evaluated = (optimal, *configurations(RANDOM, random), *configurations(BETWEEN, between), *others)
     kind = (OPTIMAL, *[RANDOM] * len(random), *[BETWEEN] * len(between), *[OTHERWISE] * len(others))
     yield Progress(2, 2, "placements drawn", counted=False)
-    return DrawnPlacements(evaluated, kind, configurations("learnt", learnt))
+    return DrawnPlacements(evaluated, kind, configurations("training", training))
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from headless.detection.rules import MAIN_RULE, RULES, precision_by
 from headless.detection.run_detection import AT_ONCE, detect_in_runs
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import deterministic
+from headless.side_by_side import side_by_side
 from headless.studies.detection.case_study import ModelConfiguration, Traffic, TrainingSet, simulate_training_set
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 
@@ -27,7 +28,7 @@ import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Text
 from seip_addon.core.estimates import RESAMPLES, Interval, percentiles
-from seip_addon.core.progress import Progress, side_by_side
+from seip_addon.core.progress import Progress
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
 
@@ -151,7 +152,7 @@ def detectors_of(
     return [
         ModelConfiguration(
             f"detector-{seed}",
-            drawn.learnt,
+            drawn.training,
             NetworkSettings(),
             replace(training, steps=settings.steps, seed=seed),
             start,
@@ -160,11 +161,11 @@ def detectors_of(
     ]
 
 
-def learnt_clouds(
+def training_clouds(
     simulator: Simulator, drawn: DrawnPlacements, traffic: Traffic
 ) -> Generator[Progress, None, TrainingSet]:
     """Simulate what the placements to learn from measure."""
-    return (yield from simulate_training_set(simulator, drawn.learnt, traffic, NetworkSettings()))
+    return (yield from simulate_training_set(simulator, drawn.training, traffic, NetworkSettings()))
 
 
 def precisions(
@@ -186,7 +187,9 @@ def precisions(
         results = yield from side_by_side(works, AT_ONCE)
     runs: Text = np.repeat([run.name for run in traffic.test], [len(run.times) for run in traffic.test])
     of_classes: dict[str, Float] = {
-        name: np.array([np.mean([precision_by(frames, RULES[rule]).value for frames in own]) for own in results])
+        name: np.array(
+            [np.mean([precision_by(frames, RULES[rule]).average_precision for frames in own]) for own in results]
+        )
         for name, rule in CLASSES.items()
     }
     return Precisions(runs, tuple(tuple(evaluate(frames, MAIN_RULE) for frames in own) for own in results), of_classes)

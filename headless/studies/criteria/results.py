@@ -17,11 +17,11 @@ from seip_addon.core.storage.csv_table import save_csv
 from seip_addon.core.storage.files import save_json
 
 from .agreement import (
+    AssessedCriterion,
     Correlation,
-    JudgedCriterion,
     NoiseCeiling,
+    assess,
     correlate,
-    judge,
     near_optimum,
     noise_ceiling,
     upper_half,
@@ -55,9 +55,9 @@ class PlacementsStudy:
     criteria: tuple[Criterion, ...]
 
     @cached_property
-    def judged(self) -> tuple[JudgedCriterion, ...]:
+    def assessed(self) -> tuple[AssessedCriterion, ...]:
         """The criteria beside coverage."""
-        return judge(self.criteria, self.precise)
+        return assess(self.criteria, self.precise)
 
     @cached_property
     def ceiling(self) -> NoiseCeiling:
@@ -89,7 +89,7 @@ class PlacementsStudy:
             f"{self.title}: AP@0.7 from {values.min():.1%} to {values.max():.1%}, {values[0]:.1%}{between} where "
             "coverage is optimal"
         )
-        coverage, *others = self.judged
+        coverage, *others = self.assessed
         yield (
             f"coverage and AP@0.7: Spearman {_written(coverage.correlation.spearman)}, "
             f"Kendall {_written(coverage.correlation.kendall)}"
@@ -125,8 +125,8 @@ class PlacementsStudy:
         )
 
     @property
-    def _beforehand(self) -> list[JudgedCriterion]:
-        return [one for one in self.judged[1:] if one.criterion.beforehand]
+    def _beforehand(self) -> list[AssessedCriterion]:
+        return [one for one in self.assessed[1:] if one.criterion.beforehand]
 
     def _of_correlations(self) -> str:
         better = [one for one in self._beforehand if 0 < one.difference.low < math.inf]
@@ -172,10 +172,10 @@ def save_study(
         PlacementMark(kind, float(coverage[number]), float(values[number]), study.precise.interval(number))
         for number, kind in enumerate(study.drawn.kind)
     ]
-    found = study.judged[0].correlation.spearman
+    found = study.assessed[0].correlation.spearman
     save_placements_chart(folder / "coverage_and_ap.png", marks, f"Spearman ρ = {_written(found)}", study.title)
     bars = [
-        CriterionBar(one.criterion.name, one.correlation.spearman, one.criterion.beforehand) for one in study.judged
+        CriterionBar(one.criterion.name, one.correlation.spearman, one.criterion.beforehand) for one in study.assessed
     ]
     save_criteria_chart(folder / "criteria.png", bars, study.ceiling.ceiling, study.title)
 
@@ -231,8 +231,8 @@ def _record(
             for number, placement in enumerate(study.drawn.evaluated)
             for row in [_row(study, number)]
         ],
-        "learnt_placements": [
-            [sensor.pose for sensor in placement.deployment.sensors] for placement in study.drawn.learnt
+        "training_placements": [
+            [sensor.pose for sensor in placement.deployment.sensors] for placement in study.drawn.training
         ],
         "criteria": [
             {
@@ -245,7 +245,7 @@ def _record(
                 "best_placement": study.drawn.evaluated[one.best].name if one.best else OPTIMAL,
                 "gain": _estimate(one.gain),
             }
-            for one in study.judged
+            for one in study.assessed
         ],
         "coverage_over": [
             {"what": name, "placements": part.placements, "spearman": _estimate(part.spearman)}

@@ -11,22 +11,24 @@ from itertools import combinations
 from pathlib import Path
 
 from headless.detection.average_precision import ADVISED_TEST_RUNS, Evaluation, balanced_score, evaluate
-from headless.detection.breakdown import false_positives
 from headless.detection.detector import Detector
 from headless.detection.frame_results import FrameResult
 from headless.detection.frames import SampledRecording
 from headless.detection.recordings import MountedSensors, SampledRun, Simulator, sampled_runs
-from headless.detection.rules import MAIN_RULE, Precision, precisions
+from headless.detection.rules import MAIN_RULE, precisions
 from headless.detection.run_detection import AT_ONCE, detect_in_runs
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import TrainedDetector, deterministic, train
+from headless.side_by_side import side_by_side
 from headless.studies.coverage.cells import COUNTS, Case, Cell, solve_cell
 from headless.studies.detection.sensor_configuration import SensorConfiguration
+from headless.studies.false_positives import false_positives
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress, side_by_side, within
+from seip_addon.core.output.results.detection_record import Precision
+from seip_addon.core.progress import Progress, within
 from seip_addon.core.sensing.traffic.parked import shared_bays
 from seip_addon.core.sensing.traffic.run_overlap import MATCH_RADIUS, require_independent, vehicle_positions
 from seip_addon.core.workflows.survey import Survey

@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 
 from headless.studies.claims import UNDECIDED, Claim, verdict_above, verdict_within, worst_verdict
 from headless.studies.coverage.cells import COUNTS
+from headless.studies.mean_over_seeds import ANYTHING, CHANGE_OF_SHARE, COUNT, mean_interval
 
 import numpy as np
 
 from seip_addon.core.counts import counted
-from seip_addon.core.estimates import ANYTHING, CHANGE_OF_SHARE, COUNT, SHARE, Interval, mean_interval
+from seip_addon.core.estimates import SHARE, Interval
 
 FACTOR = 2.0  # largest ratio of two figures that are "about" the same
 MIN_SEEDS = 3  # seeds below which nothing is decided

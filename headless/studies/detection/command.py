@@ -14,14 +14,14 @@ from headless import runtime, survey
 from headless.detection.average_precision import too_few_runs
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
 from headless.detection.recordings import Simulator
-from headless.detection.settings import FINE_TUNING, NetworkSettings, TrainingSettings
+from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.options import add_rolling_shutter, new_parser, real_number, whole_number
 from headless.studies.claims import save_claims
 from headless.studies.coverage.cells import COUNTS
 from headless.studies.criteria.criteria import WEIGHTED, criteria_of, weights_of_targets
 from headless.studies.criteria.drawing import PlacementsStudySettings, draw_placements
 from headless.studies.criteria.occupancy import require_vehicles
-from headless.studies.criteria.precision import detectors_of, learnt_clouds, precisions
+from headless.studies.criteria.precision import detectors_of, precisions, training_clouds
 from headless.studies.criteria.results import PlacementsStudy, save_study
 from headless.studies.criteria.site_criteria import best_of, problem_of, site_criteria
 from headless.studies.detection import case_study
@@ -33,15 +33,17 @@ from headless.studies.detection.sensor_configuration import SensorConfiguration
 import bpy
 
 from seip_addon.core.choosing.placement.objective import Objective, check_objective
-from seip_addon.core.choosing.robustness.traffic_instants import check_runs
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import COUNT, SEED, SENSORS, TIME_STEP, Limits
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.sensing.scans.simulation import ScanSettings
-from seip_addon.core.sensing.traffic.source import require_own_traffic
+from seip_addon.core.sensing.traffic.site_traffic import check_runs, require_own_traffic
 from seip_addon.core.workflows.survey import Survey
 
 STEPS, TRAININGS = Limits(1, 10_000_000), Limits(0, 1_000)
+
+FINE_TUNING = TrainingSettings(steps=450, learning_rate=2e-3, validate_every=75, patience=6)
+"""Training of the shipped detector's weights on a site; not stopped early, because precision drops at first."""
 
 
 def main(argv: list[str]) -> None:
@@ -80,7 +82,7 @@ def main(argv: list[str]) -> None:
             folder / "evaluation.json", results, claims, settings, versions(blender=bpy.app.version_string)
         )
         save_claims(folder / "claims_5_to_9.md", claims, site.name)
-    for line in study_results.in_words(results):
+    for line in study_results.describe(results):
         runtime.print_line(line)
     for claim in claims:
         runtime.print_line(claim.describe())
@@ -103,7 +105,7 @@ def _evaluate_placements(options: argparse.Namespace) -> None:
     settings = PlacementsStudySettings(
         placements=options.placements,
         count=options.count,
-        learnt=options.learnt_placements if options.trainings else 0,
+        training_placements=options.training_placements if options.trainings else 0,
         trainings=options.trainings,
         steps=training.steps,
         seed=options.placement_seed,
@@ -121,16 +123,16 @@ def _evaluate_placements(options: argparse.Namespace) -> None:
     simulator = site.simulator
     if options.trainings:
         models = detectors_of(drawn, settings, training, start)
-        training_set = watch.run("simulation", learnt_clouds(simulator, drawn, site.traffic))
+        training_set = watch.run("simulation", training_clouds(simulator, drawn, site.traffic))
         trained = watch.run("training", case_study.train_all(models, training_set, folder, device=options.device))
         detectors = [one.detector for one in trained]
     else:
         detectors = [Detector.load(SHIPPED_DETECTOR, options.device)]
     precise = watch.run("evaluation", precisions(simulator, drawn.evaluated, detectors, site.traffic, folder))
-    judged = watch.run(
+    criteria = watch.run(
         "criteria", criteria_of(site.surveyed, simulator, drawn.evaluated, site.traffic, precise, others)
     )
-    study = PlacementsStudy(site.surveyed.site.name, settings, options.sensor[0], drawn, precise, judged)
+    study = PlacementsStudy(site.surveyed.site.name, settings, options.sensor[0], drawn, precise, criteria)
     with runtime.incomplete_if_interrupted(folder):
         asked = site.surveyed.settings.as_record() | {"frames_every_s": options.every}
         asked["from_scratch"] = options.from_scratch
@@ -273,7 +275,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     drawn.add_argument("--count", type=whole_number(SENSORS), default=2, metavar="N", help="sensors of each")
     drawn.add_argument(
-        "--learnt-placements", type=whole_number(COUNT), default=12, metavar="N", help="others, to learn from"
+        "--training-placements", type=whole_number(COUNT), default=12, metavar="N", help="placements to train on"
     )
     drawn.add_argument("--placement-seed", type=whole_number(SEED), default=0, metavar="SEED", help="of what is drawn")
     return parser

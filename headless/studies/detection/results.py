@@ -6,36 +6,22 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from headless.charts.detection import (
-    BinnedFigure,
-    PrecisionCell,
-    save_count_chart,
-    save_coverage_chart,
-    save_parts_chart,
-    save_precision_recall_chart,
-    save_price_chart,
-    save_training_chart,
-)
+from headless.charts.detection import BinnedFigure, save_parts_chart, save_precision_recall_chart, save_training_chart
 from headless.charts.error_view import save_error_view
-from headless.detection.breakdown import (
-    DENSITY_EDGES,
-    DISTANCE_EDGES,
-    POINT_EDGES,
-    VISIBILITY_EDGES,
-    Bin,
-    average_precision_by,
-    false_by,
-    recall_by,
-)
+from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, Bin, average_precision_by, recall_by
 from headless.detection.chart_data import curve, error_view, parts
 from headless.detection.recordings import Simulator
 from headless.detection.rules import MAIN_RULE, RULES
 from headless.detection.training import LearningCurve, TrainedDetector
 from headless.studies.claims import Claim
+from headless.studies.false_positives import DENSITY_EDGES, false_by
+from headless.studies.mean_over_seeds import mean_interval
+from headless.studies.precision_charts import PrecisionCell, save_count_chart, save_coverage_chart, save_price_chart
+from headless.studies.rank_correlation import rank_correlation, rank_correlation_interval
 
 import numpy as np
 
-from seip_addon.core.estimates import SHARE, Interval, mean_interval, rank_correlation, rank_correlation_interval
+from seip_addon.core.estimates import SHARE, Interval
 from seip_addon.core.storage.csv_table import save_csv
 from seip_addon.core.storage.files import save_json
 
@@ -43,6 +29,7 @@ from .case_study import DetectorOutcome, ModelConfiguration, Traffic
 from .claims import SeedResult
 
 SCHEMA = "seip-evaluation/2"
+VISIBILITY_EDGES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.95, np.inf)
 
 _NO_ENDS = (math.nan, math.nan)
 
@@ -175,7 +162,9 @@ def _row(outcome: DetectorOutcome) -> dict[str, str]:
         **{
             f"ap_{name}{end}": "" if math.isnan(value) else f"{value:.4f}"
             for name, found in outcome.precisions.items()
-            for end, value in zip(("", "_low", "_high"), (found.value, *(found.interval or _NO_ENDS)), strict=True)
+            for end, value in zip(
+                ("", "_low", "_high"), (found.average_precision, *(found.interval or _NO_ENDS)), strict=True
+            )
         },
         **{f"road_users_{name}": f"{found.road_users}" for name, found in outcome.precisions.items()},
         "ap_kitti_ap40": f"{by_kitti.ap40:.4f}",
@@ -237,7 +226,7 @@ def save_record(
     )
 
 
-def in_words(results: StudyResults) -> Iterator[str]:
+def describe(results: StudyResults) -> Iterator[str]:
     """Yield lines for each configuration, and one on the correlation of coverage and average precision."""
     for cell in cells([outcome.seed_result for outcome in results.masked]):
         yield (
@@ -256,7 +245,7 @@ def _by_rules(results: StudyResults, name: str) -> str:
     tables = [one.precisions for one in results.masked if one.configuration.name == name]
     words = []
     for rule in RULES:
-        values = [table[rule].value for table in tables]
+        values = [table[rule].average_precision for table in tables]
         if RULES[rule] is not MAIN_RULE and tables[0][rule].road_users:
             interval = mean_interval(values, SHARE) if len(values) > 1 else None
             words.append(f"{rule} {np.mean(values):.1%}{_between(interval)}")

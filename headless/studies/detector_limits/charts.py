@@ -52,13 +52,13 @@ def save_transfer_chart(path: str | os.PathLike[str], study: LimitsStudy) -> Non
         panel.plot((low, high), (row, row), color=COLOURS[0], linewidth=1.2, marker="|")
         panel.plot(one.change.value * 100, row, color=COLOURS[0], marker=MARKERS[0], mec=PAPER)
     panel.axvline(0.0, color=SOFT_INK, linewidth=1.0, linestyle=DASHED)
-    panel.set_yticks(range(len(changes)), [_in_words(one) for one in changes], fontsize=8.5, parse_math=False)
+    panel.set_yticks(range(len(changes)), [_label(one) for one in changes], fontsize=8.5, parse_math=False)
     panel.invert_yaxis()
     style_axes(panel, "change of average precision (points)")
     save_chart(path, figure, f"{study.name}: types, traffic and sites not in training")
 
 
-def _in_words(one: TransferResult) -> str:
+def _label(one: TransferResult) -> str:
     return f"{one.trained_on}, on {one.tested_on}, against {one.against}"
 
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from headless.detection.detector import Detector, keeping_at_most
+from headless.detection.detector import Detector
 
 import numpy as np
 
@@ -348,3 +348,11 @@ def _recounted(frame: Frame) -> Frame:
     cell = frame.instance[on_users].astype(np.int64) * sensors + frame.sensor[on_users]
     counts = np.bincount(cell, minlength=most * sensors).reshape(most, sensors)
     return replace(frame, labels=replace(labels, points=counts[labels.user]))
+
+
+def keeping_at_most(detector: Detector, points: int) -> Detector:
+    """Return the detector with another limit on the points in a pillar."""
+    settings = replace(detector.settings, most_points=points)
+    other = Detector(settings, training_record=detector.training_record)
+    other.load_state_dict(detector.state_dict())
+    return other.to(detector.device).eval()

@@ -6,20 +6,13 @@ import math
 from collections.abc import Sequence
 
 from headless.detection.average_precision import Evaluation, average_precisions_without_each_run
+from headless.detection.jackknife import jackknife_reach, share_interval
+from headless.studies.mean_over_seeds import CHANGE_OF_SHARE, within
 
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.estimates import (
-    CHANGE_OF_SHARE,
-    SHARE,
-    Interval,
-    IntervalEstimate,
-    jackknife_reach,
-    share_interval,
-    student_reach,
-    within,
-)
+from seip_addon.core.estimates import SHARE, Interval, IntervalEstimate, student_reach
 
 
 class ResampledPrecision:

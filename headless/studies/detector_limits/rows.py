@@ -74,7 +74,7 @@ def limit_rows(study: LimitsStudy) -> tuple[Row, ...]:
     )
 
 
-def points_in_words(change: IntervalEstimate) -> str:
+def format_points(change: IntervalEstimate) -> str:
     """Return a change of average precision with its interval in percentage points, as a message."""
     value, low, high = (100 * end for end in (change.value, change.low, change.high))
     return f"{value:+.1f} points [{low:+.1f}, {high:+.1f}]"
@@ -113,13 +113,13 @@ def _of_curve(curve: DisturbanceCurve, study: LimitsStudy) -> Row:
 def _begins(curve: DisturbanceCurve) -> str:
     begins, last = curve.begins, curve.points[-1]
     if begins is None:
-        return f"not up to {_size(last)}: {points_in_words(last.change)} on {curve.undisturbed.value:.1%}"
-    words = f"at {_size(begins)}: {points_in_words(begins.change)} on {curve.undisturbed.value:.1%}"
+        return f"not up to {_size(last)}: {format_points(last.change)} on {curve.undisturbed.value:.1%}"
+    words = f"at {_size(begins)}: {format_points(begins.change)} on {curve.undisturbed.value:.1%}"
     milder = curve.points[: curve.points.index(begins)]
     if milder:
-        words += f"; at {_size(milder[-1])} not significant, {points_in_words(milder[-1].change)}"
+        words += f"; at {_size(milder[-1])} not significant, {format_points(milder[-1].change)}"
     if last is not begins:
-        words += f"; at {_size(last)} {points_in_words(last.change)}"
+        words += f"; at {_size(last)} {format_points(last.change)}"
     return words
 
 
@@ -130,7 +130,7 @@ def _size(point: DisturbanceEffect) -> str:
 
 
 def _each_loss(curve: DisturbanceCurve) -> str:
-    each = (f"S{point.disturbance.size:g} {points_in_words(point.change)}" for point in curve.points)
+    each = (f"S{point.disturbance.size:g} {format_points(point.change)}" for point in curve.points)
     return f"lost: {', '.join(each)} on {curve.undisturbed.value:.1%}"
 
 
@@ -138,7 +138,7 @@ def _transfer_row(one: TransferResult) -> Row:
     return Row(
         METHOD,
         f"trained on {one.trained_on}, used on {one.tested_on}",
-        f"{points_in_words(one.change)} against {one.against}: {one.precision.describe(1)}",
+        f"{format_points(one.change)} against {one.against}: {one.precision.describe(1)}",
         "the same frames, paired" if one.against != AT_HOME else "different frames: not paired",
         "a detector's file names the sensor types and sites of its training; other types, or another site than the "
         "only one of the training, cause a warning",
@@ -203,7 +203,7 @@ def _of_padding(one: TransferResult) -> Row:
     return Row(
         METHOD,
         f"pillars padded with zeros, {one.tested_on}",
-        f"{points_in_words(one.change)}: {one.precision.describe(1)}",
+        f"{format_points(one.change)}: {one.precision.describe(1)}",
         "the same training steps and seeds, the same frames, paired",
         "pillars are not padded: the network processes only measured points",
     )

@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from headless.detection.average_precision import Evaluation
-from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, Bin, false_by, recall_by
+from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, Bin, recall_by
 from headless.detection.detector import Detector
 from headless.detection.pillars import Filling, filling
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.studies.detection.case_study import ModelConfiguration, model_configurations, padded
 from headless.studies.detection.sensor_configuration import SensorConfiguration
+from headless.studies.false_positives import false_by
 
 import numpy as np
 

@@ -18,6 +18,7 @@ from headless.detection.recordings import SampledRun, Simulator
 from headless.detection.run_detection import AT_ONCE
 from headless.detection.settings import CLASS_CATEGORIES
 from headless.detection.training import deterministic
+from headless.side_by_side import side_by_side
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 
 import numpy as np
@@ -26,7 +27,7 @@ from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core import limits
 from seip_addon.core.arrays import Float
-from seip_addon.core.progress import Progress, finish, side_by_side
+from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.core.sensing.scans.simulation import prepare
 from seip_addon.core.sensing.traffic.bodies import fitted_body

@@ -12,21 +12,25 @@ from collections.abc import Generator
 from dataclasses import replace
 
 from headless import runtime
-from headless.charts.detection import DetectorSetting, save_setting_chart
 from headless.detection.detector import Detector
 from headless.detection.inference import seconds_of
 from headless.detection.recordings import Simulator
 from headless.detection.run_detection import AT_ONCE
-from headless.detection.settings import PUBLISHED_NETWORK, NetworkSettings, TrainingSettings
+from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import deterministic
 from headless.options import new_parser
+from headless.side_by_side import side_by_side
 from headless.studies.detection import case_study
 from headless.studies.detection import command as evaluate
+from headless.studies.precision_charts import DetectorSetting, save_setting_chart
 
 import numpy as np
 
-from seip_addon.core.progress import Progress, side_by_side
+from seip_addon.core.progress import Progress
 from seip_addon.core.storage.files import save_json
+
+PUBLISHED_NETWORK = NetworkSettings(pillar=0.24, most_points=32, width=64, blocks=(3, 5, 5), head="anchor")
+"""Network of the SEIP paper: 0.24 m pillars of 32 points, blocks of 3, 5, 5 at 64, 128, 256 channels, anchors."""
 
 DEFAULT_NETWORK = NetworkSettings()
 NETWORKS = {

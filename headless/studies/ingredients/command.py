@@ -49,15 +49,15 @@ def main(argv: list[str]) -> None:
     found = runtime.finish_with_bar(effects(tests, VARIANTS, detectors))
     with runtime.incomplete_if_interrupted(folder):
         save_table(folder / "ingredients.csv", found)
-        what = f"{options.steps:,} steps, {len(sites.learnt)} sites"
+        what = f"{options.steps:,} steps, {len(sites.training)} sites"
         marks = [IngredientMark(one.test, one.variant, one.change) for one in found if one.change is not None]
         save_ingredients_chart(folder / "ingredients.png", marks, f"Without each ingredient: {what}")
     for one in found:
-        runtime.print_line(in_words(one))
+        runtime.print_line(describe_effect(one))
     runtime.print_line(f"written to {folder}/")
 
 
-def in_words(one: IngredientEffect) -> str:
+def describe_effect(one: IngredientEffect) -> str:
     """Return a row of the table as a message."""
     against = "" if one.change is None else f", {one.change.as_points(1)} against {ALL}"
     return f"{one.test}: {one.variant}: AP {one.precision.describe(1)}{against}"

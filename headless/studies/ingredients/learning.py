@@ -12,22 +12,24 @@ from headless.detection.frames import LazyFrames, Recording, SampledRecording
 from headless.detection.run_detection import AT_ONCE
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import TrainedDetector, deterministic, train
+from headless.side_by_side import side_by_side
 from headless.studies.coverage.cells import Cell, solve_cell
 from headless.studies.detection.sensor_configuration import SensorConfiguration
-from headless.studies.site_training.training_site import LearntSite
+from headless.studies.site_training.training_site import TrainingSite
 
 import numpy as np
 
-from seip_addon.core.progress import Progress, finish, side_by_side
+from seip_addon.core.progress import Progress, finish
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import SceneGeometry
-from seip_addon.core.workflows.survey import SurveySettings, lay_out, see
+from seip_addon.core.workflows.survey import lay_out, see
+from seip_addon.core.workflows.survey_settings import SurveySettings
 
 from .variants import FEW_SITES, Ingredients, ScanIngredients, with_bodies
 
 SENSOR, COUNT = "type2", 4  # of the placement that covers most
 
-Scans = list[tuple[LearntSite, Recording]]
+Scans = list[tuple[TrainingSite, Recording]]
 """Recordings, each with the site where it was made."""
 
 
@@ -37,7 +39,7 @@ class TrainingSites:
 
     Parameters
     ----------
-    learnt, aside : tuple of LearntSite
+    training, validation : tuple of TrainingSite
         Training sites and validation sites.
     store : path
         Folder of visibility grids and trainings.
@@ -45,31 +47,31 @@ class TrainingSites:
         Seed of random placements.
     """
 
-    learnt: tuple[LearntSite, ...]
-    aside: tuple[LearntSite, ...]
+    training: tuple[TrainingSite, ...]
+    validation: tuple[TrainingSite, ...]
     store: Path
     seed: int
 
     def scans(self, ingredients: ScanIngredients) -> Generator[Progress, None, Scans]:
         """Return the training scans."""
-        sites = self.learnt if ingredients.many_sites else self.learnt[:FEW_SITES]
+        sites = self.training if ingredients.many_sites else self.training[:FEW_SITES]
         scans: Scans = []
         for number, site in enumerate(sites):
             yield Progress(number, len(sites), f"draw scans of {site.name}")
             runs = tuple(finish(with_bodies(run, ingredients, self.seed)) for run in site.runs)
             if ingredients.random_placements:
-                recordings = replace(site, runs=runs).scans(len(self.learnt) // len(sites), self._random(number))
+                recordings = replace(site, runs=runs).scans(len(self.training) // len(sites), self._random(number))
             else:
                 placement = yield from covering_most(site.geometry, self.store / f"visibility-{number}.npz")
                 recordings = [site.simulator.record(placement, run) for run in runs]
             scans += [(site, recording) for recording in recordings]
         return scans
 
-    def scans_aside(self) -> Scans:
+    def validation_scans(self) -> Scans:
         """Return the validation scans, the same for all variants."""
         return [
             (site, recording)
-            for number, site in enumerate(self.aside, len(self.learnt))
+            for number, site in enumerate(self.validation, len(self.training))
             for recording in site.scans(1, self._random(number))
         ]
 
@@ -101,14 +103,14 @@ def train_variants(
         Detectors by the name of the variant, in the order of the seeds.
     """
     samples: dict[str, list[SampledRecording]] = {}
-    aside = yield from _sampled(sites.scans_aside(), variants, network)
+    validation = yield from _sampled(sites.validation_scans(), variants, network)
     for scans in dict.fromkeys(one.scans for one in variants.values()):
         sharing = {name: one for name, one in variants.items() if one.scans == scans}
         samples |= yield from _sampled((yield from sites.scans(scans)), sharing, network)
     works = {
         (name, seed): train(
             samples[name],
-            aside[name],
+            validation[name],
             network,
             replace(training, seed=seed),
             store=sites.store / f"{name.replace(' ', '-')}-{seed}.pt",
@@ -130,7 +132,7 @@ def _sampled(
 ) -> Generator[Progress, None, dict[str, list[SampledRecording]]]:
     """Simulate each frame once, and store the training sample of each variant."""
     sampled: list[dict[str, SampledRecording]] = []
-    works: dict[LearntSite, list[Generator[Progress, None, None]]] = {}
+    works: dict[TrainingSite, list[Generator[Progress, None, None]]] = {}
     for site, recording in scans:
         area, latest = site.simulator.area(network.pillar), functools.lru_cache(1)(recording.frames.__getitem__)
         cached = replace(recording, frames=LazyFrames(len(recording.frames), latest))

@@ -11,13 +11,14 @@ from headless.detection.recordings import MountedSensors, SampledRun, Simulator
 from headless.detection.rules import MAIN_RULE
 from headless.detection.run_detection import AT_ONCE, detect_in_runs
 from headless.detection.training import deterministic
+from headless.side_by_side import side_by_side
 from headless.studies.detector_limits.paired_change import ResampledPrecision, change, level
-from headless.studies.site_training.training_site import LearntSite
+from headless.studies.site_training.training_site import TrainingSite
 
 import numpy as np
 
 from seip_addon.core.estimates import IntervalEstimate
-from seip_addon.core.progress import Progress, finish, side_by_side
+from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.traffic.varied_bodies import resized
 
 from .variants import ALL, SIZE_CHANGE, Ingredients
@@ -32,7 +33,7 @@ class UnseenTest:
     scanned: tuple[tuple[SampledRun, MountedSensors], ...]
 
 
-def unseen_tests(site: LearntSite, best: MountedSensors, seed: int, *, full: bool) -> tuple[UnseenTest, ...]:
+def unseen_tests(site: TrainingSite, best: MountedSensors, seed: int, *, full: bool) -> tuple[UnseenTest, ...]:
     """Return the tests at a site: with one placement; if `full`, also with random ones and changed road users."""
     runs = site.runs
     tests = [UnseenTest(f"{site.simulator.site}, {best.name}", site.simulator, tuple((run, best) for run in runs))]

@@ -12,7 +12,6 @@ import argparse
 from pathlib import Path
 
 from headless import build_scene, runtime
-from headless.charts.detection import save_count_chart, save_coverage_chart
 from headless.detection.detector import check_device
 from headless.detection.settings import TrainingSettings
 from headless.options import new_parser, real_number
@@ -34,6 +33,7 @@ from headless.studies.paper.traffic_runs import (
     overlaps,
     read_traffic_of_site,
 )
+from headless.studies.precision_charts import save_count_chart, save_coverage_chart
 
 import bpy
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 from headless.detection.average_precision import average_precision_interval, average_precisions_without_each_run
 from headless.detection.recordings import Simulator
@@ -21,9 +22,11 @@ from headless.studies.detection.sensor_configuration import SensorConfiguration
 import numpy as np
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress, in_detail
+from seip_addon.core.progress import Progress
 
 from .figures import ENOUGH_RETURNS, PlacementFigures
+
+Result = TypeVar("Result")
 
 PARTS = 6  # of the whole: simulate, train, and evaluate, for either traffic
 
@@ -124,3 +127,15 @@ def _figures(
         copies=copies.evaluation.average_precision,
         unfamiliar=unfamiliar.evaluation.average_precision,
     )
+
+
+def in_detail(whole: Progress, steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
+    """Run work as one of several equally long units of a whole, yielding progress that includes that of the unit."""
+    while True:
+        try:
+            step = next(steps)
+        except StopIteration as stop:
+            result: Result = stop.value
+            return result
+        done, total = whole.done * step.total + step.done, whole.total * step.total
+        yield Progress(done, total, step.what, whole.counted and step.counted)

@@ -4,10 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
+from headless.detection.jackknife import jackknife_reach
+from headless.studies.rank_correlation import rank_correlation
+
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.estimates import Interval, jackknife_reach, rank_correlation
+from seip_addon.core.estimates import Interval
 
 MIN_DIFFERENCE = 0.005  # difference of coverage below which two placements count as equal
 

@@ -25,7 +25,8 @@ from seip_addon.core.storage.files import digest, save_json
 from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
-from seip_addon.core.workflows.survey import SurveySettings, lay_out
+from seip_addon.core.workflows.survey import lay_out
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.core.workflows.traffic_runs import traffic_folder
 from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.scene.blend_file import new_file, save_blend

@@ -23,20 +23,21 @@ from headless.detection.run_detection import AT_ONCE
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import train
 from headless.options import add_settings, new_parser, read_settings, real_number
+from headless.side_by_side import side_by_side
 from headless.studies.detection.case_study import simulated
-from headless.studies.site_training.training_site import LearntSite
+from headless.studies.site_training.training_site import TrainingSite
 
 import bpy
 import numpy as np
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import TIME_STEP
-from seip_addon.core.progress import Progress, side_by_side
+from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.scans.simulation import ScanSettings
-from seip_addon.core.sensing.traffic.source import require_own_traffic
+from seip_addon.core.sensing.traffic.site_traffic import require_own_traffic
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.site import make_site
-from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.scene.read import read_scene
 
 HEIGHTS = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)  # metres
@@ -112,7 +113,7 @@ class LearningSettings:
     seed: int = 1
 
 
-def read_site(scene: Path, learning: LearningSettings) -> LearntSite:
+def read_site(scene: Path, learning: LearningSettings) -> TrainingSite:
     """Read a scene with the runs of traffic next to it.
 
     Raises
@@ -135,7 +136,7 @@ def read_site(scene: Path, learning: LearningSettings) -> LearntSite:
     for run in runs:
         require_own_traffic(run.trajectories, geometry, run.name)
     simulator = Simulator(geometry, ScanSettings(seed=learning.seed))
-    return LearntSite(f"{scene.parent.name}/{scene.stem}", geometry, candidates, models, runs, simulator)
+    return TrainingSite(f"{scene.parent.name}/{scene.stem}", geometry, candidates, models, runs, simulator)
 
 
 def set_aside(sites: Sequence[Site]) -> tuple[Sequence[Site], Sequence[Site]]:
@@ -153,7 +154,7 @@ def set_aside(sites: Sequence[Site]) -> tuple[Sequence[Site], Sequence[Site]]:
 
 
 def _sampled(
-    site: LearntSite, number: int, network: NetworkSettings, learning: LearningSettings
+    site: TrainingSite, number: int, network: NetworkSettings, learning: LearningSettings
 ) -> Generator[Progress, None, list[SampledRecording]]:
     """Simulate scans of random placements in all runs of a site."""
     area = site.simulator.area(network.pillar)

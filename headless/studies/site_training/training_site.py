@@ -18,7 +18,7 @@ from .random_placements import random_placement
 
 
 @dataclass(frozen=True, eq=False)
-class LearntSite:
+class TrainingSite:
     """A training site.
 
     Parameters

@@ -17,10 +17,10 @@ from headless.studies.stability.page import load_chapter, put_chapter, save_chap
 
 from seip_addon.core.choosing.placement.objective import DEFAULT_COUNT, Objective, check_objective
 from seip_addon.core.errors import SeipError
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.workflows.survey import grid_key
-from seip_addon.core.workflows.traffic_runs import load_runs
 
 PAGE, CHARTS = "stability.md", "stability"
 
@@ -38,7 +38,8 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
         argparse.Namespace(**vars(options) | {"output": options.work}),
         lambda layout: check_objective(layout.site, layout.models, Objective(count=DEFAULT_COUNT)),
     )
-    runs = load_runs(survey.runs_beside(options.scene), surveyed.geometry.origin)
+    origin = surveyed.geometry.origin
+    runs = [Trajectories.load(path).moved_to(origin) for path in survey.runs_beside(options.scene)]
     scene = StudiedScene(surveyed, runs, options.scene, options.other, options.work, charts, scope or StabilityScope())
     made_from = digest(
         grid_key(surveyed),

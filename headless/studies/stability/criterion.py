@@ -37,7 +37,7 @@ from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.visibility_model import visibility_model
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.site.site import Site, Targets, make_site
-from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.core.workflows.survey_settings import SurveySettings
 
 from .rows import Row
 from .shares import Share

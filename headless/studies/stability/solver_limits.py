@@ -10,12 +10,13 @@ from itertools import combinations
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer
-from seip_addon.core.choosing.placement.integer_program import is_available, reaching
+from seip_addon.core.choosing.placement.integer_program import reaching
 from seip_addon.core.choosing.placement.near_optimal import NearOptimalSet
 from seip_addon.core.choosing.placement.problem import TIE_TOLERANCE, Placement, PlacementProblem
 from seip_addon.core.choosing.placement.reduced_problem import make_instance
 from seip_addon.core.choosing.placement.search_limits import Clock, SolverLimits
 from seip_addon.core.choosing.placement.solver import solve, solve_greedy
+from seip_addon.core.choosing.placement.solvers import is_available
 from seip_addon.core.progress import Progress, finish
 
 from .rows import Row

@@ -58,6 +58,20 @@ def angles_of(matrix: Float) -> tuple[float, float, float]:
     return math.atan2(matrix[1, 0], matrix[0, 0]), tilt, math.atan2(matrix[2, 1], matrix[2, 2])
 
 
+def rotations(yaw: Float, pitch: Float) -> Float:
+    """Return rotations (n, 3, 3) from the axes of road users (forward, left, up) to those of the site.
+
+    Parameters
+    ----------
+    yaw, pitch : (n,) float64, radians
+        Yaw counter-clockwise from +x; positive pitches are nose up.
+    """
+    zero = np.zeros_like(yaw)
+    forward = np.stack([np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)], axis=-1)
+    left = np.stack([-np.sin(yaw), np.cos(yaw), zero], axis=-1)
+    return np.stack([forward, left, np.cross(forward, left)], axis=-1)
+
+
 def rotated(vectors: Float, matrix: Float) -> Float:
     """Return the products of a matrix and each vector, (n, 3) float64.
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..acceptance import Acceptance
 from ..choosing.placement.deployment import deploy
 from ..choosing.placement.near_optimal import near_optimal_set
 from ..choosing.placement.objective import (
@@ -20,7 +21,7 @@ from ..choosing.placement.objective import (
     with_count,
 )
 from ..choosing.placement.risk import Risk
-from ..choosing.placement.search_limits import Acceptance, SolverLimits
+from ..choosing.placement.search_limits import SolverLimits
 from ..choosing.robustness.assumed_heights import height_notes
 from ..choosing.robustness.gain_band import with_gain_band
 from ..choosing.robustness.pose_error_evaluation import PoseErrorEvaluation

@@ -2,141 +2,30 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ..choosing.placement.integer_program import check_solver
-from ..choosing.placement.search_limits import DEFAULT_EFFORT, SolverLimits
-from ..output.results.headings import tilt_degrees
 from ..progress import Progress
 from ..sensing.lidar.carla_dropoff import CarlaDropoff
-from ..sensing.lidar.catalogue import find_models, load_catalogue
 from ..sensing.lidar.model import LidarModel
-from ..sensing.visibility.estimate import Estimate, estimate_visibility
 from ..sensing.visibility.float32_precision import rounding_warnings
 from ..sensing.visibility.grid import VisibilityGrid, visibility_key
-from ..sensing.visibility.ray_casting import Engine, engine_name
+from ..sensing.visibility.ray_casting import engine_name
 from ..sensing.visibility.ring_resolution import resolution_warnings
 from ..sensing.visibility.road_range import range_warnings, road_reflectivity
 from ..sensing.visibility.settings import VisibilitySettings
 from ..sensing.visibility.store import stored_visibility
 from ..sensing.visibility.surroundings import Surroundings
-from ..settings import setting
-from ..site.candidates import CandidateSettings, assumed_pole_warnings
+from ..site.candidates import assumed_pole_warnings
 from ..site.far_objects import without_far_objects
-from ..site.installed_cost import InstalledCost
 from ..site.obstruction import bareness_warnings
 from ..site.scene_geometry import SceneGeometry
 from ..site.site import Site, make_site
 from ..site.weather import Weather
-
-
-@dataclass(frozen=True)
-class SurveySettings:
-    """Settings of a survey and of the searches on it.
-
-    Parameters
-    ----------
-    grid_spacing : float, metres
-        Distance between neighbouring targets.
-    catalogue : tuple of path
-        The user's own catalogues of LiDARs.
-    engine : {"auto", "bvh", "embree"}
-        Ray-casting engine.
-    solver : str
-        Solver of integer programs: ``auto``, ``highs``, ``cbc`` or ``gurobi``; ``auto`` is HiGHS if it is installed,
-        otherwise CBC.
-    time_limit : float, seconds, optional
-        Limit of the wall time of each search.
-    effort : float, units of work, optional
-        Limit of the counted work of each search, which makes results reproducible: see `SolverLimits`.
-    installed_cost : InstalledCost, optional
-        Cost of installation to include in every price; by default prices are those of sensors only.
-    spacings_because : str
-        Reason for the spacings of targets and candidates; empty if the user chose them.
-    """
-
-    candidates: CandidateSettings = field(default_factory=CandidateSettings)
-    visibility: VisibilitySettings = field(default_factory=VisibilitySettings)
-    weather: Weather = field(default_factory=Weather)
-    reflectivity: tuple[str, ...] = ()
-    grid_spacing: float = setting(1.0, "distance between neighbouring targets on the road", unit="m", option="grid")
-    catalogue: tuple[Path, ...] = setting((), "catalogues of your own; a unit's beams as KEY=FILE", metavar="FILE")
-    engine: Engine = setting("auto", "ray caster")
-    solver: str = setting("auto", "auto (HiGHS if it is installed, otherwise CBC), highs, cbc or gurobi")
-    effort: float | None = setting(
-        None,
-        f"limit of each search in counted work, 1 is about a second of a core ({DEFAULT_EFFORT:g})",
-        metavar="UNITS",
-    )
-    time_limit: float | None = setting(None, "limit of each search in seconds, in place of counted work", metavar="S")
-    installed_cost: InstalledCost | None = None
-    spacings_because: str = ""
-
-    def models(self) -> dict[str, LidarModel]:
-        """Return the sensor types to choose from, in the given weather, by catalogue key.
-
-        Raises
-        ------
-        SeipError
-            The solver or a type is unknown, a limit is not a positive number, a catalogue cannot be read, or a type
-            detects nothing with the required probability.
-        """
-        check_solver(self.solver)
-        self.limits.clock()  # rejects invalid limits before any ray is cast
-        models = find_models(load_catalogue(self.catalogue), self.candidates.sensors)
-        for model in models.values():
-            self.visibility.least_strength(model)
-        return {key: self.weather.through(model) for key, model in models.items()}
-
-    @property
-    def limits(self) -> SolverLimits:
-        """Solver and limits of a search."""
-        return SolverLimits(self.solver, self.time_limit, self.effort)
-
-    def reach(self, models: Mapping[str, LidarModel] | None = None) -> float:
-        """Return the largest distance from a target at which a ray that sees it can begin or be stopped, in metres.
-
-        Parameters
-        ----------
-        models : mapping of str to LidarModel, optional
-            Sensor types that `models` has returned; by default they are loaded again.
-        """
-        types = self.models() if models is None else models
-        return max(model.max_range for model in types.values()) + self.visibility.delta
-
-    def as_record(self) -> dict[str, Any]:
-        """Return the settings for records, defaults included, as values that JSON can represent."""
-        limits = _finite({"time_limit_s": self.time_limit or math.inf, "effort": self.limits.work})
-        return {
-            "grid_spacing_m": self.grid_spacing,
-            "candidates": _candidates_record(self.candidates),
-            "visibility": asdict(self.visibility),
-            "weather": _finite(asdict(self.weather)),
-            "reflectivity": list(self.reflectivity),
-            "catalogue": [path.name for path in self.catalogue],
-            "engine": self.engine,
-            "solver": self.solver,
-            "installed_cost": self.installed_cost and asdict(self.installed_cost),
-            "spacings_because": self.spacings_because,
-            **limits,
-        }
-
-
-def _finite(record: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a record without infinite values, which JSON cannot represent."""
-    return {name: value for name, value in record.items() if math.isfinite(value)}
-
-
-def _candidates_record(settings: CandidateSettings) -> dict[str, Any]:
-    record = asdict(settings)
-    tilts = record.pop("tilts")
-    return record | {"tilts_deg": [tilt_degrees(tilt) for tilt in tilts]}
+from .survey_settings import SurveySettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,12 +139,6 @@ def with_grid(layout: Layout, grid: VisibilityGrid, path: Path | None = None) ->
     """Return the survey of a layout with a given visibility grid; ``path`` is the file that it is stored in, if any."""
     returns_path = None if path is None else path.with_suffix(".returns.npz")
     return Survey(**{**vars(layout), "grid": grid, "returns_path": returns_path})
-
-
-def estimate(layout: Layout, threads: int | None = None) -> Generator[Progress, None, Estimate]:
-    """Estimate the run time and memory of `see` without a stored grid; see `estimate_visibility`."""
-    settings = layout.settings
-    return estimate_visibility(layout.site, layout.models, settings.visibility, settings.engine, threads)
 
 
 def surroundings(layout: Layout) -> Surroundings:

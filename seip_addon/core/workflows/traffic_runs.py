@@ -9,12 +9,10 @@ from itertools import product
 from pathlib import Path
 from typing import TypeVar
 
-from ..arrays import Float
-from ..choosing.robustness.traffic_instants import check_runs
 from ..errors import SeipError
 from ..progress import Progress
 from ..sensing.traffic.run_overlap import require_independent, vehicle_positions
-from ..sensing.traffic.source import load_trajectories
+from ..sensing.traffic.site_traffic import check_runs, load_trajectories
 from ..sensing.traffic.trajectories import Trajectories
 from ..site.site import Site
 from .survey import Layout
@@ -83,11 +81,6 @@ def found_runs(folder: Path) -> list[Path]:
             "seip traffic, each with its own seed"
         )
     return paths
-
-
-def load_runs(paths: Sequence[Path], origin: Float) -> list[Trajectories]:
-    """Read runs, in the local axes of an origin."""
-    return [Trajectories.load(path).moved_to(origin) for path in paths]
 
 
 def read_runs(paths: Sequence[Path], layout: Layout) -> Generator[Progress, None, TrafficRuns]:

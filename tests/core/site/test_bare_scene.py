@@ -8,7 +8,8 @@ import pytest
 from seip_addon.core.progress import finish
 from seip_addon.core.site.obstruction import NO_OBSTACLES_MESSAGE
 from seip_addon.core.site.scene_geometry import Mesh, Pole
-from seip_addon.core.workflows.survey import SurveySettings, lay_out
+from seip_addon.core.workflows.survey import lay_out
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import SiteDescription, Trees
 from seip_addon.core.world.streetscape.model import site_model

@@ -4,7 +4,8 @@ import pytest
 
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.workflows.survey import SurveySettings, lay_out, see
+from seip_addon.core.workflows.survey import lay_out, see
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from tests.builders.small_junction import make_geometry
 
 SETTINGS = SurveySettings(

@@ -6,9 +6,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from seip_addon.core.acceptance import Acceptance
 from seip_addon.core.choosing.placement.objective import MOVED, Objective
 from seip_addon.core.choosing.placement.scenarios import PoseErrors, Scenarios
-from seip_addon.core.choosing.placement.search_limits import Acceptance
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.moved_sensors import evaluate_moved_sensors

@@ -18,7 +18,7 @@ from seip_addon.core.output.results.placement_file import save_placement
 
 COARSE = ["--heights", "5.4", "--grid", "8", "--spacing", "20"]
 BRIEF = ["--every", "14", "--steps", "2", "--from-scratch"]
-DRAWN = ["--sensor", "type1", "--placements", "5", "--count", "2", "--learnt-placements", "2", "--trainings", "2"]
+DRAWN = ["--sensor", "type1", "--placements", "5", "--count", "2", "--training-placements", "2", "--trainings", "2"]
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +70,7 @@ def test_tables_hold_every_placement(study):
         [float(row["coverage"]) for row in rows], abs=1e-4
     )
     evaluated = [{sensor["pose"] for sensor in one["sensors"]} for one in record["placements"]]
-    assert not any(set(learnt) in evaluated for learnt in record["learnt_placements"])
+    assert not any(set(trained) in evaluated for trained in record["training_placements"])
     assert record["criteria"][0]["key"] == "coverage"
     assert record["sentences"][-1].startswith("this supports no conclusion")
 
@@ -80,7 +80,7 @@ def test_without_training_the_shipped_detector_is_evaluated(run, tmp_path):
     run(tmp_path, "--sensor", "type1", "--placements", "5", "--count", "2", "--trainings", "0", "--effort", "1")
     record = json.loads((tmp_path / "placements.json").read_text(encoding="utf-8"))
     assert not list(tmp_path.glob("detector-*"))
-    assert record["learnt_placements"] == []
+    assert record["training_placements"] == []
     known, tests = (len(record["traffic"][what]) for what in ("training", "test"))
     assert known == (known + tests) // 4
     placed = record["placements"]

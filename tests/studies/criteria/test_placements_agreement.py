@@ -31,13 +31,13 @@ class Told:
         rng = np.random.default_rng(self.seed)
         number = len(self.quality)
         runs = self.quality + self.run_error * rng.normal(size=(RUNS, number))
-        learnt = self.training_error * rng.normal(size=(self.trainings, number))
-        self.by_training = learnt + runs.mean(axis=0)
+        trained = self.training_error * rng.normal(size=(self.trainings, number))
+        self.by_training = trained + runs.mean(axis=0)
         self.values = self.by_training.mean(axis=0)
         half = RUNS // 2
-        self.halves = learnt.mean(axis=0) + np.array([[runs[:half].mean(axis=0), runs[half:].mean(axis=0)]])
+        self.halves = trained.mean(axis=0) + np.array([[runs[:half].mean(axis=0), runs[half:].mean(axis=0)]])
         drawn = rng.integers(RUNS, size=(RESAMPLES, RUNS))
-        self.resampled = (learnt.mean(axis=0) + runs[drawn].mean(axis=1)).T
+        self.resampled = (trained.mean(axis=0) + runs[drawn].mean(axis=1)).T
 
     def interval(self, placement):
         return tuple(np.quantile(self.resampled[placement], (0.025, 0.975)))
@@ -85,7 +85,7 @@ def test_a_criterion_is_paired_with_coverage():
     told = Told(spread(), 0.05, 0.0)
     coverage = Criterion("coverage", "coverage", told.quality + np.random.default_rng(2).normal(0, 0.15, PLACEMENTS))
     same, true = Criterion("same", "same", 2 * coverage.values), Criterion("true", "true", told.quality)
-    first, alike, better = agreement.judge((coverage, same, true), told)
+    first, alike, better = agreement.assess((coverage, same, true), told)
     assert (first.difference.value, first.gain.value) == (0, 0)
     assert (alike.difference.low, alike.difference.high) == (0, 0)
     assert 0 < better.difference.low < better.difference.value < better.difference.high
@@ -148,7 +148,7 @@ def test_a_criterion_that_gains_is_named():
     assert "hindsight" not in said[-1]
 
 
-def test_a_detector_that_has_not_learnt_says_nothing():
+def test_a_detector_that_was_not_trained_says_nothing():
     told = Told(np.linspace(0.0, 0.05, PLACEMENTS), 0.0, 0.0)
     said = list(study(told, Criterion("true", "the truth", told.quality)).sentences())
     assert said[-1].startswith("this supports no conclusion")

@@ -10,7 +10,7 @@ pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless.detection.frame_results import FrameResult
 from headless.detection.recordings import SampledRun
-from headless.studies.criteria.criteria import criteria_of
+from headless.studies.criteria.criteria import cars_at, criteria_of
 from headless.studies.criteria.drawing import (
     BETWEEN,
     NEAR,
@@ -40,7 +40,6 @@ from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.noisy_returns import return_chance
 from seip_addon.core.sensing.returns.bodies import PANELS
 from seip_addon.core.sensing.returns.expected_returns import expected_returns
-from seip_addon.core.sensing.returns.road_users import cars_at
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.scans.static_scene import StaticScene
@@ -50,7 +49,7 @@ from seip_addon.core.site.site import Targets
 from tests.builders.labelled_frames import box, detected, traffic, truth
 from tests.builders.small_junction import make_example
 
-SETTINGS = PlacementsStudySettings(placements=11, count=2, learnt=6)
+SETTINGS = PlacementsStudySettings(placements=11, count=2, training_placements=6)
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +76,7 @@ def poses(configurations):
 def test_placements_are_feasible_different_and_spread(survey):
     drawn = finish(draw_placements(survey, SETTINGS, {}))
     assert drawn.kind == (OPTIMAL, *[RANDOM] * 5, *[BETWEEN] * 5)
-    everything = poses(drawn.evaluated) + poses(drawn.learnt)
+    everything = poses(drawn.evaluated) + poses(drawn.training)
     assert len(set(everything)) == len(everything) == 17
     position = survey.site.candidates.position_of
     assert all(len({position[pose] for pose in some}) == 2 for some in everything)
@@ -124,7 +123,7 @@ def test_what_coverage_rates_best_is_proven_optimal(survey, key):
 
 def test_a_seed_draws_the_same_and_another_others(survey):
     again = [finish(draw_placements(survey, replace(SETTINGS, seed=seed), {})) for seed in (0, 0, 1)]
-    first, same, other = [poses(one.evaluated) + poses(one.learnt) for one in again]
+    first, same, other = [poses(one.evaluated) + poses(one.training) for one in again]
     assert first == same
     assert first[0] == other[0]
     assert set(first[1:6]) != set(other[1:6])
@@ -146,7 +145,7 @@ def test_random_placements_are_uniform(survey):
     ("changed", "sensors", "sentence"),
     [
         ({"placements": 3}, ["type2"], "3 placements say nothing of a correlation: ask for 4 or more"),
-        ({"learnt": 0}, ["type2"], "must be trained on 1 placement or more, not 0"),
+        ({"training_placements": 0}, ["type2"], "must be trained on 1 placement or more, not 0"),
         ({"seed": -1}, ["type2"], "seed of the placements must be 0 or more"),
         ({}, ["type1", "type2"], "placements of one type are compared, not of type1 and type2"),
     ],
@@ -250,9 +249,9 @@ def test_criteria_by_hand():
     ]
     simulator = SimpleNamespace(static=StaticScene(GROUND, np.full(2, 0.3), site.region), settings=ScanSettings())
     precise = SimpleNamespace(share_with_returns=np.array([0.1, 0.2, 0.3]))
-    learnt = SimpleNamespace(training=(run_of(one_car(seconds=40.0)),))  # for 18 of 38 s, and then passing the second
+    trained = SimpleNamespace(training=(run_of(one_car(seconds=40.0)),))  # for 18 of 38 s, and then passing the second
     found = {
-        one.key: one for one in finish(criteria_of(SimpleNamespace(site=site), simulator, placements, learnt, precise))
+        one.key: one for one in finish(criteria_of(SimpleNamespace(site=site), simulator, placements, trained, precise))
     }
     assert found["coverage"].values == pytest.approx([1 / 3] * 3)
     assert found["weighted_coverage"].values == pytest.approx([1 / 6, 4 / 6, 1 / 6])
@@ -263,7 +262,7 @@ def test_criteria_by_hand():
     assert (found["log_returns"].values > 0).all()
     assert [key for key, one in found.items() if not one.beforehand] == ["test_vehicles_with_returns"]
     flat = replace(site, targets=replace(targets, central=np.zeros(3, dtype=bool)))
-    steps = criteria_of(SimpleNamespace(site=flat), simulator, placements, learnt, precise)
+    steps = criteria_of(SimpleNamespace(site=flat), simulator, placements, trained, precise)
     assert "weighted_coverage" not in {one.key for one in finish(steps)}
 
 

@@ -116,7 +116,7 @@ def test_false_positives_have_to_be_more_and_in_sparse_places():
     assert "not measured" in evidence(8, sparse=math.nan)
 
 
-def test_padding_is_judged_where_it_was_tried():
+def test_padding_is_evaluated_where_it_was_tried():
     assert verdicts(padded=1.0)[9] == "holds"
     assert verdicts(padded=-0.5)[9] == "does not hold"
     assert verdicts(padded=0.0)[9] == "undecided"

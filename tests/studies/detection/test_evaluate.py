@@ -73,7 +73,7 @@ def test_the_table_has_a_row_for_each_detector_and_placement(folder):
     assert {row["road_users_pedestrian_0.5"] for row in rows} == {"0"}
 
 
-def test_detectors_know_what_they_have_learnt_from(run, tmp_path):
+def test_detectors_know_what_they_were_trained_on(run, tmp_path):
     run(tmp_path, "--trainings", "1")
     before, after = (Detector.load(path).training_record for path in (SHIPPED_DETECTOR, tmp_path / "detector-1.pt"))
     assert set(after.sensors) == {*before.sensors, "type1"}
@@ -138,15 +138,15 @@ def test_a_run_without_road_users_in_the_region_is_refused_before_training(run, 
 
 
 @pytest.mark.parametrize(
-    ("count", "learnt", "aside", "tested"), [(4, 1, 1, 2), (5, 2, 1, 2), (6, 2, 1, 3), (16, 6, 2, 8)]
+    ("count", "trained", "aside", "tested"), [(4, 1, 1, 2), (5, 2, 1, 2), (6, 2, 1, 3), (16, 6, 2, 8)]
 )
-def test_half_the_runs_are_for_tests_and_an_eighth_for_validation(tmp_path, count, learnt, aside, tested):
+def test_half_the_runs_are_for_tests_and_an_eighth_for_validation(tmp_path, count, trained, aside, tested):
     paths = [tmp_path / f"run-{number}.npz" for number in range(count)]
     for number, path in enumerate(paths):
         make_run(number, 5.0).save(path)
     traffic = read_traffic(paths, np.zeros(3), 1.0)
     names = [[sampled.name for sampled in part] for part in (traffic.training, traffic.validation, traffic.test)]
-    assert list(map(len, names)) == [learnt, aside, tested]
+    assert list(map(len, names)) == [trained, aside, tested]
     assert list(chain(*names)) == [path.stem for path in paths]
 
 

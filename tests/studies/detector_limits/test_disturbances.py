@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from headless.detection.detector import Detector, keeping_at_most
+from headless.detection.detector import Detector
 from headless.detection.settings import NetworkSettings
 from headless.studies.detector_limits.disturbances import (
     DROP_INTENSITY,
@@ -21,6 +21,7 @@ from headless.studies.detector_limits.disturbances import (
     Thinned,
     TiltError,
     YawError,
+    keeping_at_most,
     range_in,
 )
 
@@ -84,7 +85,7 @@ def test_the_share_lost_is_the_share_asked_for(share, plain):
     expected, spread = len(plain) * (1 - share), math.sqrt(len(plain) * share * (1 - share))
     assert abs(len(left) - expected) < 4 * spread
     whole = {tuple(point) for point in plain.points.tolist()}
-    assert all(tuple(point) in whole for point in left.points.tolist())  # lost, not drawn anew
+    assert all(tuple(point) in whole for point in left.points.tolist())  # lost, not drawn again
 
 
 def test_a_larger_loss_takes_what_a_smaller_one_takes():

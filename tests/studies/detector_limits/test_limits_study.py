@@ -10,7 +10,7 @@ from headless.studies.detector_limits import study as study_module
 from headless.studies.detector_limits import trials as trials_module
 from headless.studies.detector_limits.charts import save_limits_chart, save_transfer_chart
 from headless.studies.detector_limits.disturbances import Disturbance, DropOff, SensorFailure, YawError
-from headless.studies.detector_limits.rows import limit_rows, points_in_words
+from headless.studies.detector_limits.rows import format_points, limit_rows
 from headless.studies.detector_limits.study import (
     DisturbanceCurve,
     DisturbanceEffect,
@@ -195,4 +195,4 @@ def test_it_begins_at_the_first_size_that_chance_does_not_explain():
 
 
 def test_changes_are_told_in_points():
-    assert points_in_words(IntervalEstimate(-0.041, -0.06, 0.0004)) == "-4.1 points [-6.0, +0.0]"
+    assert format_points(IntervalEstimate(-0.041, -0.06, 0.0004)) == "-4.1 points [-6.0, +0.0]"

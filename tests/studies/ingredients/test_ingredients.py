@@ -23,7 +23,7 @@ from headless.studies.ingredients.variants import (
     ScanIngredients,
     with_bodies,
 )
-from headless.studies.site_training.training_site import LearntSite
+from headless.studies.site_training.training_site import TrainingSite
 from headless.sumo.demand import MODELS
 
 import numpy as np
@@ -32,7 +32,8 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.workflows.survey import SurveySettings, lay_out
+from seip_addon.core.workflows.survey import lay_out
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from tests.builders.sloping_road import hill
 from tests.builders.small_junction import make_geometry
 from tests.builders.small_scene import make_run
@@ -50,7 +51,7 @@ def a_site(number, runs=2):
         SampledRun(f"run-{run}", make_run(10 * number + run, 30.0).moved_to(geometry.origin), TIMES)
         for run in range(runs)
     )
-    return LearntSite(
+    return TrainingSite(
         f"site {number}",
         geometry,
         layout.site.candidates,
@@ -145,7 +146,7 @@ def test_few_sites_are_scanned_as_often_as_many(sites):
 
 @pytest.mark.slow
 def test_one_placement_at_each_site_covers_most(sites):
-    one = TrainingSites(sites.learnt[:1], sites.aside, sites.store, sites.seed)
+    one = TrainingSites(sites.training[:1], sites.validation, sites.store, sites.seed)
     scans = finish(one.scans(ScanIngredients(random_placements=False)))
     assert all(len(some) == 2 and len(set(some)) == 1 for some in placements(scans).values())
     assert all(recording.sensors == (SENSOR,) for _, recording in scans)
@@ -158,7 +159,7 @@ def test_variants_share_their_scans(sites, monkeypatch):
     monkeypatch.setattr(Simulator, "frame", lambda self, *which: asked.append(which[2]) or frame(self, *which))
     variants = {name: VARIANTS[name] for name in (ALL, "background left in", "heights above one level")}
     training = TrainingSettings(steps=1, batch=2, validate_every=1)
-    two = TrainingSites(sites.learnt[:2], sites.aside, sites.store, sites.seed)
+    two = TrainingSites(sites.training[:2], sites.validation, sites.store, sites.seed)
     detectors = finish(train_variants(two, variants, SMALL, training, 2))
     assert len(asked) == len(TIMES) * (2 * 2 + 2)
     assert {name: len(own) for name, own in detectors.items()} == dict.fromkeys(variants, 2)

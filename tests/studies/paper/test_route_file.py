@@ -1,4 +1,4 @@
-"""Demand of a user's route file, drawn anew or as it stands."""
+"""Demand of a user's route file, drawn again or as it stands."""
 
 from collections import Counter
 from itertools import pairwise

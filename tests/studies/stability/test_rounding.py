@@ -24,7 +24,8 @@ from seip_addon.core.sensing.visibility.float32_precision import rounding_warnin
 from seip_addon.core.sensing.visibility.ray_casting import Engine
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
-from seip_addon.core.workflows.survey import SurveySettings, grid_key, lay_out
+from seip_addon.core.workflows.survey import grid_key, lay_out
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from tests.engines import each_engine, needs_embree
 from tests.oracles.float64_rays import first_hits as plain_first_hits
 

@@ -33,7 +33,8 @@ from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.workflows.survey import SurveySettings, lay_out, with_grid
+from seip_addon.core.workflows.survey import lay_out, with_grid
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from tests.builders.small_junction import make_geometry
 
 assert bpy.app.version  # the engine bvh needs Blender's module, which is there from here on

@@ -90,29 +90,3 @@ def _excess(step: float) -> float:
         return 0.0
     ratio = step / -math.expm1(-step)
     return ratio - 1 - math.log(ratio)
-
-
-@dataclass(frozen=True)
-class Saturating:
-    """The value g(s) = min(s/k, 1): k returns are enough. For k = 1 and returns of 0 and 1 it is coverage.
-
-    Parameters
-    ----------
-    enough : float
-        k, above 0.
-    """
-
-    enough: float = 1.0
-
-    def __call__(self, s: Float) -> Float:
-        """Return min(s/k, 1)."""
-        value: Float = np.minimum(s / self.enough, 1.0)
-        return value
-
-    def lines(self, most: float, error: float) -> Lines:  # noqa: ARG002  # it is piecewise linear itself
-        """Return its two pieces, whose minimum is g."""
-        return Lines(np.array([0.0, 1.0]), np.array([1 / self.enough, 0.0])).up_to(most)
-
-    def tangent(self, s: float) -> tuple[float, float]:
-        """Return the piece at s."""
-        return (0.0, 1 / self.enough) if s < self.enough else (1.0, 0.0)

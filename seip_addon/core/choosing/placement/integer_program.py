@@ -1,6 +1,5 @@
-"""Integer programs in PuLP, and the solvers for them."""
+"""Integer programs in PuLP."""
 
-import importlib.metadata
 import math
 import os
 import shutil
@@ -25,11 +24,11 @@ from .constraints import Constrained
 from .problem import TIE_TOLERANCE
 from .reduced_problem import Instance
 from .search_limits import OPERATIONS_PER_UNIT, Clock
+from .solvers import solver_name
 
 Expression = Any  # of PuLP, which has no types
 TOTAL_WEIGHT = 1e4  # total weight in a program: far above the solvers' absolute tolerances of 1e-6
 TOLERANCE = 2e-6  # share of all weight that a solver's tolerance of 1e-6 on every variable may add up to, doubled
-SOLVERS = ("highs", "cbc", "gurobi")  # names of solvers besides ``auto``
 MAX_ENTRIES = 1_000_000  # entries of V up to which a program is built: PuLP takes 0.5 kB for each
 MAX_REJECTED = 100  # choices in a row that a solver's tolerance admits and exact arithmetic does not, before giving up
 MIN_SECONDS = 0.01  # seconds that a solver is given where none are left
@@ -232,15 +231,11 @@ class CoverProgram(PlacementProgram):
         return [self.number_among(np.flatnonzero(column)) for column in self.instance.visible.T]
 
 
-def root_operations(instance: Instance) -> float:
-    """Return the work of the first linear relaxation of an instance's program, in multiplications.
+def _root_operations(entries: int) -> float:
+    """Return the work of the first linear relaxation of a program, in multiplications.
 
     The benchmark measures it against the entries of V (`seip study benchmark`, under “Growth”).
     """
-    return _root_operations(np.count_nonzero(instance.visible))
-
-
-def _root_operations(entries: int) -> float:
     return ROOT_OPERATIONS * float(entries) ** 2
 
 
@@ -291,31 +286,6 @@ def cover_by_cliques(conflict: Boolean) -> Iterator[Integer]:
             members = np.sort(np.array(clique, np.int64))
             left[np.ix_(members, members)] = False
             yield members
-
-
-def solver_name(solver: str) -> str:
-    """Return the solver for a name; ``auto`` is HiGHS if it is installed, otherwise CBC."""
-    if solver == "auto":
-        return "highs" if is_available("highs") else "cbc"
-    return solver
-
-
-def check_solver(solver: str) -> str:
-    """Return name and version of a solver.
-
-    Raises
-    ------
-    SeipError
-        The solver is unknown or cannot run here; the message lists those that can.
-    """
-    solver = solver_name(solver)
-    if solver not in SOLVERS:
-        raise SeipError(f"unknown solver {solver!r}; choose among {', '.join(_available())}")
-    if not is_available(solver):
-        raise SeipError(f"the solver {solver} is not available here; choose among {', '.join(_available())}")
-    if solver == "cbc":
-        return f"CBC of PuLP {pulp.__version__}"
-    return f"{_PULP_NAME[solver]} {importlib.metadata.version(_PACKAGE[solver])}, PuLP {pulp.__version__}"
 
 
 def _linear(variables: list[Any], factors: Float) -> Expression:
@@ -400,19 +370,3 @@ def _executable_cbc() -> Iterator[str]:
         shutil.copyfile(pulp_cbc_path, copy)
         copy.chmod(stat.S_IRWXU)
         yield str(copy)
-
-
-def is_available(solver: str) -> bool:
-    """Return whether a known solver can run here."""
-    if solver == "cbc":
-        return os.access(pulp_cbc_path, os.R_OK)
-    return _PULP_NAME[solver] in pulp.listSolvers(onlyAvailable=True)
-
-
-_PULP_NAME = {"highs": "HiGHS", "gurobi": "GUROBI"}
-
-_PACKAGE = {"highs": "highspy", "gurobi": "gurobipy"}
-
-
-def _available() -> list[str]:
-    return [name for name in SOLVERS if is_available(name)]

@@ -15,7 +15,7 @@ from ...arrays import Boolean, Float, Integer
 from ...progress import Progress
 from .feasibility import starting_choice
 from .greedy import addable
-from .integer_program import check_solver, fits
+from .integer_program import fits
 from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
 from .reduced_problem import make_instance
 from .returns_bounds import OPERATIONS_PER_LOGARITHM, Completion, ReturnsBound
@@ -23,6 +23,7 @@ from .returns_instance import ReturnsInstance, make_returns_instance
 from .returns_program import ReturnsProgram, entries_of
 from .returns_summary import returns_text
 from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
+from .solvers import check_solver
 
 STARTS = 6  # number of greedy choices, each from a different first candidate, that swaps improve
 ROOT_STEPS, NODE_STEPS = 60, 6  # steps of the bound at the root, with all candidates, and at each other node

@@ -3,39 +3,16 @@
 from __future__ import annotations
 
 import math
-import threading
 import time
 from dataclasses import dataclass, field
 
+from ...acceptance import Acceptance
 from ...errors import SeipError
 
 OPERATIONS_PER_UNIT = 1e10  # multiplications that make a unit of work: about a second of one processor core
 OVERHEAD_OPERATIONS = 3e6  # multiplications that take as long as what goes on around each counted step
 DEFAULT_EFFORT = 60.0  # units of work of a search without other limits
 MIN_PART = 0.01  # least part of a limit, seconds or units of work, even where nothing is left
-
-
-class Acceptance:
-    """A user's request, from another thread, to end a search with the best placement found so far.
-
-    Attributes
-    ----------
-    searching : bool
-        Whether the search has begun, so that there is something to accept.
-    """
-
-    def __init__(self) -> None:
-        self._event = threading.Event()
-        self.searching = False
-
-    def accept(self) -> None:
-        """End the search at its next step."""
-        self._event.set()
-
-    @property
-    def accepted(self) -> bool:
-        """Whether the search is to end."""
-        return self._event.is_set()
 
 
 @dataclass(frozen=True)

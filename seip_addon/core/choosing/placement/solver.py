@@ -23,11 +23,12 @@ from .greedy import (
     orders,
     swap_search,
 )
-from .integer_program import CoverProgram, check_solver, is_affordable
+from .integer_program import CoverProgram, is_affordable
 from .local_search import composition_search
 from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
 from .reduced_problem import Instance, common_unit, make_instance
 from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
+from .solvers import check_solver
 from .tie_breaking import MAX_SEARCHED_TIES, canonical_optimum
 
 BRANCHING_SHARE = 0.25  # of what is left of the limits, for a first branch and bound, which goes on after other methods

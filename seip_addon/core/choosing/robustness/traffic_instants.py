@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
-from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Float, Integer
 from ...errors import SeipError
-from ...sensing.scans.motion import rotations
+from ...geometry.orientation import rotations
 from ...sensing.traffic.bodies import fitted_body
-from ...sensing.traffic.trajectories import Snapshot, Trajectories
+from ...sensing.traffic.trajectories import WARM_UP, Snapshot, Trajectories
 
-WARM_UP = 2.0  # seconds from the first sample of a run to the first instant that is used
 BATCH_SECONDS = 12.0  # seconds of a run whose instants count as one draw, since the same queues block the view
 _MARGIN = 1e-3  # metres by which bounding boxes are larger than their contents: ray casters compute in float32
 
@@ -94,7 +91,9 @@ def spread_instants(runs: Sequence[Trajectories], number: int, seed: int) -> Ins
     lasts = np.array([run.span[1] for run in runs]) - begin
     if (lasts <= 0).any():
         short = runs[int(np.argmin(lasts))]
-        raise SeipError(f"{_name(short)} is not longer than the {WARM_UP:g} s that are left out: simulate more traffic")
+        raise SeipError(
+            f"{short.description} is not longer than the {WARM_UP:g} s that are left out: simulate more traffic"
+        )
     before = np.concatenate([[0.0], np.cumsum(lasts)])
     drawn = (np.arange(number) + np.random.default_rng(seed).random(number)) * before[-1] / number
     run = np.searchsorted(before[1:-1], drawn, side="right")
@@ -102,16 +101,6 @@ def spread_instants(runs: Sequence[Trajectories], number: int, seed: int) -> Ins
     parts = np.maximum(np.rint(lasts / BATCH_SECONDS), 1).astype(np.int64)
     part = np.minimum(into / lasts[run] * parts[run], parts[run] - 1).astype(np.int64)
     return Instants(tuple(runs), run, begin[run] + into, np.concatenate([[0], np.cumsum(parts)])[run] + part)
-
-
-def check_runs(runs: Sequence[Trajectories], region: BaseGeometry) -> None:
-    """Raise SeipError if a run has no road user in the region of interest: it then belongs to another site."""
-    for run in runs:
-        if not shapely.contains_xy(region, run.position[:, 0], run.position[:, 1]).any():
-            raise SeipError(
-                f"no road user of {_name(run)} is ever in the region of interest: use traffic of this site, or set the "
-                "scene's seip_origin to that of its map"
-            )
 
 
 def obstacles_of(trajectories: Trajectories, snapshot: Snapshot) -> TrafficObstacles:
@@ -128,7 +117,3 @@ def obstacles_of(trajectories: Trajectories, snapshot: Snapshot) -> TrafficObsta
         reflectivity.append(body.reflectivity)
         hulls.append(position + (low + _CORNERS * (high - low)) @ attitude.T)
     return TrafficObstacles(np.concatenate(triangles), np.concatenate(reflectivity), np.array(hulls))
-
-
-def _name(run: Trajectories) -> str:
-    return f"the run of traffic ({run.source})" if run.source else "a run of traffic"

@@ -7,9 +7,8 @@ import numpy as np
 from ...arrays import Float, Integer
 from ...errors import SeipError
 from ...progress import Progress
-from ...sensing.traffic.trajectories import Trajectories
+from ...sensing.traffic.trajectories import WARM_UP, Trajectories
 from ...site.targets import Targets
-from .traffic_instants import WARM_UP
 
 INTERVAL = 0.2  # seconds between samples: a car at 50 km/h moves 2.8 m, less than its length
 

@@ -14,13 +14,12 @@ from ...arrays import Boolean, Integer
 from ...errors import SeipError
 from ...geometry.geo_reference import GeoReference
 from ...sensing.visibility.grid import VisibilityGrid
+from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
 from ..results.placement_file import load_placement
 from ..results.placement_record import PlacementRecord, RecordedSensor
 from ..results.site_file import SiteFile, load_site_file
 
 PICTURES = ("view.png", "plan.png")
-POSE_ERROR_PICTURES = ("spread.png", "blame.png", "frontier.png")
-TRAFFIC_PICTURES = ("time_seen.png", "traffic.png")
 
 
 @dataclass(frozen=True, eq=False)

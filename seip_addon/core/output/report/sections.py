@@ -15,11 +15,12 @@ from ...choosing.placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE, Ob
 from ...counts import counted
 from ...site.sources import source_table
 from ..pictures.drawing import percent
+from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
 from ..results.located import LOCATED_FILES
 from ..results.placement_record import RecordedObjective, relevant_warnings
 from .blind_spots import BlindSpot, blind_spots, centres, seen_places
 from .blocks import Block, Bullets, Code, Paragraph, Picture, Report, Section, Table
-from .evidence import POSE_ERROR_PICTURES, TRAFFIC_PICTURES, Evidence
+from .evidence import Evidence
 from .figures import blind_spot_map, front_chart
 from .losses import FrontPoint, equal_prices, failures
 from .repeat import repeating_command

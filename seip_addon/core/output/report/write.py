@@ -9,7 +9,7 @@ from ...errors import SeipError
 from ...limits import EFFORT as EFFORT_LIMITS
 from ...progress import Progress
 from ...storage.files import whole_file
-from ..results.report_files import REPORT_FILES
+from ..results.file_names import REPORT_FILES
 from .evidence import load_evidence
 from .html import as_html
 from .losses import front

@@ -20,16 +20,17 @@ Share = Annotated[float, limits.SHARE]
 
 
 @dataclass(frozen=True)
-class RecordedPrecision:
+class Precision:
     """Average precision by one rule.
 
     Parameters
     ----------
     average_precision : float, 0 to 1
+        NaN without road users; records leave such rules out.
     interval : (float, float) or None
-        95 %, over runs of traffic; None where they are too few.
+        95 % interval over runs of traffic; None if there are too few.
     road_users : int
-        How many count, over all frames.
+        Number of road users that count, over all frames.
     """
 
     average_precision: Share
@@ -41,7 +42,7 @@ class RecordedPrecision:
 class DetectionRecord:
     """Part of a ``detection.json`` that is shown: average precision by rule, and warnings."""
 
-    average_precision: Mapping[str, RecordedPrecision]
+    average_precision: Mapping[str, Precision]
     warnings: tuple[str, ...]
 
     def __post_init__(self) -> None:

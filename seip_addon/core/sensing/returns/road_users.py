@@ -56,13 +56,6 @@ class RoadUsers:
         return len(self.xyz)
 
 
-def cars_at(points: Float, spacing: float) -> RoadUsers:
-    """Return a car at each of some points (m, 3), metres."""
-    count = len(points)
-    body, none = np.full(count, BODIES.index("car")), np.full(count, -1)
-    return RoadUsers(points, body, np.ones(count), np.zeros(count, dtype=bool), none, (), spacing)
-
-
 def road_users(geometry: SceneGeometry, spacing: float = SPACING) -> RoadUsers:
     """Place road users in a scene's region: all bodies on the carriageway, pedestrians at the edges of pavements too.
 

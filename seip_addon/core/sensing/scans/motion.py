@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Float
+from ...geometry.orientation import rotations
 from ..traffic.trajectories import Snapshot, Trajectories
 
 
@@ -61,14 +62,6 @@ class Motion:
         position = np.stack([np.interp(delay, self.delay, part) for part in self.position.T], axis=1)
         yaw, pitch = (np.interp(delay, self.delay, angle) for angle in (self.yaw, self.pitch))
         return position, rotations(yaw, pitch)
-
-
-def rotations(yaw: Float, pitch: Float) -> Float:
-    """Return rotations (n, 3, 3) from a road user's axes (forward, left, up) to the site's."""
-    zero = np.zeros_like(yaw)
-    forward = np.stack([np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)], axis=-1)
-    left = np.stack([-np.sin(yaw), np.cos(yaw), zero], axis=-1)
-    return np.stack([forward, left, np.cross(forward, left)], axis=-1)
 
 
 def still(snapshot: Snapshot) -> list[Motion]:

@@ -16,6 +16,7 @@ from ...errors import SeipError
 from ...geometry.geo_reference import GeoReference
 from ...progress import Progress
 from ...storage.files import digest, save_json
+from ...storage.folder_contents import MANIFEST, check_no_placement
 from ...storage.source_digest import source_digest
 from ..lidar.model import LidarModel
 from ..traffic.bodies import Body
@@ -26,9 +27,7 @@ from .simulation import ScanSettings, Simulation
 from .static_scene import StaticScene
 
 SCHEMA = "seip-run/1"
-MANIFEST, FRAMES = "manifest.json", "frames"
-PLACEMENT = "placement.json"  # a folder with this file is that of a placement
-
+FRAMES = "frames"
 Record = dict[str, Any]
 
 
@@ -154,12 +153,6 @@ def check_run_folder(folder: Path, run: Run) -> None:
             )
     elif (folder / FRAMES).exists():
         raise SeipError(f"{folder} contains frames without a {MANIFEST}: delete them, or choose another folder")
-
-
-def check_no_placement(folder: Path) -> None:
-    """Raise SeipError if a folder contains a placement, whose files would be mixed with those of a run."""
-    if (folder / PLACEMENT).exists():
-        raise SeipError(f"{folder} contains a placement, and a run needs a folder of its own: choose another one")
 
 
 def load_manifest(folder: Path) -> Record:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Float, Integer
 from ...errors import SeipError
+from ...geometry.orientation import rotations
 from ...limits import FRAMES
 from ...progress import Progress
 from ...settings import setting
@@ -21,7 +22,7 @@ from ..traffic.bodies import Body
 from ..traffic.trajectories import Snapshot, Trajectories
 from ..visibility.ray_casting import Engine, make_ray_caster
 from .frame import STATIC_INSTANCE, Frame, Labels
-from .motion import Motion, moving, rotations, still
+from .motion import Motion, moving, still
 from .scanner import BodySurface, MovingTraffic, ReflectiveSurface, Scan, Scanner, returns_by_user
 from .sensor import MountedSensor
 from .static_scene import StaticScene

@@ -9,19 +9,12 @@ import shapely
 from ...arrays import Boolean, Float, Integer
 from ...counts import counted
 from ...errors import SeipError
-from ...geometry.plan import MIN_AREA, heights_over, plane_height, signed_area
 from ...site.scene_geometry import SceneGeometry, joined
 from .floating_car_data import listed, unwrapped
+from .road_surface import ROAD_TOLERANCE, RoadSurface
 from .smooth_walks import out_of_reach
 from .trajectories import LoadedTraffic, RoadUser, Trajectories
 
-ROAD_TOLERANCE = 1.0
-"""Largest distance in plan, metres, between the centre of a road user that is on the road and the road.
-
-A bus of 12 m, which simulations move like a rod on its lane, cuts a tight corner by up to this distance.
-"""
-
-MAX_SAMPLES = 2_000  # largest number of samples used to recognise traffic of another site
 WHEELBASE_SHARE = 0.6  # wheelbase as a share of a vehicle's length: its pitch is that of the road between the axles
 MAX_GAP = 2.5  # sampling intervals; if samples are farther apart, the road user was elsewhere in between
 
@@ -53,8 +46,8 @@ def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> LoadedTr
         another map.
     """
     local = trajectories.moved_to(geometry.origin)
-    roads = _RoadSurface(joined(geometry.roads))
-    both = _RoadSurface(joined((*geometry.roads, *geometry.ground)))
+    roads = RoadSurface(joined(geometry.roads))
+    both = RoadSurface(joined((*geometry.roads, *geometry.ground)))
     user = np.repeat(np.arange(len(local)), np.diff(local.first))
     walks = np.array([each.category == "pedestrian" for each in local.users], dtype=np.bool_)[user]
 
@@ -74,71 +67,6 @@ def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> LoadedTr
     pitch = np.where(walks, 0.0, _pitch(height, plan, z, local.yaw, length))
     fitted = replace(local, position=np.column_stack([plan, z]), pitch=pitch)
     return LoadedTraffic(_rounded(_without_gaps(fitted, user, on_road)), warnings)
-
-
-def share_on_road(local: Trajectories, geometry: SceneGeometry) -> float:
-    """Return the share of vehicle samples that are on the road of the scene, 0 to 1.
-
-    Samples are those near the region of interest or, if no vehicle comes near it, those within the extent of the roads.
-    A sample within `ROAD_TOLERANCE` of the road, in plan and in height, is on it.
-
-    Parameters
-    ----------
-    local : Trajectories
-        Trajectories in the local axes of the scene.
-
-    Returns
-    -------
-    float
-        Share among at most `MAX_SAMPLES` evenly spread samples; 1 without vehicles, and 0 if all of them are elsewhere.
-    """
-    user = np.repeat(np.arange(len(local)), np.diff(local.first))
-    drives = np.array([each.category != "pedestrian" for each in local.users], dtype=np.bool_)[user]
-    if not drives.any() or not geometry.roads:
-        return 1.0
-    x, y = local.position[:, 0], local.position[:, 1]
-    extent = shapely.MultiPoint(joined(geometry.roads)[:, :, :2].reshape(-1, 2)).envelope
-    areas = (geometry.region.convex_hull, extent)
-    within = (np.flatnonzero(drives & shapely.contains_xy(area, x, y)) for area in areas)
-    near = next((samples for samples in within if len(samples)), None)
-    if near is None:
-        return 0.0
-    sample = local.position[near[np.linspace(0, len(near) - 1, min(len(near), MAX_SAMPLES)).astype(np.int64)]]
-    height = _RoadSurface(joined(geometry.roads)).height(sample[:, :2], sample[:, 2])
-    return float(np.mean(np.abs(height - sample[:, 2]) <= ROAD_TOLERANCE))
-
-
-class _RoadSurface:
-    """Triangles (n, 3, 3) that road users can stand on."""
-
-    def __init__(self, triangles: Float) -> None:
-        self._triangles = triangles[np.abs(signed_area(triangles)) > MIN_AREA]
-        self._tree = shapely.STRtree(shapely.polygons(self._triangles[:, :, :2]))
-
-    def height(self, plan: Float, hint: Float) -> Float:
-        """Return the height (n,) of the surface at points (n, 2), nearest to a hint (n,); NaN off the road."""
-        point, heights = heights_over(plan, self._triangles)
-        height = _nearest_heights(len(plan), point, heights, hint)
-        beside = np.flatnonzero(np.isnan(height))
-        places = shapely.points(plan[beside])
-        number, triangle = self._tree.query_nearest(places, max_distance=ROAD_TOLERANCE)
-        nearest = shapely.get_coordinates(
-            shapely.get_point(shapely.shortest_line(self._tree.geometries[triangle], places[number]), 0)
-        )
-        heights = plane_height(self._triangles[triangle], nearest)
-        height[beside] = _nearest_heights(len(beside), number, heights, hint[beside])
-        return height
-
-
-def _nearest_heights(count: int, point: Integer, heights: Float, hint: Float) -> Float:
-    """Return for each point the height that is nearest to its hint, or the highest if the hint is NaN."""
-    wanted = np.where(np.isnan(hint[point]), np.inf, hint[point])
-    badness = np.where(np.isinf(wanted), -heights, np.abs(heights - wanted))
-    order = np.lexsort((badness, point))
-    first = np.unique(point[order], return_index=True)[1]
-    height = np.full(count, np.nan)
-    height[point[order][first]] = heights[order][first]
-    return height
 
 
 def _pitch(height: Callable[[Float, Float], Float], plan: Float, z: Float, yaw: Float, length: Float) -> Float:

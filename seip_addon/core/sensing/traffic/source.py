@@ -9,18 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from ...counts import counted
-from ...errors import SeipError
 from ...progress import Progress
 from ...site.scene_geometry import SceneGeometry, joined
 from .floating_car_data import Extent, read_floating_car_data, read_trajectories
 from .overlaps import find_overlaps
-from .road_fit import fit_to_road, share_on_road
+from .road_fit import fit_to_road
+from .site_traffic import load_trajectories
 from .sumo_files import read_net_offset
 from .trajectories import CATEGORIES, LoadedTraffic, Trajectories
 from .vehicle_types import read_vehicle_types
 
-MAX_REGION_DISTANCE = 500.0  # metres from the region beyond which traffic belongs to another site
-MIN_ON_ROAD = 0.98  # share of vehicle positions on the road below which traffic belongs to another site
 ROAD_MARGIN = 20.0  # metres beyond the road of the scene within which traffic is read
 OVERLAP_INTERVAL = 1.0  # seconds between the instants that are searched for overlapping road users
 
@@ -69,49 +67,6 @@ def load_traffic(files: TrafficFiles, geometry: SceneGeometry) -> Generator[Prog
     fit = fit_to_road(read.trajectories, geometry)
     overlaps = yield from overlap_warnings(fit.trajectories)
     return LoadedTraffic(fit.trajectories, (*read.warnings, *fit.warnings, *overlaps))
-
-
-def load_trajectories(path: Path, geometry: SceneGeometry) -> Trajectories:
-    """Read trajectories into a scene's axes.
-
-    Raises
-    ------
-    SeipError
-        The file cannot be read, no road user in it comes near, or it is traffic of another site.
-    """
-    trajectories = Trajectories.load(path).moved_to(geometry.origin)
-    left, bottom, right, top = geometry.region.bounds
-    low, high = np.array([left, bottom]) - MAX_REGION_DISTANCE, np.array([right, top]) + MAX_REGION_DISTANCE
-    plan = trajectories.position[:, :2]
-    if not ((plan >= low) & (plan <= high)).all(axis=1).any():
-        raise SeipError(
-            f"{path} is traffic of another place, far from this scene: name traffic that was made for its map"
-        )
-    require_own_traffic(trajectories, geometry, str(path))
-    return trajectories
-
-
-def require_own_traffic(trajectories: Trajectories, geometry: SceneGeometry, name: str) -> None:
-    """Check that vehicles drive on the road of a scene, as those of its own traffic do without exception.
-
-    Parameters
-    ----------
-    trajectories : Trajectories
-        Trajectories in the scene's local axes.
-    name : str
-        Name of the traffic, for messages.
-
-    Raises
-    ------
-    SeipError
-        Too many vehicles are off the road: the traffic belongs to another site, or the scene has changed.
-    """
-    share = share_on_road(trajectories, geometry)
-    if share < MIN_ON_ROAD:
-        raise SeipError(
-            f"traffic of another site: {1 - share:.0%} of the vehicle positions of {name} are off the road of this "
-            "scene; import or simulate traffic for it"
-        )
 
 
 def read_sumo(

@@ -16,6 +16,7 @@ from ...arrays import Float, Integer
 from ...storage.array_file import ArrayFile, ArrayRule, ContentError
 from ...storage.files import digest
 
+WARM_UP = 2.0  # seconds from the first sample of a run to the first instant that is used
 MAX_BEND = 0.6  # largest bend of the lines of a body along one axis
 MAX_EXTENT = 1e6  # largest distance between two samples along each axis, metres
 
@@ -158,6 +159,11 @@ class Trajectories:
     def span(self) -> tuple[float, float]:
         """First and last time of any sample, seconds."""
         return float(self.time.min()), float(self.time.max())
+
+    @property
+    def description(self) -> str:
+        """Name of the run in messages."""
+        return f"the run of traffic ({self.source})" if self.source else "a run of traffic"
 
     def at(self, time: float) -> Snapshot:
         """Return the road users present at an instant, with positions interpolated linearly between samples.

@@ -28,12 +28,9 @@ from ..lidar.catalogue import find_models
 from ..lidar.model import LidarModel
 from .chunks import Checkpoint, chunks_of, compute_chunks
 from .executors import VisibilityTask, dask_executor, thread_executor
-from .near_surfaces import near_surfaces
-from .ray_casting import Engine, RayCaster, engine_name
-from .scanning import ScanPosition
+from .ray_casting import Engine, engine_name
 from .settings import VisibilitySettings
 from .triangle_culling import needed_triangles
-from .visibility_model import seen_by_tilted_full_scan
 
 FILE = ArrayFile(
     "seip.visibility",
@@ -178,7 +175,7 @@ def compute_visibility(  # noqa: PLR0913, PLR0917  # the inputs, and how to comp
     Returns
     -------
     VisibilityGrid
-        Identical to that of `full_scan_visibility`, wherever it is computed.
+        Identical to that of full scans (`seen_by_tilted_full_scan`), wherever it is computed.
 
     Raises
     ------
@@ -197,41 +194,10 @@ def compute_visibility(  # noqa: PLR0913, PLR0917  # the inputs, and how to comp
     packed = np.zeros((len(site.candidates), (len(site.targets) + 7) // 8), dtype=np.uint8)
     packed[np.concatenate(chunks)] = np.concatenate([row.packed for row in rows])
     parameters = {"triangles": needed.counts, "rays_cast": sum(row.rays for row in rows)}
-    return _grid(site, used, settings, task.engine, packed, parameters)
-
-
-def full_scan_visibility(
-    site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, caster: RayCaster
-) -> Generator[Progress, None, VisibilityGrid]:
-    """Compute the grid from full scans of all poses: the reference for `compute_visibility`."""
-    used = _used_models(site, models)
-    _check_site(site)
-    poses, targets = site.candidates, site.targets.xyz
-    surfaces = near_surfaces(site.triangles, targets, settings.delta, site.reflectivity)
-    packed = np.zeros((len(poses), (len(targets) + 7) // 8), dtype=np.uint8)
-    for pose, key in enumerate(poses.sensor.tolist()):
-        yield Progress(pose, len(poses), "full scan")
-        origin, yaw = poses.xyz[pose], float(poses.yaw[pose])
-        position = ScanPosition(caster, origin, yaw, [used[key]], settings, site.reflectivity)
-        packed[pose] = np.packbits(seen_by_tilted_full_scan(position, float(poses.tilt[pose]), surfaces)[0])
-    yield Progress(len(poses), len(poses), "full scan")
-    return _grid(site, used, settings, caster.name, packed, {"rays_cast": _rays_of_full_scan(site, used)})
-
-
-def _grid(
-    site: Site,
-    used: Mapping[str, LidarModel],
-    settings: VisibilitySettings,
-    engine: str,
-    packed: NDArray[np.uint8],
-    parameters: Mapping[str, Any],
-) -> VisibilityGrid:
-    """Return the grid with its key and provenance."""
-    origin = {"engine": engine, "sensors": list(used), "rays_of_full_scan": _rays_of_full_scan(site, used)}
-    key = visibility_key(site, used, settings, engine)
-    return VisibilityGrid(
-        packed, (len(site.candidates), len(site.targets)), key, {**asdict(settings), **origin, **parameters}
-    )
+    origin = {"engine": task.engine, "sensors": list(used), "rays_of_full_scan": _rays_of_full_scan(site, used)}
+    key = visibility_key(site, used, settings, task.engine)
+    shape = len(site.candidates), len(site.targets)
+    return VisibilityGrid(packed, shape, key, {**asdict(settings), **origin, **parameters})
 
 
 def _rays_of_full_scan(site: Site, used: Mapping[str, LidarModel]) -> int:

@@ -6,7 +6,8 @@ from headless.studies.benchmark.street_visibility import street_problem
 
 import pytest
 
-from seip_addon.core.choosing.placement.search_limits import Acceptance, SolverLimits
+from seip_addon.core.acceptance import Acceptance
+from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.progress import finish
 

@@ -23,6 +23,7 @@ from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.reduced_problem import common_unit, make_instance, merge_targets
 from seip_addon.core.choosing.placement.search_limits import Clock, SolverLimits
 from seip_addon.core.choosing.placement.solver import solve, solve_greedy
+from seip_addon.core.choosing.placement.solvers import is_available
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, finish
 
@@ -371,7 +372,7 @@ def test_coverage_out_of_reach_of_the_limits() -> None:
 def test_unknown_and_missing_solvers_name_the_others() -> None:
     with pytest.raises(SeipError, match="unknown solver 'cplex'; choose among highs, cbc"):
         finish(solve(row_problem(halves), SolverLimits(solver="cplex")))
-    if not integer_program.is_available("gurobi"):
+    if not is_available("gurobi"):
         with pytest.raises(SeipError, match="gurobi is not available here; choose among highs, cbc"):
             finish(solve(row_problem(halves), SolverLimits(solver="gurobi")))
 

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seip_addon.core.choosing.placement import returns_solver
-from seip_addon.core.choosing.placement.concave_value import LogReturns, Saturating
+from seip_addon.core.choosing.placement.concave_value import Lines, LogReturns
 from seip_addon.core.choosing.placement.integer_program import CoverProgram
 from seip_addon.core.choosing.placement.problem import TIE_TOLERANCE
 from seip_addon.core.choosing.placement.reduced_problem import make_instance
@@ -20,6 +21,31 @@ from seip_addon.core.progress import finish
 from tests.core.choosing.placement.test_returns_placement import problem_of
 
 NONE = np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Saturating:
+    """The value g(s) = min(s/k, 1): k returns are enough. For k = 1 and returns of 0 and 1 it is coverage.
+
+    Parameters
+    ----------
+    enough : float
+        k, above 0.
+    """
+
+    enough: float = 1.0
+
+    def __call__(self, s):
+        """Return min(s/k, 1)."""
+        return np.minimum(s / self.enough, 1.0)
+
+    def lines(self, most, error):  # noqa: ARG002  # it is piecewise linear itself
+        """Return its two pieces, whose minimum is g."""
+        return Lines(np.array([0.0, 1.0]), np.array([1 / self.enough, 0.0])).up_to(most)
+
+    def tangent(self, s):
+        """Return the piece at s."""
+        return (0.0, 1 / self.enough) if s < self.enough else (1.0, 0.0)
 
 
 def best_of(instance, program):

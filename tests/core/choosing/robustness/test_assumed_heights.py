@@ -12,7 +12,8 @@ from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import ASSUMED, Mesh, SceneGeometry
 from seip_addon.core.workflows.placing import place
-from seip_addon.core.workflows.survey import SurveySettings, lay_out, see, surroundings
+from seip_addon.core.workflows.survey import lay_out, see, surroundings
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from tests.builders.plain_street import block, sheet
 
 WALL = block((-12.0, -1.0, 0.0), (12.0, -0.8, 2.0))  # between the sensors' pavement and half of the road

@@ -47,7 +47,7 @@ def study(laid_out):
 
 
 @pytest.mark.slow
-def test_all_are_judged_by_draws_that_none_was_chosen_on(laid_out, study):
+def test_all_are_evaluated_by_draws_that_none_was_chosen_on(laid_out, study):
     around, problem = laid_out
     (nominal,) = study.nominal
     assert nominal.placement.chosen.tolist() == finish(solve(problem)).chosen.tolist()
@@ -98,7 +98,7 @@ def study_of_losses(laid_out):
 
 
 @pytest.mark.slow
-def test_who_was_chosen_for_a_loss_is_judged_by_that_loss_as_is_the_nominal_optimum(laid_out, study_of_losses):
+def test_who_was_chosen_for_a_loss_is_evaluated_by_that_loss_as_is_the_nominal_optimum(laid_out, study_of_losses):
     around, problem = laid_out
 
     def outcome(view, risk):
@@ -114,12 +114,12 @@ def test_who_was_chosen_for_a_loss_is_judged_by_that_loss_as_is_the_nominal_opti
         return finish(visibility_under_errors(around, poses, drawn))
 
     for contender, risk in zip(study_of_losses.robust, LOSSES, strict=True):
-        for judged in (contender, study_of_losses.beside(contender)):
-            chosen = judged.placement.chosen
+        for evaluated in (contender, study_of_losses.beside(contender)):
+            chosen = evaluated.placement.chosen
             views = looks(*chosen.tolist())
             expected = [outcome(views.seen(draw), risk) for draw in range(SCENARIOS.evaluated)]
-            assert judged.unseen == pytest.approx(expected, abs=1e-12)
-            assert judged.undisturbed == pytest.approx(outcome(problem.visible[chosen], risk), abs=1e-12)
+            assert evaluated.unseen == pytest.approx(expected, abs=1e-12)
+            assert evaluated.undisturbed == pytest.approx(outcome(problem.visible[chosen], risk), abs=1e-12)
         assert (contender.unseen < contender.planned).any()
 
 
@@ -132,7 +132,7 @@ def test_it_says_what_is_compared(study, study_of_losses, tmp_path):
     assert "5 % quantile of coverage by at least 2 sensors" in second
     assert "5 % quantile of coverage by at least 2 sensors" in third
     assert "5 % quantile of coverage after the loss of any one sensor, on average" in fourth
-    assert len(study_of_losses.nominal) == 3  # two are judged alike
+    assert len(study_of_losses.nominal) == 3  # two are evaluated alike
     save_spread_chart(tmp_path / "spread.png", study_of_losses, "spread")
     save_frontier_chart(tmp_path / "frontier.png", study_of_losses, "frontier")
 
@@ -160,9 +160,9 @@ def test_charts_are_drawn(laid_out, study, tmp_path):
     around, problem = laid_out
     chosen = study.nominal[0].placement.chosen
     deployment = deploy(around.site, MODELS, problem.visible[chosen], chosen)
-    judged = finish(pose_study(around, deployment, PoseStudySettings(PoseErrors(tilt=math.radians(5)), 10, 4)))
+    evaluated = finish(pose_study(around, deployment, PoseStudySettings(PoseErrors(tilt=math.radians(5)), 10, 4)))
     save_spread_chart(tmp_path / "spread.png", study, "spread")
     save_frontier_chart(tmp_path / "frontier.png", study, "frontier")
-    save_loss_chart(tmp_path / "blame.png", judged, "blame")
+    save_loss_chart(tmp_path / "blame.png", evaluated, "blame")
     for path in tmp_path.iterdir():
         assert imread(path).shape[1] > 1000

@@ -14,7 +14,7 @@ from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.choosing.robustness.robust_placement import at_least
-from seip_addon.core.choosing.robustness.traffic_instants import NO_TRAFFIC, WARM_UP, spread_instants
+from seip_addon.core.choosing.robustness.traffic_instants import NO_TRAFFIC, spread_instants
 from seip_addon.core.choosing.robustness.traffic_presence import road_user_seconds
 from seip_addon.core.choosing.robustness.traffic_study import LAYER_NAMES, traffic_scenarios, traffic_study
 from seip_addon.core.choosing.robustness.visibility_in_traffic import visibility_in_traffic
@@ -22,7 +22,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import IntervalEstimate, mean_of, mean_over_time
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.traffic.trajectories import RoadUser
+from seip_addon.core.sensing.traffic.trajectories import WARM_UP, RoadUser
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.surroundings import Surroundings
@@ -77,13 +77,13 @@ def test_the_empty_road_is_where_both_begin(laid_out, study):
 
 
 @pytest.mark.slow
-def test_both_are_judged_at_instants_that_nothing_was_chosen_on(laid_out, study):
+def test_both_are_evaluated_at_instants_that_nothing_was_chosen_on(laid_out, study):
     around, _ = laid_out
     _, found = study
-    judged = spread_instants([queue(3)], 8, 1)
+    evaluated = spread_instants([queue(3)], 8, 1)
     for placed in (found.empty, found.traffic):
         for layer, seen in placed.seen.items():
-            views = finish(visibility_in_traffic(around, placed.placement.chosen, judged.obstacles(), layer))
+            views = finish(visibility_in_traffic(around, placed.placement.chosen, evaluated.obstacles(), layer))
             rows = np.array([views.seen(instant).any(axis=0) for instant in range(8)])
             assert seen.at == pytest.approx(rows.mean(axis=1), abs=1e-12)
             assert seen.time == pytest.approx(rows.mean(axis=0), abs=1e-12)

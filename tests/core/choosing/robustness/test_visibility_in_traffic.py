@@ -13,8 +13,6 @@ from hypothesis import strategies as st
 from seip_addon.core.choosing.robustness.traffic_instants import (
     BATCH_SECONDS,
     NO_TRAFFIC,
-    WARM_UP,
-    check_runs,
     obstacles_of,
     spread_instants,
 )
@@ -25,7 +23,8 @@ from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.beams import beam_directions
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.lidar.rosette import Rosette
-from seip_addon.core.sensing.traffic.trajectories import RoadUser
+from seip_addon.core.sensing.traffic.site_traffic import check_runs
+from seip_addon.core.sensing.traffic.trajectories import WARM_UP, RoadUser
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster

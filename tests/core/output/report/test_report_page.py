@@ -21,8 +21,8 @@ from seip_addon.core.output.report.html import as_html
 from seip_addon.core.output.report.losses import front
 from seip_addon.core.output.report.sections import certificate_sentence, make_report
 from seip_addon.core.output.report.write import write_report
+from seip_addon.core.output.results.file_names import REPORT_FILES
 from seip_addon.core.output.results.placement_record import RecordedGreedy
-from seip_addon.core.output.results.report_files import REPORT_FILES
 from seip_addon.core.progress import finish
 from tests.builders.report_folder import NAME, make_folder
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.choosing.placement.integer_program import check_solver, is_available, solver_name
+from seip_addon.core.choosing.placement.solvers import check_solver, is_available, solver_name
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.comparison import (
     BOTH,

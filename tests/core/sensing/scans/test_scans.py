@@ -13,13 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.orientation import rotations
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.rosette import Rosette
 from seip_addon.core.sensing.scans.beam_culling import BeamWindows
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame, Labels
-from seip_addon.core.sensing.scans.motion import rotations
 from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
 from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, frame_times, prepare
 from seip_addon.core.sensing.scans.static_scene import static_scene

@@ -52,7 +52,7 @@ def test_there_are_all_kinds_of_road_users(folder):
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda path: path.name)
 def test_no_bay_and_no_paint_is_shared(folder):
-    """Of two runs no parked car stands within a metre of one of the other, and paint is drawn anew: few look alike."""
+    """Of two runs no parked car stands within a metre of one of the other, and paint is drawn again: few look alike."""
     runs = [Trajectories.load(path) for path in sorted(folder.glob("*.npz"))]
     for one, other in combinations(runs, 2):
         assert not {user.name for user in one.users} & {user.name for user in other.users}

@@ -30,7 +30,6 @@ from seip_addon.core.sensing.visibility.grid import (
     FILE,
     VisibilitySettings,
     compute_visibility,
-    full_scan_visibility,
     visibility_key,
 )
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
@@ -43,10 +42,11 @@ from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
 from seip_addon.core.site.site import Site, Targets
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
-from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.core.workflows.survey_settings import SurveySettings
 from tests.builders.synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity
 from tests.engines import ANY, each_engine
 from tests.oracles.float64_rays import nearest_return
+from tests.oracles.full_scan import full_scan
 from tests.oracles.random_cases import cases
 
 MODELS = {key: replace(model, points_per_second=model.points_per_second / 8) for key, model in load_catalogue().items()}
@@ -108,8 +108,8 @@ def tilted(site, yaw, tilt):
 def test_same_as_the_full_scan_bit_for_bit(engine, seed, delta, strength):
     site, (models, min_intensity) = patch(seed), strength
     settings = VisibilitySettings(delta, min_intensity)
-    full = finish(full_scan_visibility(site, models, settings, make_ray_caster(site.triangles, engine)))
-    assert (finish(compute_visibility(site, models, settings, engine)).packed == full.packed).all()
+    full, _ = full_scan(site, models, settings, make_ray_caster(site.triangles, engine))
+    assert (finish(compute_visibility(site, models, settings, engine)).visible == full).all()
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(-4, 4), TILT, st.sampled_from([MODELS, ONE_WAY]))
@@ -288,7 +288,7 @@ def test_a_draw_turns_a_tilted_pose_about_itself():
     assert hangs == pytest.approx(orientations(np.array(1.05), np.array(0.28), np.array(0.03)), abs=1e-12)
 
 
-def test_a_chosen_sensor_is_turned_as_its_candidate_and_judged_so():
+def test_a_chosen_sensor_is_turned_as_its_candidate_and_evaluated_so():
     geometry = street()
     candidates = generate_candidates(geometry, replace(CHOICE, tilts=(math.radians(20),)))
     site = street_site(candidates)
@@ -301,7 +301,7 @@ def test_a_chosen_sensor_is_turned_as_its_candidate_and_judged_so():
         assert (looks.see(sensor.model, sensor.xyz, sensor.orientation) == visible[sensor.pose]).all()
 
 
-def test_a_placement_of_tilted_sensors_is_judged_as_they_hang():
+def test_a_placement_of_tilted_sensors_is_evaluated_as_they_are_mounted():
     settings = SurveySettings(candidates=replace(CHOICE, heights=(5.0,), tilts=(math.radians(20),)), engine=ANY)
     evaluator = Evaluator(street(), settings, Objective(count=1))
     solution = finish(evaluator.solve(street_site(generate_candidates(street(), settings.candidates)), settings))

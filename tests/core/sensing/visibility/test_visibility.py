@@ -26,7 +26,6 @@ from seip_addon.core.sensing.visibility.grid import (
     VisibilityGrid,
     VisibilitySettings,
     compute_visibility,
-    full_scan_visibility,
     visibility_key,
 )
 from seip_addon.core.sensing.visibility.ray_casting import Engine, make_ray_caster
@@ -36,6 +35,7 @@ from seip_addon.core.site.site import Site, Targets
 from tests.builders.synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity
 from tests.engines import ANY, each_engine, needs_any, needs_bvh, needs_embree
 from tests.oracles.float64_rays import nearest_return
+from tests.oracles.full_scan import full_scan
 from tests.oracles.random_cases import cases
 
 Float = NDArray[np.float64]
@@ -126,10 +126,10 @@ def test_same_as_the_full_scan_bit_for_bit(engine: Engine, seed: int, delta: flo
     settings = VisibilitySettings(delta, *least)
     caster = make_ray_caster(site.triangles, engine)
     lazy = finish(compute_visibility(site, models, settings, engine))
-    full = finish(full_scan_visibility(site, models, settings, caster))
-    assert (lazy.packed == full.packed).all()
-    assert lazy.key == full.key
-    assert lazy.parameters["rays_cast"] <= full.parameters["rays_cast"] == full.parameters["rays_of_full_scan"]
+    full, rays = full_scan(site, models, settings, caster)
+    assert (lazy.visible == full).all()
+    assert lazy.key == visibility_key(site, models, settings, caster.name)
+    assert lazy.parameters["rays_cast"] <= rays == lazy.parameters["rays_of_full_scan"]
 
 
 def soup(seed: int) -> Site:
@@ -157,8 +157,8 @@ def test_same_as_the_full_scan_in_a_soup(engine: Engine, seed: int, delta: float
     site, (models, least) = soup(seed), strength
     settings = VisibilitySettings(delta, *least)
     lazy = finish(compute_visibility(site, models, settings, engine))
-    full = finish(full_scan_visibility(site, models, settings, make_ray_caster(site.triangles, engine)))
-    assert (lazy.packed == full.packed).all()
+    full, _ = full_scan(site, models, settings, make_ray_caster(site.triangles, engine))
+    assert (lazy.visible == full).all()
 
 
 @each_engine
@@ -168,10 +168,10 @@ def test_same_as_the_full_scan_on_a_junction(engine: Engine, key: str) -> None:
     site = junction_site(positions=1, sensors=[key], heights=[5.4])
     caster = make_ray_caster(site.triangles, engine)
     lazy = finish(compute_visibility(site, models, VisibilitySettings(), engine))
-    full = finish(full_scan_visibility(site, models, VisibilitySettings(), caster))
-    assert (lazy.packed == full.packed).all()
+    full, rays = full_scan(site, models, VisibilitySettings(), caster)
+    assert (lazy.visible == full).all()
     assert 0.02 < lazy.visible.mean() < 0.98
-    assert lazy.parameters["rays_cast"] < 0.03 * full.parameters["rays_cast"]
+    assert lazy.parameters["rays_cast"] < 0.03 * rays
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import pytest
 from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
 from seip_addon.core.sensing.visibility.ray_casting import Engine
 from tests.engines import each_engine
-from tests.oracles.visibility_search import FAULTS, draw_case, judge, search, sentence
+from tests.oracles.visibility_search import FAULTS, assess, draw_case, search, sentence
 
 QUICK = 12
 FIRST = 42  # faults that there were showed in scenes 42, 43, 51 and 52
@@ -36,8 +36,8 @@ def test_grids_of_many_random_scenes(engine: Engine) -> None:
 
 @pytest.mark.slow
 def test_the_arithmetic_decides_nearly_all_by_itself() -> None:
-    """The reference is no echo of what it judges: it says seen and unseen of what shares no code with it."""
-    verdicts = [judge(draw_case(seed)) for seed in range(QUICK)]
+    """The reference is no echo of what it evaluates: it says seen and unseen of what shares no code with it."""
+    verdicts = [assess(draw_case(seed)) for seed in range(QUICK)]
     undecided = sum(int(verdict.undecided.sum()) for verdict in verdicts)
     assert undecided < 0.01 * sum(verdict.seen.size for verdict in verdicts)
     assert all(not (verdict.seen & verdict.undecided).any() for verdict in verdicts)

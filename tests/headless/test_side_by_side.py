@@ -3,9 +3,11 @@
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
+from headless.side_by_side import side_by_side
+
 import pytest
 
-from seip_addon.core.progress import Progress, finish, in_detail, side_by_side
+from seip_addon.core.progress import Progress, finish
 
 
 def counting(steps, name, seen=None):
@@ -87,9 +89,3 @@ def test_an_interruption_while_works_begin_stops_those_that_have_begun(monkeypat
     with pytest.raises(KeyboardInterrupt):
         finish(side_by_side([endless(stopped), endless(threading.Event())], 2))
     assert stopped.wait(10)
-
-
-def test_work_in_detail_counts_what_is_done_within_its_unit():
-    seen = []
-    assert finish(in_detail(Progress(2, 5, "whole"), counting(4, "part")), seen.append) == "part"
-    assert [(step.done, step.total, step.what) for step in seen] == [(8 + done, 20, "part") for done in range(4)]

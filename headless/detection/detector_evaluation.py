@@ -1,14 +1,14 @@
 """Detections of a trained detector with the sensors of a placement, on runs of traffic."""
 
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from headless.detection.run_detection import AT_ONCE, detect_in_runs
+from headless.side_by_side import side_by_side
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import Interval
-from seip_addon.core.progress import Progress, side_by_side
+from seip_addon.core.output.results.detection_record import Precision
+from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.scans.frame import Frame
 
 from .average_precision import Evaluation, balanced_score, evaluate
@@ -21,7 +21,7 @@ from .training import deterministic
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement:
+class DetectorEvaluation:
     """Frames of some runs with the detections of a detector.
 
     Parameters
@@ -50,16 +50,15 @@ class Judgement:
             for name, (share, users) in recall_by_category(self.evaluation, self.score).items()
         }
 
-    def precisions(self) -> Iterator[tuple[str, float, Interval | None, int]]:
-        """Yield name, average precision, interval and number of road users by each rule by which there are any."""
-        for name, found in precisions(self.frames).items():
-            if found.road_users:
-                yield name, found.value, found.interval, found.road_users
+    @property
+    def precisions(self) -> dict[str, Precision]:
+        """Average precision by the name of each rule by which road users count."""
+        return {name: found for name, found in precisions(self.frames).items() if found.road_users}
 
 
-def judge(
+def evaluate_detector(
     detector: Detector, simulator: Simulator, placed: MountedSensors, runs: Sequence[SampledRun]
-) -> Generator[Progress, None, Judgement]:
+) -> Generator[Progress, None, DetectorEvaluation]:
     """Detect road users in every frame of runs of traffic, scanned by given sensors.
 
     Raises
@@ -78,16 +77,4 @@ def judge(
     fullest = users.index(max(users))
     instants = [(run, number) for run in runs for number in range(len(run.times))]
     scan = simulator.frame(placed, *instants[fullest])
-    return Judgement(frames, evaluation, fullest, scan, balanced_score(evaluation))
-
-
-def figures(judgement: Judgement) -> Mapping[str, Any]:
-    """Return the figures for the record."""
-    return {
-        name: {
-            "average_precision": value,
-            "interval": None if interval is None else list(interval),
-            "road_users": users,
-        }
-        for name, value, interval, users in judgement.precisions()
-    }
+    return DetectorEvaluation(frames, evaluation, fullest, scan, balanced_score(evaluation))

@@ -1,0 +1,5 @@
+"""Names of files in a folder of results that several programs write or read."""
+
+POSE_ERROR_PICTURES = ("spread.png", "blame.png", "frontier.png")
+TRAFFIC_PICTURES = ("time_seen.png", "traffic.png")
+REPORT_FILES = ("report.html", "report.pdf")

@@ -1,3 +1,0 @@
-"""Names of the files of a report."""
-
-REPORT_FILES = ("report.html", "report.pdf")

@@ -1,0 +1,31 @@
+"""The visibility grid by full scans of all poses, each ray of which is cast: the reference for the grid."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from seip_addon.core.arrays import Boolean
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
+from seip_addon.core.sensing.visibility.ray_casting import RayCaster
+from seip_addon.core.sensing.visibility.scanning import ScanPosition
+from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.sensing.visibility.visibility_model import seen_by_tilted_full_scan
+from seip_addon.core.site.site import Site
+
+
+def full_scan(
+    site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, caster: RayCaster
+) -> tuple[Boolean, int]:
+    """Return the visibility of each target from each pose, (c, t) bool, and the number of rays."""
+    poses = site.candidates
+    surfaces = near_surfaces(site.triangles, site.targets.xyz, settings.delta, site.reflectivity)
+    visible, rays = np.zeros((len(poses), len(site.targets)), dtype=bool), 0
+    for pose, key in enumerate(poses.sensor.tolist()):
+        position = ScanPosition(
+            caster, poses.xyz[pose], float(poses.yaw[pose]), [models[key]], settings, site.reflectivity
+        )
+        seen, cast = seen_by_tilted_full_scan(position, float(poses.tilt[pose]), surfaces)
+        visible[pose] = seen[0]
+        rays += cast
+    return visible, rays

@@ -1,0 +1,38 @@
+"""False detections on frames with known ones."""
+
+import math
+
+import pytest
+
+from tests.builders.labelled_frames import near_and_far, traffic, values
+
+pytest.importorskip("torch", reason="the detector's torch is optional")
+
+from headless.detection.average_precision import evaluate
+from headless.detection.matching import Rule
+from headless.studies.false_positives import false_by, false_positives
+
+AT_07 = Rule()
+
+
+def test_false_detections_by_density_and_distance():
+    evaluation = evaluate([near_and_far(), near_and_far()], AT_07)
+    assert values(false_by(evaluation, "density", (0, 1, 20), 0.1)) == [1, 1]
+    assert values(false_by(evaluation, "density", (0, 1, 20), 0.75)) == [0, 1]
+    assert values(false_by(evaluation, "distance", (0, 20, 60), 0.1)) == [1, 1]
+
+
+def test_false_positives_and_how_many_are_in_sparse_places():
+    """Around half of the hits the density is under 30: both false ones are in sparser places."""
+    evaluation = evaluate([near_and_far()], AT_07)
+    found = false_positives(evaluation, 0.1)
+    assert (found.per_frame, found.sparse) == (2, 1)
+    # From 0.9 on there is one hit with density 40, and nothing is false.
+    found = false_positives(evaluation, 0.9)
+    assert found.per_frame == 0
+    assert math.isnan(found.sparse)
+
+
+def test_density_that_says_nothing_gives_a_half():
+    frames = traffic(2, frames=200)
+    assert false_positives(evaluate(frames, AT_07), 0.2).sparse == pytest.approx(0.5, abs=0.06)
