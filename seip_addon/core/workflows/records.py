@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from ..choosing.placement.deployment import deploy_rows
 from ..choosing.placement.objective import Solution, target_weights
 from ..errors import SeipError
 from ..output.results.located import LOCATED_FILES, missing_sentence
 from ..output.results.placement_record import PlacementRecord, Provenance, placement_record
+from ..site.locations import locations
 from ..storage.json_dataclass import as_json
 from .returns import stored_pedestrian_returns
 from .survey import Survey, inputs_of
@@ -25,7 +28,7 @@ def record_of(survey: Survey, solution: Solution, provenance: Provenance, *, ren
     objective = {"goal": as_json(solution.objective), "render": render}
     missing = missing_sentence(survey.site, LOCATED_FILES)
     notes = (*solution.notes, *([missing] if missing else []))
-    return placement_record(
+    record = placement_record(
         survey.site,
         replace(solution, placement=replace(solution.placement, notes=notes)),
         provenance,
@@ -33,6 +36,9 @@ def record_of(survey: Survey, solution: Solution, provenance: Provenance, *, ren
         inputs=inputs_of(survey) | {"visibility": survey.grid.key},
         warnings=survey.warnings,
     )
+    feet = np.array([sensor.foot[:2] for sensor in solution.deployment.sensors]).reshape(-1, 2)
+    named = zip(record.sensors, locations(survey.geometry, feet), strict=True)
+    return replace(record, sensors=tuple(replace(sensor, location=words) for sensor, words in named))
 
 
 def restored_solution(survey: Survey, record: PlacementRecord) -> Solution:
@@ -60,4 +66,4 @@ def restored_solution(survey: Survey, record: PlacementRecord) -> Solution:
     known = replace(deployment, gain_band=record.coverage.gain_band, returns=record.returns)
     if record.returns is not None:
         known = replace(known, pedestrian_returns=stored_pedestrian_returns(survey, chosen))
-    return Solution(objective, record.placement(covered), None, known)
+    return Solution(objective, record.placement(covered), None, known, front=record.front, crossings=record.crossings)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from seip_addon.core.choosing.placement.deployment import deploy, pose_prices
-from seip_addon.core.choosing.placement.objective import Objective, optimise, placement_problem
+from seip_addon.core.choosing.placement.objective import Objective, placement_problem
+from seip_addon.core.choosing.placement.optimisation import optimise
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,6 @@ from ... import limits
 from ...arrays import Boolean, Float
 from ...choosing.placement.objective import Solution
 from ...choosing.placement.problem import PlacementProblem
-from ...sensing.visibility.grid import VisibilityGrid
 from ...site.scene_geometry import NamedArea, SceneGeometry
 from ...site.site import Site, Targets
 from ...storage.array_file import ArrayFile, ArrayRule, ContentError
@@ -69,7 +68,7 @@ class SiteFile:
     seen : (k, t) bool
         Targets that each sensor sees, in the order of the record.
     problem : PlacementProblem
-        Without its visibility; see `with_visibility`.
+        Without its visibility, which is in ``visibility.npz``.
     """
 
     key: str
@@ -77,10 +76,6 @@ class SiteFile:
     areas: tuple[Area, ...]
     seen: Boolean
     problem: PlacementProblem
-
-    def with_visibility(self, grid: VisibilityGrid) -> PlacementProblem:
-        """Return the problem as it was solved."""
-        return replace(self.problem, visible=grid.visible)
 
 
 def save_site_file(
