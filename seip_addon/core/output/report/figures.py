@@ -23,6 +23,7 @@ MAP_WIDTH, MIN_MAP_HEIGHT, MAX_MAP_HEIGHT = 7.2, 4.0, 8.0  # inches
 MARGIN = 6.0  # metres around the road
 CHART_SIZE = (7.2, 3.6)  # inches
 NUMBER_SIZE = 10.0  # points
+MOST_LABELLED = 8  # points of the chart that have room for labels
 
 
 def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
@@ -106,7 +107,7 @@ def front_chart(points: Sequence[FrontPoint], placed: tuple[int, float]) -> byte
     missed = [100 * point.missed for point in points]
     style: Style = {"color": SEEN_COLOURS[2], "ecolor": SOFT_INK, "capsize": 4, "markersize": 8}
     axes.errorbar(count, share, yerr=np.array([np.zeros(len(points)), missed]), marker="o", linewidth=1.6, **style)
-    for number, percent in zip(count, share, strict=True):
+    for number, percent in zip(count, share, strict=True) if len(points) <= MOST_LABELLED else ():
         place: Style = {"xytext": (0, -18), "textcoords": "offset points", "ha": "center", "size": 10}
         axes.annotate(f"{percent:.1f}%", (number, percent), **place)
     ring: Style = {"markersize": 17, "mfc": "none", "mec": INK, "mew": 1.8, "linestyle": "none"}
