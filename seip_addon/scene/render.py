@@ -11,6 +11,8 @@ import sys
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -187,7 +189,7 @@ def render_elsewhere(
     request = {"path": sys.path, "blend": str(blend), "scene": scene, "answer": str(answer)}
     pictures = {"raws": [str(raw) for raw in raws], "shots": [shot.as_json() for shot in shots]}
     job.write_text(json.dumps(request | pictures))
-    yield from run_logged(_command(job), log, _samples)
+    yield from run_logged(_command(job), log, partial(_samples, len(raws)))
     try:
         taken = [Taken.from_json(one) for one in json.loads(answer.read_text())]
     except OSError as error:
@@ -205,9 +207,12 @@ def _command(job: Path) -> list[str]:
     return [sys.executable, script, "--", str(job)]
 
 
-def _samples(line: str) -> Progress:
-    counts = SAMPLE.findall(line)
-    return Progress(int(counts[-1]) if counts else 0, sample_count(), "rendering")
+def _samples(pictures: int, output: str) -> Progress:
+    """Return the samples done of all pictures, from all that Cycles has printed: each picture counts from the start."""
+    counts = [int(count) for count in SAMPLE.findall(output)]
+    finished = sum(later < earlier for earlier, later in pairwise(counts))
+    each = sample_count()
+    return Progress(min(finished, pictures - 1) * each + counts[-1] if counts else 0, pictures * each, "rendering")
 
 
 def take(shots: Sequence[Shot], scene: bpy.types.Scene, raws: Sequence[Path]) -> list[Taken]:
