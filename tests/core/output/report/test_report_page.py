@@ -14,6 +14,7 @@ from PIL import Image
 
 from seip_addon.core.choosing.placement.cheapest import cheapest_for_coverage
 from seip_addon.core.choosing.placement.objective import MOVED, SAME_PRICE, FrontPoint, Objective
+from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.returns_summary import ReturnsSummary
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.errors import SeipError
@@ -333,9 +334,8 @@ def test_the_table_of_numbers_is_that_of_the_record(folder):
 
 def test_a_note_on_equally_cheap_placements_gives_way_to_what_the_table_proves(tmp_path):
     make_folder(tmp_path)
-    problem = replace(
-        load_evidence(tmp_path).site.problem, visible=VisibilityGrid.load(tmp_path / "visibility.npz").visible
-    )
+    constraints = load_evidence(tmp_path).site.problem
+    problem = PlacementProblem(visible=VisibilityGrid.load(tmp_path / "visibility.npz").visible, **vars(constraints))
     equal = replace(problem, prices=np.full(len(problem.prices), 10_000.0))
     best = finish(cheapest_for_coverage(equal, GOAL, SolverLimits(effort=1000.0)))
     note = f"{SAME_PRICE}another one may cover up to 9.9 percentage points more"
