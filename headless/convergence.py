@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from seip_addon.core.choosing.placement.deployment import weighted_share
-from seip_addon.core.choosing.placement.objective import Objective, Solution, optimise, target_weights
+from seip_addon.core.choosing.placement.objective import Objective, Solution, target_weights
+from seip_addon.core.choosing.placement.optimisation import optimise
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.sensing.visibility.grid import compute_visibility

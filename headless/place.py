@@ -28,7 +28,7 @@ from seip_addon.core.choosing.placement.objective import Solution, check_objecti
 from seip_addon.core.choosing.placement.returns_summary import share_reached
 from seip_addon.core.limits import SHARE
 from seip_addon.core.progress import finish
-from seip_addon.core.workflows.placing import place
+from seip_addon.core.workflows.placing import place, with_context
 from seip_addon.core.workflows.survey import Layout
 from seip_addon.core.workflows.traffic_runs import TrafficRuns, read_runs
 
@@ -53,6 +53,7 @@ def main(argv: list[str]) -> None:
     acceptance = runtime.accepted_by_enter()
     solution = watch.run("placement", place(surveyed, objective, runs, acceptance))
     runtime.print_line(_describe(solution))
+    solution = watch.run("fewer and more sensors", with_context(surveyed, solution))
     with runtime.incomplete_if_interrupted(options.output):
         save_evaluation_charts(options.output, surveyed, solution)
         survey.save_solution(surveyed, watch, solution, options.output, render=not options.no_render)

@@ -12,11 +12,10 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime
-from headless.options import new_parser, real_number
+from headless.options import new_parser
 
-from seip_addon.core import limits
 from seip_addon.core.output.report.evidence import load_evidence
-from seip_addon.core.output.report.write import EFFORT, write_report
+from seip_addon.core.output.report.write import write_report
 
 
 def main(argv: list[str]) -> None:
@@ -24,20 +23,13 @@ def main(argv: list[str]) -> None:
     options = _parser().parse_args(argv)
     load_evidence(options.folder)  # refuses a folder that is none of a placement before it is locked
     runtime.check_folder(options.folder)
-    for path in runtime.finish_with_bar(write_report(options.folder, options.effort)):
+    for path in runtime.finish_with_bar(write_report(options.folder)):
         runtime.print_line(str(path))
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("report", "Write a report on a placement into its folder, as HTML and PDF.")
     parser.add_argument("folder", type=Path, help="result folder of `seip place`")
-    parser.add_argument(
-        "--effort",
-        type=real_number(limits.EFFORT),
-        default=EFFORT,
-        metavar="UNITS",
-        help="counted work for each other number of sensors, in units of about one core-second; 0: none",
-    )
     return parser
 
 

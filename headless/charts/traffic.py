@@ -18,7 +18,7 @@ from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.geometry.plan import closed, outline
 from seip_addon.core.output.pictures.drawing import draw_attribution, draw_polygons, draw_sensors
 from seip_addon.core.output.pictures.palette import INK, SEEN_COLOURS, SOFT_INK
-from seip_addon.core.output.pictures.plan_view import MAX_GAP, draw_area
+from seip_addon.core.output.pictures.plan_map import MAX_GAP, draw_area
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.site.site import Site
 from seip_addon.core.site.target_squares import target_squares

@@ -18,7 +18,7 @@ from ..core.errors import SeipError
 from ..core.output.results.placement_record import Provenance
 from ..core.output.results.versions import versions
 from ..core.progress import Progress
-from ..core.workflows.placing import place
+from ..core.workflows.placing import place, with_context
 from ..core.workflows.records import record_of
 from ..core.workflows.traffic_runs import found_runs, read_runs
 from ..properties.conversion import runs_folder
@@ -68,6 +68,7 @@ def _placed(
     state, survey = yield from scene_survey.with_visibility(state)
     began = time.perf_counter()
     solution = yield from place(survey, objective, runs, acceptance)
+    solution = yield from with_context(survey, solution)
     return replace(state, solution=solution, durations=state.timed("placement", began))
 
 

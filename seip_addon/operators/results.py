@@ -6,6 +6,7 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import bpy
 import numpy as np
@@ -35,7 +36,7 @@ from ..scene.gltf import save_glb
 from ..scene.pieces import tidy_pieces
 from ..scene.read import attribution_of
 from ..scene.render_elsewhere import render_elsewhere
-from ..scene.result_folder import result_files, write_tables
+from ..scene.result_folder import result_files, write_pictures, write_tables
 from ..scene.sensors import labelled_sensors, read_sensors
 from ..scene.write import coverage_of, shown_legend, take_over
 from ..sensor_edits import position_names, sensor_edits
@@ -400,10 +401,13 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
         survey, solution = state.placed()
         record = parsed_record(state.record)
         record = replace(record, settings={**record.settings, "render": render})
-        site = survey.site
         yield from write_tables(part, survey, solution, record)
-        if render:
-            yield from render_elsewhere(part["view.png"], part["placed.blend"], name, site, solution.deployment, legend)
+        deployment = solution.deployment
+        with TemporaryDirectory(prefix="seip-") as raw:
+            rendered = None
+            if render:
+                rendered = yield from render_elsewhere(Path(raw), part["placed.blend"], name, survey.site, deployment)
+            write_pictures(part, survey, record, deployment, rendered, legend)
     survey.grid.save(folder / "visibility.npz")
     return state
 

@@ -12,7 +12,6 @@ import bpy
 
 from .. import scene_survey
 from ..core.errors import SeipError
-from ..core.output.results.placement_record import relevant_warnings
 from ..core.progress import Progress
 from ..core.sensing.visibility.sight_lines import pose_at, sight_lines
 from ..scene import contract
@@ -203,16 +202,19 @@ def _rendered_sheet(path: Path, scene: bpy.types.Scene) -> Generator[Progress, N
     """Write the rendered view that batch commands make, and the plan beside it; the scene is saved before the rest."""
     from PIL import Image  # noqa: PLC0415  # as above
 
+    from ..core.output.pictures.labelled_view import save_labelled_view  # noqa: PLC0415  # as above
     from ..scene.render_elsewhere import render_elsewhere  # noqa: PLC0415  # as above
 
     finding, name, legend = scene_survey.with_placement(scene), scene.name, shown_legend(scene)
     with TemporaryDirectory(prefix="seip-") as folder:
-        blend, view = (Path(folder) / file for file in ("scene.blend", "view.png"))
+        blend, view = (Path(folder) / file for file in ("scene.blend", "labelled.png"))
         save_blend(blend)
         yield Progress(0, 0, "reading the scene")
         state = yield from finding
         survey, solution = state.placed()
-        yield from render_elsewhere(view, blend, name, survey.site, solution.deployment, legend)
+        site, deployment = survey.site, solution.deployment
+        rendered = yield from render_elsewhere(Path(folder), blend, name, site, deployment, close_ups=False)
+        save_labelled_view(view, rendered.view, site, deployment, legend, rendered.sight)
         with Image.open(view) as picture:
             _save_sheet(path, state, picture)
     return state
@@ -227,9 +229,7 @@ def _save_sheet(path: Path, state: SceneState, view: Any) -> None:  # noqa: ANN4
     survey, solution = state.placed()
     with TemporaryDirectory(prefix="seip-") as folder:
         drawn = Path(folder) / "plan.png"
-        chosen = [sensor.model.key for sensor in solution.deployment.sensors]
-        notes = [*solution.caption, *relevant_warnings(survey.warnings, survey.models, chosen)]
-        save_plan_view(drawn, survey.geometry, survey.site, solution.deployment, notes)
+        save_plan_view(drawn, survey.geometry, survey.site, solution.deployment, solution.caption)
         with Image.open(drawn) as picture:
             save_sheet(path, view, picture)
 

@@ -3,36 +3,39 @@
 from __future__ import annotations
 
 import importlib
-import json
 import math
 import os
 import sys
-import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
+from PIL import Image
 
 from ..core.arrays import Boolean, Float
 from ..core.choosing.placement.deployment import Deployment
 from ..core.errors import SeipError
-from ..core.output.pictures.labelled_view import Sight, save_labelled_view
+from ..core.output.pictures.close_up_sheet import MOST, TILE
+from ..core.output.pictures.close_ups import viewpoints
+from ..core.output.pictures.labelled_view import Sight
 from ..core.output.pictures.viewpoint import Viewpoint, frame
 from ..core.site.site import Site
 from . import contract
 from .daylight import add_daylight
 from .interrupts import held_interrupts
-from .write import shown_legend
 
 WIDTH, HEIGHT = 1440, 810  # pixels
 SAMPLES, DENOISED_SAMPLES = 12, 2  # without and with a denoiser, for as little noise or less
 AZIMUTH, ELEVATION = math.radians(-115.0), math.radians(52.0)  # of the camera, seen from the region
 FIELD_OF_VIEW = math.radians(35.0)  # across the picture
-ROOM = 1.04  # around the region
+ROOM = 1.07  # around the region and the sensors
+CLOSE_REACH = 300.0  # metres from the camera of a close-up, as far as anything is shown
+FOOT_ROOM = np.array((0.0, 0.0, 1.0))  # metres above the foot of a sensor
 SENSOR_ROOM = 0.5  # metres round a sensor that its own body and bracket take up
 UNSEEN_TYPES = {"LIGHT", "CAMERA", "SPEAKER", "LIGHT_PROBE"}
 
@@ -43,34 +46,85 @@ class Shot:
 
     Parameters
     ----------
+    viewpoints : tuple of Viewpoint
+        The first from which something stands in front of the fewest sensors is taken.
     reach : float, metres
         From the camera, as far as anything is shown.
     sensors : (k, 3) float64, metres
-        Optical centres.
+        Optical centres; in a close-up that of one sensor, then a point low above its foot.
+    size : (int, int), pixels
+        Width and height of the picture.
     """
 
-    viewpoint: Viewpoint
+    viewpoints: tuple[Viewpoint, ...]
     reach: float
     sensors: Float
+    size: tuple[int, int]
 
-    def as_json(self) -> str:
-        """Return it as a text for `from_json`."""
-        view = self.viewpoint
-        arrays = (view.place, view.axes, view.slopes, self.sensors)
-        return json.dumps([self.reach, *(array.tolist() for array in arrays)])
+    def as_json(self) -> list[Any]:
+        """Return it as a JSON value for `from_json`."""
+        views = [[array.tolist() for array in (view.place, view.axes, view.slopes)] for view in self.viewpoints]
+        return [views, self.reach, self.sensors.tolist(), self.size]
 
     @classmethod
-    def from_json(cls, text: str) -> Shot:
+    def from_json(cls, value: list[Any]) -> Shot:
         """Return what `as_json` wrote down."""
-        reach, place, axes, slopes, sensors = json.loads(text)
-        viewpoint = Viewpoint(np.array(place), np.array(axes), np.array(slopes))
-        return cls(viewpoint, reach, np.array(sensors, dtype=np.float64).reshape(-1, 3))
+        views, reach, sensors, (width, height) = value
+        viewpoints = tuple(Viewpoint(*(np.array(array) for array in view)) for view in views)
+        return cls(viewpoints, reach, np.array(sensors, dtype=np.float64).reshape(-1, 3), (width, height))
 
 
-def save_rendered_view(
-    path: str | os.PathLike[str], scene: bpy.types.Scene, site: Site, deployment: Deployment
-) -> None:
-    """Render the scene from an oblique angle in the south and label the sensors, as PNG.
+@dataclass(frozen=True, eq=False)
+class Taken:
+    """How a picture was taken.
+
+    Parameters
+    ----------
+    viewpoint : int
+        Number of the shot's viewpoint.
+    hidden : (k,) bool
+        Sensors that something stands in front of.
+    """
+
+    viewpoint: int
+    hidden: Boolean
+
+    def as_json(self) -> list[Any]:
+        """Return it as a JSON value for `from_json`."""
+        return [self.viewpoint, self.hidden.tolist()]
+
+    @classmethod
+    def from_json(cls, value: list[Any]) -> Taken:
+        """Return what `as_json` wrote down."""
+        return cls(value[0], np.array(value[1], dtype=bool))
+
+
+@dataclass(frozen=True, eq=False)
+class RenderedPictures:
+    """The rendered view and the close-ups of each sensor, without labels.
+
+    Parameters
+    ----------
+    view : path
+        Picture of the whole site.
+    sight : Sight
+        Where sensors and targets are on it.
+    close_ups : tuple of Image
+        In the order of the sensors, at most `close_ups.MOST`.
+    places : mapping of str to (float, float)
+        Where each sensor is on its close-up, by its label, in shares of width and height from the lower left.
+    """
+
+    view: Path
+    sight: Sight
+    close_ups: tuple[Image.Image, ...]
+    places: Mapping[str, tuple[float, float]]
+
+
+def rendered_pictures(
+    scene: bpy.types.Scene, site: Site, deployment: Deployment, folder: Path, *, close_ups: bool = True
+) -> RenderedPictures:
+    """Render the scene from an oblique angle in the south, and close to each sensor, into a folder for raw pictures.
 
     The picture is taken in a scene of its own that shares the objects and is
     removed afterwards, under its own camera, light and settings: the user's
@@ -79,30 +133,37 @@ def save_rendered_view(
 
     Parameters
     ----------
-    path : path-like
-        The picture to write.
     scene : bpy.types.Scene
         Holds the result of `write_result`.
     deployment : Deployment
         The chosen sensors and what they see.
+    close_ups : bool
+        Whether to render the surroundings of each sensor as well.
     """
-    shot = shot_of(site, deployment)
-    with tempfile.TemporaryDirectory(prefix="seip-") as folder:
-        raw = Path(folder) / "view.png"
-        with _silence():
-            hidden = take(shot, scene, raw)
-        save_labelled_view(path, raw, site, deployment, shown_legend(scene), sight_of(shot, hidden, site))
+    shots = shots_of(site, deployment) if close_ups else shots_of(site, deployment)[:1]
+    raws = raw_files(folder, shots)
+    with _silence():
+        taken = take(shots, scene, raws)
+    return labelled_pictures(shots, taken, raws, site, deployment)
 
 
-def take(shot: Shot, scene: bpy.types.Scene, raw: Path) -> Boolean:
-    """Render a scene's picture without labels, and return which sensors something stands in front of, (k,) bool."""
+def take(shots: Sequence[Shot], scene: bpy.types.Scene, raws: Sequence[Path]) -> list[Taken]:
+    """Render pictures of a scene without labels, and return how each was taken."""
+    taken = []
     with _stage(scene) as stage:
-        _add_camera(stage, shot)
         add_daylight(stage, stage.collection)
-        _set_up(stage, raw)
-        with held_interrupts():
-            bpy.ops.render.render(scene=stage.name, write_still=True)
-        return _hidden(stage, shot)
+        camera = _add_camera(stage)
+        _set_up(stage)
+        for shot, raw in zip(shots, raws, strict=True):
+            hidden = [_hidden(stage, shot, viewpoint) for viewpoint in shot.viewpoints]
+            number = int(np.argmin([behind.sum() for behind in hidden]))
+            taken.append(Taken(number, hidden[number]))
+            _aim(camera, shot.viewpoints[number], shot.reach)
+            stage.render.resolution_x, stage.render.resolution_y = shot.size
+            stage.render.filepath = str(raw)
+            with held_interrupts():
+                bpy.ops.render.render(scene=stage.name, write_still=True)
+    return taken
 
 
 @contextmanager
@@ -151,33 +212,68 @@ def _rendered_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     ]
 
 
-def shot_of(site: Site, deployment: Deployment) -> Shot:
-    """Return a shot that has the whole region in its picture."""
+def shots_of(site: Site, deployment: Deployment) -> list[Shot]:
+    """Return a shot that has the whole region and all sensors in its picture, and one close to each sensor."""
     slope = math.tan(FIELD_OF_VIEW / 2.0)
     slopes = np.array((slope, slope * HEIGHT / WIDTH))
-    tight = frame(site.targets.xyz, AZIMUTH, ELEVATION, slopes / ROOM)
-    reach = 2.0 * float(np.linalg.norm(site.targets.xyz - tight.place, axis=1).max())
     sensors = np.array([sensor.xyz for sensor in deployment.sensors]).reshape(-1, 3)
-    return Shot(Viewpoint(tight.place, tight.axes, slopes), reach, sensors)
+    points = np.vstack((site.targets.xyz, sensors))
+    tight = frame(points, AZIMUTH, ELEVATION, slopes / ROOM)
+    reach = 2.0 * float(np.linalg.norm(points - tight.place, axis=1).max())
+    whole = Shot((Viewpoint(tight.place, tight.axes, slopes),), reach, sensors, (WIDTH, HEIGHT))
+    near = [
+        Shot(
+            tuple(viewpoints(site, sensor)),
+            max(reach, CLOSE_REACH),
+            np.vstack((sensor.xyz, sensor.foot + FOOT_ROOM)),
+            TILE,
+        )
+        for sensor in deployment.sensors[:MOST]
+    ]
+    return [whole, *near]
 
 
-def _add_camera(stage: bpy.types.Scene, shot: Shot) -> None:
-    data = bpy.data.cameras.new("SEIP view")
-    data.angle = FIELD_OF_VIEW
-    camera = bpy.data.objects.new("SEIP view", data)
-    camera.matrix_world = Matrix.Translation(shot.viewpoint.place) @ Matrix(shot.viewpoint.axes.tolist()).to_4x4()
-    data.clip_end = shot.reach
+def raw_files(folder: Path, shots: Sequence[Shot]) -> list[Path]:
+    """Return the files of the raw pictures of shots."""
+    return [folder / f"view{number}.png" for number in range(len(shots))]
+
+
+def labelled_pictures(
+    shots: Sequence[Shot], taken: Sequence[Taken], raws: Sequence[Path], site: Site, deployment: Deployment
+) -> RenderedPictures:
+    """Return rendered pictures with the places of sensors on them."""
+    whole, *near = shots
+    (view,) = whole.viewpoints
+    sight = Sight(view.project(whole.sensors), taken[0].hidden, view.project(site.targets.xyz))
+    places, images = {}, []
+    for shot, how, raw, sensor in zip(near, taken[1:], raws[1:], deployment.sensors, strict=False):
+        x, y = shot.viewpoints[how.viewpoint].project(shot.sensors)[0]
+        places[sensor.label] = (float(x), float(y))
+        with Image.open(raw) as picture:
+            images.append(picture.copy())
+    return RenderedPictures(raws[0], sight, tuple(images), places)
+
+
+def _add_camera(stage: bpy.types.Scene) -> bpy.types.Object:
+    camera = bpy.data.objects.new("SEIP view", bpy.data.cameras.new("SEIP view"))
     stage.collection.objects.link(camera)
     stage.camera = camera
+    return camera
 
 
-def _set_up(stage: bpy.types.Scene, raw: Path) -> None:
+def _aim(camera: bpy.types.Object, viewpoint: Viewpoint, reach: float) -> None:
+    camera.matrix_world = Matrix.Translation(viewpoint.place) @ Matrix(viewpoint.axes.tolist()).to_4x4()
+    camera.data.angle = 2.0 * math.atan(float(viewpoint.slopes[0]))
+    camera.data.clip_end = reach
+
+
+def _set_up(stage: bpy.types.Scene) -> None:
     if not hasattr(stage, "cycles"):
         raise SeipError("this Blender has no Cycles, which renders the view; enable it in Preferences, Add-ons")
     render = stage.render
     render.engine = "CYCLES"
-    render.resolution_x, render.resolution_y, render.resolution_percentage = WIDTH, HEIGHT, 100
-    render.filepath = str(raw)
+    render.resolution_percentage = 100
+    render.use_persistent_data = True  # between the pictures, which show the same objects
     render.image_settings.file_format = "PNG"
     render.image_settings.color_mode = "RGBA"
     render.film_transparent = True
@@ -206,17 +302,13 @@ def sample_count() -> int:
     return min(SAMPLES, DENOISED_SAMPLES) if has_denoiser() else SAMPLES
 
 
-def _hidden(stage: bpy.types.Scene, shot: Shot) -> Boolean:
+def _hidden(stage: bpy.types.Scene, shot: Shot, viewpoint: Viewpoint) -> Boolean:
+    """Return which sensors of a shot something stands in front of, seen from a viewpoint, (k,) bool."""
     layer = stage.view_layers[0]
     layer.update()
-    start = Vector(shot.viewpoint.place)
+    start = Vector(viewpoint.place)
     ways = [Vector(sensor) - start for sensor in shot.sensors]
     hits = [
         stage.ray_cast(layer.depsgraph, start, way.normalized(), distance=way.length - SENSOR_ROOM)[0] for way in ways
     ]
     return np.array(hits, dtype=bool)
-
-
-def sight_of(shot: Shot, hidden: Boolean, site: Site) -> Sight:
-    """Return where sensors and targets are on the picture, and which sensors something stands in front of."""
-    return Sight(shot.viewpoint.project(shot.sensors), hidden, shot.viewpoint.project(site.targets.xyz))

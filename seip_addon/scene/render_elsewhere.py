@@ -1,47 +1,45 @@
-"""A rendered view of a scene, made in a Blender of its own."""
+"""Rendered pictures of a scene, made in a Blender of its own."""
 
 from __future__ import annotations
 
 import json
 import re
 import sys
-import tempfile
 from collections.abc import Generator
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 from ..core.child_process import run_logged
 from ..core.choosing.placement.deployment import Deployment
 from ..core.errors import SeipError
-from ..core.output.pictures.coverage_colours import Legend
-from ..core.output.pictures.labelled_view import save_labelled_view
 from ..core.progress import Progress
 from ..core.site.site import Site
-from .render import sample_count, shot_of, sight_of
+from .render import RenderedPictures, Taken, labelled_pictures, raw_files, sample_count, shots_of
 
 SAMPLE = re.compile(r"Sample (\d+)/")
 """How Cycles tells of its progress."""
 
 
 def render_elsewhere(
-    path: Path, blend: Path, scene: str, site: Site, deployment: Deployment, legend: Legend | None
-) -> Generator[Progress, None, None]:
-    """Render a scene as `save_rendered_view` does, in another Blender, so that this one keeps responding.
+    folder: Path, blend: Path, scene: str, site: Site, deployment: Deployment, *, close_ups: bool = True
+) -> Generator[Progress, None, RenderedPictures]:
+    """Render a scene as `rendered_pictures` does, in a Blender of its own: the one that asks goes on answering.
 
     Parameters
     ----------
-    path : path
-        The picture to write.
+    folder : path
+        Folder for raw pictures.
     blend : path
         Holds the scene.
     scene : str
         Its name.
     deployment : Deployment
         The sensors and what they see.
-    legend : Legend or None
-        What the colours on the road of the scene mean.
+    close_ups : bool
+        Whether to render the surroundings of each sensor as well.
 
     Yields
     ------
@@ -53,19 +51,19 @@ def render_elsewhere(
     SeipError
         The other Blender failed.
     """
-    shot = shot_of(site, deployment)
-    with tempfile.TemporaryDirectory(prefix="seip-") as folder:
-        raw, job, log = (Path(folder) / name for name in ("view.png", "job.json", "log"))
-        job.write_text(
-            json.dumps({"path": sys.path, "blend": str(blend), "scene": scene, "raw": str(raw), "shot": shot.as_json()})
-        )
-        yield from run_logged(_command(job), log, _samples)
-        try:
-            hidden = np.array(json.loads(raw.with_suffix(".json").read_text()), dtype=bool)
-        except OSError as error:
-            last = log.read_text(errors="replace").strip().splitlines()[-1:]
-            raise SeipError(f"the view could not be rendered ({' '.join(last)}): export without it") from error
-        save_labelled_view(path, raw, site, deployment, legend, sight_of(shot, hidden, site))
+    shots = shots_of(site, deployment) if close_ups else shots_of(site, deployment)[:1]
+    raws = raw_files(folder, shots)
+    job, log, answer = (folder / name for name in ("job.json", "log", "taken.json"))
+    request = {"path": sys.path, "blend": str(blend), "scene": scene, "answer": str(answer)}
+    pictures = {"raws": [str(raw) for raw in raws], "shots": [shot.as_json() for shot in shots]}
+    job.write_text(json.dumps(request | pictures))
+    yield from run_logged(_command(job), log, partial(_samples, len(raws)))
+    try:
+        taken = [Taken.from_json(one) for one in json.loads(answer.read_text())]
+    except OSError as error:
+        last = log.read_text(errors="replace").strip().splitlines()[-1:]
+        raise SeipError(f"the view could not be rendered ({' '.join(last)}): export without it") from error
+    return labelled_pictures(shots, taken, raws, site, deployment)
 
 
 def _command(job: Path) -> list[str]:
@@ -77,6 +75,9 @@ def _command(job: Path) -> list[str]:
     return [sys.executable, script, "--", str(job)]
 
 
-def _samples(line: str) -> Progress:
-    counts = SAMPLE.findall(line)
-    return Progress(int(counts[-1]) if counts else 0, sample_count(), "rendering")
+def _samples(pictures: int, output: str) -> Progress:
+    """Return the samples done of all pictures, from all that Cycles has printed: each picture counts from the start."""
+    counts = [int(count) for count in SAMPLE.findall(output)]
+    finished = sum(later < earlier for earlier, later in pairwise(counts))
+    each = sample_count()
+    return Progress(min(finished, pictures - 1) * each + counts[-1] if counts else 0, pictures * each, "rendering")

@@ -14,16 +14,16 @@ import bpy
 
 
 def main(job: Path) -> None:
-    """Render what a job asks for, and write beside the picture which sensors are hidden."""
+    """Render what a job asks for, and write how each picture was taken."""
     request = json.loads(job.read_text())
     package = Path(__file__).resolve().parents[1]
     sys.path[:] = [str(package.parent), *request["path"]]
     render = import_module(f"{package.name}.scene.render")  # no extension is installed here
 
     bpy.ops.wm.open_mainfile(filepath=request["blend"], load_ui=False, use_scripts=False)
-    raw = Path(request["raw"])
-    hidden = render.take(render.Shot.from_json(request["shot"]), bpy.data.scenes[request["scene"]], raw)
-    raw.with_suffix(".json").write_text(json.dumps(hidden.tolist()))
+    shots = [render.Shot.from_json(shot) for shot in request["shots"]]
+    taken = render.take(shots, bpy.data.scenes[request["scene"]], [Path(raw) for raw in request["raws"]])
+    Path(request["answer"]).write_text(json.dumps([one.as_json() for one in taken]))
 
 
 if __name__ == "__main__":

@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import bpy
 
+from ..core.choosing.placement.deployment import Deployment
 from ..core.choosing.placement.objective import Solution, placement_constraints
 from ..core.errors import SeipError
+from ..core.output.pictures.close_ups import save_close_ups
+from ..core.output.pictures.coverage_colours import Legend
+from ..core.output.pictures.labelled_view import save_labelled_view
 from ..core.output.pictures.plan_view import save_plan_view
 from ..core.output.results.candidate_table import save_candidate_table
 from ..core.output.results.carla import save_carla_spawns
@@ -18,7 +23,7 @@ from ..core.output.results.geojson import save_geojson
 from ..core.output.results.kml import save_kml
 from ..core.output.results.located import LOCATED_FILES, located
 from ..core.output.results.placement_file import save_placement
-from ..core.output.results.placement_record import PlacementRecord, relevant_warnings
+from ..core.output.results.placement_record import PlacementRecord
 from ..core.output.results.site_file import save_site_file
 from ..core.progress import Progress, finish
 from ..core.storage.files import unfinished_name
@@ -26,11 +31,11 @@ from ..core.workflows.survey import Survey
 from .blend_file import save_blend
 from .gltf import save_glb
 from .pieces import tidy_pieces
-from .render import save_rendered_view
-from .write import write_result
+from .render import RenderedPictures, rendered_pictures
+from .write import shown_legend, write_result
 
 FILES = (
-    *("candidates.csv", "carla_spawn.json", "site.npz", "plan.png", "view.png"),
+    *("candidates.csv", "carla_spawn.json", "site.npz", "plan.png", "view.png", "sensors.png"),
     *("scene.glb", "placed.blend", "placement.json"),
 )
 """In the order in which they take their places: where ``placement.json`` stands, everything else does."""
@@ -102,8 +107,9 @@ def write_result_folder(
         save_blend(part["placed.blend"])
         save_glb(part["scene.glb"], site.attribution)
         finish(write_tables(part, survey, solution, record))
-        if render:
-            save_rendered_view(part["view.png"], scene, site, deployment)
+        with TemporaryDirectory(prefix="seip-") as raw:
+            rendered = rendered_pictures(scene, site, deployment, Path(raw)) if render else None
+            write_pictures(part, survey, record, deployment, rendered, shown_legend(scene))
 
 
 def write_tables(
@@ -125,5 +131,21 @@ def write_tables(
         save_geojson(part["placement.geojson"], placed)
         save_kml(part["placement.kml"], placed)
     yield Progress(2, 3, "drawing the plan", counted=False)
-    warnings = relevant_warnings(record.warnings, models, (sensor.model.key for sensor in deployment.sensors))
-    save_plan_view(part["plan.png"], geometry, site, deployment, [*solution.caption, *warnings])
+    created = record.times.created
+    save_plan_view(part["plan.png"], geometry, site, deployment, solution.caption, created=created)
+
+
+def write_pictures(
+    part: Mapping[str, Path],
+    survey: Survey,
+    record: PlacementRecord,
+    deployment: Deployment,
+    rendered: RenderedPictures | None,
+    legend: Legend | None,
+) -> None:
+    """Write the rendered view with its labels, and the close-ups of the sensors; without rendering only their plans."""
+    geometry, site, created = survey.geometry, survey.site, record.times.created
+    if rendered is not None:
+        save_labelled_view(part["view.png"], rendered.view, site, deployment, legend, rendered.sight, created=created)
+    views, places = ((), {}) if rendered is None else (rendered.close_ups, rendered.places)
+    save_close_ups(part["sensors.png"], geometry, site, deployment, views, places)

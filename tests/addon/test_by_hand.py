@@ -185,7 +185,7 @@ def test_an_export_that_fails_or_is_stopped_leaves_the_earlier_one_whole(placed,
     work.close()  # as Stop does
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
-    def full(*_: object) -> None:
+    def full(*_: object, **_named: object) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(result_folder, "save_plan_view", full)

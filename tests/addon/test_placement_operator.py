@@ -36,7 +36,9 @@ def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scen
     assert bpy.ops.seip.write_report() == {"FINISHED"}
     assert (tmp_path / "panel" / "placed.blend").stat().st_mtime_ns == exported
     assert (tmp_path / "panel" / "report.pdf").is_file()
-    assert "start from this placement" in (tmp_path / "panel" / "report.html").read_text(encoding="utf-8")
+    assert "With fewer or more sensors under the same rules" in (tmp_path / "panel" / "report.html").read_text(
+        encoding="utf-8"
+    )
     key = session.state_of(junction).survey.grid.key
     place.main([str(small_scene), *OPTIONS, "-o", str(tmp_path / "batch")])
     panel, batch = (load_placement(tmp_path / name / "placement.json") for name in ("panel", "batch"))

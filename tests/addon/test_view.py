@@ -9,6 +9,8 @@ import pytest
 from PIL import Image
 
 import seip_addon
+from seip_addon.core.output.pictures.plan_view import DPI, MAP_WIDTH, MARGIN
+from seip_addon.core.output.pictures.sheet import GAP
 from seip_addon.panels import view as view_section
 from seip_addon.scene import render
 from seip_addon.scene.sensors import placed_sensors
@@ -117,14 +119,16 @@ def test_draw_handlers_are_always_removed(placed, ending):
 
 @pytest.mark.slow
 def test_a_picture_has_the_rendered_view_and_the_plan(placed, tmp_path, monkeypatch):
-    for name, value in (("WIDTH", 320), ("HEIGHT", 180), ("SAMPLES", 1)):
+    for name, value in (("WIDTH", 960), ("HEIGHT", 540), ("SAMPLES", 1)):
         monkeypatch.setattr(render, name, value)
     placed.seip.view.picture, placed.seip.view.picture_of = str(tmp_path / "report.png"), "RENDER"
     assert bpy.ops.seip.save_picture() == {"FINISHED"}
     assert bpy.ops.seip.save_picture() == {"FINISHED"}
     assert sorted(path.name for path in tmp_path.glob("*.png")) == ["report-2.png", "report.png"]
     with Image.open(tmp_path / "report.png") as picture:
-        assert picture.width > 2 * picture.height
+        plan = round(DPI * (MAP_WIDTH + 2 * MARGIN))
+        assert picture.width == 2 * plan + 3 * GAP
+        assert picture.width > picture.height
 
 
 def test_a_picture_of_a_viewport_needs_one(placed, tmp_path):

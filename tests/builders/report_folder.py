@@ -10,14 +10,19 @@ import numpy as np
 import shapely
 
 from seip_addon.core.choosing.placement.deployment import deploy
-from seip_addon.core.choosing.placement.objective import Objective, Solution, placement_constraints
+from seip_addon.core.choosing.placement.objective import Objective, Solution, placement_constraints, placement_problem
+from seip_addon.core.choosing.placement.price_front import price_front
 from seip_addon.core.choosing.placement.problem import Placement, relative_gap
+from seip_addon.core.choosing.placement.returns_summary import CrossingReturns
 from seip_addon.core.geometry.geo_reference import GeoReference
+from seip_addon.core.output.pictures.close_ups import save_close_ups
 from seip_addon.core.output.pictures.plan_view import save_plan_view
 from seip_addon.core.output.results.placement_file import save_placement
 from seip_addon.core.output.results.placement_record import Provenance, placement_record
 from seip_addon.core.output.results.site_file import save_site_file
+from seip_addon.core.progress import finish
 from seip_addon.core.sensing.visibility.grid import VisibilityGrid
+from seip_addon.core.site.locations import locations
 from seip_addon.core.site.scene_geometry import NamedArea
 from seip_addon.core.storage.json_dataclass import as_json
 from tests.builders.small_junction import Example, make_example
@@ -26,10 +31,16 @@ NAME = "Crossing <script>alert(1)</script> & “Ecke”"
 CREATED = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 UTM = GeoReference("EPSG:32632", (-4_500_000.0, 5_300_000.0, 400.0, 0.0))
 KEY = "ab" * 32
+CROSSING = CrossingReturns("Crossing of High Street", 4.25)
 
 
-def make_folder(folder: Path, *, goal: Objective | None = None, place: GeoReference = UTM, **found) -> Example:
-    """Write what `seip place` writes, but for what only Blender can, and return what it is about."""
+def make_folder(
+    folder: Path, *, goal: Objective | None = None, place: GeoReference = UTM, effort: float = 0.0, **found
+) -> Example:
+    """Write what `seip place` writes, but for what only Blender can, and return what it is about.
+
+    The front of other numbers of sensors is searched for with an effort above 0.
+    """
     example = make_example()
     example = replace(
         example,
@@ -39,11 +50,16 @@ def make_folder(folder: Path, *, goal: Objective | None = None, place: GeoRefere
             places=(
                 NamedArea("Mill Lane <i>", shapely.box(-55, -7, -7, 7)),
                 NamedArea("High Street", shapely.box(7, -7, 55, 7)),
+                NamedArea(CROSSING.name, shapely.box(9, -7, 13, 7), crossing=True),
             ),
         ),
     )
     goal = goal or Objective(count=3)
-    solution = make_solution(example, goal, **found)
+    solution = replace(make_solution(example, goal, **found), crossings=(CROSSING,))
+    problem = placement_problem(example.site, example.visible, example.models, goal)
+    if effort:
+        solution = replace(solution, front=finish(price_front(problem, solution, effort)))
+    deployment = solution.deployment
     settings = {
         "grid_spacing_m": 2.0,
         "candidates": {"sensors": ["type1", "type2"], "heights": [3.5, 5.4]},
@@ -58,12 +74,16 @@ def make_folder(folder: Path, *, goal: Objective | None = None, place: GeoRefere
         inputs={"visibility": KEY},
         warnings=("type2: sees <far>",),
     )
+    feet = np.array([sensor.foot[:2] for sensor in deployment.sensors])
+    named = zip(record.sensors, locations(example.geometry, feet), strict=True)
+    record = replace(record, sensors=tuple(replace(sensor, location=words) for sensor, words in named))
     folder.mkdir(parents=True, exist_ok=True)
     save_placement(folder / "placement.json", record)
     problem = placement_constraints(example.site, example.models, goal)
     save_site_file(folder / "site.npz", KEY, example.geometry, example.site, solution, problem)
     VisibilityGrid(np.packbits(example.visible, axis=1), example.visible.shape, KEY, {}).save(folder / "visibility.npz")
-    save_plan_view(folder / "plan.png", example.geometry, example.site, example.deployment)
+    save_plan_view(folder / "plan.png", example.geometry, example.site, deployment)
+    save_close_ups(folder / "sensors.png", example.geometry, example.site, deployment, (), {})
     return example
 
 

@@ -54,6 +54,7 @@ def test_the_folder_holds_every_result(folder):
         "site.npz",
         "scene.glb",
         "plan.png",
+        "sensors.png",
         "placed.blend",
     }
 

@@ -1,5 +1,7 @@
 import hashlib
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import bpy
 import matplotlib.pyplot as plt
@@ -8,12 +10,13 @@ import pytest
 
 from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.errors import SeipError
+from seip_addon.core.output.pictures import labelled_view
 from seip_addon.core.output.pictures.coverage_colours import Colouring, colouring, of_placement
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.scene import contract
 from seip_addon.scene.coverage_colours import colour_coverage, recolour, show_seen_by
 from seip_addon.scene.materials import linear
-from seip_addon.scene.render import save_rendered_view
+from seip_addon.scene.render import rendered_pictures
 from seip_addon.scene.traffic import animate
 from seip_addon.scene.write import LIFT, clear_result, shown_legend, write_result
 from tests.builders.scene_by_hand import make_scene
@@ -154,6 +157,13 @@ def test_the_result_survives_saving_and_opening(example, scene, tmp_path):
     assert len(coverage(scene).data.attributes["seip_seen"].data) == len(example.site.targets)
 
 
+def save_rendered_view(path, scene, site, deployment):
+    """Render and label the view as `write_result_folder` does, without close-ups."""
+    with TemporaryDirectory() as folder:
+        taken = rendered_pictures(scene, site, deployment, Path(folder), close_ups=False)
+        labelled_view.save_labelled_view(path, taken.view, site, deployment, shown_legend(scene), taken.sight)
+
+
 def test_the_rendered_view_changes_nothing_in_the_file(example, scene, tmp_path, capfd, monkeypatch):
     monkeypatch.setattr("seip_addon.scene.render.SAMPLES", 1)
     monkeypatch.setattr("seip_addon.scene.render.WIDTH", 480)
@@ -179,7 +189,8 @@ def test_the_rendered_view_shows_traffic_where_it_is_now(example, scene, tmp_pat
     monkeypatch.setattr("seip_addon.scene.render.WIDTH", 160)
     monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 90)
     monkeypatch.setattr(
-        "seip_addon.scene.render.save_labelled_view", lambda *given: pictures.append(plt.imread(given[1]))
+        "seip_addon.core.output.pictures.labelled_view.save_labelled_view",
+        lambda *given: pictures.append(plt.imread(given[1])),
     )
     write_result(scene, example.site, example.deployment)
     for begin, end in ((-24.0, 24.0), (6.0, 6.0), (-24.0, -24.0)):  # driving, and parked where it is now and where not
@@ -200,7 +211,9 @@ def test_a_sensor_behind_a_building_is_marked_as_hidden(example, scene, tmp_path
     monkeypatch.setattr("seip_addon.scene.render.SAMPLES", 1)
     monkeypatch.setattr("seip_addon.scene.render.WIDTH", 64)
     monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 36)
-    monkeypatch.setattr("seip_addon.scene.render.save_labelled_view", lambda *given: seen.update(sight=given[-1]))
+    monkeypatch.setattr(
+        "seip_addon.core.output.pictures.labelled_view.save_labelled_view", lambda *given: seen.update(sight=given[-1])
+    )
     names = example.site.candidates.position_name[example.site.candidates.position_of].tolist()
     position = example.site.candidates.position
     clear = int(np.argmin(np.hypot(*(position[:, :2] - (47.0, 9.0)).T)))  # open to the south
@@ -211,6 +224,21 @@ def test_a_sensor_behind_a_building_is_marked_as_hidden(example, scene, tmp_path
     save_rendered_view(tmp_path / "view.png", scene, example.site, deployment)
     hidden = dict(zip([sensor.pose for sensor in deployment.sensors], seen["sight"].hidden.tolist(), strict=True))
     assert hidden == {poses[0]: False, poses[1]: True}
+
+
+def test_each_sensor_has_a_close_up_that_shows_it(example, scene, tmp_path, monkeypatch):
+    monkeypatch.setattr("seip_addon.scene.render.SAMPLES", 1)
+    monkeypatch.setattr("seip_addon.scene.render.WIDTH", 64)
+    monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 36)
+    monkeypatch.setattr("seip_addon.scene.render.TILE", (64, 48))
+    write_result(scene, example.site, example.deployment)
+    kept, objects = settings_of(scene), len(bpy.data.objects)
+    taken = rendered_pictures(scene, example.site, example.deployment, tmp_path)
+    assert [picture.size for picture in taken.close_ups] == [(64, 48)] * 3
+    assert list(taken.places) == ["S1", "S2", "S3"]
+    assert all(0.05 < share < 0.95 for place in taken.places.values() for share in place)
+    assert len({picture.tobytes() for picture in taken.close_ups}) == 3
+    assert (settings_of(scene), len(bpy.data.objects)) == (kept, objects)
 
 
 def colours_of(obj):
@@ -259,7 +287,9 @@ def test_the_rendered_view_explains_the_colours_that_are_shown(example, scene, t
     legends = []
     monkeypatch.setattr("seip_addon.scene.render.WIDTH", 64)
     monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 36)
-    monkeypatch.setattr("seip_addon.scene.render.save_labelled_view", lambda *given: legends.append(given[-2]))
+    monkeypatch.setattr(
+        "seip_addon.core.output.pictures.labelled_view.save_labelled_view", lambda *given: legends.append(given[-2])
+    )
     returns = np.full(len(example.site.targets), 7.0)
     for deployment in (example.deployment, replace(example.deployment, pedestrian_returns=returns)):
         write_result(scene, example.site, deployment)

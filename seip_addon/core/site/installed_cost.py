@@ -51,10 +51,26 @@ class InstalledCost:
         bracket : float, metres
             Distance of sensors from the axis of an existing pole.
         """
+        pole, post = (sum(self.items(on_pole=on_pole, bracket=bracket).values()) for on_pole in (True, False))
+        return replace(candidates, installation=np.where(candidates.on_pole, pole, post))
+
+    def items(self, *, on_pole: bool, bracket: float) -> dict[str, float]:
+        """Return the cost of each item of an installation by its name, in dollars; items without cost are left out.
+
+        Parameters
+        ----------
+        on_pole : bool
+            Whether the sensor is mounted on an existing pole.
+        bracket : float, metres
+            Distance of sensors from the axis of an existing pole.
+        """
         arm = self.mast_arm_usd if bracket > self.mast_arm_beyond_m else 0.0
-        pole = self.existing_pole_usd + arm + self.power_existing_pole_usd
-        post = self.new_post_usd + self.power_new_post_usd
-        return replace(candidates, installation=np.where(candidates.on_pole, pole, post) + self.backhaul_usd)
+        items = (
+            {"mounting on the pole": self.existing_pole_usd, "mast arm": arm, "power": self.power_existing_pole_usd}
+            if on_pole
+            else {"new post": self.new_post_usd, "power": self.power_new_post_usd}
+        )
+        return {name: cost for name, cost in {**items, "data line": self.backhaul_usd}.items() if cost}
 
 
 def load_installed_cost(path: str | os.PathLike[str] | None = None) -> InstalledCost:

@@ -15,11 +15,12 @@ from ..choosing.placement.objective import (
     Objective,
     Solution,
     criterion_of,
-    optimise,
     placement_problem,
     target_weights,
     with_count,
 )
+from ..choosing.placement.optimisation import optimise
+from ..choosing.placement.price_front import price_front
 from ..choosing.placement.risk import Risk
 from ..choosing.placement.search_limits import SolverLimits
 from ..choosing.robustness.assumed_heights import height_notes
@@ -33,7 +34,7 @@ from ..choosing.robustness.traffic_study import LAYER_NAMES, traffic_message, tr
 from ..choosing.robustness.visibility_in_traffic import TrafficLayer
 from ..errors import SeipError
 from ..progress import Progress
-from .returns import place_by_returns
+from .returns import crossing_returns, place_by_returns
 from .survey import Survey, surroundings
 from .traffic_runs import TrafficRuns
 
@@ -82,6 +83,13 @@ def place(
     if measure is None and deployment.sensors:
         notes += yield from _evaluated(survey, replace(solution, deployment=deployment), runs)
     return replace(solution, deployment=deployment, placement=replace(solution.placement, notes=tuple(notes)))
+
+
+def with_context(survey: Survey, solution: Solution) -> Generator[Progress, None, Solution]:
+    """Return a solution with what reports add: other numbers of sensors, and a pedestrian's returns on crossings."""
+    problem = placement_problem(survey.site, survey.grid.visible, survey.models, solution.objective)
+    front = yield from price_front(problem, solution)
+    return replace(solution, front=front, crossings=crossing_returns(survey, solution))
 
 
 def _nominal(survey: Survey, objective: Objective, limits: SolverLimits) -> Generator[Progress, None, Solution]:

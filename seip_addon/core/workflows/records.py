@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import replace
 
+import numpy as np
+
 from ..choosing.placement.deployment import deploy, pose_prices
 from ..choosing.placement.objective import MOVED, Solution, target_weights
 from ..errors import SeipError
@@ -15,6 +17,7 @@ from ..sensing.lidar.catalogue import find_models, load_catalogue
 from ..sensing.returns.returns_grid import returns_key
 from ..sensing.returns.road_users import road_users
 from ..sensing.visibility.ray_casting import engine_name
+from ..site.locations import locations
 from ..storage.files import digest
 from ..storage.json_dataclass import as_json
 from .moved_sensors import evaluate_moved_sensors
@@ -61,7 +64,7 @@ def record_of(survey: Survey, solution: Solution, provenance: Provenance, *, ren
     inputs = inputs_of(survey)
     if solution.deployment.returns is None:
         del inputs[_RETURNS]
-    return placement_record(
+    record = placement_record(
         survey.site,
         replace(solution, placement=replace(solution.placement, notes=notes)),
         provenance,
@@ -69,6 +72,9 @@ def record_of(survey: Survey, solution: Solution, provenance: Provenance, *, ren
         inputs=inputs,
         warnings=survey.warnings,
     )
+    feet = np.array([sensor.foot[:2] for sensor in solution.deployment.sensors]).reshape(-1, 2)
+    named = zip(record.sensors, locations(survey.geometry, feet), strict=True)
+    return replace(record, sensors=tuple(replace(sensor, location=words) for sensor, words in named))
 
 
 def restored_solution(survey: Survey, record: PlacementRecord) -> Generator[Progress, None, Solution]:
@@ -102,7 +108,7 @@ def restored_solution(survey: Survey, record: PlacementRecord) -> Generator[Prog
     known = replace(deployment, gain_band=record.coverage.gain_band, returns=record.returns)
     if record.returns is not None:
         known = replace(known, pedestrian_returns=stored_pedestrian_returns(survey, chosen))
-    return Solution(objective, record.placement(covered), None, known)
+    return Solution(objective, record.placement(covered), None, known, front=record.front, crossings=record.crossings)
 
 
 def _restored_by_hand(survey: Survey, record: PlacementRecord) -> Generator[Progress, None, Solution]:

@@ -23,9 +23,10 @@ from ..choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
 from ..choosing.placement.search_limits import SolverLimits
 from ..errors import SeipError
 from ..progress import Progress
+from ..sensing.returns.expected_returns import expected_returns
 from ..sensing.returns.returns_grid import ReturnsGrid, returns_key, stored_returns
 from ..sensing.returns.road_users import BODIES, RoadUsers, road_users
-from ..sensing.visibility.ray_casting import engine_name
+from ..sensing.visibility.ray_casting import engine_name, make_ray_caster
 from ..site.targets import Targets
 from .survey import Survey
 
@@ -60,6 +61,40 @@ def place_by_returns(survey: Survey, objective: Objective, limits: SolverLimits)
             returns=summary,
             pedestrian_returns=_near_targets(site.targets, users, grid, placement.chosen),
         ),
+    )
+
+
+def crossing_returns(survey: Survey, solution: Solution) -> tuple[CrossingReturns, ...]:
+    """Return the least expected returns from a pedestrian on each crossing, of all sensors of a solution together."""
+    deployment = solution.deployment
+    if deployment.returns is not None:
+        return deployment.returns.crossings
+    users = road_users(survey.geometry)
+    on_crossing = np.flatnonzero(users.crossing >= 0)
+    if not len(on_crossing) or not deployment.sensors:
+        return ()
+    on_foot = replace(
+        users,
+        xyz=users.xyz[on_crossing],
+        body=users.body[on_crossing],
+        weight=users.weight[on_crossing],
+        central=users.central[on_crossing],
+        crossing=users.crossing[on_crossing],
+    )
+    caster = make_ray_caster(survey.site.triangles, engine_name(survey.settings.engine))
+    together = sum(
+        expected_returns(caster, sensor.xyz, sensor.orientation, sensor.model, on_foot)[0]
+        for sensor in deployment.sensors
+    )
+    return _least_on_crossings(np.asarray(together, dtype=np.float64), on_foot)
+
+
+def _least_on_crossings(returns: Float, users: RoadUsers) -> tuple[CrossingReturns, ...]:
+    """Return the least of the returns of road users (m,) on each crossing that some of them are on."""
+    return tuple(
+        CrossingReturns(name, float(returns[users.crossing == number].min()))
+        for number, name in enumerate(users.crossings)
+        if (users.crossing == number).any()
     )
 
 
@@ -107,12 +142,7 @@ def summarised(grid: ReturnsGrid, users: RoadUsers, objective: Objective, chosen
     in_regions = weights_in_regions(objective, users.weight, users.central)
     kinds = [(name, users.body == body) for body, name in enumerate(BODIES)]
     of_each: dict[str, float] = {name: _typical(together[own], in_regions[own]) for name, own in kinds}
-    crossings = tuple(
-        CrossingReturns(name, float(together[users.crossing == number].min()))
-        for number, name in enumerate(users.crossings)
-        if (users.crossing == number).any()
-    )
-    return ReturnsSummary(_typical(together, weight), of_each, crossings)
+    return ReturnsSummary(_typical(together, weight), of_each, _least_on_crossings(together, users))
 
 
 def _typical(returns: Float, weight: Float) -> float:

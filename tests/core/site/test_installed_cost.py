@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from seip_addon.core.choosing.placement.deployment import deploy, pose_prices
-from seip_addon.core.choosing.placement.objective import Objective, optimise, placement_problem
+from seip_addon.core.choosing.placement.objective import Objective, placement_problem
+from seip_addon.core.choosing.placement.optimisation import optimise
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
@@ -95,3 +96,14 @@ def test_a_mistake_has_its_sentence(tmp_path, text, says):
 def test_without_costs_nothing_is_added(example):
     prices = np.array([example.models[key].price for key in example.site.candidates.sensor])
     np.testing.assert_array_equal(pose_prices(example.site.candidates, example.models), prices)
+
+
+@pytest.mark.parametrize(("bracket", "arm"), [(0.4, 0.0), (2.0, 7500.0)])
+def test_the_items_of_an_installation_add_up_to_its_cost(bracket, arm):
+    table = load_installed_cost()
+    pole, post = (table.items(on_pole=on_pole, bracket=bracket) for on_pole in (True, False))
+    assert pole.get("mast arm", 0.0) == arm
+    assert "mast arm" not in post
+    assert sum(pole.values()) == 1000.0 + arm + 3000.0
+    assert sum(post.values()) == 5500.0 + 1000.0 + 3000.0
+    assert "power" not in pole  # costs nothing there

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.choosing.placement.objective import Objective, optimise
+from seip_addon.core.choosing.placement.objective import Objective
+from seip_addon.core.choosing.placement.optimisation import optimise
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue

@@ -13,6 +13,7 @@ from .bounds import bound_from, can_reach, lagrangian_bound, least_price
 from .feasibility import starting_choice
 from .greedy import drop_redundant, greedy, greedy_with_swaps
 from .integer_program import reaching
+from .objective import SAME_PRICE
 from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
 from .reduced_problem import Instance, common_unit, make_instance
 from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
@@ -20,7 +21,6 @@ from .solver import prove, scale_notes, solve_within
 from .solvers import check_solver
 from .tie_breaking import fewest
 
-SAME_PRICE = "among equally cheap placements "  # beginning of the note on the coverage that another one may reach
 MIN_TIE_BREAKING_LIMIT = 1.0  # least limit, seconds or units of work, of the choice among equally cheap placements
 
 

@@ -2,32 +2,30 @@
 
 import difflib
 import math
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import Annotated, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SeipError
-from ...limits import CHOSEN_WEIGHT, DISTANCE, PRICE
-from ...progress import Progress
+from ...limits import CHOSEN_WEIGHT, COUNT, DISTANCE, PRICE, SHARE
 from ...sensing.lidar.carla_dropoff import CarlaDropoff
 from ...sensing.lidar.model import LidarModel
 from ...settings import setting
 from ...site.site import Candidates, Site
-from .cheapest import cheapest_for_coverage
-from .deployment import BAND, UNRANKED, Deployment, deploy, pose_prices
+from .deployment import BAND, UNRANKED, Deployment, pose_prices
 from .problem import Placement, PlacementConstraints, PlacementProblem
+from .returns_summary import CrossingReturns
 from .risk import Failure, Risk
 from .scenarios import Scenarios
-from .search_limits import DEFAULT_LIMITS, SolverLimits
-from .solver import solve, solve_greedy
 
 DEFAULT_COUNT = 4  # number of sensors if neither a number nor a budget nor a coverage is given: that of the study
 MOVED = "moved by hand"  # status of a placement whose sensors a user has moved
 MOVED_MESSAGE = "Moved by hand: evaluated at the sensors' current poses, without proof of optimality."
 CHOSEN_FOR = "chosen "  # beginning of a note on what was optimised in place of nominal coverage
+SAME_PRICE = "among equally cheap placements "  # beginning of the note on the coverage that another one may reach
 
 TAILS = {"mean": 1.0, "worst-quarter": 0.25, "worst": 0.0}
 """Share of the scenarios, the worst ones, over which each risk measure averages."""
@@ -224,6 +222,25 @@ class Evaluation(Protocol):
         """Return lines that compare the placement with the nominal optimum."""
 
 
+@dataclass(frozen=True)
+class FrontPoint:
+    """The best placement found with at most ``count`` sensors.
+
+    Parameters
+    ----------
+    coverage : float
+        Share of the weight that it covers.
+    price : float, dollars
+    missed : float
+        Largest share of the weight that another placement could cover in addition; 0 where this one is proven optimal.
+    """
+
+    count: Annotated[int, COUNT]
+    coverage: Annotated[float, SHARE]
+    price: Annotated[float, PRICE]
+    missed: Annotated[float, SHARE]
+
+
 @dataclass(frozen=True, eq=False)
 class Solution:
     """A solution: an objective with its placement, certificate, deployment and evaluation.
@@ -236,6 +253,10 @@ class Solution:
         Greedy solution of the same problem; None for the reverse problem and over scenarios.
     evaluation : Evaluation, optional
         Evaluation on held-out scenarios, where the placement was optimised over scenarios.
+    front : tuple of FrontPoint
+        Best placements found with fewer and more sensors; see `price_front`. Empty if they were not searched for.
+    crossings : tuple of CrossingReturns
+        Expected returns from a pedestrian on each crossing, of all sensors together. Empty if not computed.
     """
 
     objective: Objective
@@ -243,6 +264,8 @@ class Solution:
     greedy: Placement | None
     deployment: Deployment
     evaluation: Evaluation | None = None
+    front: tuple[FrontPoint, ...] = ()
+    crossings: tuple[CrossingReturns, ...] = ()
 
     @property
     def certificate(self) -> str:
@@ -367,35 +390,6 @@ def placement_constraints(site: Site, models: Mapping[str, LidarModel], objectiv
 def check_objective(site: Site, models: Mapping[str, LidarModel], objective: Objective) -> None:
     """Raise SeipError if a site cannot meet an objective, before any ray is cast."""
     placement_constraints(site, models, objective)
-
-
-def optimise(
-    site: Site,
-    visible: NDArray[np.bool_],
-    models: Mapping[str, LidarModel],
-    objective: Objective,
-    limits: SolverLimits = DEFAULT_LIMITS,
-) -> Generator[Progress, None, Solution]:
-    """Optimise a placement on a site: the most coverage, or the least price for a coverage.
-
-    Parameters
-    ----------
-    visible : (c, t) bool
-
-    Raises
-    ------
-    SeipError
-        Same as for `placement_problem`, `solve` and `cheapest_for_coverage`.
-    """
-    problem = placement_problem(site, visible, models, objective)
-    if objective.coverage is not None:
-        placement = yield from cheapest_for_coverage(problem, objective.coverage, limits)
-        greedy = None
-    else:
-        placement = yield from solve(problem, limits)
-        greedy = solve_greedy(problem)
-    deployment = deploy(site, models, visible[placement.chosen], placement.chosen)
-    return Solution(with_count(objective, site), placement, greedy, deployment)
 
 
 def with_count(objective: Objective, site: Site) -> Objective:

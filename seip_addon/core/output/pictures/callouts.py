@@ -14,7 +14,9 @@ DISTANCE_COSTS = 0.35 * np.repeat(np.array(LABEL_DISTANCES) - 1.0, LABEL_DIRECTI
 """What distance costs, where hiding as much of the subject as any place would costs 1."""
 
 
-def place_callouts(anchors: Float, sizes: Float, bounds: Bounds, clearance: float, subject: Float) -> Float:
+def place_callouts(  # what a label must keep off is of several kinds
+    anchors: Float, sizes: Float, bounds: Bounds, clearance: float, subject: Float, taken: Float | None = None
+) -> Float:
     """Return the centre of each label's box, (k, 2) float64.
 
     Labels are set one after the other without leaving the picture or touching an anchor or an earlier label: near their
@@ -33,10 +35,13 @@ def place_callouts(anchors: Float, sizes: Float, bounds: Bounds, clearance: floa
         To keep between a label and everything else.
     subject : (m, 2) float64
         Evenly spread points of what labels had better not hide.
+    taken : (n, 4) float64, optional
+        Left, bottom, right and top of boxes in which no label may be.
     """
     low, high = np.array(bounds[:2]), np.array(bounds[2:])
-    taken_low = anchors - clearance
-    taken_high = anchors + clearance
+    others = np.empty((0, 4)) if taken is None else taken.reshape(-1, 4)
+    taken_low = np.vstack((anchors - clearance, others[:, :2]))
+    taken_high = np.vstack((anchors + clearance, others[:, 2:]))
     centres = np.empty_like(anchors)
     middle = anchors.mean(axis=0) if len(anchors) else anchors
     for index, (anchor, size) in enumerate(zip(anchors, sizes, strict=True)):

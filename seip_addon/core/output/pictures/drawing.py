@@ -2,14 +2,18 @@
 
 import io
 import os
+import warnings
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.text import Text
+from matplotlib.font_manager import FontProperties, findfont, get_font
+from matplotlib.ft2font import FT2Font, LoadFlags
 from PIL import Image
 
 from ...arrays import Boolean, Float
@@ -23,10 +27,15 @@ from .palette import INK, PAPER, SOFT_INK
 MARKERS = ("o", "s", "^", "D", "v", "P", "h", "X")
 SENSOR_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 11.0, "mfc": INK, "mec": PAPER, "mew": 1.6}
 HIDDEN_MARK: dict[str, Any] = {"mfc": "none", "mec": INK, "mew": 2.0}
-MARK_RADIUS, LABEL_SIZE, LABEL_PADDING = 8.0, 8.5, 0.35  # points, points, share of the size
+MARK_RADIUS, LABEL_SIZE, LABEL_PADDING = 8.0, 10.0, 0.35  # points, points, share of the size
+MANY_MARK_SIZE = 8.0  # points
+ATTRIBUTION_SIZE = 8.5  # points
 ATTRIBUTION_ORDER = 100  # drawing order of credits: over everything
-SIZE_STEP = 0.1  # points
-MAX_LABELLED = 40  # more sensors than these get no labels on the picture
+MAX_LABELLED_IN_FULL = 12  # of more sensors than these the legend alone gives type and height
+NAME_SIZE, RESULT_SIZE = 18.0, 12.0  # points
+TOP, NAME_LINE, RESULT_LINE = 0.2, 0.34, 0.24  # inches
+MEASURED_SIZE = 20.0  # points, at which the widths of texts are measured
+SEPARATOR = "  ·  "
 
 
 def save_png(path: str | os.PathLike[str], figure: Figure) -> None:
@@ -70,10 +79,17 @@ def markers_of(deployment: Deployment) -> dict[str, str]:
     return {key: MARKERS[index % len(MARKERS)] for index, key in enumerate(keys)}
 
 
-def draw_sensors(
-    axes: Axes, deployment: Deployment, points: Float, road: Float, *, zorder: float, hidden: Boolean | None = None
+def draw_sensors(  # noqa: PLR0913  # what labels need to keep off
+    axes: Axes,
+    deployment: Deployment,
+    points: Float,
+    road: Float,
+    *,
+    zorder: float,
+    hidden: Boolean | None = None,
+    taken: Float | None = None,
 ) -> None:
-    """Mark each sensor and write its label, type and height next to it, no label on another.
+    """Mark each sensor and write its label next to it, no label on another; with type and height if there are few.
 
     Parameters
     ----------
@@ -87,45 +103,88 @@ def draw_sensors(
         Drawing order of the marks; labels and their lines are drawn below.
     hidden : (k,) bool, optional
         Hidden sensors, which are marked by an outline only.
+    taken : (n, 4) float64, optional
+        Left, bottom, right and top of boxes without labels, in data coordinates.
     """
-    if 0 < len(points) <= MAX_LABELLED:
-        words = [f"{s.label}  {s.model.key} · {s.height:.3g} m{s.turned}" for s in deployment.sensors]
-        draw_callouts(axes, points, words, road, zorder - 0.5)
+    sensors = deployment.sensors
+    in_full = len(sensors) <= MAX_LABELLED_IN_FULL
+    words = [f"{s.label}  {s.model.key} · {s.height:.3g} m{s.turned}" if in_full else s.label for s in sensors]
+    draw_callouts(axes, points, words, road, zorder - 0.5, taken)
     markers = markers_of(deployment)
     hidden = np.zeros(len(points), dtype=bool) if hidden is None else hidden
-    for sensor, point, behind in zip(deployment.sensors, points, hidden, strict=True):
-        style = SENSOR_MARK | HIDDEN_MARK if behind else SENSOR_MARK
+    size = SENSOR_MARK["markersize"] if in_full else MANY_MARK_SIZE
+    for sensor, point, behind in zip(sensors, points, hidden, strict=True):
+        style = (SENSOR_MARK | HIDDEN_MARK if behind else SENSOR_MARK) | {"markersize": size}
         axes.plot(*point, marker=markers[sensor.model.key], zorder=zorder, **style)
 
 
-def draw_title(figure: Figure, site: Site, deployment: Deployment, left: float) -> None:
-    """Write the site's name and the result at the head of a page, ``left`` inches from its border."""
-    width, height = figure.get_size_inches()
-    style = {"x": left / width, "ha": "left", "va": "top", "parse_math": False}
-    room = width - 2 * left
-    title = figure.text(y=1 - 0.20 / height, s=site.name, weight="bold", color=INK, **style)
-    line = figure.text(y=1 - 0.55 / height, s=summary(deployment), color=SOFT_INK, **style)
-    _fit(title, room, 17.0, 12.0)
-    _fit(line, room, 11.0, 4.0)
+def text_width(words: str, size: float, weight: str = "normal") -> float:
+    """Return the width of a text in inches at a size in points."""
+    font = _font(weight)
+    font.set_size(MEASURED_SIZE, 72)  # each time: figures set the size of the same font
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of letters that the type lacks, which drawing tells of
+        font.set_text(words, 0.0, flags=LoadFlags.NO_HINTING)
+    return float(font.get_width_height()[0]) / 64.0 * size / MEASURED_SIZE / 72.0
 
 
-def _fit(text: Text, room: float, size: float, least: float) -> None:
-    """Fit a text into a width in inches: at a size in points, a smaller one down to ``least``, or cut short."""
-    words = text.get_text()
-    text.set_fontsize(size)
-    while _inches(text) > room and size > least:  # letters have whole pixels: widths do not quite follow the size
-        size = max(min(size - SIZE_STEP, size * room / _inches(text)), least)
-        text.set_fontsize(size)
-    for length in range(len(words) - 1, 0, -1):
-        if _inches(text) <= room:
-            return
-        text.set_text(f"{words[:length].rstrip()}…")
+@cache
+def _font(weight: str) -> FT2Font:
+    return get_font(findfont(FontProperties(weight=weight)))
 
 
-def _inches(text: Text) -> float:
-    """Return the width of a text on its page."""
-    figure = text.get_figure(root=True)
-    return float(text.get_window_extent().width / figure.dpi) if figure is not None else 0.0
+def wrapped(words: str, width: float, size: float, weight: str = "normal") -> list[str]:
+    """Return a text in lines that fit a width in inches at a size in points."""
+    lines, line = [], ""
+    for word in words.split():
+        longer = f"{line} {word}" if line else word
+        if text_width(longer, size, weight) <= width:
+            line = longer
+            continue
+        lines += [line] if line else []
+        line = word
+        while text_width(line, size, weight) > width and len(line) > 1:  # one word wider than the line
+            fits = next(n for n in range(len(line) - 1, 0, -1) if n == 1 or text_width(line[:n], size, weight) <= width)
+            lines.append(line[:fits])
+            line = line[fits:]
+    return [*lines, line] if line or not lines else lines
+
+
+@dataclass(frozen=True)
+class Heading:
+    """The site's name and the result, in lines that fit a page."""
+
+    name: tuple[str, ...]
+    result: tuple[str, ...]
+
+    @property
+    def height(self) -> float:
+        """Height on the page, inches."""
+        return TOP + len(self.name) * NAME_LINE + len(self.result) * RESULT_LINE + TOP / 2
+
+    def draw(self, figure: Figure, left: float) -> None:
+        """Write it at the head of a page, ``left`` inches from its border."""
+        width, height = figure.get_size_inches()
+        style = {"x": left / width, "ha": "left", "va": "top", "parse_math": False}
+        y = TOP
+        for line in self.name:
+            figure.text(y=1 - y / height, s=line, size=NAME_SIZE, weight="bold", color=INK, **style)
+            y += NAME_LINE
+        for line in self.result:
+            figure.text(y=1 - y / height, s=line, size=RESULT_SIZE, color=SOFT_INK, **style)
+            y += RESULT_LINE
+
+
+def heading_of(site: Site, deployment: Deployment, room: float) -> Heading:
+    """Return the heading of a picture, ``room`` inches wide."""
+    lines: list[str] = []
+    for part in summary_parts(deployment):
+        joined = f"{lines[-1]}{SEPARATOR}{part}" if lines else part
+        if lines and text_width(joined, RESULT_SIZE) <= room:
+            lines[-1] = joined
+        else:
+            lines += wrapped(part, room, RESULT_SIZE)
+    return Heading(tuple(wrapped(site.name, room, NAME_SIZE, "bold")), tuple(lines))
 
 
 def draw_attribution(axes: Axes, attribution: Sequence[str]) -> None:
@@ -133,12 +192,37 @@ def draw_attribution(axes: Axes, attribution: Sequence[str]) -> None:
     if not attribution:
         return
     paper: dict[str, Any] = {"boxstyle": "square,pad=0.25", "facecolor": PAPER, "alpha": 0.85, "edgecolor": "none"}
-    style: dict[str, Any] = {"ha": "right", "va": "bottom", "size": 7, "color": INK, "bbox": paper, "parse_math": False}
+    style: dict[str, Any] = {
+        "ha": "right",
+        "va": "bottom",
+        "size": ATTRIBUTION_SIZE,
+        "color": INK,
+        "bbox": paper,
+        "parse_math": False,
+    }
     axes.text(0.995, 0.005, "\n".join(attribution), transform=axes.transAxes, zorder=ATTRIBUTION_ORDER, **style)
+
+
+def credits_box(axes: Axes, attribution: Sequence[str]) -> tuple[float, float, float, float]:
+    """Return left, bottom, right and top of the credits of `draw_attribution`, in data coordinates."""
+    texts = [text for text in axes.texts if text.get_text() == "\n".join(attribution)]
+    extent = texts[-1].get_window_extent().padded(ATTRIBUTION_SIZE / 2 * axes.figure.dpi / 72)
+    (left, bottom), (right, top) = axes.transData.inverted().transform(extent.get_points())
+    return left, bottom, right, top
+
+
+def credits_of(site: Site, created: str) -> tuple[str, ...]:
+    """Return the credits of a picture: those that the sources demand, and the date of the placement if it is known."""
+    return (*site.attribution, *([f"Placement of {created[:10]}"] if created else []))
 
 
 def summary(deployment: Deployment) -> str:
     """Return the result in one line."""
+    return SEPARATOR.join(summary_parts(deployment))
+
+
+def summary_parts(deployment: Deployment) -> list[str]:
+    """Return the result in parts: what is seen, and the price."""
     sensors = counted(len(deployment.sensors), "sensor sees", "sensors see")
     band = deployment.gain_band
     between = f" ({percent(band.low)} to {percent(band.high)})" if band is not None and band.sheets else ""
@@ -149,8 +233,9 @@ def summary(deployment: Deployment) -> str:
         if deployment.central is not None:
             parts.append(f"{percent(deployment.central)} of its weighted part")
         parts.append(f"{percent(deployment.seen_twice)} seen twice")
-    parts.append(f"price {price_text(deployment.price, installed=deployment.installed)}")
-    return "  ·  ".join(parts)
+    price = price_text(deployment.price, installed=deployment.installed)
+    parts.append(price if deployment.installed else f"{price} for sensors")
+    return parts
 
 
 def percent(share: float) -> str:
@@ -160,19 +245,38 @@ def percent(share: float) -> str:
     return f"{min(share, 1.0 if share == 1.0 else 0.999):.1%}"
 
 
-def draw_callouts(axes: Axes, points: Float, words: list[str], road: Float, zorder: float) -> None:
-    """Write words next to points (k, 2), in data coordinates, off the road (t, 2) and each other where they can be."""
+def draw_callouts(  # as for `place_callouts`
+    axes: Axes, points: Float, words: list[str], road: Float, zorder: float, taken: Float | None = None
+) -> None:
+    """Write words next to points (k, 2), in data coordinates, off the road (t, 2) and each other where they can be.
+
+    No label is in a box of ``taken`` (n, 4): left, bottom, right and top.
+    """
+    if not len(points):
+        return
     boxed = {"boxstyle": f"round,pad={LABEL_PADDING}", "facecolor": PAPER, "edgecolor": SOFT_INK, "linewidth": 0.6}
     texts = [
-        axes.text(0, 0, label, ha="center", va="center", size=LABEL_SIZE, color=INK, bbox=boxed, zorder=zorder)
+        axes.text(
+            0,
+            0,
+            label,
+            ha="center",
+            va="center",
+            size=LABEL_SIZE,
+            color=INK,
+            bbox=boxed,
+            zorder=zorder,
+            parse_math=False,
+        )
         for label in words
     ]
     point = axes.figure.dpi / 72
     extents = [text.get_window_extent() for text in texts]
     sizes = np.array([(extent.width, extent.height) for extent in extents]) + 2 * LABEL_PADDING * LABEL_SIZE * point
     anchors = axes.transData.transform(points)
+    boxes = None if taken is None else axes.transData.transform(taken.reshape(-1, 2)).reshape(-1, 4)
     bounds = axes.get_window_extent().padded(-4.0 * point).extents
-    centres = place_callouts(anchors, sizes, bounds, MARK_RADIUS * point, axes.transData.transform(road))
+    centres = place_callouts(anchors, sizes, bounds, MARK_RADIUS * point, axes.transData.transform(road), boxes)
     for text, start, end in zip(texts, points, axes.transData.inverted().transform(centres), strict=True):
         text.set_position(end)
         axes.plot(*zip(start, end, strict=True), color=INK, linewidth=0.9, zorder=zorder - 0.1)

@@ -1,6 +1,7 @@
 """A rendered picture with the sensors' labels and a legend on it."""
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,13 +15,24 @@ from ...arrays import Boolean, Float
 from ...choosing.placement.deployment import Deployment
 from ...site.site import Site
 from .coverage_colours import Legend
-from .drawing import draw_attribution, draw_sensors, draw_title, percent, save_png
-from .palette import INK, PAPER, SOFT_INK
+from .drawing import (
+    ATTRIBUTION_SIZE,
+    credits_of,
+    draw_sensors,
+    heading_of,
+    percent,
+    save_png,
+    text_width,
+)
+from .palette import INK, PAPER
+from .plan_style import Style
 
 DPI = 160
-HEAD, FOOT, MARGIN = 0.86, 0.42, 0.2  # inches
-LEGEND_GAP = 0.22  # inches
+LEGEND_LINE, CREDIT_LINE, MARGIN = 0.3, 0.19, 0.2  # inches
+LEGEND_GAP, SWATCH = 0.22, 0.3  # inches
+LEGEND_SIZE = 9.5  # points
 BACKGROUND_COLOUR = "#e9edf0"
+HIDDEN_NOTE = "outlined sensors stand behind something"
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +52,15 @@ class Sight:
     targets: Float
 
 
-def save_labelled_view(
+def save_labelled_view(  # noqa: PLR0913  # what is written on the picture
     path: str | os.PathLike[str],
     picture: str | os.PathLike[str],
     site: Site,
     deployment: Deployment,
     legend: Legend | None,
     sight: Sight,
+    *,
+    created: str = "",
 ) -> None:
     """Write title, labels and legend on a picture of the scene, as PNG.
 
@@ -56,41 +70,72 @@ def save_labelled_view(
         The rendered PNG, transparent where there is nothing.
     legend : Legend or None
         What the colours on the road mean; None where the road has none.
+    created : str
+        Time of the placement (ISO 8601), whose date the picture carries.
     """
     pixels = imread(str(picture))
     height, width = pixels.shape[0] / DPI, pixels.shape[1] / DPI
-    figure = Figure((width, height + HEAD + FOOT), dpi=DPI, facecolor=PAPER)
+    heading = heading_of(site, deployment, width - 2 * MARGIN)
+    rows = [] if legend is None else _legend_rows(legend, width)
+    credit = credits_of(site, created)
+    foot = len(rows) * LEGEND_LINE + len(credit) * CREDIT_LINE + MARGIN / 2
+    page = height + heading.height + foot
+    figure = Figure((width, page), dpi=DPI, facecolor=PAPER)
     FigureCanvasAgg(figure)  # measures text
-    page = height + HEAD + FOOT
-    view = figure.add_axes((0.0, FOOT / page, 1.0, height / page))
+    view = figure.add_axes((0.0, foot / page, 1.0, height / page))
     view.set(xticks=(), yticks=(), facecolor=BACKGROUND_COLOUR)
     view.spines[:].set_visible(False)
     view.imshow(pixels, extent=(0.0, width, 0.0, height), interpolation="nearest", aspect="auto")
     view.set(xlim=(0.0, width), ylim=(0.0, height))
     size = np.array((width, height))
-    draw_sensors(view, deployment, sight.sensors * size, sight.targets * size, zorder=2, hidden=sight.hidden)
-    draw_attribution(view, site.attribution)
-    draw_title(figure, site, deployment, MARGIN)
+    taken = []
     if sight.hidden.any():
         paper = {"boxstyle": "square,pad=0.25", "facecolor": PAPER, "alpha": 0.85, "edgecolor": "none"}
-        note = "outlined sensors stand behind something"
-        view.text(MARGIN, 0.08, note, va="bottom", size=8, color=SOFT_INK, bbox=paper, zorder=3)
-    if legend is not None:
-        _draw_legend(figure, legend)
+        note = view.text(MARGIN, 0.08, HIDDEN_NOTE, va="bottom", size=ATTRIBUTION_SIZE, color=INK, bbox=paper, zorder=3)
+        extent = note.get_window_extent().padded(ATTRIBUTION_SIZE)
+        taken.append(tuple((extent.get_points() / DPI - (0.0, foot)).ravel()))
+    points, road = sight.sensors * size, sight.targets * size
+    draw_sensors(view, deployment, points, road, zorder=2, hidden=sight.hidden, taken=np.array(taken).reshape(-1, 4))
+    heading.draw(figure, MARGIN)
+    _draw_legend(figure, rows, credit, foot)
     save_png(path, figure)
 
 
-def _draw_legend(figure: Figure, legend: Legend) -> None:
-    """Write at the foot of the picture what the colours on the road mean."""
+def _legend_rows(legend: Legend, width: float) -> list[list[tuple[str, str]]]:
+    """Return words and colour of each entry of the legend, in rows that fit the picture; the title has no colour."""
+    classes = reversed(list(zip(legend.words, legend.colours, legend.shares, strict=True)))
+    entries = [(legend.title, ""), *((f"{words}  {percent(share)}", colour) for words, colour, share in classes)]
+    rows: list[list[tuple[str, str]]] = [[]]
+    used = MARGIN
+    for entry in entries:
+        length = (
+            SWATCH * bool(entry[1]) + text_width(entry[0], LEGEND_SIZE, "normal" if entry[1] else "bold") + LEGEND_GAP
+        )
+        if rows[-1] and used + length > width:
+            rows.append([])
+            used = MARGIN
+        rows[-1].append(entry)
+        used += length
+    return rows
+
+
+def _draw_legend(figure: Figure, rows: list[list[tuple[str, str]]], credit: Sequence[str], height: float) -> None:
+    """Write at the foot of the picture what the colours on the road mean, and the credits below."""
     width, page = figure.get_size_inches()
-    foot = figure.add_axes((0.0, 0.0, 1.0, FOOT / page))
-    foot.set(xlim=(0.0, width), ylim=(0.0, FOOT))
+    foot = figure.add_axes((0.0, 0.0, 1.0, height / page))
+    foot.set(xlim=(0.0, width), ylim=(height, 0.0))
     foot.axis("off")
-    x = _end(foot.text(MARGIN, FOOT / 2, legend.title, va="center", size=9, color=INK, weight="bold"))
-    for words, colour, share in reversed(list(zip(legend.words, legend.colours, legend.shares, strict=True))):
-        foot.add_patch(Rectangle((x + LEGEND_GAP, FOOT / 2 - 0.07), 0.2, 0.14, facecolor=colour))
-        label = f"{words}  {percent(share)}"
-        x = _end(foot.text(x + LEGEND_GAP + 0.3, FOOT / 2, label, va="center", size=9, color=INK))
+    for number, row in enumerate(rows):
+        x, y = MARGIN - LEGEND_GAP, MARGIN / 2 + (number + 0.4) * LEGEND_LINE
+        for words, colour in row:
+            if colour:
+                foot.add_patch(Rectangle((x + LEGEND_GAP, y - 0.07), 0.2, 0.14, facecolor=colour))
+            style: Style = {"weight": "normal" if colour else "bold", "size": LEGEND_SIZE, "color": INK}
+            x = _end(foot.text(x + LEGEND_GAP + (SWATCH if colour else 0.0), y, words, va="center", **style))
+    for number, words in enumerate(credit):
+        y = height - MARGIN / 4 - (len(credit) - number - 0.5) * CREDIT_LINE
+        plain: Style = {"size": ATTRIBUTION_SIZE, "color": INK, "parse_math": False}
+        foot.text(MARGIN, y, words, va="center", **plain)
 
 
 def _end(text: Text) -> float:

@@ -37,7 +37,7 @@ POLE_COLOUR, ASSUMED_POLE_COLOUR = "#f2c94c", "#8a7400"
 """Of where a sensor may be mounted."""
 ALL_SENSOR_COLOURS = (*SENSOR_COLOURS, SENSOR_BODY, SIGHT_LINE, POLE_COLOUR, ASSUMED_POLE_COLOUR)
 
-WEIGHTED, FORBIDDEN, MANDATORY = "#7b3fa0", "#a3333d", "#4b3fb0"
+WEIGHTED, FORBIDDEN, MANDATORY = "#5d1f7d", "#8f1d2c", "#4b3fb0"
 REGION_VEIL, WEIGHTED_VEIL, FORBIDDEN_VEIL, MANDATORY_VEIL = "#d9d2ee", "#c04df0", "#f0304f", "#6f5dff"
 """Of areas in the viewport, where three quarters of what is below shine through."""
 WEIGHT_COLOURS = ("#f1e6f7", "#d7b8e8", "#b584d3", "#8a4fb3", "#4f2374")

@@ -1,7 +1,7 @@
-"""The legend beside a plan: sensors, shares of the road, and what lines and marks mean."""
+"""The legend below a plan: sensors, shares of the road, and what lines and marks mean, in columns."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from textwrap import wrap
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,13 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.patches import Rectangle
 
-from ...choosing.placement.deployment import Deployment
+from ...choosing.placement.deployment import Deployment, Sensor
 from ...counts import counted
-from ...site.scene_geometry import ASSUMED, FROM_MAP, OTHER_LEVELS, SceneGeometry
+from ...site.scene_geometry import ASSUMED, FROM_MAP, OTHER_LEVELS, NamedArea, SceneGeometry
 from ...site.site import Site
 from .coverage_colours import of_placement
-from .drawing import MAX_LABELLED, SENSOR_MARK, markers_of, percent
+from .drawing import SENSOR_MARK, markers_of, percent, wrapped
 from .palette import FORBIDDEN, INK, MANDATORY, SOFT_INK, WEIGHTED
+from .plan_map import MapContent
 from .plan_style import (
     ASSUMED_HEIGHT,
     ASSUMED_MARK,
@@ -26,165 +27,233 @@ from .plan_style import (
     Style,
 )
 
-LEGEND_WIDTH, COLUMN_GAP = 3.7, 0.3  # inches, of a column and between two
-ROW_HEIGHT, LINE_HEIGHT, SMALL_LINE_HEIGHT = 0.42, 0.24, 0.15  # inches
-HEADING_HEIGHT, FOOTNOTE_HEIGHT = 0.36, 0.38  # inches
-LETTERS_PER_LINE = 62  # of small text that fit into a line
+COLUMNS, COLUMN_GAP = 3, 0.35  # number, and inches between two
+SIZE, SMALL, HEADING_SIZE = 10.0, 9.0, 11.5  # points
+LINE, SMALL_LINE, HEADING_LINE, AFTER = 0.23, 0.19, 0.4, 0.16  # inches
+TEXT_X, LABEL_X, SHARE_ROOM = 0.34, 0.78, 0.55  # inches: of text beside a mark, of a sensor's type, for its share
+MOST_TOGETHER = 12  # rows of a section that stay in one column
+HEIGHT_STEP = 0.1  # inches, by which a legend grows until its columns suffice
+
+Draw = Callable[["_Column"], None]
 
 
-class PlanLegend:
-    """Legend of a plan, written from top to bottom in columns; lengths in inches.
+@dataclass(frozen=True, eq=False)
+class _Row:
+    """A part of the legend that stays in one column: its height in inches, and what draws it at the column's place.
 
     Parameters
     ----------
-    axes : Axes
-    height : float, inches
-        Height of the axes.
+    joined : bool
+        Whether the next row stays in the same column, as below a heading.
     """
 
-    def __init__(self, axes: Axes, height: float) -> None:
-        self.axes = axes
-        self.height = height
-        self.x, self.y = 0.0, 0.0
+    height: float
+    draw: Draw
+    joined: bool = False
+
+
+@dataclass
+class _Column:
+    """A place in the legend at which a row is drawn, inches from its upper left corner, and the width of the column."""
+
+    axes: Axes
+    x: float
+    y: float
+    width: float
+
+    def text(self, x: float, words: str, *, down: float = 0.0, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
+        plain: Style = {"size": SIZE, "color": INK, "ha": "left", "va": "center", "parse_math": False}
+        self.axes.text(self.x + x, self.y + down, words, **plain | style)
+
+    def swatch(self, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
+        self.axes.add_patch(Rectangle((self.x + 0.02, self.y - 0.07), 0.2, 0.14, **style))
+
+    def mark(self, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
+        self.axes.plot(self.x + 0.12, self.y, clip_on=False, **style)
+
+
+class PlanLegend:
+    """Legend of a plan, laid out in columns as low as its rows allow.
+
+    Parameters
+    ----------
+    width : float, inches
+        Width of all columns together.
+    notes : sequence of str
+        Sentences below everything else.
+    """
+
+    def __init__(self, content: MapContent, width: float, notes: Sequence[str]) -> None:
+        self._column_width = (width - (COLUMNS - 1) * COLUMN_GAP) / COLUMNS
+        self._width = width
+        assumed = any(mesh.height_assumed for mesh in content.geometry.occluders)
+        sections = (
+            self._sensors(content.deployment),
+            self._targets(content.site, content.deployment),
+            self._map(content.geometry, content.site),
+            self._heights(content.heights, assumed=assumed),
+            self._notes(notes),
+        )
+        self._rows = [row for section in sections for row in _together(list(section))]
+        self.height = max(*map(self._tall, range(len(self._rows))), self._least_height())
+        while len({column for column, _ in self._places()}) > COLUMNS:
+            self.height += HEIGHT_STEP
+
+    def draw(self, axes: Axes) -> None:
+        """Draw all rows into axes of the legend's width and height."""
         axes.axis("off")
+        axes.set(xlim=(0.0, self._width), ylim=(self.height, 0.0))
+        for row, (column, y) in zip(self._rows, self._places(), strict=True):
+            row.draw(_Column(axes, column * (self._column_width + COLUMN_GAP), y, self._column_width))
 
-    @property
-    def width(self) -> float:
-        """Width of the columns that have been written, inches."""
-        return self.x + LEGEND_WIDTH
+    def _least_height(self) -> float:
+        return sum(row.height for row in self._rows) / COLUMNS
 
-    def draw(
-        self, geometry: SceneGeometry, site: Site, deployment: Deployment, heights: Normalize, notes: Sequence[str]
-    ) -> None:
-        """Write all parts.
+    def _tall(self, start: int) -> float:
+        """Return the height of a row and of all that must stay below it in its column."""
+        height = self._rows[start].height
+        while self._rows[start].joined and start + 1 < len(self._rows):
+            start += 1
+            height += self._rows[start].height
+        return height
 
-        Parameters
-        ----------
-        heights : Normalize
-            Scale of the obstacles' colours, metres above the road.
-        notes : sequence of str
-            Sentences below everything else.
-        """
-        self._sensors(deployment)
-        self._targets(site, deployment)
-        self._map(geometry, site, sorted({area.weight for area in geometry.weighted_regions}))
-        self._heights(heights, assumed=any(mesh.height_assumed for mesh in geometry.occluders))
-        if notes:
-            self._notes(notes)
-        self.axes.set(xlim=(0.0, self.width), ylim=(self.height, 0.0))
+    def _places(self) -> list[tuple[int, float]]:
+        """Return the column of each row, and the distance of its middle line from the top."""
+        places, column, y = [], 0, 0.0
+        for number, row in enumerate(self._rows):
+            follows = number > 0 and self._rows[number - 1].joined
+            if y > 0.0 and not follows and y + self._tall(number) > self.height + 1e-9:
+                column, y = column + 1, 0.0
+            places.append((column, y + 0.12))
+            y += row.height
+        return places
 
-    def _keep_together(self, height: float) -> None:
-        """Begin another column where this one has no room for what comes next, unless it has only begun."""
-        if self.y > 0.0 and self.y + height > self.height:
-            self.x, self.y = self.x + LEGEND_WIDTH + COLUMN_GAP, 0.0
-
-    def _sensors(self, deployment: Deployment) -> None:
-        """List the sensors that have labels; with their positions if one column has room for that."""
-        listed = deployment.sensors[:MAX_LABELLED]
-        row = ROW_HEIGHT if HEADING_HEIGHT + len(listed) * ROW_HEIGHT + FOOTNOTE_HEIGHT <= self.height else LINE_HEIGHT
-        self._heading("Sensors", row)
+    def _sensors(self, deployment: Deployment) -> Iterator[_Row]:
+        """Yield a row for each sensor, and a heading in front."""
+        if not deployment.sensors:
+            return
+        yield self._heading("Sensors", "sees of the road")
         markers = markers_of(deployment)
-        for sensor in listed:
-            self._keep_together(row)
-            self._mark(marker=markers[sensor.model.key], **SENSOR_MARK | {"markersize": 8.0, "mew": 0.8})
-            self._text(0.34, sensor.label, weight="bold")
-            mounting = f", {sensor.height:.3g} m{sensor.turned}"
-            self._text(0.70, _short(sensor.model.name, min(28, 37 - len(mounting))) + mounting)
-            self._text(LEGEND_WIDTH, f"{sensor.alone:.0%}", ha="right", weight="bold")
-            if row == ROW_HEIGHT:
-                below = self.y + ROW_HEIGHT - LINE_HEIGHT
-                self._text(0.70, _short(sensor.position_name, 40), y=below, color=SOFT_INK, size=8)
-            self.y += row
-        if len(deployment.sensors) > len(listed):
-            self._line(f"and {len(deployment.sensors) - len(listed)} more", color=SOFT_INK)
-        self._footnote("Share of the road that each sees by itself")
+        for last, sensor in zip((*(False,) * (len(deployment.sensors) - 1), True), deployment.sensors, strict=True):
+            yield self._sensor(sensor, markers[sensor.model.key], AFTER if last else 0.0)
 
-    def _targets(self, site: Site, deployment: Deployment) -> None:
+    def _sensor(self, sensor: Sensor, marker: str, after: float) -> _Row:
+        room = self._column_width - LABEL_X
+        lines = wrapped(sensor.model.name, room - SHARE_ROOM, SIZE)
+        below = wrapped(f"{sensor.height:.3g} m high{sensor.turned}, {sensor.position_name}", room, SMALL)
+
+        def draw(at: _Column) -> None:
+            at.mark(marker=marker, **SENSOR_MARK | {"markersize": 8.0, "mew": 0.8})
+            at.text(TEXT_X, sensor.label, weight="bold")
+            at.text(at.width, f"{sensor.alone:.0%}", ha="right", weight="bold")
+            for number, line in enumerate(lines):
+                at.text(LABEL_X, line, down=number * LINE)
+            for number, line in enumerate(below):
+                at.text(LABEL_X, line, down=len(lines) * LINE + number * SMALL_LINE - 0.02, size=SMALL, color=SOFT_INK)
+
+        return _Row(len(lines) * LINE + len(below) * SMALL_LINE + 0.04 + after, draw)
+
+    def _targets(self, site: Site, deployment: Deployment) -> Iterator[_Row]:
         shown = of_placement(deployment)
-        self._heading(shown.title, len(shown.words) * LINE_HEIGHT + FOOTNOTE_HEIGHT)
+        yield self._heading(shown.title)
         for words, colour, share in reversed(list(zip(shown.words, shown.colours, shown.shares, strict=True))):
-            self._swatch(facecolor=colour)
-            self._text(LEGEND_WIDTH, percent(share), ha="right", weight="bold")
-            self._line(words)
-        self._footnote(f"{counted(len(site.targets), 'point')}, {site.targets.spacing:g} m apart")
+            yield self._swatch(words, percent(share), facecolor=colour)
+        squares = f"share of the road, in {counted(len(site.targets), 'square')} of {site.targets.spacing:g} m"
+        yield self._small(squares)
 
-    def _map(self, geometry: SceneGeometry, site: Site, weights: Iterable[float]) -> None:
-        self._heading("Map", LINE_HEIGHT)
-        self._swatch(facecolor="none", edgecolor=INK, linewidth=1.1)
-        self._line("region of interest")
+    def _map(self, geometry: SceneGeometry, site: Site) -> Iterator[_Row]:
+        yield self._heading("Map")
+        rows = [self._swatch("region of interest", facecolor="none", edgecolor=INK, linewidth=1.1)]
         if any(mesh.name.startswith(OTHER_LEVELS) for mesh in geometry.ground):
-            self._keep_together(LINE_HEIGHT)
-            self._swatch(**OTHER_ROAD)
-            self._line("road on another level")
-        for weight in weights:
-            names = [area.name for area in geometry.weighted_regions if area.weight == weight]
-            words = _short(names[0], 20) if len(names) == 1 else counted(len(names), "area")
-            self._keep_together(LINE_HEIGHT)
-            self._swatch(facecolor="none", edgecolor=WEIGHTED, linewidth=1.4, linestyle=(0, (4, 1.5)))
-            self._line(f"{words} (weight {weight:g} where weights count)")
+            rows.append(self._swatch("road on another level", **OTHER_ROAD))
+        dashed: Style = {"facecolor": "none", "edgecolor": WEIGHTED, "linewidth": 1.4, "linestyle": (0, (4, 1.5))}
+        rows += [self._swatch(words, **dashed) for words in _weighted(geometry.weighted_regions)]
         for areas, colour, hatch, words in (
             (geometry.forbidden_areas, FORBIDDEN, "////", "no sensor here"),
             (geometry.mandatory_areas, MANDATORY, "....", "at least one sensor here"),
         ):
             if areas:
-                self._keep_together(LINE_HEIGHT)
-                self._swatch(facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.9)
-                self._line(words)
-        for count, mark, words in _positions(geometry, site):
-            if count:
-                self._keep_together(LINE_HEIGHT)
-                self._mark(**mark | {"markersize": mark["markersize"] * 1.4})
-                self._line(words)
-        self.y += 0.14
+                rows.append(self._swatch(words, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.9))
+        rows += [self._marked(words, mark) for count, mark, words in _positions(geometry, site) if count]
+        yield from rows[:-1]
+        yield _Row(rows[-1].height + AFTER, rows[-1].draw)
 
-    def _heights(self, norm: Normalize, *, assumed: bool) -> None:
-        self._heading("Obstacles, height above the road", 0.6 + LINE_HEIGHT * assumed)
+    def _heights(self, norm: Normalize, *, assumed: bool) -> Iterator[_Row]:
+        yield self._heading("Obstacles", "height above the road")
         highest = float(norm.vmax or 0.0)
-        ramp = np.linspace(0.0, highest, 128)[None, :]
-        extent = (self.x, self.x + 2.2, self.y + 0.16, self.y)
-        self.axes.imshow(HEIGHT_CMAP(norm(ramp)), extent=extent, aspect="auto", interpolation="nearest")
-        self.y += 0.3
-        for share, align in ((0.0, "left"), (0.5, "center"), (1.0, "right")):
-            unit = " m" if share == 1.0 else ""
-            self._text(2.2 * share, f"{highest * share:g}{unit}", ha=align, size=8)
-        self.y += LINE_HEIGHT + 0.06
+
+        def draw(at: _Column) -> None:
+            ramp = np.linspace(0.0, highest, 128)[None, :]
+            extent = (at.x, at.x + 2.2, at.y + 0.1, at.y - 0.06)
+            at.axes.imshow(HEIGHT_CMAP(norm(ramp)), extent=extent, aspect="auto", interpolation="nearest")
+            for share, align in ((0.0, "left"), (0.5, "center"), (1.0, "right")):
+                unit = " m" if share == 1.0 else ""
+                at.text(2.2 * share, f"{highest * share:g}{unit}", down=0.22, ha=align, size=SMALL)
+
+        yield _Row(0.44 + AFTER * (not assumed), draw, joined=assumed)
         if assumed:
-            self._swatch(**ASSUMED_HEIGHT)
-            self._line("height assumed")
+            row = self._swatch("height assumed", **ASSUMED_HEIGHT)
+            yield _Row(row.height + AFTER, row.draw)
 
-    def _notes(self, notes: Sequence[str]) -> None:
-        self.y += 0.1
-        self._heading("Notes", SMALL_LINE_HEIGHT)
-        for line in (line for note in notes for line in wrap(note, LETTERS_PER_LINE)):
-            self._keep_together(SMALL_LINE_HEIGHT)
-            self._text(0.0, line, size=7.5, color=SOFT_INK)
-            self.y += SMALL_LINE_HEIGHT
+    def _notes(self, notes: Sequence[str]) -> Iterator[_Row]:
+        if notes:
+            yield self._heading("Notes")
+        for note in notes:
+            yield self._small(note[:1].upper() + note[1:])
 
-    def _heading(self, words: str, below: float) -> None:
-        """Write a heading, in one column with so much of what is below it."""
-        self._keep_together(HEADING_HEIGHT + below)
-        self._text(0.0, words, weight="bold", size=11, y=self.y + 0.04)
-        self.axes.plot((self.x, self.x + LEGEND_WIDTH), (self.y + 0.16,) * 2, color=SOFT_INK, linewidth=0.6)
-        self.y += HEADING_HEIGHT
+    def _heading(self, words: str, aside: str = "") -> _Row:
+        lines = wrapped(words, self._column_width, HEADING_SIZE, "bold")
+        below = (len(lines) - 1) * LINE
 
-    def _line(self, words: str, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
-        self._text(0.34, words, **style)
-        self.y += LINE_HEIGHT
+        def draw(at: _Column) -> None:
+            for number, line in enumerate(lines):
+                at.text(0.0, line, weight="bold", size=HEADING_SIZE, down=number * LINE)
+            at.text(at.width, aside, size=SMALL, color=SOFT_INK, ha="right")
+            at.axes.plot((at.x, at.x + at.width), (at.y + below + 0.14,) * 2, color=SOFT_INK, linewidth=0.6)
 
-    def _footnote(self, words: str) -> None:
-        self._keep_together(LINE_HEIGHT)
-        self._text(0.0, words, color=SOFT_INK, size=8)
-        self.y += FOOTNOTE_HEIGHT
+        return _Row(HEADING_LINE + below, draw, joined=True)
 
-    def _text(self, x: float, words: str, *, y: float | None = None, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
-        plain: Style = {"size": 9, "color": INK, "ha": "left", "va": "center", "parse_math": False}
-        self.axes.text(self.x + x, self.y if y is None else y, words, **plain | style)
+    def _swatch(self, words: str, share: str = "", **style: Any) -> _Row:  # noqa: ANN401 - matplotlib's own
+        return self._line(words, share, lambda at: at.swatch(**style))
 
-    def _swatch(self, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
-        self.axes.add_patch(Rectangle((self.x + 0.02, self.y - 0.07), 0.2, 0.14, **style))
+    def _marked(self, words: str, mark: Style) -> _Row:
+        return self._line(words, "", lambda at: at.mark(**mark | {"markersize": mark["markersize"] * 1.4}))
 
-    def _mark(self, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
-        self.axes.plot(self.x + 0.12, self.y, clip_on=False, **style)
+    def _line(self, words: str, share: str, sign: Draw) -> _Row:
+        """Return a row with a sign on the left, words, and a share on the right."""
+        lines = wrapped(words, self._column_width - TEXT_X - (SHARE_ROOM if share else 0.0), SIZE)
+
+        def draw(at: _Column) -> None:
+            sign(at)
+            at.text(at.width, share, ha="right", weight="bold")
+            for number, line in enumerate(lines):
+                at.text(TEXT_X, line, down=number * (LINE - 0.02))
+
+        return _Row(LINE + (len(lines) - 1) * (LINE - 0.02), draw)
+
+    def _small(self, words: str) -> _Row:
+        lines = wrapped(words, self._column_width, SMALL)
+
+        def draw(at: _Column) -> None:
+            for number, line in enumerate(lines):
+                at.text(0.0, line, down=number * SMALL_LINE, size=SMALL, color=SOFT_INK)
+
+        return _Row(len(lines) * SMALL_LINE + AFTER, draw)
+
+
+def _together(rows: list[_Row]) -> list[_Row]:
+    """Return the rows of a section, all in one column unless there are too many."""
+    if len(rows) > MOST_TOGETHER:
+        return rows
+    return [replace(row, joined=row is not rows[-1]) for row in rows]
+
+
+def _weighted(regions: Sequence[NamedArea]) -> Iterator[str]:
+    """Yield the words for the weighted regions of each weight."""
+    for weight in sorted({area.weight for area in regions}):
+        names = [area.name for area in regions if area.weight == weight]
+        name = names[0] if len(names) == 1 else counted(len(names), "area")
+        yield f"{name} (weight {weight:g} if weights are used)"
 
 
 def _positions(geometry: SceneGeometry, site: Site) -> Iterator[tuple[int, Style, str]]:
@@ -198,7 +267,3 @@ def _positions(geometry: SceneGeometry, site: Site) -> Iterator[tuple[int, Style
     yield posts, SIDEWALK_MARK, counted(posts, "possible new post")
     yield len(existing), POLE_MARK, counted(len(existing), *poles)
     yield assumed, ASSUMED_MARK, f"{counted(assumed, 'assumed pole')}{'' if used else ', not used'}"
-
-
-def _short(words: str, length: int) -> str:
-    return words if len(words) <= length else f"{words[: length - 1]}…"

@@ -18,8 +18,9 @@ from ...sensing.scans.sensor import MountedSensor
 from .cloud_colours import sensor_colour
 from .drawing import LABEL_SIZE, SENSOR_MARK, add_axes, draw_attribution, draw_polygons, save_png
 from .palette import INK, INTENSITY_COLOURS, MAX_INTENSITY, PAPER, SEEN_COLOURS, SOFT_INK
+from .plan_map import draw_area
 from .plan_style import Style
-from .plan_view import draw_area, draw_scale
+from .scale_bar import draw_scale
 
 DPI = 160
 MAP_SIDE, MARGIN, HEAD, FOOT = 8.0, 0.3, 0.95, 0.55  # inches

@@ -1,4 +1,4 @@
-"""Content of a report without its format: sections of paragraphs, lists, tables and pictures."""
+"""Content of a report without its format: a first page, then sections of paragraphs, lists, tables and pictures."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Code:
 
 @dataclass(frozen=True)
 class Table:
-    """Table; the columns in ``numbers`` hold numbers and are aligned to the right.
+    """Table of few and narrow columns, which fit a phone; the columns in ``numbers`` hold numbers, on the right.
 
     Parameters
     ----------
@@ -45,14 +45,57 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Facts:
+    """Names with their values, one below the other.
+
+    Parameters
+    ----------
+    large : bool
+        Whether these are the key figures of the report.
+    """
+
+    rows: tuple[tuple[str, str], ...]
+    large: bool = False
+
+
+@dataclass(frozen=True)
 class Picture:
-    """A picture as PNG."""
+    """A picture as PNG.
+
+    Parameters
+    ----------
+    tall : bool
+        Whether it may fill a page.
+    """
 
     png: bytes
     caption: str
+    tall: bool = False
 
 
-Block = Paragraph | Bullets | Code | Table | Picture
+@dataclass(frozen=True)
+class Pictures:
+    """Pictures of one size side by side, or one below the other on a phone.
+
+    Parameters
+    ----------
+    about : str
+        What they show, for those who cannot see them.
+    """
+
+    pngs: tuple[bytes, ...]
+    about: str
+
+
+@dataclass(frozen=True)
+class Card:
+    """Something with a heading of its own that stays on one page, such as a sensor."""
+
+    title: str
+    blocks: tuple[Paragraph | Facts | Pictures, ...]
+
+
+Block = Paragraph | Bullets | Code | Table | Facts | Picture | Pictures | Card
 
 
 @dataclass(frozen=True)
@@ -71,9 +114,12 @@ class Report:
     ----------
     created : str
         Time of the placement (ISO 8601); the time of the report is not recorded.
+    first : tuple of Block
+        Content of the first page.
     """
 
     title: str
-    summary: str
+    subtitle: str
     created: str
+    first: tuple[Block, ...]
     sections: tuple[Section, ...]

@@ -13,13 +13,14 @@ from PIL import Image
 from ...arrays import Boolean, Integer
 from ...errors import SeipError
 from ...geometry.geo_reference import GeoReference
-from ...sensing.visibility.grid import VisibilityGrid
+from ..pictures.close_up_sheet import close_ups
 from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
 from ..results.placement_file import load_placement
 from ..results.placement_record import PlacementRecord, RecordedSensor
 from ..results.site_file import SiteFile, load_site_file
 
 PICTURES = ("view.png", "plan.png")
+CLOSE_UPS = "sensors.png"
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,16 +29,16 @@ class Evidence:
 
     Parameters
     ----------
-    grid : VisibilityGrid or None
-        None where the folder does not hold the one that the placement was made on.
     pictures : mapping of str to bytes
         PNG by file name, those that are there.
+    close_ups : tuple of tuple of bytes
+        For each sensor, or for the first ones, its plan and its view as PNG, those that are there.
     """
 
     record: PlacementRecord
     site: SiteFile
-    grid: VisibilityGrid | None
     pictures: Mapping[str, bytes]
+    close_ups: tuple[tuple[bytes, ...], ...] = ()
 
     @property
     def sensors(self) -> tuple[RecordedSensor, ...]:
@@ -56,9 +57,9 @@ class Evidence:
         return self.seen_by > 0
 
     @property
-    def cell(self) -> float:
-        """Square metres that a target stands for."""
-        return self.site.targets.spacing**2
+    def area(self) -> float:
+        """Square metres of road."""
+        return len(self.site.targets) * self.site.targets.spacing**2
 
     @property
     def geo_reference(self) -> GeoReference:
@@ -93,16 +94,17 @@ def load_evidence(folder: Path) -> Evidence:
     names += POSE_ERROR_PICTURES if record.request.goal.scenarios.errs else ()
     names += TRAFFIC_PICTURES if record.request.goal.scenarios.kind == "traffic" else ()
     pictures = {name: _picture(folder / name) for name in names if (folder / name).is_file()}
-    return Evidence(record, site, _grid(folder / "visibility.npz", site), pictures)
+    return Evidence(record, site, pictures, _close_ups(folder / CLOSE_UPS, len(record.sensors)))
 
 
-def _grid(path: Path, site: SiteFile) -> VisibilityGrid | None:
-    """Return the grid that the placement was made on; None where the file is missing or another's."""
-    if not path.is_file():
-        return None
-    grid = VisibilityGrid.load(path)
-    fits = grid.key == site.key and grid.shape == (len(site.problem.prices), len(site.targets))
-    return grid if fits else None
+def _close_ups(path: Path, count: int) -> tuple[tuple[bytes, ...], ...]:
+    """Return the pictures of each sensor on a sheet; none where there is no such file."""
+    if not path.is_file() or not count:
+        return ()
+    try:
+        return tuple(close_ups(_picture(path), count))
+    except ValueError as error:
+        raise SeipError(f"{path} is of another placement: place the sensors again") from error
 
 
 def _picture(path: Path) -> bytes:

@@ -1,8 +1,7 @@
-"""Pictures that only a report has: the map of blind spots, and price against coverage."""
+"""Pictures that only a report has: the map of blind spots, and coverage against the number of sensors."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,17 +9,21 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from ..pictures.drawing import MAX_LABELLED, as_png, draw_attribution, draw_callouts
+from ...arrays import Float
+from ...choosing.placement.objective import FrontPoint
+from ..pictures.drawing import as_png, draw_attribution, draw_callouts
 from ..pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
 from ..pictures.plan_style import Style
+from ..pictures.scale_bar import draw_north, draw_scale, north_paper, scale_paper
 from .blind_spots import BlindSpot
 from .evidence import Evidence
-from .losses import FrontPoint
 
 DPI = 150
-MAP_WIDTH, MAX_MAP_HEIGHT = 7.2, 8.0  # inches
-MARGIN = 4.0  # metres around the road
+MAP_WIDTH, MIN_MAP_HEIGHT, MAX_MAP_HEIGHT = 7.2, 4.0, 8.0  # inches
+MARGIN = 6.0  # metres around the road
 CHART_SIZE = (7.2, 3.6)  # inches
+NUMBER_SIZE = 10.0  # points
+MOST_LABELLED = 8  # points of the chart that have room for labels
 
 
 def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
@@ -28,14 +31,12 @@ def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
     targets = evidence.site.targets
     x, y = targets.xyz[:, 0], targets.xyz[:, 1]
     sensors = np.array([sensor.local_m[:2] for sensor in evidence.sensors]).reshape(-1, 2)
-    low = np.minimum(targets.xyz[:, :2].min(axis=0), sensors.min(axis=0, initial=math.inf)) - MARGIN
-    high = np.maximum(targets.xyz[:, :2].max(axis=0), sensors.max(axis=0, initial=-math.inf)) + MARGIN
-    width, height = high - low
-    page = (MAP_WIDTH, min(MAX_MAP_HEIGHT, MAP_WIDTH * height / width))
+    window = _window(np.vstack((targets.xyz[:, :2], sensors)))
+    page = (MAP_WIDTH, MAP_WIDTH * (window[3] - window[1]) / (window[2] - window[0]))
     figure = Figure(page, dpi=DPI, facecolor=PAPER)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xticks=(), yticks=())
+    axes.set(xticks=(), yticks=())
     axes.spines[:].set(color=SOFT_INK, linewidth=0.8)
 
     column = np.round((x - x.min()) / targets.spacing).astype(np.int64)
@@ -46,43 +47,79 @@ def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
     frame = (x.min() - half, x.max() + half, y.min() - half, y.max() + half)
     style: Style = {"cmap": ListedColormap(SEEN_COLOURS), "vmin": 0, "vmax": 2, "interpolation": "nearest"}
     axes.imshow(cells, origin="lower", extent=frame, aspect="auto", **style)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-    if 0 < len(sensors) <= MAX_LABELLED:
-        draw_callouts(axes, sensors, [sensor.id for sensor in evidence.sensors], targets.xyz[:, :2], 3.0)
-    axes.plot(*sensors.T, linestyle="none", marker="^", markersize=10, mfc=INK, mec=PAPER, mew=1.2, zorder=4.0)
+    axes.set(xlim=(window[0], window[2]), ylim=(window[1], window[3]))
+    inch = (window[2] - window[0]) / MAP_WIDTH
+    draw_scale(axes, inch)
+    draw_north(axes, inch)
     draw_attribution(axes, evidence.record.site.attribution)
-    for number, spot in enumerate(spots, start=1):
-        circle: Style = {"boxstyle": "circle,pad=0.25", "facecolor": PAPER, "edgecolor": INK, "linewidth": 1.2}
-        style = {"ha": "center", "va": "center", "size": 9, "weight": "bold", "color": INK, "zorder": 5.0}
-        axes.text(float(spot.middle[0]), float(spot.middle[1]), str(number), bbox=circle, **style)
+    papers = (scale_paper(window[0], window[1], inch), north_paper(window[2], window[3], inch))
+    taken = [(left, bottom, left + width, bottom + height) for left, bottom, width, height in papers]
+    middles = np.array([spot.middle[:2] for spot in spots])
+    room = 0.12 * inch
+    taken += [(*(middle - room), *(middle + room)) for middle in middles]
+    axes.plot(*sensors.T, linestyle="none", marker="^", markersize=10, mfc=INK, mec=PAPER, mew=1.2, zorder=4.0)
+    labels = [sensor.id for sensor in evidence.sensors]
+    draw_callouts(axes, sensors, labels, targets.xyz[:, :2], 3.0, np.array(taken))
+    circle: Style = {"boxstyle": "circle,pad=0.22", "facecolor": PAPER, "edgecolor": INK, "linewidth": 1.2}
+    style = {"ha": "center", "va": "center", "size": NUMBER_SIZE, "weight": "bold", "color": INK, "zorder": 5.0}
+    for number, (right, up) in enumerate(_apart(middles, 0.24 * inch).tolist(), start=1):
+        axes.text(right, up, str(number), bbox=circle, **style)
     return as_png(figure)
 
 
-def front_chart(points: Sequence[FrontPoint], placed: tuple[float, float], *, installed: bool = False) -> bytes:
-    """Return coverage against price as PNG.
+def _window(points: Float) -> tuple[float, float, float, float]:
+    """Return left, bottom, right and top of a map of points (n, 2) that fits the page."""
+    low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
+    width, height = (high - low).tolist()
+    width = max(width, MAP_WIDTH / MAX_MAP_HEIGHT * height)
+    height = max(height, MIN_MAP_HEIGHT / MAP_WIDTH * width)
+    x, y = ((low + high) / 2).tolist()
+    return x - width / 2, y - height / 2, x + width / 2, y + height / 2
+
+
+def _apart(points: Float, distance: float) -> Float:
+    """Return points (n, 2) moved as little as a few steps allow until no two are nearer than a distance."""
+    moved = points.copy()
+    for _ in range(50):
+        for number in range(1, len(moved)):
+            away = moved[number] - moved[:number]
+            gaps = np.hypot(*away.T)
+            nearest = int(np.argmin(gaps))
+            if gaps[nearest] < distance:
+                way = away[nearest] / gaps[nearest] if gaps[nearest] > 0 else np.array((0.0, 1.0))
+                moved[number] = moved[nearest] + distance * 1.02 * way
+    return moved
+
+
+def front_chart(points: Sequence[FrontPoint], placed: tuple[int, float]) -> bytes:
+    """Return coverage against the number of sensors as PNG.
 
     Parameters
     ----------
-    placed : (float, float)
-        Price (dollars) and covered share of the weight of the placement.
-    installed : bool
-        Whether prices count posts, mounting, power and backhaul.
+    placed : (int, float)
+        Number of sensors and covered share of the weight of the placement.
     """
     figure = Figure(CHART_SIZE, dpi=DPI, facecolor=PAPER, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    price = [point.price / 1000 for point in points]
+    count = [point.count for point in points]
     share = [100 * point.coverage for point in points]
     missed = [100 * point.missed for point in points]
-    style: Style = {"color": SEEN_COLOURS[2], "ecolor": SOFT_INK, "capsize": 4, "markersize": 7}
-    axes.errorbar(price, share, yerr=np.array([np.zeros(len(points)), missed]), marker="o", linewidth=1.4, **style)
-    for point, x, y in zip(points, price, share, strict=True):
-        axes.annotate(str(point.count), (x, y), xytext=(8, -13), textcoords="offset points", size=9)
-    ring: Style = {"markersize": 15, "mfc": "none", "mec": INK, "mew": 1.6, "linestyle": "none"}
-    axes.plot(placed[0] / 1000, 100 * placed[1], marker="o", label="this placement", **ring)
-    axes.set(xlabel=f"{'installed ' * installed}price, thousand US dollars", ylabel="coverage, %")
-    axes.margins(0.1, 0.15)
+    style: Style = {"color": SEEN_COLOURS[2], "ecolor": SOFT_INK, "capsize": 4, "markersize": 8}
+    axes.errorbar(count, share, yerr=np.array([np.zeros(len(points)), missed]), marker="o", linewidth=1.6, **style)
+    for number, percent in zip(count, share, strict=True) if len(points) <= MOST_LABELLED else ():
+        place: Style = {"xytext": (0, -18), "textcoords": "offset points", "ha": "center", "size": 10}
+        axes.annotate(f"{percent:.1f}%", (number, percent), **place)
+    ring: Style = {"markersize": 17, "mfc": "none", "mec": INK, "mew": 1.8, "linestyle": "none"}
+    axes.plot(placed[0], 100 * placed[1], marker="o", label="this placement", **ring)
+    axes.set_xlabel("number of sensors", size=11)
+    axes.set_ylabel("road seen, %", size=11)
+    axes.set_xticks(count)
+    axes.tick_params(labelsize=10)
+    low = min(share)
+    axes.set_ylim(low - max(4.0, 0.2 * (100 - low)), 100 + max(1.0, 0.06 * (100 - low)))
+    axes.margins(x=0.08)
     axes.grid(visible=True, color="#d8dde1", linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, loc="lower right")
+    axes.legend(frameon=False, loc="lower right", fontsize=10)
     return as_png(figure)

@@ -3,34 +3,55 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Iterable
 from html import escape
 
-from .blocks import Block, Bullets, Code, Paragraph, Picture, Report, Table
+from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Report, Table
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 """Nothing is fetched, and no script runs, whatever stands in the page."""
 
 STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #1d2b36; max-width: 62em; margin: 2em auto; padding: 0 1em; }
-h1 { font-size: 1.7em; line-height: 1.25; margin: 0 0 .2em; overflow-wrap: anywhere; }
-h2 { font-size: 1.2em; margin: 2em 0 .5em; padding-top: .5em; border-top: 1px solid #c9d1d7; break-after: avoid; }
-.summary { font-size: 1.15em; margin: 0; }
-.created { color: #5d6b76; margin: .2em 0 0; }
+body { font: 16px/1.5 system-ui, sans-serif; color: #1d2b36; max-width: 60em; margin: 2em auto; padding: 0 1em; }
+h1 { font-size: 1.9em; line-height: 1.2; margin: 0 0 .2em; overflow-wrap: anywhere; }
+h2 { font-size: 1.3em; margin: 2.2em 0 .6em; padding-top: .6em; border-top: 2px solid #1d2b36; break-after: avoid; }
+h3 { font-size: 1.05em; margin: 0 0 .5em; overflow-wrap: anywhere; break-after: avoid; }
+.subtitle { color: #5d6b76; font-size: 1.1em; margin: 0 0 1.2em; }
 figure { margin: 1em 0; break-inside: avoid; }
-img { max-width: 100%; max-height: 48em; border: 1px solid #c9d1d7; }
-figcaption { color: #5d6b76; font-size: .9em; }
-table { border-collapse: collapse; margin: .8em 0; font-size: .92em; }
-th, td { text-align: left; vertical-align: top; padding: .25em .9em .25em 0; border-bottom: 1px solid #dde3e7; }
+img { display: block; max-width: 100%; border: 1px solid #c9d1d7; box-sizing: border-box; }
+figure > img { max-height: 60em; margin: 0 auto; }
+figcaption { color: #5d6b76; font-size: .9em; margin-top: .3em; }
+.pair { display: flex; flex-wrap: wrap; gap: .5em; }
+.pair img { flex: 1 1 16em; min-width: 0; width: 16em; height: auto; }
+.card { border: 1px solid #c9d1d7; border-radius: 4px; padding: 1em; margin: 1em 0; break-inside: avoid; }
+.card figure { margin: 0 0 .8em; }
+dl { display: grid; grid-template-columns: minmax(6em, max-content) 1fr; gap: .25em 1.2em; margin: .6em 0; }
+dt { color: #5d6b76; }
+dd { margin: 0; overflow-wrap: anywhere; font-variant-numeric: tabular-nums; }
+dl.large { font-size: 1.15em; border: 1px solid #c9d1d7; border-width: 1px 0; padding: .6em 0; }
+dl.large dd { font-weight: 600; }
+table { border-collapse: collapse; margin: .8em 0; font-size: .95em; }
+th, td { text-align: left; vertical-align: top; padding: .3em .9em .3em 0; border-bottom: 1px solid #dde3e7; }
 th { border-bottom-color: #1d2b36; }
-td:last-child { overflow-wrap: anywhere; }
+td { overflow-wrap: break-word; }
 .number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+th.number { white-space: normal; }
 tr { break-inside: avoid; }
 thead { display: table-header-group; }
 code { display: block; background: #eef1f3; padding: .6em .8em; overflow-wrap: anywhere; white-space: pre-wrap; }
 @page { size: A4; margin: 18mm 16mm; }
+@media (max-width: 30em) {
+  body { margin: 1em auto; }
+  dl { grid-template-columns: 1fr; gap: 0; }
+  dd { margin-bottom: .5em; }
+  .card { padding: .7em; }
+  th, td { padding-right: .6em; }
+}
 @media print {
   body { font-size: 9.5pt; margin: 0; max-width: none; padding: 0; }
-  img { max-height: 13cm; }
+  figure > img { max-height: 21cm; }
+  header figure > img { max-height: 11cm; }
+  section:first-of-type { break-before: page; }
 }
 """
 
@@ -39,7 +60,7 @@ def as_html(report: Report) -> str:
     """Return the page."""
     title = escape(report.title)
     sections = "\n".join(
-        f"<section>\n<h2>{escape(section.title)}</h2>\n" + "\n".join(map(_block, section.blocks)) + "\n</section>"
+        f"<section>\n<h2>{escape(section.title)}</h2>\n{_blocks(section.blocks)}\n</section>"
         for section in report.sections
     )
     return f"""<!DOCTYPE html>
@@ -52,27 +73,50 @@ def as_html(report: Report) -> str:
 <style>{STYLE}</style>
 </head>
 <body>
+<header>
 <h1>{title}</h1>
-<p class="summary">{escape(report.summary)}</p>
-<p class="created">Placement of {escape(report.created)}</p>
+<p class="subtitle">{escape(report.subtitle)}</p>
+{_blocks(report.first)}
+</header>
 {sections}
 </body>
 </html>
 """
 
 
+def _blocks(blocks: Iterable[Block]) -> str:
+    return "\n".join(map(_block, blocks))
+
+
 def _block(block: Block) -> str:
-    if isinstance(block, Paragraph):
-        return f"<p>{escape(block.text)}</p>"
-    if isinstance(block, Code):
-        return f"<code>{escape(block.text)}</code>"
+    if isinstance(block, Paragraph | Code):
+        tag = "p" if isinstance(block, Paragraph) else "code"
+        return f"<{tag}>{escape(block.text)}</{tag}>"
     if isinstance(block, Bullets):
         return "<ul>\n" + "\n".join(f"<li>{escape(line)}</li>" for line in block.lines) + "\n</ul>"
+    if isinstance(block, Facts):
+        return _facts(block)
+    if isinstance(block, Card):
+        return f'<div class="card">\n<h3>{escape(block.title)}</h3>\n{_blocks(block.blocks)}\n</div>'
+    return _table(block) if isinstance(block, Table) else _figure(block)
+
+
+def _facts(facts: Facts) -> str:
+    rows = "\n".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts.rows)
+    kind = ' class="large"' if facts.large else ""
+    return f"<dl{kind}>\n{rows}\n</dl>"
+
+
+def _figure(block: Picture | Pictures) -> str:
     if isinstance(block, Picture):
-        source = f"data:image/png;base64,{base64.b64encode(block.png).decode('ascii')}"
-        caption = escape(block.caption)
-        return f'<figure><img src="{source}" alt="{caption}"><figcaption>{caption}</figcaption></figure>'
-    return _table(block)
+        return f"<figure>{_image(block.png, block.caption)}<figcaption>{escape(block.caption)}</figcaption></figure>"
+    images = "".join(_image(png, block.about) for png in block.pngs)
+    return f'<figure><div class="pair">{images}</div></figure>'
+
+
+def _image(png: bytes, caption: str) -> str:
+    source = f"data:image/png;base64,{base64.b64encode(png).decode('ascii')}"
+    return f'<img src="{source}" alt="{escape(caption)}">'
 
 
 def _table(table: Table) -> str:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import logging
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
+from typing import cast
 
 import matplotlib as mpl
 from fpdf import FPDF, FontFace
@@ -13,13 +15,14 @@ from fpdf.enums import Align, TableBordersLayout, VAlign, XPos, YPos
 from PIL import Image
 
 from ..pictures.palette import INK, PAPER, SOFT_INK
-from .blocks import Block, Bullets, Code, Paragraph, Picture, Report, Section, Table
+from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Report, Section, Table
 
 MARGIN, TOP, BOTTOM = 50.0, 52.0, 56.0
-BODY, SMALL, HEADING, TITLE = 9.5, 8.0, 13.0, 18.0
+BODY, SMALL, CARD_TITLE, LARGE, HEADING, TITLE = 9.5, 8.0, 10.5, 10.5, 14.0, 20.0
 LEADING = 1.4  # height of a line, in sizes of the type
 GAP = 7.0  # between blocks
-MAX_PICTURE_HEIGHT = 400.0
+FIRST_PICTURE_HEIGHT, MAX_PICTURE_HEIGHT, FULL_PAGE_HEIGHT = 400.0, 400.0, 620.0
+CARD_PICTURE_HEIGHT = 178.0
 HEADING_ROOM = 90.0  # room required below the top of a heading, so that it does not end a page
 RULE, SHADE = "#c9d1d7", "#eef1f3"
 BULLET_INDENT, CELL_PADDING = 12.0, 3.0
@@ -40,10 +43,13 @@ def as_pdf(report: Report) -> bytes:
     pdf.set_creation_date(datetime.fromisoformat(report.created))
     pdf.add_page()
     pdf.text_lines(report.title, TITLE, style="B")
-    pdf.ln(4.0)
-    pdf.text_lines(report.summary, HEADING - 1.0)
-    pdf.text_lines(f"Placement of {report.created}", SMALL, color=SOFT_INK)
-    for section in report.sections:
+    pdf.text_lines(report.subtitle, HEADING - 2.0, color=SOFT_INK)
+    for block in report.first:
+        pdf.ln(GAP)
+        _add_block(pdf, block, FIRST_PICTURE_HEIGHT)
+    for number, section in enumerate(report.sections):
+        if number == 0:
+            pdf.add_page()
         _add_section(pdf, section)
     return bytes(pdf.output())
 
@@ -84,6 +90,13 @@ class _Document(FPDF):
         self.set_x(MARGIN + indent)
         self.multi_cell(0, size * LEADING, text, align="L", new_x=XPos.LMARGIN, new_y=YPos.NEXT)
 
+    def rule(self) -> None:
+        """Draw a line across the page, with some room below."""
+        self.set_draw_color(RULE)
+        self.set_line_width(0.6)
+        self.line(MARGIN, self.y, self.w - MARGIN, self.y)
+        self.ln(4.0)
+
     def need(self, room: float) -> None:
         """Start a new page if less room than given is left on this one."""
         if self.will_page_break(room):
@@ -103,7 +116,7 @@ def _add_section(pdf: _Document, section: Section) -> None:
         _add_block(pdf, block)
 
 
-def _add_block(pdf: _Document, block: Block) -> None:
+def _add_block(pdf: _Document, block: Block, highest: float = MAX_PICTURE_HEIGHT) -> None:
     if isinstance(block, Paragraph):
         pdf.text_lines(block.text, BODY)
     elif isinstance(block, Bullets):
@@ -122,22 +135,74 @@ def _add_block(pdf: _Document, block: Block) -> None:
             0, SMALL * LEADING, block.text, fill=True, align="L", padding=CODE_PADDING, new_x="LMARGIN", new_y="NEXT"
         )
         pdf.set_fill_color(PAPER)
+    elif isinstance(block, Facts):
+        _add_facts(pdf, block)
+    elif isinstance(block, Card):
+        _add_card(pdf, block)
+    elif isinstance(block, Pictures):
+        _add_pictures(pdf, block.pngs, "", CARD_PICTURE_HEIGHT)
     elif isinstance(block, Picture):
-        _add_picture(pdf, block)
+        _add_pictures(pdf, (block.png,), block.caption, FULL_PAGE_HEIGHT if block.tall else highest)
     else:
         _add_table(pdf, block)
 
 
-def _add_picture(pdf: _Document, picture: Picture) -> None:
-    image = Image.open(io.BytesIO(picture.png)).convert("RGB")
-    width = min(pdf.epw, MAX_PICTURE_HEIGHT * image.width / image.height)
-    height = width * image.height / image.width
-    pdf.need(height + 3 * SMALL * LEADING)
-    pdf.image(image, x=MARGIN, w=width, h=height)
+def _add_pictures(pdf: _Document, pngs: Sequence[bytes], caption: str, highest: float) -> None:
+    """Add pictures of one size side by side."""
+    images = [Image.open(io.BytesIO(png)).convert("RGB") for png in pngs]
+    room = (pdf.epw - (len(images) - 1) * GAP) / len(images)
+    width = min(room, highest * images[0].width / images[0].height)
+    height = width * images[0].height / images[0].width
+    pdf.need(height + (3 * SMALL * LEADING if caption else 0.0))
+    top = pdf.y
     pdf.set_draw_color(RULE)
-    pdf.rect(MARGIN, pdf.y - height, width, height)
-    pdf.ln(4.0)
-    pdf.text_lines(picture.caption, SMALL, color=SOFT_INK)
+    for number, image in enumerate(images):
+        left = MARGIN + number * (width + GAP)
+        pdf.image(image, x=left, y=top, w=width, h=height)
+        pdf.rect(left, top, width, height)
+    pdf.set_y(top + height + 4.0)
+    if caption:
+        pdf.text_lines(caption, SMALL, color=SOFT_INK)
+
+
+def _add_facts(pdf: _Document, facts: Facts) -> None:
+    """Add names and values in two columns; those of the first page in larger type between two lines."""
+    size = LARGE if facts.large else BODY
+    pdf.set_font(TEXT, "", size)
+    indent = max(pdf.get_string_width(name) for name, _ in facts.rows) + 2 * GAP
+    if facts.large:
+        pdf.rule()
+    for name, value in facts.rows:
+        pdf.need(size * LEADING)
+        top = pdf.y
+        pdf.text_lines(name, size, color=SOFT_INK)
+        below = pdf.y
+        pdf.set_y(top)
+        pdf.text_lines(value, size, style="B" if facts.large else "", indent=indent)
+        pdf.set_y(max(below, pdf.y) + 1.5)
+    if facts.large:
+        pdf.rule()
+
+
+def _add_card(pdf: _Document, card: Card) -> None:
+    """Add something with a heading of its own, on one page if it fits."""
+    with pdf.offset_rendering() as trial:
+        _fill_card(cast("_Document", trial), card)  # records the same calls
+    if trial.page_break_triggered:
+        pdf.add_page()
+    _fill_card(pdf, card)
+
+
+def _fill_card(pdf: _Document, card: Card) -> None:
+    pdf.ln(GAP / 2)
+    pdf.rule()
+    pdf.text_lines(card.title, CARD_TITLE, style="B")
+    for block in card.blocks:
+        pdf.ln(4.0)
+        if isinstance(block, Pictures):
+            _add_pictures(pdf, block.pngs, "", CARD_PICTURE_HEIGHT)
+        else:
+            _add_block(pdf, block)
 
 
 def _add_table(pdf: _Document, table: Table) -> None:

@@ -1,33 +1,47 @@
-"""The sections of a report, in words that a city engineer reads."""
+"""The pages of a report, in words that a city engineer reads."""
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ...arrays import Float
-from ...choosing.placement.cheapest import SAME_PRICE
 from ...choosing.placement.deployment import BAND, UNRANKED
-from ...choosing.placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE, Objective, certificate, purpose
+from ...choosing.placement.objective import CHOSEN_FOR, MOVED, SAME_PRICE, purpose
+from ...choosing.placement.returns_summary import FEW_RETURNS, returns_text
 from ...counts import counted
-from ...site.sources import source_table
+from ...sensing.visibility.settings import VisibilitySettings
 from ..pictures.drawing import percent
 from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
 from ..results.located import LOCATED_FILES
-from ..results.placement_record import RecordedObjective, relevant_warnings
+from ..results.placement_record import RecordedSensor, relevant_warnings
 from .blind_spots import BlindSpot, blind_spots, centres, seen_places
-from .blocks import Block, Bullets, Code, Paragraph, Picture, Report, Section, Table
+from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Report, Section, Table
+from .costs import Costs, costs_of
 from .evidence import Evidence
 from .figures import blind_spot_map, front_chart
-from .losses import FrontPoint, equal_prices, failures
+from .losses import failures
 from .repeat import repeating_command
+from .wording import (
+    PAPER_TYPES,
+    date,
+    dollars,
+    geographic,
+    in_sentence,
+    limits_of,
+    mounting,
+    plain_warning,
+    points,
+    proof,
+    sentence,
+)
 
 MOST_SPOTS = 8
+LEAST_TILT = 0.05  # degrees, below which a sensor is upright
 MIN_DIFFERENCE = 1e-6  # share of the road by which two coverages differ at least; records have nine digits
-Row = tuple[str, ...]
 POSE_ERRORS = "with errors of"
 """How the note begins that says what pose errors cost."""
 CAPTIONS = {
@@ -37,139 +51,191 @@ CAPTIONS = {
     "time_seen.png": "For which share of the time each part of the road is seen in traffic.",
     "traffic.png": "The empty road and the road in traffic.",
 }
+COST_SOURCES = (
+    "Installation costs: Florida DOT in the ITS Costs Database of the US DOT (2004) for posts, arms and power; AASHTO, "
+    "National Connected Vehicle Field Infrastructure Footprint Analysis, FHWA-JPO-14-125 (2014), for data lines; "
+    "mounting on an existing pole is an assumption. Replace them by your own contract prices."
+)
+PAPER_MODELS = (
+    "are the sensor models of the SEIP study on roadside perception, not products: they stand for LiDARs with 16, 32 "
+    "and 128 channels, and count every return within range. Choose a product and place the sensors again before "
+    "inviting tenders."
+)
 
 
-def make_report(evidence: Evidence, points: Sequence[FrontPoint]) -> Report:
-    """Return the report on a placement.
+SURFACE = (
+    "Seen means here that the surface of the road itself is measured. People and vehicles reflect more light and are "
+    "detected farther away: the plan shows where."
+)
 
-    Parameters
-    ----------
-    points : sequence of FrontPoint
-        Best choices of other numbers of sensors; empty where they were not looked for.
-    """
+
+def make_report(evidence: Evidence) -> Report:
+    """Return the report on a placement."""
     record = evidence.record
+    costs = costs_of(record)
     sections = (
-        Section("Objective", tuple(_question(evidence))),
-        Section("Site", tuple(_site(evidence))),
-        Section("Sensors", tuple(_sensors(evidence))),
-        Section("Coverage", tuple(_coverage(evidence))),
+        Section("Plan", tuple(_plan(evidence))),
+        Section("Sensors", tuple(_sensors(evidence, costs))),
+        Section("Costs", tuple(_costs(costs))),
+        Section("Streets and crossings", tuple(_places(evidence))),
         Section("Blind spots", tuple(_blind_spots(evidence))),
-        Section("Optimality", tuple(_certificate(evidence, points))),
+        Section("Other choices", tuple(_other_choices(evidence))),
         Section("Failures and errors", tuple(_losses(evidence))),
-        Section("Fewer or more sensors", tuple(_front(evidence, points))),
-        Section("Warnings and limits", tuple(_warnings(evidence))),
+        Section("How far the figures can be trusted", tuple(_trust(evidence))),
+        Section("Sources", tuple(_sources(evidence))),
         Section("Reproduction", tuple(_making(evidence))),
     )
-    coverage = record.coverage
-    central = "" if coverage.central is None else f", {percent(coverage.central)} of its weighted part"
-    band = coverage.gain_band
-    between = f" ({percent(band.low)} to {percent(band.high)} {BAND})" if band is not None and band.sheets else ""
-    returns = "" if record.returns is None else f"{_sentence(record.returns.describe())} "
-    summary = (
-        f"{returns}{counted(len(record.sensors), 'sensor sees', 'sensors see')} "
-        f"{percent(coverage.whole)} of the road{between}{central}, for {record.price_text}."
+    return Report(
+        record.site.name,
+        f"Positions of roadside LiDAR sensors, {date(record.times.created)}",
+        record.times.created,
+        tuple(_first_page(evidence, costs)),
+        tuple(section for section in sections if section.blocks),
     )
-    return Report(record.site.name, summary, record.times.created, sections)
 
 
-def certificate_sentence(evidence: Evidence) -> str:
-    """Return the sentence on the proven optimality gap among the same positions."""
+def _first_page(evidence: Evidence, costs: Costs) -> Iterator[Block]:
     record = evidence.record
-    found, places = record.objective, record.counts.positions
-    if found.status == MOVED:
-        return MOVED_MESSAGE
-    if any(note.startswith(CHOSEN_FOR) for note in record.notes):
-        return certificate(found.status, found.gap, cheapest=found.cheapest, notes=record.notes)
-    choice = f"choice{_limits(record.request.goal, 'of')} among the {places:,} positions, under the same rules,"
-    if found.bound is None:
-        return f"Another {choice} may be better; how much better is not known."
-    better = _cheaper(found) if found.cheapest else _more_coverage(evidence)
-    proven = "this is proven" if found.status == "optimal" else "this bound is proven"
-    return f"No other {choice} {better}: {proven}."
-
-
-def _limits(goal: Objective, joint: str) -> str:
-    """Return the limits on a placement, its number of sensors after a word and its price, as the end of a sentence."""
-    count = "" if goal.count is None else f" {joint} at most {counted(goal.count, 'sensor')}"
-    return count if goal.budget is None else f"{count} for at most {_dollars(goal.budget)}"
-
-
-def _cheaper(found: RecordedObjective) -> str:
-    if found.status == "optimal" or found.bound is None:
-        return "reaches the required coverage at a lower price"
-    return f"is more than {_dollars(max(0.0, found.value - found.bound))} cheaper"
-
-
-def _more_coverage(evidence: Evidence) -> str:
-    found = evidence.record.objective
-    what = "of the road" if found.kind == "vanilla" else "of the road, counted by its weights"
-    if found.status == "optimal" or found.bound is None:
-        return f"covers more {what}"
-    more = max(0.0, found.bound - found.value) / math.fsum(evidence.site.problem.weights)
-    return f"covers more than {_points(more)} more {what}"
-
-
-def _question(evidence: Evidence) -> Iterator[Block]:
-    record = evidence.record
-    goal, counts = record.request.goal, record.counts
-    limits = _limits(goal, "with")
-    with_limits = f",{limits}" if limits else ""
-    types = ", ".join(record.request.candidates.sensors)
-    if goal.coverage is not None:
-        yield Paragraph(
-            f"Find the cheapest sensors and positions that see {percent(goal.coverage)} of the road{with_limits}."
-        )
-    else:
-        what = "see most of the road" if record.returns is None else "receive most returns from road users"
-        yield Paragraph(f"Find the positions of sensors that {what}{with_limits}.")
-    rules = [
-        f"Sensor types to choose from: {types}.",
-        (
-            f"Positions to choose from: {counts.positions:,}, of which {counts.positions_on_poles:,} are on existing "
-            f"poles; with all heights, types and directions {counts.poses:,} candidates."
-        ),
+    types = Counter(sensor.sensor_name for sensor in record.sensors)
+    rows = [
+        ("Where", _where(evidence)),
+        ("What", ", ".join(f"{number} × {name}" for name, number in types.items()) or "no sensors"),
+        ("How many", _how_many(record.sensors)),
+        ("Price", _price(costs)),
+        ("Quality", _quality(evidence)),
     ]
-    if goal.weighted:
-        rules.append("The road in weighted regions has a higher weight.")
-    if goal.min_distance > 0:
-        rules.append(f"Sensors are at least {goal.min_distance:g} m apart.")
-    rules += [_sentence(note) for note in record.notes if note.startswith(CHOSEN_FOR)]
-    rules += [f"There must be a sensor at {name}." for name in goal.mandatory]
-    rules += [f"There must be no sensor at {name}." for name in goal.forbidden]
-    yield Bullets(tuple(rules))
+    yield Facts(tuple(rows), large=True)
+    name = next((name for name in ("view.png", "plan.png") if name in evidence.pictures), None)
+    if name is not None:
+        yield Picture(evidence.pictures[name], "The site with the sensors and what they see.")
+    yield Paragraph(_summary(evidence))
 
 
-def _site(evidence: Evidence) -> Iterator[Block]:
-    record, targets = evidence.record, evidence.site.targets
-    yield Paragraph(
-        f"The region of interest is evaluated in {len(targets):,} squares of {targets.spacing:g} m, "
-        f"{len(targets) * evidence.cell:,.0f} m² of road together. {_origin(evidence)}"
-    )
-    if record.site.sources:
-        heading, *rows = source_table(record.site.sources)
-        yield Paragraph("Sources of the objects in the scene, with the number whose position or height is assumed:")
-        yield Table(heading, tuple(rows), frozenset({2, 3, 4}))
-    if record.site.attribution:
-        yield Paragraph(f"Data: {'; '.join(record.site.attribution)}.")
-    obstacle = evidence.geo_reference.obstacle
-    if obstacle:
-        yield Paragraph(f"There are no latitudes and longitudes: {obstacle}.")
-    else:
-        yield Paragraph(
-            f"Eastings and northings are coordinates of the map's projection, “{_projection(evidence)}”; latitudes and "
-            "longitudes are on WGS 84."
+def _where(evidence: Evidence) -> str:
+    record = evidence.record
+    place = evidence.geo_reference.geographic(np.array(record.site.origin_m)[None])
+    if place is None:
+        return record.site.name
+    longitude, latitude, _ = place[0]
+    return f"{record.site.name}, {geographic(latitude, longitude, 5)}"
+
+
+def _how_many(sensors: Sequence[RecordedSensor]) -> str:
+    on_poles = sum(sensor.on_pole for sensor in sensors)
+    kinds = [(on_poles, "on an existing pole", "on existing poles")]
+    kinds.append((len(sensors) - on_poles, "on a new post", "on new posts"))
+    parts = [f"{number} {one if number == 1 else several}" for number, one, several in kinds if number]
+    return f"{counted(len(sensors), 'sensor')}{': ' if parts else ''}{', '.join(parts)}"
+
+
+def _price(costs: Costs) -> str:
+    installation = costs.total - costs.sensors
+    about = "about " if costs.estimated else ""
+    parts = f"{dollars(costs.sensors)} sensors, {dollars(installation)} installation"
+    return f"{about}{dollars(costs.total)} installed ({parts})"
+
+
+def _quality(evidence: Evidence) -> str:
+    coverage, returns = evidence.record.coverage, evidence.record.returns
+    seen = f"{percent(coverage.whole)} of the road is seen, {percent(coverage.seen_twice)} by two or more sensors"
+    if returns is None:
+        return seen
+    on_foot = returns_text(returns.of_each["pedestrian"])
+    return f"about {on_foot} measured points on a pedestrian in each turn of the sensors; {seen}"
+
+
+def _summary(evidence: Evidence) -> str:
+    """Return the paragraph of the first page."""
+    record, coverage = evidence.record, evidence.record.coverage
+    together = counted(len(record.sensors), "LiDAR sensor sees", "LiDAR sensors see")
+    seen = f"{together} {percent(coverage.whole)} of the {evidence.area:,.0f} m² of road studied here"
+    parts = [f"{seen}{_between(evidence)}."]
+    if coverage.central is not None:
+        parts.append(f"Of the most important part ({_central(evidence)}), {percent(coverage.central)} is seen.")
+    if record.returns is not None:
+        of_each = record.returns.of_each
+        named = [f"{returns_text(number)} points on a {name}" for name, number in of_each.items()]
+        parts.append(f"In each turn they typically measure {', '.join(named[:-1])} and {named[-1]}.")
+    least = min(record.crossings, key=lambda one: one.least, default=None)
+    if least is not None:
+        parts.append(
+            f"A pedestrian on a crossing receives at least {returns_text(least.least)} points in each turn "
+            f"(at the worst point of the {in_sentence(least.name)})."
         )
-    if "view.png" in evidence.pictures:
-        yield Picture(evidence.pictures["view.png"], "The site with the sensors and their coverage.")
+    failed = failures(evidence.site.seen)
+    if failed is not None and len(record.sensors) > 1:
+        parts.append(f"If any one sensor fails, at least {percent(failed.worst)} of the road is still seen.")
+    parts.append(proof(evidence))
+    return " ".join(parts)
 
 
-def _origin(evidence: Evidence) -> str:
-    origin = np.array(evidence.record.site.origin_m)
-    if evidence.geo_reference.obstacle:
-        x, y, z = origin
-        return f"The scene's origin is at ({x:,.2f}, {y:,.2f}, {z:,.2f}) in map coordinates, metres."
-    easting, northing, height = evidence.geo_reference.projected(origin)
-    return f"The scene's origin is at easting {easting:,.2f} m, northing {northing:,.2f} m, height {height:,.2f} m."
+def _between(evidence: Evidence) -> str:
+    band = evidence.record.coverage.gain_band
+    if band is None or not band.sheets:
+        return ""
+    return f" ({percent(band.low)} to {percent(band.high)}, as the sensors' range is only known from data sheets)"
+
+
+def _central(evidence: Evidence) -> str:
+    names = [centre.name for centre in centres(evidence.site.targets, evidence.site.areas)]
+    return ", ".join(names)
+
+
+def _plan(evidence: Evidence) -> Iterator[Block]:
+    if "plan.png" in evidence.pictures and "view.png" in evidence.pictures:
+        yield Picture(evidence.pictures["plan.png"], "Plan with the sensors and what they see; north is up.", tall=True)
+
+
+def _sensors(evidence: Evidence, costs: Costs) -> Iterator[Block]:
+    obstacle = evidence.geo_reference.obstacle
+    system = (
+        f"There are no latitudes and longitudes: {obstacle}."
+        if obstacle
+        else f"Eastings and northings are coordinates of the projection “{_projection(evidence)}”; latitudes and "
+        "longitudes are on WGS 84."
+    )
+    yield Paragraph(
+        "Heights and coordinates are those of the optical centre. On the plans north is up, and small circles are "
+        f"other possible posts. {system} Before work begins, check ownership, foundations, power and underground lines "
+        "on site."
+    )
+    for number, (sensor, items) in enumerate(zip(evidence.sensors, costs.items, strict=True)):
+        pictures = evidence.close_ups[number] if number < len(evidence.close_ups) else ()
+        blocks: list[Paragraph | Facts | Pictures] = []
+        if pictures:
+            blocks.append(Pictures(pictures, f"Close-up of {sensor.id} on the plan and in the view."))
+        blocks.append(Facts(tuple(_sensor_facts(evidence, sensor, items))))
+        yield Card(f"{sensor.id}  {sensor.sensor_name}", tuple(blocks))
+
+
+def _sensor_facts(evidence: Evidence, sensor: RecordedSensor, items: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    if sensor.location:
+        yield "Location", sensor.location
+    yield "Mounted on", mounting(sensor)
+    tilted = abs(sensor.tilt_deg) >= LEAST_TILT
+    tilt = f"tilted by {sensor.tilt_deg:.1f}° downwards at the front" if tilted else "upright (tilt 0°)"
+    yield "Height, tilt", f"{sensor.height_m:.2f} m above the ground, {tilt}"
+    if sensor.roll_deg:
+        yield "Roll", f"{sensor.roll_deg:.1f}°"
+    if not sensor.all_round or tilted:
+        yield "Yaw", f"{sensor.yaw_deg:.1f}° counter-clockwise from the map's x axis (east)"
+    yield from _coordinates(sensor)
+    parts = ", ".join(f"{name} {dollars(amount)}" for name, amount in items.items())
+    yield "Cost", f"{dollars(sum(items.values()))}: {parts}"
+    alone = f"; {percent(sensor.coverage_marginal)} no other sensor sees" if len(evidence.sensors) > 1 else ""
+    yield "Sees", f"{percent(sensor.coverage_alone)} of the road{alone}"
+
+
+def _coordinates(sensor: RecordedSensor) -> Iterator[tuple[str, str]]:
+    if sensor.easting_m is None or sensor.northing_m is None:
+        x, y, z = sensor.map_m
+        yield "Map x, y, z", f"{x:.3f}, {y:.3f}, {z:.3f} m"
+        return
+    yield "Easting, northing", f"{sensor.easting_m:.3f}, {sensor.northing_m:.3f} m"
+    if sensor.latitude_deg is not None and sensor.longitude_deg is not None:
+        yield "Latitude, longitude", f"{sensor.latitude_deg:.8f}°, {sensor.longitude_deg:.8f}°"
+    if sensor.altitude_m is not None:
+        yield "Altitude", f"{sensor.altitude_m:.3f} m above the map's zero"
 
 
 def _projection(evidence: Evidence) -> str:
@@ -177,104 +243,47 @@ def _projection(evidence: Evidence) -> str:
     return "" if known is None else known.projection
 
 
-def _sensors(evidence: Evidence) -> Iterator[Block]:
-    record = evidence.record
-    price = "Installed price, $" if record.installed else "Price, $"
-    head = ("", "Type", "Position", "Height, m", "Tilt, °", "Direction, °", price)
-    rows = [
-        (
-            sensor.id,
-            sensor.sensor_name,
-            f"{sensor.position} ({'existing pole' if sensor.on_pole else 'new post'})"
-            if sensor.pose is not None
-            else sensor.position,
-            f"{sensor.height_m:.2f}",
-            f"{sensor.tilt_deg:.1f}",
-            f"{sensor.yaw_deg:.1f}",
-            f"{sensor.price_usd:,.0f}",
-        )
-        for sensor in record.sensors
-    ]
-    yield Table(head, tuple(rows), frozenset({3, 4, 5, 6}))
-    yield Paragraph(
-        f"Together {record.price_text}. Height is that of the optical centre above the ground; tilt is "
-        "the downward angle of the sensor's front, direction its heading, counter-clockwise from the map's x axis."
-    )
-    if record.installed:
-        total = sum(sensor.installation_usd or 0.0 for sensor in record.sensors)
+def _costs(costs: Costs) -> Iterator[Block]:
+    rows = [(name[:1].upper() + name[1:], str(number), dollars(amount)) for name, number, amount in costs.by_item]
+    yield Table(("Item", "Number", "Cost"), (*rows, ("Total", "", dollars(costs.total))), frozenset({1, 2}))
+    yield Paragraph(COST_SOURCES)
+    if costs.estimated:
         yield Paragraph(
-            f"Prices include installation: {_dollars(total)} for posts, mounting, power and backhaul, "
-            "from the table of installed costs under “Reproduction”."
+            "The sensors were placed by their own prices, without installation. To choose by installed prices, place "
+            "them again with installed costs."
         )
-    else:
-        yield Paragraph("Prices are for sensors only, without posts, mounting, power and backhaul.")
-    types = {sensor.sensor_name: sensor.evidence for sensor in record.sensors if sensor.evidence}
-    if types:
-        yield Paragraph("Evidence for the detection range of each type:")
-        yield Bullets(tuple(f"{name}: {rests_on}." for name, rests_on in types.items()))
-    yield _coordinates(evidence)
-    if not evidence.geo_reference.obstacle:
-        yield Paragraph("Height in this table is that of the optical centre above the map's zero.")
 
 
-def _coordinates(evidence: Evidence) -> Table:
-    """Return the table of the sensors' optical centres."""
-    head, rows = _located(evidence, np.array([sensor.map_m for sensor in evidence.sensors]), 3, 8)
-    named = tuple((sensor.id, *row) for sensor, row in zip(evidence.sensors, rows, strict=True))
-    return Table(("", *head), named, frozenset(range(1, 1 + len(head))))
-
-
-def _located(evidence: Evidence, points: Float, metres: int, degrees: int) -> tuple[Row, list[Row]]:
-    """Return heads and cells of a table of positions.
-
-    Positions are projected and geographic coordinates where the map's projection is known, otherwise map coordinates.
-
-    Parameters
-    ----------
-    points : (n, 3) float64, metres
-        Map coordinates.
-    metres, degrees : int
-        Decimals of each.
-    """
-    points = points.reshape(-1, 3)
-    places = evidence.geo_reference.geographic(points)
-    if places is None:
-        return ("Map x, m", "Map y, m", "Map z, m"), [tuple(f"{value:.{metres}f}" for value in row) for row in points]
-    rows = [
-        (*(f"{value:.{metres}f}" for value in projected), f"{latitude:.{degrees}f}", f"{longitude:.{degrees}f}")
-        for projected, (longitude, latitude, _) in zip(evidence.geo_reference.projected(points), places, strict=True)
-    ]
-    return ("Easting, m", "Northing, m", "Height, m", "Latitude, °", "Longitude, °"), rows
-
-
-def _coverage(evidence: Evidence) -> Iterator[Block]:
-    record = evidence.record
-    coverage = record.coverage
-    lines = [
+def _places(evidence: Evidence) -> Iterator[Block]:
+    record, coverage = evidence.record, evidence.record.coverage
+    yield Paragraph(
         f"{percent(coverage.whole)} of the road is seen by a sensor, {percent(coverage.seen_twice)} by two or more."
-    ]
-    lines += [_sentence(note) for note in record.notes if note.startswith((BAND, UNRANKED))]
-    if coverage.central is not None:
-        lines.append(f"{percent(coverage.central)} of the weighted regions is seen.")
-    yield Bullets(tuple(lines))
-    if "plan.png" in evidence.pictures:
-        yield Picture(evidence.pictures["plan.png"], "Coverage map with the sensor positions.")
-    yield Table(
-        ("", "Sees of the road", "Sees alone"),
-        tuple((one.id, percent(one.coverage_alone), percent(one.coverage_marginal)) for one in record.sensors),
-        frozenset({1, 2}),
     )
     places = seen_places(evidence.site.targets, evidence.seen_by, evidence.site.areas)
-    yield Table(
-        ("Place", "Road, m²", "Seen", "Seen twice"),
-        tuple((one.name, f"{one.area:,.0f}", percent(one.seen), percent(one.seen_twice)) for one in places),
-        frozenset({1, 2, 3}),
+    returns = {one.name: one.least for one in record.crossings}
+    streets = tuple(
+        (one.name, f"{one.area:,.0f}", percent(one.seen), percent(one.seen_twice))
+        for one in places
+        if one.name not in returns
     )
+    if streets:
+        yield Table(("Street", "Area, m²", "Seen", "Twice"), streets, frozenset({1, 2, 3}))
+    crossings = tuple(
+        (one.name, percent(one.seen), returns_text(returns[one.name])) for one in places if one.name in returns
+    )
+    if crossings:
+        yield Table(("Crossing", "Surface seen", "Points on a pedestrian"), crossings, frozenset({1, 2}))
+        yield Paragraph(
+            "Points on a pedestrian are those that all sensors together measure in one turn, at the worst point of "
+            f"the crossing. With fewer than {FEW_RETURNS:g} a detector may miss the pedestrian."
+        )
+        few = [name for name, _, _ in crossings if returns[name] < FEW_RETURNS]
+        if few:
+            yield Paragraph(f"Fewer than {FEW_RETURNS:g}: {', '.join(few)}.")
 
 
 def _blind_spots(evidence: Evidence) -> Iterator[Block]:
-    targets = evidence.site.targets
-    spots = blind_spots(targets, evidence.seen, evidence.site.areas)
+    spots = blind_spots(evidence.site.targets, evidence.seen, evidence.site.areas)
     if not spots:
         yield Paragraph("There are none: every square of the road is seen.")
         return
@@ -283,72 +292,103 @@ def _blind_spots(evidence: Evidence) -> Iterator[Block]:
     largest = "" if len(shown) == len(spots) else f" The {len(shown)} largest are listed."
     parts = counted(len(spots), "connected part")
     yield Paragraph(f"{area:,.0f} m² of road is not seen, in {parts}.{largest} {_counted_from(evidence)}")
+    if evidence.record.returns is not None:
+        yield Paragraph(SURFACE)
     yield Picture(
         blind_spot_map(evidence, shown),
-        "Orange is not seen, light blue seen by one sensor, dark blue by two or more; triangles are sensors, numbers "
-        "the blind spots of the table. The map's y axis points up.",
+        "Orange is not seen, light blue seen by one sensor, dark blue by two or more. Triangles are sensors, numbers "
+        "the blind spots of the table.",
     )
-    middles = np.array([spot.middle for spot in shown]) + np.array(evidence.record.site.origin_m)
-    yield _spot_table(evidence, shown, middles)
+    yield _spot_table(evidence, shown)
 
 
 def _counted_from(evidence: Evidence) -> str:
     """Return the sentence that defines distances and directions of blind spots."""
-    origins = centres(evidence.site.targets, evidence.site.areas)
-    names = [f"“{centre.name}”" for centre in origins]
+    names = [f"“{centre.name}”" for centre in centres(evidence.site.targets, evidence.site.areas)]
     if not evidence.site.targets.central.any():
         origin = "the centre of the road, the mean of all its squares"
     elif len(names) == 1:
-        origin = f"the centre of the weighted region {names[0]}"
+        origin = f"the centre of {names[0]}"
     else:
-        origin = f"the nearest centre of a weighted region ({', '.join(names)})"
+        origin = f"the nearest of the centres of {', '.join(names)}"
     return f"Distances and directions are counted from {origin}; north is the direction of the map's y axis."
 
 
-def _spot_table(evidence: Evidence, spots: Sequence[BlindSpot], middles: Float) -> Table:
-    head, rows = _located(evidence, middles, 1, 6)
-    cells = tuple(
-        (str(number), f"{spot.area:,.0f}", spot.where, *row)
-        for number, (spot, row) in enumerate(zip(spots, rows, strict=True), start=1)
+def _spot_table(evidence: Evidence, spots: Sequence[BlindSpot]) -> Table:
+    middles = np.array([spot.middle for spot in spots]) + np.array(evidence.record.site.origin_m)
+    rows = tuple(
+        (str(number), f"{spot.area:,.0f}", f"{spot.where} ({place})")
+        for number, (spot, place) in enumerate(zip(spots, _located(evidence, middles), strict=True), start=1)
     )
-    return Table(("", "Area, m²", "Where", *head), cells, frozenset({1, *range(3, 3 + len(head))}))
+    return Table(("", "Area, m²", "Where"), rows, frozenset({1}))
 
 
-def _certificate(evidence: Evidence, points: Sequence[FrontPoint]) -> Iterator[Block]:
+def _located(evidence: Evidence, middles: Float) -> list[str]:
+    """Return positions as text: latitude and longitude where the map's projection is known, else map coordinates."""
+    places = evidence.geo_reference.geographic(middles)
+    if places is None:
+        return [f"map x {x:.1f} m, y {y:.1f} m" for x, y, _ in middles.tolist()]
+    return [geographic(latitude, longitude, 6) for longitude, latitude, _ in places.tolist()]
+
+
+def _other_choices(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
-    yield Paragraph(certificate_sentence(evidence))
-    same_price = _same_price(evidence, points)
+    yield Paragraph(proof(evidence))
+    same_price = _same_price(evidence)
     elsewhere = (POSE_ERRORS, CHOSEN_FOR, BAND, UNRANKED, *LOCATED_FILES, *([SAME_PRICE] if same_price else []))
-    notes = [_sentence(note) for note in record.notes if not note.startswith(elsewhere)]
+    notes = [sentence(note) for note in record.notes if not note.startswith(elsewhere)]
     notes += [same_price] if same_price else []
-    if record.greedy is not None:
-        lost = record.greedy.gap_to_placement
-        notes.append(
-            "A greedy choice of one sensor after the other gives "
-            f"{f'{lost:.2%}' if lost > 0 else 'no'} {'less' if record.returns is None else 'fewer returns'}."
-        )
     notes.append("“Proven” refers to the model: this scene, these sensor models and this definition of seen.")
     yield Bullets(tuple(notes))
+    if record.front:
+        yield from _front(evidence)
 
 
-def _same_price(evidence: Evidence, points: Sequence[FrontPoint]) -> str:
+def _same_price(evidence: Evidence) -> str:
     """Return what is proven of the coverage of the cheapest placement, from the table of numbers of sensors, or ""."""
     record, problem = evidence.record, evidence.site.problem
-    own = [point for point in points if point.count == len(record.sensors)]
-    if not record.objective.cheapest or record.objective.status == MOVED or not own or not equal_prices(problem):
+    own = [point for point in record.front if point.count == len(record.sensors)]
+    equal = bool(np.ptp(problem.prices[problem.allowed]) == 0) if problem.allowed.any() else False
+    if not record.objective.cheapest or record.objective.status == MOVED or not own or not equal:
         return ""
     choice = f"choice of {counted(len(record.sensors), 'sensor')}, at the same price,"
     more = own[0].coverage - _weighted_share(evidence)
     if more > MIN_DIFFERENCE:
-        return f"Another {choice} covers {_points(more)} more: see “Fewer or more sensors”."
+        return f"Another {choice} covers {points(more)} more: see the table of numbers of sensors."
     missed = own[0].missed
-    return f"No other {choice} covers more{f' than {_points(missed)} more' if missed else ': this is proven'}."
+    return f"No other {choice} covers more{f' than {points(missed)} more' if missed else ': this is proven'}."
 
 
 def _weighted_share(evidence: Evidence) -> float:
     """Return the share of the road that is seen, counted by its weights."""
     weights = evidence.site.problem.weights
     return math.fsum(weights[evidence.seen]) / math.fsum(weights)
+
+
+def _front(evidence: Evidence) -> Iterator[Block]:
+    record = evidence.record
+    weighted = " Coverage is weighted here." if np.ptp(evidence.site.problem.weights) > 0 else ""
+    budget = record.request.goal.budget
+    limit = "" if budget is None else f" The budget of {dollars(budget)} does not limit the choices of this table."
+    yield Paragraph(
+        "With fewer or more sensors under the same rules, regardless of price, the best choices found by a short "
+        f"search see:{weighted}{limit}"
+    )
+    yield Picture(
+        front_chart(record.front, (len(record.sensors), _weighted_share(evidence))),
+        "Road seen by number of sensors; a line above a point extends to what no choice can exceed.",
+    )
+    price = "Installed, $" if record.installed else "Sensors, $"
+    rows = tuple(
+        (
+            str(point.count),
+            f"{point.price:,.0f}",
+            percent(point.coverage),
+            "none sees more" if point.missed == 0 else f"at most {points(point.missed)} more",
+        )
+        for point in record.front
+    )
+    yield Table(("Sensors", price, "Seen", "Other choices"), rows, frozenset({0, 1, 2}))
 
 
 def _losses(evidence: Evidence) -> Iterator[Block]:
@@ -368,12 +408,12 @@ def _losses(evidence: Evidence) -> Iterator[Block]:
             ),
             frozenset({1, 2}),
         )
-    errors = [_sentence(note) for note in record.notes if note.startswith(POSE_ERRORS)]
+    errors = [sentence(note) for note in record.notes if note.startswith(POSE_ERRORS)]
     scenarios = record.request.goal.scenarios
     if not errors and not scenarios.errs:
-        errors = ["The loss from errors of the sensors' poses was not evaluated (option --pose-errors)."]
+        errors = ["The loss from sensors that stand or point a little off their plan was not evaluated."]
     if scenarios.kind != "traffic":
-        errors.append("The road is empty: occlusion by vehicles was not evaluated (option --traffic).")
+        errors.append("The road is empty in this study: vehicles that block the view were not evaluated.")
     if errors:
         yield Bullets(tuple(errors))
     for name in (*POSE_ERROR_PICTURES, *TRAFFIC_PICTURES):
@@ -381,53 +421,40 @@ def _losses(evidence: Evidence) -> Iterator[Block]:
             yield Picture(evidence.pictures[name], CAPTIONS[name])
 
 
-def _front(evidence: Evidence, points: Sequence[FrontPoint]) -> Iterator[Block]:
-    if not points:
-        why = (
-            "the folder does not hold the visibility grid of this placement"
-            if evidence.grid is None
-            else "it was not requested"
-        )
-        yield Paragraph(f"Other numbers of sensors were not evaluated: {why}.")
-        return
+def _trust(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
-    weighted = " Coverage is weighted here." if np.ptp(evidence.site.problem.weights) > 0 else ""
-    budget = record.request.goal.budget
-    limit = "" if budget is None else f" The budget of {_dollars(budget)} does not limit the choices of this table."
-    yield Paragraph(
-        f"For each number of sensors, the placement with most coverage under the same rules, regardless of "
-        f"price.{limit}{weighted} The last column gives the proven bound on the coverage of all other placements of at "
-        "most that number. Searches for other numbers start from this placement and are limited."
-    )
-    goal = purpose(record.notes)
-    if goal:
-        yield Paragraph(f"This placement was chosen{goal}, not for coverage: the table does not rank it.")
-    price = "Installed price, $" if record.installed else "Price, $"
-    yield Picture(
-        front_chart(points, (record.price_usd, _weighted_share(evidence)), installed=record.installed),
-        "Coverage against price by number of sensors; a line above a point extends to its proven bound.",
-    )
-    rows = tuple(
-        (
-            str(point.count),
-            f"{point.price:,.0f}",
-            percent(point.coverage),
-            "none covers more" if point.missed == 0 else f"at most {_points(point.missed)} more",
-        )
-        for point in points
-    )
-    yield Table(("Sensors", price, "Coverage", "Other choices"), rows, frozenset({0, 1, 2}))
-
-
-def _warnings(evidence: Evidence) -> Iterator[Block]:
-    record = evidence.record
+    names = {sensor.sensor: sensor.sensor_name for sensor in record.sensors}
+    lines = []
+    models = [name for key, name in names.items() if key in PAPER_TYPES]
+    if models:
+        lines.append(f"Types 1 to 3 {PAPER_MODELS} This placement uses {' and '.join(models)}.")
+    evidences = {sensor.sensor_name: sensor.evidence for sensor in record.sensors if sensor.sensor not in PAPER_TYPES}
+    lines += [f"Range of {name}: {rests_on}." for name, rests_on in evidences.items() if rests_on]
+    lines += [sentence(note) for note in record.notes if note.startswith((BAND, UNRANKED))]
     chosen = (sensor.sensor for sensor in record.sensors)
     warnings = relevant_warnings(record.warnings, record.request.candidates.sensors, chosen)
-    standing = (
-        "A square is seen if a return of the sensor's scan lies near its centre. The scene is a model: objects that it "
-        "lacks do not occlude. Check positions on site for ownership, foundations, power and lines."
-    )
-    yield Bullets((*(_sentence(warning) for warning in warnings), standing))
+    lines += [plain_warning(warning, names) for warning in warnings]
+    lines.append("The scene is a model: objects that it lacks do not block the view. Check the positions on site.")
+    yield Bullets(tuple(lines))
+
+
+def _sources(evidence: Evidence) -> Iterator[Block]:
+    record = evidence.record
+    lines = [f"Map data: {credit}." for credit in record.site.attribution] or [
+        "Map data: the scene names no source that demands a credit."
+    ]
+    if any(sensor.sensor in PAPER_TYPES for sensor in record.sensors):
+        lines.append("Sensor types 1 to 3 and their prices: SEIP study of infrastructure-based collective perception.")
+    version = record.versions.get("seip", "")
+    lines.append(f"Program: SEIP for Blender {version}, GPL-3.0-or-later.".replace("  ", " "))
+    yield Bullets(tuple(lines))
+    if record.site.sources:
+        yield Paragraph("Where the objects of the scene come from, and for how many position or size is assumed:")
+        rows = tuple(
+            (row.kind, row.source, f"{row.count:,}", f"{row.assumed:,}" if row.assumed else "none")
+            for row in record.site.sources
+        )
+        yield Table(("Objects", "Source", "Number", "Assumed"), rows, frozenset({2, 3}))
 
 
 def _making(evidence: Evidence) -> Iterator[Block]:
@@ -437,25 +464,34 @@ def _making(evidence: Evidence) -> Iterator[Block]:
         yield Paragraph("This command, run in the result folder, repeats the placement in another folder:")
         yield Code(command)
     else:
-        yield Paragraph("No single command repeats this placement; its settings are below.")
-    versions = ", ".join(f"{name} {version}" for name, version in record.versions.items())
-    yield Paragraph(f"Made {record.times.created} with {versions}; solver {record.objective.solver}.")
-    settings = ((name, json.dumps(value, ensure_ascii=False)) for name, value in record.settings.items())
-    inputs = ((f"digest of {name}", value) for name, value in record.inputs.items())
-    yield Table(("Setting", "Value"), (*settings, *inputs))
+        yield Paragraph("No single command repeats this placement.")
+    yield Facts(tuple(_settings(evidence)))
 
 
-def _sentence(text: str) -> str:
-    """Return a note with a capital and a full stop; names of types and files at its beginning stay as they are."""
-    first = text.split(maxsplit=1)[0] if text.strip() else ""
-    begun = text[:1].upper() + text[1:] if first.isalpha() else text
-    return begun if begun.endswith((".", "!", "?")) else f"{begun}."
-
-
-def _dollars(amount: float) -> str:
-    return f"${amount:,.0f}"
-
-
-def _points(share: float) -> str:
-    """Return a share as percentage points, rounded up."""
-    return f"{math.ceil(share * 1000 - 1e-9) / 10:.1f} percentage points"
+def _settings(evidence: Evidence) -> Iterator[tuple[str, str]]:
+    """Yield the settings of a placement that a reader can check, in words."""
+    record = evidence.record
+    goal, counts, targets = record.request.goal, record.counts, evidence.site.targets
+    if goal.coverage is not None:
+        asked = f"the cheapest sensors that see {percent(goal.coverage)} of the road{limits_of(goal, 'with')}"
+    else:
+        what = "most of the road seen" if record.returns is None else "most points on road users"
+        asked = f"{what}{limits_of(goal, 'with')}"
+    chosen_for = purpose(record.notes)
+    yield "Asked for", f"{asked}{f', chosen{chosen_for}' if chosen_for else ''}"
+    rules = ["the road in weighted regions counts more"] if goal.weighted else []
+    rules += [f"sensors at least {goal.min_distance:g} m apart"] if goal.min_distance > 0 else []
+    rules += [f"a sensor at {name}" for name in goal.mandatory] + [f"no sensor at {name}" for name in goal.forbidden]
+    if rules:
+        yield "Rules", "; ".join(rules)
+    yield "Sensor types", ", ".join(record.request.candidates.sensors)
+    positions = f"{counts.positions:,}, of which {counts.positions_on_poles:,} on existing poles"
+    yield "Positions", f"{positions}; with all heights, types and directions {counts.poses:,}"
+    yield "Road", f"{len(targets):,} squares of {targets.spacing:g} m, {evidence.area:,.0f} m² together"
+    visibility = record.settings.get("visibility")
+    delta = visibility.get("delta") if isinstance(visibility, dict) else None
+    yield "A square is seen", f"if a measured point lies within {delta or VisibilitySettings().delta:g} m of its centre"
+    yield "Made", f"{record.times.created} by {record.objective.solver}"
+    yield "With", ", ".join(f"{name} {version}" for name, version in record.versions.items())
+    for name, value in record.inputs.items():
+        yield f"Checksum of {name}", value

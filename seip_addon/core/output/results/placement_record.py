@@ -13,9 +13,9 @@ import numpy as np
 from ... import limits
 from ...arrays import Float, Integer
 from ...choosing.placement.deployment import GainBand, Sensor, TypeBand, price_text
-from ...choosing.placement.objective import Objective, Solution
+from ...choosing.placement.objective import FrontPoint, Objective, Solution
 from ...choosing.placement.problem import Placement
-from ...choosing.placement.returns_summary import ReturnsSummary, share_reached
+from ...choosing.placement.returns_summary import CrossingReturns, ReturnsSummary, share_reached
 from ...geometry.geo_reference import GeoReference
 from ...geometry.orientation import orientation
 from ...sensing.lidar.model import LidarModel
@@ -114,6 +114,10 @@ class RecordedSensor:
         What its type's law of detection rests on; records of earlier versions lack it.
     installation_usd : float, optional
         Of the price, what it takes to install the sensor; None where prices are those of sensors alone.
+    location : str
+        Street, side and distances in words; see `locations`. Records of earlier versions lack it.
+    all_round : bool
+        Whether its type measures in all directions, so that its yaw does not matter; false in earlier versions.
     """
 
     id: str
@@ -139,6 +143,8 @@ class RecordedSensor:
     northing_m: MapCoordinate | None = None
     evidence: str = ""
     installation_usd: Dollars | None = None
+    location: str = ""
+    all_round: bool = False
 
     @property
     def orientation(self) -> Float:
@@ -244,6 +250,10 @@ class PlacementRecord:
         Digests of what went in.
     returns : ReturnsSummary, optional
         Returns from road users, where the placement was chosen for them.
+    front : tuple of FrontPoint
+        Best placements found with fewer and more sensors; records of earlier versions lack it.
+    crossings : tuple of CrossingReturns
+        Expected returns from a pedestrian on each crossing; records of earlier versions lack them.
     """
 
     site: RecordedSite
@@ -261,6 +271,8 @@ class PlacementRecord:
     versions: Mapping[str, str]
     times: RecordedTimes
     returns: ReturnsSummary | None = None
+    front: tuple[FrontPoint, ...] = ()
+    crossings: tuple[CrossingReturns, ...] = ()
 
     @cached_property
     def request(self) -> PlacementRequest:
@@ -373,6 +385,8 @@ def placement_record(
             {step: _rounded(seconds, 3) for step, seconds in provenance.durations.items()},
         ),
         returns=deployment.returns and _rounded_returns(deployment.returns),
+        front=tuple(_rounded_point(point) for point in solution.front),
+        crossings=_rounded_crossings(solution.crossings),
     )
 
 
@@ -419,6 +433,7 @@ def _sensor(sensor: Sensor, site: Site) -> RecordedSensor:
         easting_m=None if easting is None else _rounded(easting, 3),
         northing_m=None if northing is None else _rounded(northing, 3),
         evidence=sensor.model.evidence,
+        all_round=sensor.model.all_round,
         installation_usd=None if sensor.installation is None else _rounded(sensor.installation, 2),
     )
 
@@ -440,9 +455,16 @@ def _sought(solution: Solution) -> Literal["most coverage", "most returns", "lea
 
 def _rounded_returns(returns: ReturnsSummary) -> ReturnsSummary:
     """Round to what single precision holds."""
-    crossings = tuple(replace(one, least=_rounded(one.least, 3)) for one in returns.crossings)
     of_each = {name: _rounded(number, 3) for name, number in returns.of_each.items()}
-    return ReturnsSummary(_rounded(returns.typical, 3), of_each, crossings)
+    return ReturnsSummary(_rounded(returns.typical, 3), of_each, _rounded_crossings(returns.crossings))
+
+
+def _rounded_crossings(crossings: Iterable[CrossingReturns]) -> tuple[CrossingReturns, ...]:
+    return tuple(replace(one, least=_rounded(one.least, 3)) for one in crossings)
+
+
+def _rounded_point(point: FrontPoint) -> FrontPoint:
+    return FrontPoint(point.count, _share(point.coverage), _rounded(point.price, 2), _share(point.missed))
 
 
 def _greedy(greedy: Placement, placement: Placement, *, of_returns: bool) -> RecordedGreedy:

@@ -13,8 +13,7 @@ import shapely
 from ... import limits
 from ...arrays import Boolean, Float
 from ...choosing.placement.objective import Solution
-from ...choosing.placement.problem import PlacementConstraints, PlacementProblem
-from ...sensing.visibility.grid import VisibilityGrid
+from ...choosing.placement.problem import PlacementConstraints
 from ...site.scene_geometry import NamedArea, SceneGeometry
 from ...site.site import Site, Targets
 from ...storage.array_file import ArrayFile, ArrayRule, ContentError
@@ -69,7 +68,7 @@ class SiteFile:
     seen : (k, t) bool
         Targets that each sensor sees, in the order of the record.
     problem : PlacementConstraints
-        The problem without its visibility; see `with_visibility`.
+        The problem without its visibility, which is in ``visibility.npz``.
     """
 
     key: str
@@ -77,10 +76,6 @@ class SiteFile:
     areas: tuple[Area, ...]
     seen: Boolean
     problem: PlacementConstraints
-
-    def with_visibility(self, grid: VisibilityGrid) -> PlacementProblem:
-        """Return the problem as it was solved."""
-        return PlacementProblem(visible=grid.visible, **vars(self.problem))
 
 
 def save_site_file(

@@ -6,10 +6,10 @@ import pytest
 from seip_addon.core.choosing.placement.objective import (
     Objective,
     check_objective,
-    optimise,
     placement_problem,
     target_weights,
 )
+from seip_addon.core.choosing.placement.optimisation import optimise
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from tests.builders.small_junction import make_example

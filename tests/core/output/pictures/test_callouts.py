@@ -82,3 +82,15 @@ def test_a_label_keeps_off_the_subject_where_there_is_room_next_to_it():
 
 def test_nothing_to_label():
     assert place_callouts(np.empty((0, 2)), np.empty((0, 2)), BOUNDS, CLEARANCE, NOWHERE).shape == (0, 2)
+
+
+def test_no_label_is_in_a_box_that_is_taken():
+    anchors = np.array([(50.0, 50.0), (60.0, 55.0)])
+    sizes = np.full((2, 2), 12.0)
+    taken = np.array([(0.0, 0.0, 45.0, 100.0), (45.0, 62.0, 100.0, 100.0)])
+    bounds = (0.0, 0.0, 100.0, 100.0)
+    free, kept = (place_callouts(anchors, sizes, bounds, CLEARANCE, NOWHERE, boxes) for boxes in (None, taken))
+    low, high = kept - 6.0, kept + 6.0
+    for box in taken:
+        assert np.all((high[:, 0] <= box[0]) | (low[:, 0] >= box[2]) | (high[:, 1] <= box[1]) | (low[:, 1] >= box[3]))
+    assert not np.array_equal(free, kept)

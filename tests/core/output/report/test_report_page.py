@@ -1,34 +1,44 @@
 """Reports: what they say, that nothing in a name becomes markup, and that the same folder gives the same bytes."""
 
-import math
+import ast
+import io
 import re
 from dataclasses import replace
+from html import unescape
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
-from seip_addon.core.choosing.placement.cheapest import SAME_PRICE, cheapest_for_coverage
-from seip_addon.core.choosing.placement.objective import MOVED, Objective
+from seip_addon.core.choosing.placement.cheapest import cheapest_for_coverage
+from seip_addon.core.choosing.placement.objective import MOVED, SAME_PRICE, FrontPoint, Objective
+from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.returns_summary import ReturnsSummary
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
-from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
-from seip_addon.core.output.report.blocks import Bullets, Code, Paragraph, Picture, Table
+from seip_addon.core.output.pictures.close_up_sheet import TILE
+from seip_addon.core.output.report.blocks import Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Table
+from seip_addon.core.output.report.costs import costs_of
 from seip_addon.core.output.report.evidence import load_evidence
 from seip_addon.core.output.report.html import as_html
-from seip_addon.core.output.report.losses import front
-from seip_addon.core.output.report.sections import certificate_sentence, make_report
+from seip_addon.core.output.report.sections import make_report
+from seip_addon.core.output.report.wording import certificate_sentence, date, geographic, plain_warning
 from seip_addon.core.output.report.write import write_report
 from seip_addon.core.output.results.file_names import REPORT_FILES
-from seip_addon.core.output.results.placement_record import RecordedGreedy
 from seip_addon.core.progress import finish
-from tests.builders.report_folder import NAME, make_folder
+from seip_addon.core.sensing.visibility.grid import VisibilityGrid
+from seip_addon.core.site.installed_cost import load_installed_cost
+from tests.builders.report_folder import CROSSING, NAME, make_folder
 
 EFFORT = 0.2
 GOAL = 0.6  # coverage that takes several sensors
 VOID = {"meta", "img", "link", "br"}
+ROOT = Path(__file__).resolve().parents[4]
+MOST_LINES = 12_000
+"""Lines of the project that a report may import."""
 
 
 class Page(HTMLParser):
@@ -58,8 +68,8 @@ class Page(HTMLParser):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report") / "out"
-    make_folder(folder)
-    finish(write_report(folder, EFFORT))
+    make_folder(folder, effort=EFFORT)
+    finish(write_report(folder))
     return folder
 
 
@@ -68,9 +78,21 @@ def page(folder):
     return Page((folder / "report.html").read_text(encoding="utf-8"))
 
 
-def blocks(folder, kind, points=()):
-    report = make_report(load_evidence(folder), points)
-    return [block for section in report.sections for block in section.blocks if isinstance(block, kind)]
+def blocks_of(report, kind):
+    """Return all blocks of a kind, those within cards included."""
+    tops = [*report.first, *(block for section in report.sections for block in section.blocks)]
+    within = [inner for block in tops if isinstance(block, Card) for inner in block.blocks]
+    return [block for block in (*tops, *within) if isinstance(block, kind)]
+
+
+def blocks(folder, kind):
+    return blocks_of(make_report(load_evidence(folder)), kind)
+
+
+def text_of(folder, **changes):
+    """Return the page of a folder with parts of its record changed."""
+    evidence = load_evidence(folder)
+    return unescape(as_html(make_report(replace(evidence, record=replace(evidence.record, **changes)))))
 
 
 def test_names_stay_text(page):
@@ -78,7 +100,7 @@ def test_names_stay_text(page):
     assert "i" not in page.tags
     assert NAME in page.text
     assert "Mill Lane <i>" in page.text
-    assert "type2: sees <far>." in page.text
+    assert "Type 2 (32 channels): sees <far>." in page.text
 
 
 def test_nothing_comes_from_elsewhere(page):
@@ -89,10 +111,10 @@ def test_nothing_comes_from_elsewhere(page):
 @pytest.mark.slow
 def test_the_same_folder_gives_the_same_bytes(folder, tmp_path):
     first = [(folder / name).read_bytes() for name in REPORT_FILES]
-    finish(write_report(folder, EFFORT))
+    finish(write_report(folder))
     assert [(folder / name).read_bytes() for name in REPORT_FILES] == first
-    make_folder(tmp_path / "elsewhere")
-    finish(write_report(tmp_path / "elsewhere", EFFORT))
+    make_folder(tmp_path / "elsewhere", effort=EFFORT)
+    finish(write_report(tmp_path / "elsewhere"))
     assert [(tmp_path / "elsewhere" / name).read_bytes() for name in REPORT_FILES] == first
 
 
@@ -101,40 +123,6 @@ def test_the_pdf_is_whole_and_dated_by_the_record(folder):
     assert content.startswith(b"%PDF-1.")
     assert content.rstrip().endswith(b"%%EOF")
     assert b"(D:20260102030405Z)" in content
-
-
-def test_every_sensor_has_its_places_and_its_price(folder, page):
-    record = load_evidence(folder).record
-    for sensor in record.sensors:
-        for words in (
-            sensor.position,
-            f"{sensor.latitude_deg:.8f}",
-            f"{sensor.price_usd:,.0f}",
-            f"{sensor.map_m[0] - 4_500_000.0:.3f}",
-            f"{sensor.map_m[1] + 5_300_000.0:.3f}",
-        ):
-            assert words in page.text
-
-
-def test_places_and_blind_spots_are_named(page):
-    assert "High Street" in page.text
-    assert "of road is not seen" in page.text
-    assert "High Street, 48 m east of the centre of central box" in page.text
-    assert "counted from the centre of the weighted region “central box”; north is the direction of" in page.text
-    assert "middle" not in page.text.split("Blind spots")[1].split("Optimality")[0]
-    assert not re.search("Road (north|east|south|west) of", page.text)
-
-
-def test_figures_agree_with_the_grid(folder):
-    evidence = load_evidence(folder)
-    assert evidence.seen.mean() == pytest.approx(evidence.record.coverage.whole)
-    points = finish(front(evidence, EFFORT))
-    assert [point.count for point in points] == [1, 2, 3, 4, 5]
-    assert all(np.diff([point.coverage for point in points]) >= 0)
-    assert points[2].coverage == pytest.approx(
-        evidence.record.coverage.whole, abs=1e-8
-    )  # of which the record has 9 digits
-    assert points[2].missed == 0
 
 
 @pytest.mark.parametrize(
@@ -192,183 +180,218 @@ def test_the_certificate_is_a_sentence_for_engineers(tmp_path, goal, found, says
     assert re.search(says, certificate_sentence(load_evidence(tmp_path)))
 
 
-@pytest.mark.parametrize(("status", "room"), [("optimal", 0.0), ("feasible", 30.0)])
-def test_the_front_has_the_bound_of_the_certificate_and_bounds_do_not_cross(tmp_path, status, room):
-    example = make_folder(tmp_path)
-    best = finish(solve(example_problem(tmp_path)))
-    covered = best.objective
-    make_folder(tmp_path, status=status, objective=covered, bound=covered + room, chosen=best.chosen)
-    evidence = load_evidence(tmp_path)
-    points = finish(front(evidence, 1e-6))  # searches end at once: only what is known can bound them
-    assert example.visible.any()
-    whole = len(evidence.site.targets)
-    own = points[2]
-    assert (own.count, own.coverage, own.missed) == (3, covered / whole, room / whole)
-    bounds = [point.coverage + point.missed for point in points]
-    assert bounds == sorted(bounds)
-    assert [point.coverage for point in points] == sorted(point.coverage for point in points)
-    more = certificate_sentence(evidence)
-    assert ("this is proven" in more) == (own.missed == 0)
-    report = as_html(make_report(evidence, points))
-    stated = f"{math.ceil(1000 * room / whole - 1e-9) / 10:.1f} percentage points more"
-    assert (stated in report) == (room > 0)
-    assert report.count(stated) == (2 if room else 0)
+def test_every_sensor_has_a_card_with_its_place_and_its_costs(folder):
+    record = load_evidence(folder).record
+    cards = blocks(folder, Card)
+    assert [card.title.split()[0] for card in cards] == [sensor.id for sensor in record.sensors]
+    for sensor, card in zip(record.sensors, cards, strict=True):
+        facts = dict(next(block for block in card.blocks if isinstance(block, Facts)).rows)
+        assert facts["Location"] == sensor.location
+        assert sensor.position in facts["Mounted on"]
+        assert facts["Height, tilt"].startswith(f"{sensor.height_m:.2f} m above the ground, ")
+        east, north = sensor.map_m[0] - 4_500_000.0, sensor.map_m[1] + 5_300_000.0
+        assert facts["Easting, northing"] == f"{east:.3f}, {north:.3f} m"
+        assert facts["Latitude, longitude"] == f"{sensor.latitude_deg:.8f}°, {sensor.longitude_deg:.8f}°"
+        assert f"sensor ${sensor.price_usd:,.0f}" in facts["Cost"]
+        assert ("mounting on the pole" in facts["Cost"]) == sensor.on_pole
+        assert ("Yaw" in facts) == (not sensor.all_round)
+        assert all(value.strip() for value in facts.values())
 
 
-def front_of(folder, **changes):
-    """Return evidence and front where searches end at once, so that only what is known can bound them."""
-    make_folder(folder, **changes)
+def test_the_yaw_is_that_of_sensors_that_do_not_measure_all_round(folder):
     evidence = load_evidence(folder)
-    return evidence, {point.count: point for point in finish(front(evidence, 1e-6))}
+    first, *others = evidence.record.sensors
+    one_way = replace(first, all_round=False, yaw_deg=90.0)
+    record = replace(evidence.record, sensors=(one_way, *others))
+    cards = blocks_of(make_report(replace(evidence, record=record)), Card)
+    yaws = [dict(block.rows).get("Yaw") for card in cards for block in card.blocks if isinstance(block, Facts)]
+    assert yaws[0].startswith("90.0°")
+    assert yaws[1:] == [None] * len(others)
 
 
-@pytest.mark.parametrize("notes", [(), ("chosen for returns from road users: 240 returns from a car",)])
-def test_the_table_of_numbers_says_where_the_placement_was_chosen_for_something_else(tmp_path, notes):
-    evidence, points = front_of(tmp_path, notes=notes)
-    report = as_html(make_report(evidence, list(points.values())))
-    told = "This placement was chosen for returns from road users, not for coverage: the table does not rank it."
-    assert (told in report) == bool(notes)
+def test_the_first_page_says_where_what_how_many_what_price_and_how_good(folder):
+    report = make_report(load_evidence(folder))
+    (facts,) = (block for block in report.first if isinstance(block, Facts))
+    assert [name for name, _ in facts.rows] == ["Where", "What", "How many", "Price", "Quality"]
+    assert all(value.strip() for _, value in facts.rows)
+    assert sum(isinstance(block, Picture) for block in report.first) == 1
+    assert sum(isinstance(block, Paragraph) for block in report.first) == 1
+    assert report.subtitle.endswith("2 January 2026")
 
 
-def test_the_question_names_a_budget_as_a_price(tmp_path):
-    make_folder(tmp_path, goal=Objective(budget=60_000.0))
-    text = as_html(make_report(load_evidence(tmp_path), ()))
-    assert "Find the positions of sensors that see most of the road, for at most $60,000." in text
-
-
-def test_the_area_of_the_squares_is_not_said_to_be_that_of_the_region(folder):
-    evidence = load_evidence(folder)
-    squares = len(evidence.site.targets)
-    assert (
-        f"The region of interest is evaluated in {squares:,} squares of 2 m, {4 * squares:,} m² of road together."
-        in as_html(make_report(evidence, ()))
+def test_prices_are_installed_whether_or_not_the_placement_counted_that(folder):
+    record = load_evidence(folder).record
+    table = load_installed_cost()
+    added = [sum(table.items(on_pole=sensor.on_pole, bracket=0.4).values()) for sensor in record.sensors]
+    costs = costs_of(record)
+    assert costs.estimated
+    assert costs.total == pytest.approx(record.price_usd + sum(added))
+    paid = tuple(
+        replace(sensor, price_usd=sensor.price_usd + extra, installation_usd=extra)
+        for sensor, extra in zip(record.sensors, added, strict=True)
     )
+    installed = costs_of(replace(record, sensors=paid))
+    assert not installed.estimated
+    assert (installed.total, installed.sensors) == (pytest.approx(costs.total), pytest.approx(costs.sensors))
+    other = costs_of(replace(record, sensors=tuple(replace(one, installation_usd=1.0) for one in record.sensors)))
+    assert all(items["installation"] == 1.0 for items in other.items)
+    assert f"about ${costs.total:,.0f} installed" in text_of(folder)
 
 
-def test_greedy_loses_returns_where_these_were_sought(folder):
-    evidence = load_evidence(folder)
+def test_places_crossings_and_blind_spots_are_named(page):
+    assert "High Street, 48 m east of the centre of central box" in page.text
+    assert "counted from the centre of “central box”; north is the direction of the map's y axis" in page.text
+    assert not re.search("Road (north|east|south|west) of", page.text)
+    assert CROSSING.name in page.text
+    assert re.search(rf"{CROSSING.name}\s*[\d.]+%\s*4\.2", page.text)
+    assert f"Fewer than 5: {CROSSING.name}." in page.text
+
+
+def test_no_field_is_empty_and_no_json_is_shown(folder, page):
+    for table in blocks(folder, Table):
+        assert {len(row) for row in table.rows} == {len(table.head)}
+        for row in table.rows:
+            assert all(cell.strip() for cell in row) or row[0] == "Total"
+    assert all(value.strip() for facts in blocks(folder, Facts) for _, value in facts.rows)
+    assert not re.search(r"[{}]|null|None|nan", page.text)
+
+
+def test_tables_have_so_few_columns_that_they_fit_a_phone(folder):
+    assert max(len(table.head) for table in blocks(folder, Table)) <= 4
+
+
+def test_models_of_the_study_are_not_taken_for_products(folder):
+    assert "Types 1 to 3 are the sensor models of the SEIP study" in text_of(folder)
+    sensors = load_evidence(folder).record.sensors
+    bought = tuple(
+        replace(one, sensor="os1_128", sensor_name="OS1-128", evidence="calibrated on a sweep") for one in sensors
+    )
+    text = text_of(folder, sensors=bought)
+    assert "not products" not in text
+    assert "Range of OS1-128: calibrated on a sweep." in text
+
+
+def test_the_paragraph_has_no_terms_of_optimisation(folder):
     returns = ReturnsSummary(40.0, {"car": 80.0, "cyclist": 30.0, "pedestrian": 20.0}, ())
-    for found, lost, words in (
-        (None, 0.0313, "gives 3.13% less."),
-        (None, 0.0, "gives no less."),
-        (returns, 0.0313, "gives 3.13% fewer returns."),
-        (returns, 0.0, "gives no fewer returns."),
-    ):
-        greedy = RecordedGreedy(1.0, None, lost, (), ())
-        record = replace(evidence.record, returns=found, greedy=greedy)
-        assert words in as_html(make_report(replace(evidence, record=record), ()))
-
-
-def test_a_budget_that_any_choice_meets_does_not_loosen_the_bound(tmp_path):
-    """The same placement is proven the best of three sensors for $240,000, which buys any three of them."""
-    best = finish(solve(replace(example_problem_of(tmp_path), count=3)))
-    prices = example_problem(tmp_path).prices
-    found = {"objective": best.covered, "bound": best.covered, "chosen": best.chosen}
-    _, enough = front_of(tmp_path, goal=Objective(budget=3 * float(prices.max())), **found)
-    assert enough[3].missed == 0
-    _, both = front_of(tmp_path, goal=Objective(count=3, budget=3 * float(prices.max())), **found)
-    assert both[3].missed == 0
-    evidence, short = front_of(tmp_path, goal=Objective(count=3, budget=best.price), **found)
-    if best.price < 3 * float(prices.max()):  # other choices of three cost more, and may cover more
-        assert short[3].missed > 0
-    text = as_html(make_report(evidence, tuple(short.values())))
-    assert f"The budget of ${best.price:,.0f} does not limit the choices of this table." in text
-    assert f"at most 3 sensors for at most ${best.price:,.0f}" in text
-
-
-def example_problem_of(folder):
-    make_folder(folder)
-    return example_problem(folder)
-
-
-def equally_priced(folder, goal, notes=()):
-    """Return evidence of the cheapest placement for a coverage where all sensors cost $10,000, and the placement."""
-    problem = example_problem_of(folder)
-    problem = replace(problem, prices=np.full(len(problem.prices), 10_000.0))
-    best = finish(cheapest_for_coverage(problem, goal, SolverLimits(effort=1000.0)))
-    assert best.status == "optimal"
-    make_folder(folder, goal=Objective(coverage=goal), notes=notes, chosen=best.chosen)
+    notes = ("chosen for returns from road users: 80 returns from a car",)
     evidence = load_evidence(folder)
-    site = replace(evidence.site, problem=replace(evidence.site.problem, prices=problem.prices))
-    objective = replace(evidence.record.objective, value=best.price, bound=best.price, gap=0.0)
-    return replace(evidence, site=site, record=replace(evidence.record, objective=objective)), best
+    for record in (evidence.record, replace(evidence.record, returns=returns, notes=notes)):
+        report = make_report(replace(evidence, record=record))
+        (paragraph,) = (block.text for block in report.first if isinstance(block, Paragraph))
+        assert not re.search(r"bound|gap|candidate|optim|objective|geometric|target|pose", paragraph)
+        assert "this is proven" in paragraph
 
 
-def test_the_cheapest_placement_has_one_bound_on_its_coverage(tmp_path):
-    evidence, best = equally_priced(tmp_path, GOAL)
-    points = {point.count: point for point in finish(front(evidence, 1e-6))}
-    count, whole = len(best.chosen), len(evidence.site.targets)
-    assert count > 1
-    assert (points[count].missed, points[count].coverage) == (0, best.covered / whole)
-    for fewer in range(1, count):  # what costs less does not reach the coverage
-        assert points[fewer].coverage + points[fewer].missed <= GOAL + 1e-9
-    text = as_html(make_report(evidence, tuple(points.values())))
-    assert "reaches the required coverage at a lower price: this is proven." in text
-    assert f"No other choice of {count} sensors, at the same price, covers more: this is proven." in text
-    assert "equally cheap" not in text
+def test_warnings_are_in_plain_words():
+    names = {"type3": "Type 3"}
+    rings = (
+        "type3: beyond 35 m (at 3.5 m height), 44 m (at 5.4 m height) neighbouring rings on a level road are more than "
+        "2δ = 2 m apart, so the road between them is not seen although nothing hides it"
+    )
+    assert plain_warning(rings, names) == (
+        "Type 3: beyond 35 m (at 3.5 m height), 44 m (at 5.4 m height) the beams meet the road more than 2 m apart. "
+        "Parts of the road there are not seen although nothing blocks the view."
+    )
+    assert plain_warning("5 poles are assumed", names) == "5 poles are assumed."
+    assert plain_warning("type3: sees little", names) == "Type 3: sees little."
+
+
+def test_dates_and_positions_are_written_out():
+    assert date("2026-11-24T14:51:28+00:00") == "24 November 2026"
+    assert geographic(-31.97471, 115.89771, 3) == "31.975° S, 115.898° E"
+    assert geographic(51.5, -0.09301, 4) == "51.5000° N, 0.0930° W"
+
+
+def test_close_ups_are_those_of_the_sheet(folder):
+    evidence = load_evidence(folder)
+    assert len(evidence.close_ups) == len(evidence.record.sensors)
+    sheet = np.asarray(Image.open(folder / "sensors.png").convert("RGB"))
+    for number, (plan,) in enumerate(evidence.close_ups):
+        tile = np.asarray(Image.open(io.BytesIO(plan)).convert("RGB"))
+        assert tile.shape == (TILE[1], TILE[0], 3)
+        assert np.array_equal(tile, sheet[number * TILE[1] : (number + 1) * TILE[1]])
+    assert [block.pngs for block in blocks(folder, Pictures)] == list(evidence.close_ups)
+
+
+def test_without_pictures_there_is_still_a_report(tmp_path):
+    make_folder(tmp_path)
+    for name in ("plan.png", "sensors.png"):
+        (tmp_path / name).unlink()
+    assert len(blocks(tmp_path, Picture)) == 1  # the blind spots
+    assert blocks(tmp_path, Pictures) == []
+
+
+def test_the_table_of_numbers_is_that_of_the_record(folder):
+    record = load_evidence(folder).record
+    (table,) = (table for table in blocks(folder, Table) if table.head[0] == "Sensors")
+    assert [row[0] for row in table.rows] == [str(point.count) for point in record.front]
+    assert "With fewer or more sensors" not in text_of(folder, front=())
+    proven = (FrontPoint(1, 0.5, 10_000.0, 0.0), FrontPoint(2, 0.75, 20_000.0, 0.0132))
+    text = text_of(folder, front=proven)
+    assert "none sees more" in text
+    assert "at most 1.4 percentage points more" in text
 
 
 def test_a_note_on_equally_cheap_placements_gives_way_to_what_the_table_proves(tmp_path):
+    make_folder(tmp_path)
+    constraints = load_evidence(tmp_path).site.problem
+    problem = PlacementProblem(visible=VisibilityGrid.load(tmp_path / "visibility.npz").visible, **vars(constraints))
+    equal = replace(problem, prices=np.full(len(problem.prices), 10_000.0))
+    best = finish(cheapest_for_coverage(equal, GOAL, SolverLimits(effort=1000.0)))
     note = f"{SAME_PRICE}another one may cover up to 9.9 percentage points more"
-    evidence, best = equally_priced(tmp_path, GOAL, notes=(note,))
-    points = finish(front(evidence, EFFORT * 50))
-    own = points[len(best.chosen) - 1]
-    assert own.missed == 0
-    text = as_html(make_report(evidence, points))
-    assert "equally cheap" not in text
-    assert f"No other choice of {own.count} sensors, at the same price, covers more: this is proven." in text
-    better = replace(own, coverage=own.coverage + 0.05)
-    text = as_html(make_report(evidence, (*points[: own.count - 1], better, *points[own.count :])))
-    assert f"Another choice of {own.count} sensors, at the same price, covers 5.0 percentage points more" in text
-    assert "up to 9.9 percentage points more" in as_html(make_report(evidence, ()))  # without the table
+    make_folder(tmp_path, goal=Objective(coverage=GOAL), notes=(note,), chosen=best.chosen)
+    evidence = load_evidence(tmp_path)
+    site = replace(evidence.site, problem=replace(evidence.site.problem, prices=equal.prices))
+    count, share = len(best.chosen), best.covered / len(site.targets)
+    objective = replace(evidence.record.objective, value=best.price, bound=best.price, gap=0.0)
 
+    def text(*front):
+        record = replace(evidence.record, objective=objective, front=front)
+        return as_html(make_report(replace(evidence, site=site, record=record)))
 
-def example_problem(folder):
-    evidence = load_evidence(folder)
-    return evidence.site.with_visibility(evidence.grid)
+    proven = text(FrontPoint(count, share, best.price, 0.0))
+    assert "equally cheap" not in proven
+    assert f"No other choice of {count} sensors, at the same price, covers more: this is proven." in proven
+    better = text(FrontPoint(count, share + 0.05, best.price, 0.0))
+    assert f"Another choice of {count} sensors, at the same price, covers 5.0 percentage points more" in better
+    assert "up to 9.9 percentage points more" in text()  # without the table
 
 
 def test_without_a_projection_there_are_no_latitudes(tmp_path):
     make_folder(tmp_path, place=GeoReference())
-    evidence = load_evidence(tmp_path)
-    text = as_html(make_report(evidence, ()))
+    text = text_of(tmp_path)
     assert "no latitudes and longitudes" in text
-    assert "Latitude, °" not in text
-    assert "Map x, m" in text
+    assert "Latitude, longitude" not in text
+    assert "Map x, y, z" in text
     assert "Easting" not in text
 
 
-def test_positions_are_coordinates_of_the_projection_that_the_report_names(folder):
-    record = load_evidence(folder).record
-    mercator = GeoReference("EPSG:32632").mercator
-    sensors, spots = (one for one in blocks(folder, Table) if "Easting, m" in one.head)
-    for row in sensors.rows + spots.rows:
-        cells = dict(zip((sensors if row in sensors.rows else spots).head, row, strict=True))
-        latitude, longitude = (math.radians(float(cells[name])) for name in ("Latitude, °", "Longitude, °"))
-        metres = [float(cells[name]) for name in ("Easting, m", "Northing, m")]
-        assert mercator(latitude, longitude) == pytest.approx(metres, abs=0.2)
-    x, y = (record.site.origin_m[0] - 4_500_000.0, record.site.origin_m[1] + 5_300_000.0)
-    assert f"easting {x:,.2f} m, northing {y:,.2f} m" in as_html(make_report(load_evidence(folder), ()))
+def test_the_report_reads_what_the_placement_stored_and_imports_no_solver():
+    """Lazy imports count as well: all modules that are named anywhere in those that are reached."""
+    reached = _reached("headless.report")
+    assert not any("visibility.grid" in name or name.endswith((".solver", ".bounds")) for name in reached)
+    assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in reached.values()) <= MOST_LINES
 
 
-def test_without_its_grid_a_folder_has_no_front_and_the_report_says_why(tmp_path):
-    make_folder(tmp_path)
-    (tmp_path / "visibility.npz").unlink()
-    evidence = load_evidence(tmp_path)
-    assert finish(front(evidence, EFFORT)) == ()
-    assert any("does not hold the visibility grid" in one.text for one in blocks(tmp_path, Paragraph))
-    (tmp_path / "plan.png").unlink()
-    assert len(blocks(tmp_path, Picture)) == 1
-
-
-def test_a_front_can_be_left_out(folder):
-    assert finish(front(load_evidence(folder), 0.0)) == ()
-    assert any("was not requested" in one.text for one in blocks(folder, Paragraph))
-
-
-def test_all_rows_are_as_long_as_their_heads(folder):
-    for table in blocks(folder, Table):
-        assert {len(row) for row in table.rows} == {len(table.head)}
+def _reached(start):
+    found, left = {}, [start]
+    while left:
+        name = left.pop()
+        path = ROOT.joinpath(*name.split("."))
+        file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+        if name in found or not file.is_file():
+            continue
+        found[name] = file
+        left += [".".join(name.split(".")[:depth]) for depth in range(1, name.count(".") + 1)]
+        package = name if path.is_dir() else name.rpartition(".")[0]
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                left += [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                parts = package.split(".")[: package.count(".") + 2 - node.level] if node.level else []
+                base = ".".join([*parts, *([node.module] if node.module else [])])
+                left += [base, *(f"{base}.{alias.name}" for alias in node.names)]
+    return found
 
 
 def broken(folder, name, content):
@@ -388,8 +411,10 @@ def test_each_wrong_folder_has_its_sentence(tmp_path):
         load_evidence(broken(tmp_path / "b", "site.npz", b"PK\x03\x04"))
     with pytest.raises(SeipError, match=r"plan\.png is damaged or no picture"):
         load_evidence(broken(tmp_path / "c", "plan.png", b"\x89PNG"))
-    with pytest.raises(SeipError, match=r"visibility\.npz .*damaged"):
-        load_evidence(broken(tmp_path / "d", "visibility.npz", b"PK\x03\x04"))
+    with pytest.raises(SeipError, match=r"sensors\.png is damaged or no picture"):
+        load_evidence(broken(tmp_path / "d", "sensors.png", b"\x89PNG"))
+    with pytest.raises(SeipError, match=r"sensors\.png is of another placement: place the sensors again"):
+        load_evidence(broken(tmp_path / "e", "sensors.png", (tmp_path / "d" / "plan.png").read_bytes()))
 
 
 def test_files_of_different_placements_are_told_apart(tmp_path):
@@ -412,7 +437,7 @@ def test_signs_that_the_type_does_not_have_do_no_harm(tmp_path, recwarn):
     make_folder(tmp_path)
     path = tmp_path / "placement.json"
     path.write_text(path.read_text(encoding="utf-8").replace("Crossing", "路口"), encoding="utf-8")
-    finish(write_report(tmp_path, 0.0))
+    finish(write_report(tmp_path))
     assert (tmp_path / "report.pdf").stat().st_size > 10_000
     assert not [one for one in recwarn if "Glyph" in str(one.message)]
 
@@ -422,6 +447,6 @@ def test_sensors_moved_by_hand_have_no_command(tmp_path):
     record = load_evidence(tmp_path).record
     moved = replace(record, objective=replace(record.objective, solver="none", status=MOVED))
     evidence = replace(load_evidence(tmp_path), record=moved)
-    kinds = [type(block) for section in make_report(evidence, ()).sections for block in section.blocks]
+    kinds = [type(block) for section in make_report(evidence).sections for block in section.blocks]
     assert Code not in kinds
     assert Bullets in kinds

@@ -1,0 +1,143 @@
+"""Close-ups of each sensor on the plan and in the rendered view."""
+
+import io
+import os
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import shapely
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+
+from ...arrays import Float
+from ...choosing.placement.deployment import Deployment, Sensor
+from ...site.scene_geometry import SceneGeometry
+from ...site.site import Site
+from ...storage.files import whole_file
+from .close_up_sheet import MOST, TILE, close_up_sheet
+from .drawing import (
+    MARK_RADIUS,
+    SENSOR_MARK,
+    add_axes,
+    as_png,
+    credits_box,
+    draw_attribution,
+    draw_callouts,
+    markers_of,
+)
+from .palette import INK, PAPER
+from .plan_map import SENSOR, MapContent, Window, draw_map, draw_street_names, map_content
+from .plan_style import Style
+from .scale_bar import draw_scale, scale_paper
+from .viewpoint import Viewpoint, frame
+
+DPI = 160
+REACH = 20.0  # metres from the sensor to the left and right border of its plan
+VIEW_REACH = 9.0  # metres around the sensor that its view shows
+SLOPES = np.array((0.52, 0.39))  # tangents of half the field of view
+ELEVATIONS = np.radians((24.0, 38.0, 55.0, 75.0))
+TURNS = np.radians((0.0, 30.0, -30.0, 60.0, -60.0, 100.0, -100.0, 150.0))
+"""Directions tried for the camera: height above the horizon, and from that of the road."""
+
+
+def viewpoints(site: Site, sensor: Sensor) -> list[Viewpoint]:
+    """Return camera positions for a close-up of a sensor, the best first: from over the road, rather low."""
+    nearest = site.targets.xyz[np.argmin(np.hypot(*(site.targets.xyz - sensor.xyz)[:, :2].T))]
+    away = nearest[:2] - sensor.foot[:2]
+    towards = float(np.arctan2(away[1], away[0]))
+    ring = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    ground = sensor.foot + VIEW_REACH * np.column_stack((np.cos(ring), np.sin(ring), np.zeros(12)))
+    points = np.vstack((ground, sensor.foot, sensor.xyz + np.array((0.0, 0.0, 1.0))))
+    return [frame(points, towards + turn, elevation, SLOPES) for elevation in ELEVATIONS for turn in TURNS]
+
+
+def save_close_ups(  # what both kinds of pictures show
+    path: str | os.PathLike[str],
+    geometry: SceneGeometry,
+    site: Site,
+    deployment: Deployment,
+    views: Sequence[Image.Image],
+    places: Mapping[str, tuple[float, float]],
+) -> None:
+    """Write a sheet with the plan and the view of each sensor's surroundings, as PNG; without views only the plans.
+
+    Parameters
+    ----------
+    views : sequence of Image
+        Rendered close-ups in the order of the sensors, each of the size `TILE`; none at all without rendering.
+    places : mapping of str to (float, float)
+        Where each sensor with a view is on it, by its label, in shares of width and height from the lower left.
+    """
+    sensors = deployment.sensors[:MOST]
+    if not sensors:
+        return
+    content = map_content(geometry, site, deployment, site.region.buffer(REACH).bounds)
+    rows = []
+    for number, sensor in enumerate(sensors):
+        row = [_plan(content, sensor)]
+        if views:
+            row.append(_labelled(views[number], sensor, places[sensor.label], site.attribution))
+        rows.append(row)
+    with whole_file(path) as temporary:
+        close_up_sheet(rows).save(temporary, format="PNG", optimize=True)
+
+
+def _plan(content: MapContent, sensor: Sensor) -> Image.Image:
+    """Return the plan of a sensor's surroundings."""
+    width, height = TILE[0] / DPI, TILE[1] / DPI
+    x, y = sensor.xyz[:2].tolist()
+    up = REACH * height / width
+    window = (x - REACH, y - up, x + REACH, y + up)
+    figure = Figure((width, height), dpi=DPI, facecolor=PAPER)
+    FigureCanvasAgg(figure)
+    axes = add_axes(figure, 0.0, 0.0, width, height)
+    draw_map(axes, content, window, width)
+    inch = 2 * REACH / width
+    draw_scale(axes, inch, 1.0)
+    draw_attribution(axes, content.site.attribution)
+    left, bottom, across, high = scale_paper(window[0], window[1], inch, 1.0)
+    taken = [(left, bottom, left + across, bottom + high)]
+    if content.site.attribution:
+        taken.append(credits_box(axes, content.site.attribution))
+    points = np.array([one.xyz[:2] for one in content.deployment.sensors])
+    marks = [(*(point - 1.5), *(point + 1.5)) for point in points]
+    names = draw_street_names(axes, content.geometry, window, width, [*taken, *marks])
+    _mark(axes, content, sensor, window, np.array([*taken, *names]))
+    with Image.open(io.BytesIO(as_png(figure))) as drawn:
+        return drawn.convert("RGB")
+
+
+def _mark(axes: Axes, content: MapContent, sensor: Sensor, window: Window, taken: Float) -> None:
+    """Mark and label the sensor of a close-up and its neighbours."""
+    box = shapely.box(*window)
+    shown = [one for one in content.deployment.sensors if box.contains(shapely.Point(one.xyz[:2]))]
+    points = np.array([one.xyz[:2] for one in shown])
+    draw_callouts(axes, points, [one.label for one in shown], points, SENSOR - 0.5, taken)
+    markers = markers_of(content.deployment)
+    for one in shown:
+        size = SENSOR_MARK["markersize"] * (1.25 if one is sensor else 0.8)
+        style = SENSOR_MARK | {"markersize": size}
+        axes.plot(*one.xyz[:2], marker=markers[one.model.key], zorder=SENSOR, **style)
+
+
+def _labelled(view: Image.Image, sensor: Sensor, place: tuple[float, float], attribution: Sequence[str]) -> Image.Image:
+    """Return a rendered close-up with a ring round the sensor and its label."""
+    width, height = TILE[0] / DPI, TILE[1] / DPI
+    figure = Figure((width, height), dpi=DPI, facecolor=PAPER)
+    FigureCanvasAgg(figure)
+    axes = add_axes(figure, 0.0, 0.0, width, height)
+    axes.axis("off")
+    paper = Image.new("RGB", TILE, "#e9edf0")
+    paper.paste(view, mask=view.getchannel("A") if view.mode == "RGBA" else None)
+    axes.imshow(np.asarray(paper), extent=(0.0, width, 0.0, height), interpolation="nearest", aspect="auto")
+    axes.set(xlim=(0.0, width), ylim=(0.0, height))
+    point = np.array(place) * (width, height)
+    draw_callouts(axes, point[None], [sensor.label], point[None], 2.0)
+    ring: Style = {"marker": "o", "mfc": "none", "markersize": 2.6 * MARK_RADIUS, "linestyle": "none"}
+    axes.plot(*point, mec=PAPER, mew=4.0, zorder=3.0, **ring)
+    axes.plot(*point, mec=INK, mew=2.0, zorder=3.1, **ring)
+    draw_attribution(axes, attribution)
+    with Image.open(io.BytesIO(as_png(figure))) as drawn:
+        return drawn.convert("RGB")
