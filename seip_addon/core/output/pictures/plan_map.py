@@ -48,7 +48,7 @@ Window = tuple[float, float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class MapContent:
-    """What a plan shows.
+    """Content of a plan.
 
     Parameters
     ----------
