@@ -6,6 +6,7 @@ import math
 
 from ...choosing.placement.objective import MOVED, purpose
 from ...choosing.placement.returns_summary import FEW_RETURNS, returns_text, share_reached
+from ...counts import counted
 from .placement_record import PlacementRecord
 
 LARGE_GAP = 0.05
@@ -122,6 +123,5 @@ def _outlook(record: PlacementRecord) -> str:
 
 
 def _price(record: PlacementRecord) -> str:
-    number = len(record.sensors)
     scope = "with installation" if record.installed else "without installation"
-    return f"${record.price_usd:,.0f} for {number} sensor{'' if number == 1 else 's'}, {scope}."
+    return f"${record.price_usd:,.0f} for {counted(len(record.sensors), 'sensor')}, {scope}."
