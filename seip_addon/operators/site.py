@@ -26,7 +26,7 @@ from ..core.workflows.visibility_estimate import estimate
 from ..core.world.streetscape.description import DESCRIPTION_SUFFIX
 from ..properties.site import ROLE_ITEMS, SEIP_PG_problem, SEIP_PG_site
 from ..scene import contract, roles
-from ..scene.build import build_scene
+from ..scene.build import build_scene, remove_site
 from ..scene.changes import watch
 from ..scene.check import contents_of
 from ..scene.startup import remove_startup_objects
@@ -107,7 +107,9 @@ class _BuildsSite(LongWork[BuiltSite]):
         """Build the scene."""
         report = self.report  # type: ignore[attr-defined]  # of Blender's operators
         built = scene
-        if has_site(scene):
+        if self.is_chosen and is_of_choice(scene):
+            remove_site(scene)
+        elif has_site(scene):
             built = bpy.data.scenes.new(result.model.name)
             if self.is_chosen:
                 _copy_choice(scene.seip.site, built.seip.site)
@@ -115,6 +117,8 @@ class _BuildsSite(LongWork[BuiltSite]):
         elif remove_startup_objects(scene):
             report({"INFO"}, "Blender's cube, light and camera were removed")
         finish(build_scene(built, result.model, result.map_name))
+        if self.is_chosen:
+            built[contract.BUILT] = built.seip.site.place()
         _keep_map(built, result)
         show_site(built, result.model.region)
         for note in result.model.notes:
@@ -127,7 +131,7 @@ class _BuildsSite(LongWork[BuiltSite]):
 
 
 class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
-    """Model the chosen place of the map: in this scene with its camera, light and units, or in a new scene of this file where this one has a site already. Blender's cube, light and camera are removed where they are all that the scene holds"""  # noqa: E501  # a tooltip is one line
+    """Model the chosen place of the map: in this scene with its camera, light and units. A site of the same place is replaced, your own objects stay; a site of another place stays, and a new scene of this file is made. Blender's cube, light and camera are removed where they are all that the scene holds"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.build_site"
     bl_label = "Build Site"
@@ -175,7 +179,10 @@ def _copy_choice(chosen: SEIP_PG_site, site: SEIP_PG_site) -> None:
 def _keep_map(scene: bpy.types.Scene, built: BuiltSite) -> None:
     """Keep the map of an extract's streets in the file, as a text: traffic is simulated on it."""
     if built.map_text is not None:
-        bpy.data.texts.new(f"{scene.name}.xodr").from_string(built.map_text)
+        name = f"{scene.name}.xodr"
+        if name in bpy.data.texts:  # of the site that this one replaces
+            bpy.data.texts.remove(bpy.data.texts[name])
+        bpy.data.texts.new(name).from_string(built.map_text)
 
 
 def show_site(scene: bpy.types.Scene, region: BaseGeometry) -> None:
@@ -197,6 +204,11 @@ def missing_for_build(scene: bpy.types.Scene) -> str:
     if not site.source:
         return "Choose a map first"
     return "" if site.has_place() else "Choose a junction, or give latitude and longitude"
+
+
+def is_of_choice(scene: bpy.types.Scene) -> bool:
+    """Return whether the site of a scene is of the chosen place on the chosen map: a new one replaces it."""
+    return has_site(scene) and scene.get(contract.BUILT) == scene.seip.site.place()
 
 
 def has_site(scene: bpy.types.Scene) -> bool:

@@ -17,6 +17,7 @@ from ..operators.site import (
     SEIP_OT_take_out_of_role,
     has_site,
     in_short,
+    is_of_choice,
     missing_for_build,
 )
 from ..properties.site import SEIP_PG_site
@@ -52,7 +53,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         body = section(layout, "contents")
         if body is not None:
             _draw_contents(body, scene)
-        body = section(layout, "another_map")
+        body = section(layout, "change_site")
         if body is not None:
             _draw_map(body, scene)
     body = section(layout, "roles")
@@ -70,6 +71,8 @@ def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     missing = missing_for_build(scene)
     if missing:
         draw_sentence(layout, f"{missing}.", icon="INFO")
+    elif is_of_choice(scene):
+        draw_sentence(layout, "The site is built again; your own objects and the sensors stay.", icon="INFO")
     elif has_site(scene):
         draw_sentence(layout, "The site is built in a new scene; this one stays.", icon="INFO")
     draw_run(layout, SEIP_OT_build_site.bl_idname)

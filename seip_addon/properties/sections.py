@@ -44,7 +44,7 @@ class SEIP_PG_sections(bpy.types.PropertyGroup):
     site: _step("site", "Site")
     sensors: _step("sensors", "Sensors")
     placement: _step("placement", "Placement")
-    another_map: _section("Another Map")
+    change_site: _section("Change Site")
     roles: _section("Roles of Objects")
     contents: _section("Contents")
     about_sensor: _section("About the Sensor")

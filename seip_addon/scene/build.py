@@ -44,6 +44,14 @@ FRAME = 3.0
 """Margin (metres) around the region in the camera's view."""
 
 
+def remove_site(scene: bpy.types.Scene) -> None:
+    """Remove the objects that `build_scene` made from a scene; all others stay."""
+    built = [obj for obj in scene.objects if contract.BUILT in obj]
+    data = {obj.data for obj in built if obj.data is not None}
+    bpy.data.batch_remove(built)
+    bpy.data.batch_remove([one for one in data if not one.users])
+
+
 def build_scene(scene: bpy.types.Scene, model: SiteModel, map_name: str) -> Generator[Progress, None, None]:
     """Fill a scene with a site, after the scene contract of docs/architecture.md.
 
@@ -72,7 +80,7 @@ def build_scene(scene: bpy.types.Scene, model: SiteModel, map_name: str) -> Gene
         if part.of:
             _attach(made[part.name], made[part.of])
     yield Progress(len(model.parts), len(model.parts), "objects")
-    add_daylight(scene, contract.find_or_make(scene, VIEW))
+    add_daylight(scene, contract.find_or_make(scene, VIEW))[contract.BUILT] = True
     _frame(scene, model)
 
 
@@ -102,6 +110,7 @@ def _add(scene: bpy.types.Scene, part: Part, meshes: dict[str, bpy.types.Mesh]) 
     if shape not in meshes:
         meshes[shape] = mesh_of(part.name, solid)
     obj = bpy.data.objects.new(part.name, meshes[shape])
+    obj[contract.BUILT] = True
     obj.location = part.foot
     obj.rotation_euler = (0.0, 0.0, part.yaw)
     if part.weight is not None:
@@ -127,6 +136,7 @@ def _frame(scene: bpy.types.Scene, model: SiteModel) -> None:
     camera.lens = LENS
     camera.clip_start, camera.clip_end = CLIP_START, CLIP_END
     obj = bpy.data.objects.new("Overview", camera)
+    obj[contract.BUILT] = True
     obj.rotation_euler = (math.pi / 2 - CAMERA_ELEVATION, 0.0, CAMERA_AZIMUTH + math.pi / 2)
     contract.find_or_make(scene, VIEW).objects.link(obj)
     scene.camera = obj

@@ -47,6 +47,8 @@ ATTRIBUTION = "seip_attribution"
 CATEGORY = "seip_category"
 PAINT = "seip_paint"
 SHAPE = "seip_shape"
+BUILT = "seip_built"
+"""Mark of every object that was built from a map, and on the scene the place on that map."""
 WRITTEN = "seip_result"
 """Mark of every object that this program writes as a result or from trajectories: the next ones replace it only."""
 

@@ -13,8 +13,8 @@ SUN_STRENGTH, SUN_ANGLE = 2.3, math.radians(3.0)
 SKY, SKY_STRENGTH = (0.80, 0.88, 1.0, 1.0), 0.42
 
 
-def add_daylight(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
-    """Put a sun into a collection of the scene, and a sky behind it."""
+def add_daylight(scene: bpy.types.Scene, collection: bpy.types.Collection) -> bpy.types.Object:
+    """Put a sun into a collection of the scene, and a sky behind it; return the sun."""
     light = bpy.data.lights.new("Sun", "SUN")
     light.energy, light.angle = SUN_STRENGTH, SUN_ANGLE
     sun = bpy.data.objects.new("Sun", light)
@@ -26,3 +26,4 @@ def add_daylight(scene: bpy.types.Scene, collection: bpy.types.Collection) -> No
     background = next(node for node in nodes_of(scene.world) if node.type == "BACKGROUND")
     background.inputs["Color"].default_value = SKY
     background.inputs["Strength"].default_value = SKY_STRENGTH
+    return sun

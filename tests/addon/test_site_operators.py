@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
+from seip_addon import scene_status
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 
@@ -69,10 +70,42 @@ def test_a_description_says_where_and_how_large(scene):
     assert area == pytest.approx(read_scene(bpy.context.scene).geometry.region.area)
 
 
-def test_a_scene_that_has_a_site_keeps_it(scene):
-    choose(scene)
+def test_a_site_of_the_same_place_is_changed_and_own_objects_stay(scene):
+    site = choose(scene)
+    site.junction = site.junctions[0].name
+    bpy.ops.seip.build_site()
+    small = read_scene(scene).geometry.region.area
+    count = len(scene.objects)
+    bpy.ops.mesh.primitive_cube_add(location=(200.0, 0.0, 0.0))
+    bpy.context.object.name = "Own kiosk"
+    site.radius = 50.0
+    assert bpy.ops.seip.build_site() == {"FINISHED"}
+    assert bpy.context.scene == scene
+    assert len(bpy.data.scenes) == 1
+    assert "Own kiosk" in scene.objects
+    assert [obj.name for obj in scene.objects if obj.type in {"CAMERA", "LIGHT"}] == ["Sun", "Overview"]
+    assert read_scene(scene).geometry.region.area > 1.3 * small
+    site.radius = 30.0
+    bpy.ops.seip.build_site()
+    assert read_scene(scene).geometry.region.area == pytest.approx(small)
+    assert len(scene.objects) == count + 1
+
+
+def test_a_changed_site_makes_its_placement_stale(junction):
+    site = choose(junction)
+    junction[contract.BUILT] = site.place()
+    bpy.ops.seip.solve_placement()
+    assert not scene_status.stale_placement(junction)
+    bpy.ops.seip.build_site()
+    bpy.context.view_layer.update()
+    assert scene_status.stale_placement(junction)
+
+
+def test_a_scene_that_has_a_site_of_another_place_keeps_it(scene):
+    site = choose(scene)
     bpy.ops.seip.build_site()
     before = shapes(scene)
+    site.junction = site.junctions[0].name
     bpy.ops.seip.build_site()
     assert len(bpy.data.scenes) == 2
     assert shapes(scene) == before
