@@ -37,6 +37,7 @@ from .base import LongWork, Outcome, attempt
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "scenes" / f"junction{DESCRIPTION_SUFFIX}"
 """The site that comes with SEIP: beside the package, in a checkout as in the extension."""
+NO_PLACE = "Choose a junction, or give latitude and longitude"
 SHARE_OF_VIEW = 0.6
 """Of a drawn area in the size of the view."""
 AREA_ITEMS = tuple(item for item in ROLE_ITEMS if Role[item[0]] in roles.AREAS)
@@ -196,7 +197,9 @@ def missing_for_build(scene: bpy.types.Scene) -> str:
     site = scene.seip.site
     if not site.source:
         return "Choose a map first"
-    return "" if site.has_place() else "Choose a junction, or give latitude and longitude"
+    if site.is_extract() and preferences.sumo() is None:
+        return preferences.NO_SUMO
+    return "" if site.has_place() else NO_PLACE
 
 
 def has_site(scene: bpy.types.Scene) -> bool:

@@ -7,6 +7,7 @@ import bpy
 from .. import scene_status
 from ..core.site.roles import Role
 from ..operators.site import (
+    NO_PLACE,
     SEIP_OT_add_area,
     SEIP_OT_assign_role,
     SEIP_OT_build_site,
@@ -21,6 +22,7 @@ from ..operators.site import (
 )
 from ..properties.site import SEIP_PG_site
 from ..scene import roles
+from . import sumo
 from .run_button import draw_run
 from .sections import section
 from .sidebar import is_narrow, settings_column
@@ -67,30 +69,42 @@ def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     if not name:
         return
     draw_place(layout, site)
-    missing = missing_for_build(scene)
-    if missing:
-        draw_sentence(layout, f"{missing}.", icon="INFO")
-    elif has_site(scene):
+    if not missing_for_build(scene) and has_site(scene):
         draw_sentence(layout, "The site is built in a new scene; this one stays.", icon="INFO")
     draw_run(layout, SEIP_OT_build_site.bl_idname)
 
 
 def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
-    """Draw the choice of a place in the chosen file, and how large the site is."""
+    """Draw the choice of a place in the chosen file and how large the site is; no choice adds or removes a row."""
+    if site.is_extract():
+        sumo.draw_missing(layout)
     column = settings_column(layout)
     column.prop_search(site, "junction", site, "junctions", icon="DECORATE_DRIVER")
-    if site.is_extract() and not site.junction:
+    if site.is_extract():
         row = column.row()
-        row.alert = bool(site.position and site.wrong_position())
+        row.enabled = not site.junction
+        row.alert = bool(not site.junction and site.position and site.wrong_position())
         row.prop(site, "position")
+    size = column.column()
+    size.enabled = not site.is_described()
+    shape = size.row()
+    shape.enabled = bool(site.junction) or site.is_extract()
+    shape.prop(site, "region_shape")
+    size.prop(site, "radius", text="Along Them" if site.follows_approaches() else "Radius")
+    draw_sentence(layout, _place_text(site), icon="INFO")
+
+
+def _place_text(site: SEIP_PG_site) -> str:
+    """Return which place is chosen, or what is to be chosen, in a few words."""
+    if site.junction:
+        return "The site is about this junction."
     if site.is_described():
-        draw_sentence(layout, "The place is the one that the description names.")
-        return
-    if site.junction or site.is_extract():
-        column.prop(site, "region_shape")
-    column.prop(site, "radius", text="Along Them" if site.follows_approaches() else "Radius")
-    if not site.junction and not site.is_extract():
-        draw_sentence(layout, "No junction: the middle of the map.")
+        return "The description names the place."
+    if not site.is_extract():
+        return "No junction: the middle of the map."
+    if not site.position:
+        return f"{NO_PLACE}."
+    return "The site is about this position."
 
 
 def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:

@@ -13,6 +13,7 @@ from ..core.workflows.site_building import SiteRequest
 from ..core.workflows.site_places import parsed_position
 from ..core.world.openstreetmap.site import is_extract
 from ..core.world.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
+from ..preferences import sumo_folders
 from ..scene import contract, roles
 from .conversion import as_typed
 
@@ -121,7 +122,7 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
             junction = (chosen,) if chosen else ()
             return SiteRequest(junction=junction, radius=radius, approaches=approaches, anywhere=True)
         near = parsed_position(chosen or self.position)
-        return SiteRequest(near_latlon=near, radius=radius, approaches=approaches)
+        return SiteRequest(near_latlon=near, radius=radius, approaches=approaches, sumo=sumo_folders())
 
 
 def _region_weight(obj: bpy.types.Object) -> float:

@@ -68,6 +68,8 @@ class SiteRequest:
         Whether traffic of an extract keeps left; None to take it from the extract.
     anywhere : bool
         Whether to use the centre of a map if no position is given.
+    sumo : tuple of Path
+        Folders to search for SUMO first, which lays out the streets of an extract.
     """
 
     near: tuple[float, float] | None = None
@@ -83,6 +85,7 @@ class SiteRequest:
     service: bool = False
     left_hand: bool | None = None
     anywhere: bool = False
+    sumo: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +160,7 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
         level=request.level,
     )
     with tempfile.TemporaryDirectory() as folder:
-        site = yield from site_of_extract(source, place, Path(folder) / "streets.xodr")
+        site = yield from site_of_extract(source, place, Path(folder) / "streets.xodr", request.sumo)
     found = site.description
     _, described = describe_place(source, site=request.site)
     description = replace(
