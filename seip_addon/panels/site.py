@@ -7,7 +7,6 @@ import bpy
 from .. import scene_status
 from ..core.site.roles import Role
 from ..operators.site import (
-    NO_PLACE,
     SEIP_OT_add_area,
     SEIP_OT_assign_role,
     SEIP_OT_build_site,
@@ -95,16 +94,14 @@ def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
 
 
 def _place_text(site: SEIP_PG_site) -> str:
-    """Return which place is chosen, or what is to be chosen, in a few words."""
+    """Return which place is chosen, in so few words that it is one line for every choice."""
     if site.junction:
-        return "The site is about this junction."
+        return "The place: this junction."
     if site.is_described():
-        return "The description names the place."
+        return "The description's own place."
     if not site.is_extract():
-        return "No junction: the middle of the map."
-    if not site.position:
-        return f"{NO_PLACE}."
-    return "The site is about this position."
+        return "The middle of the map."
+    return "The place: this position." if site.position else "No place is chosen yet."
 
 
 def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
