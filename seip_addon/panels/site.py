@@ -91,6 +91,30 @@ def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
     shape.prop(site, "region_shape")
     size.prop(site, "radius", text="Along Them" if site.follows_approaches() else "Radius")
     draw_sentence(layout, _place_text(site), icon="INFO")
+    body = section(layout, "sources")
+    if body is not None:
+        _draw_sources(body, site)
+
+
+def _draw_sources(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
+    """Draw further files of the site, each with the settings that say where it lies."""
+    column = settings_column(layout)
+    row = column.row()
+    row.enabled = not site.is_extract()  # which has its own buildings, trees and posts
+    row.prop(site, "osm")
+    column.prop(site, "buildings")
+    if site.buildings:
+        row = column.row()
+        row.enabled = not site.buildings_origin
+        row.prop(site, "buildings_epsg")
+        column.prop(site, "buildings_origin", placeholder="X Y Z")
+    column.prop(site, "terrain")
+    if site.terrain:
+        column.prop(site, "terrain_epsg")
+    column.prop(site, "meshes")
+    if site.meshes:
+        column.prop(site, "mesh_origin", placeholder="Lat Lon, or X Y")
+        column.prop(site, "mesh_up")
 
 
 def _place_text(site: SEIP_PG_site) -> str:

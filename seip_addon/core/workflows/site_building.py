@@ -13,6 +13,7 @@ from ..arrays import Float
 from ..errors import SeipError
 from ..geometry.geo_reference import GeoReference
 from ..progress import Progress
+from ..settings import setting
 from ..storage.files import whole_file
 from ..world.citymodel.at_place import BuildingsRequest, with_city_model
 from ..world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
@@ -79,7 +80,9 @@ class SiteRequest:
     approaches: float | None = None
     level: tuple[str, ...] = ()
     site: Path | None = None
-    osm: Path | None = None
+    osm: Path | None = setting(
+        None, "OpenStreetMap extract with buildings, trees and posts for a map", metavar="EXTRACT"
+    )
     buildings: BuildingsRequest | None = None
     terrain: TerrainRequest | None = None
     service: bool = False
