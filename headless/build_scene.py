@@ -17,7 +17,7 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime
 from headless.charts.survey import save_merging_chart
-from headless.options import new_parser
+from headless.options import add_settings, new_parser
 
 from seip_addon.core.counts import counted
 from seip_addon.core.errors import SeipError
@@ -152,32 +152,10 @@ def _parser() -> argparse.ArgumentParser:
         help="street or road id on the level to study, where roads cross on several levels",
     )
     parser.add_argument("--site", type=Path, metavar="TOML", help="site description with objects that the map lacks")
-    parser.add_argument(
-        "--osm", type=Path, metavar="EXTRACT", help="OpenStreetMap extract with buildings, trees and posts for a map"
-    )
-    parser.add_argument(
-        "--buildings", type=Path, metavar="CITYJSON", help="city model (CityJSON 1.1, 2.0) with buildings"
-    )
-    placed = parser.add_mutually_exclusive_group()
-    placed.add_argument(
-        "--buildings-epsg", type=int, metavar="CODE", help="coordinate system of the city model, if it names none"
-    )
-    placed.add_argument(
-        "--buildings-origin",
-        type=float,
-        nargs=3,
-        metavar=("X", "Y", "Z"),
-        help="map coordinates of the city model's origin, metres, if it has no coordinate system",
-    )
-    parser.add_argument(
-        "--terrain",
-        type=Path,
-        metavar="FILE",
-        help="ground for a flat map: GeoTIFF, or a survey (LAS, LAZ), whose objects are added too",
-    )
-    parser.add_argument(
-        "--terrain-epsg", type=int, metavar="CODE", help="coordinate system of a survey, if it names none"
-    )
+    add_settings(parser, SiteRequest, "osm")
+    add_settings(parser, BuildingsRequest, "path")
+    add_settings(parser.add_mutually_exclusive_group(), BuildingsRequest, "epsg", "origin")
+    add_settings(parser, TerrainRequest, "path", "epsg")
     parser.add_argument(
         "--mesh",
         type=Path,

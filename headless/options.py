@@ -223,6 +223,8 @@ def _arguments(hint: Any, default: Any, about: Setting) -> dict[str, Any]:  # no
     if about.read is not None:
         return arguments | {"nargs": "+", "action": _reading(about.read)}
     parts = [part for part in get_args(hint) if part is not NoneType]
+    if NoneType in get_args(hint) and get_origin(parts[0]) is tuple:  # several numbers, or none
+        hint, parts = parts[0], list(get_args(parts[0]))
     if get_origin(hint) is Literal:
         return {"default": default, "choices": tuple(parts)}
     if get_origin(hint) is tuple:

@@ -26,6 +26,7 @@ from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.triangle_culling import culling_message
+from seip_addon.core.settings import settings_of
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
 from seip_addon.core.site.scene_geometry import SceneGeometry
@@ -78,13 +79,14 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
     add_settings(sensors, CandidateSettings, "sensors")
     add_settings(sensors, SurveySettings, "catalogue")
     add_settings(sensors, CandidateSettings, "heights", "tilts", "yaws", "assumed_poles")
+    installed, _ = settings_of(SurveySettings)["installed_cost"]
     sensors.add_argument(
         "--installed-cost",
         nargs="?",
         const=DEFAULTS,
         type=Path,
-        metavar="TOML",
-        help="include posts, power and backhaul in prices, from the shipped table or your own",
+        metavar=installed.metavar,
+        help=installed.help,
     )
     metres = parser.add_argument_group("grid and candidates, in metres")
     add_settings(metres, SurveySettings, "grid_spacing")

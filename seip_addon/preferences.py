@@ -1,6 +1,7 @@
 """Add-on preferences, for all files."""
 
 import sys
+from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -11,10 +12,15 @@ from .core.sensing.lidar.catalogue import load_catalogue
 from .core.sensing.lidar.model import LidarModel
 from .core.sensing.visibility.ray_casting import MAX_THREADS
 from .core.sensing.visibility.store import GridFolder
+from .core.sumo_installation import BY_HAND, installed_sumo
+from .core.sumo_programs import Sumo, find_sumo, sumo_version
 from .core.workflows.detection import DetectingPython
 
 ADDON_ID = (__package__ or "").removesuffix(".seip_addon")
 """The extension's key among Blender's add-ons: not that of the package in it."""
+NO_SUMO = "SUMO is missing, which lays out the streets of an extract of OpenStreetMap"
+OFFLINE = f"Blender may not go online: switch on Allow Online Access in Preferences, System, or {BY_HAND}"
+NO_PIP = f"This Blender has no pip to install SUMO with: {BY_HAND}"
 
 
 class SEIP_PG_catalogue_file(bpy.types.PropertyGroup):
@@ -48,10 +54,18 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
         description="In which Detect runs: .venv/bin/python of a checkout of this project after `make detection`, "
         "or one of your own after `pip install '.[detection]'` there",
     )
+    sumo: bpy.props.StringProperty(
+        name="SUMO",
+        subtype="DIR_PATH",
+        description="Folder of Eclipse SUMO, which lays out the streets of an extract of OpenStreetMap: the one with "
+        "bin and data in it. Empty for the SUMO that was installed here, on the PATH or in SUMO_HOME",
+    )
     catalogues: bpy.props.CollectionProperty(type=SEIP_PG_catalogue_file)
 
     def draw(self, _context: bpy.types.Context) -> None:
         """Draw the preferences."""
+        from .panels.sumo import draw_status  # noqa: PLC0415  # panels import this module
+
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "cores")
@@ -60,6 +74,8 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
         row.label(text=f"Kept visibility: {_kept().megabytes():,.1f} MB")
         row.operator("seip.empty_cache", icon="TRASH")
         layout.prop(self, "python")
+        layout.prop(self, "sumo")
+        draw_status(layout)
         layout.label(text="Catalogues of sensor types")
         for number, file in enumerate(self.catalogues):
             row = layout.row(align=True)
@@ -75,9 +91,14 @@ def cache_folder() -> Path:
     preferences = own()
     if preferences is not None and preferences.cache:
         return Path(bpy.path.abspath(preferences.cache))
+    return _own_folder("visibility")
+
+
+def _own_folder(name: str) -> Path:
+    """Return a folder of the extension's own, which may not exist."""
     if ADDON_ID.startswith("bl_ext."):
-        return Path(bpy.utils.extension_path_user(ADDON_ID, path="visibility", create=True))
-    return Path(bpy.utils.resource_path("USER")) / "seip" / "visibility"  # run from a checkout
+        return Path(bpy.utils.extension_path_user(ADDON_ID, path=name))
+    return Path(bpy.utils.resource_path("USER")) / "seip" / name  # run from a checkout
 
 
 def detecting_python() -> DetectingPython | None:
@@ -90,6 +111,59 @@ def detecting_python() -> DetectingPython | None:
     if bpy.app.module and project is not None and project.origin is not None and find_spec("torch") is not None:
         return DetectingPython(Path(sys.executable), Path(project.origin).parents[1])
     return None
+
+
+def sumo_folders() -> tuple[Path, ...]:
+    """Return the folders that are searched for SUMO first: the one in the preferences, then the extension's own."""
+    preferences = own()
+    named = preferences.sumo if preferences is not None else ""
+    return (*((Path(bpy.path.abspath(named)),) if named else ()), installed_sumo(own_sumo_folder()))
+
+
+def own_sumo_folder() -> Path:
+    """Return the extension's folder for SUMO, which may not exist."""
+    return _own_folder("sumo")
+
+
+def sumo() -> Sumo | None:
+    """Return the programs of SUMO, or None if it is missing."""
+    try:
+        return find_sumo(sumo_folders())
+    except SeipError:
+        return None
+
+
+def sumo_status() -> tuple[str, bool]:
+    """Return which SUMO there is and where, that it is missing or does not start, and whether it can be used."""
+    programs = sumo()
+    if programs is None:
+        return NO_SUMO, False
+    try:
+        version = _version(programs, programs.netconvert.stat().st_mtime_ns)
+    except SeipError as error:
+        return str(error), False
+    return f"SUMO {version} in {programs.netconvert.parent}", True
+
+
+@lru_cache(maxsize=1)
+def _version(programs: Sumo, _changed: int) -> str:
+    """Return the version of SUMO, which is asked for once as long as the program stays the same."""
+    return sumo_version(programs)
+
+
+def pip() -> list[str]:
+    """Return the command that starts pip in Blender's Python, empty without pip."""
+    package = find_spec("pip")
+    if package is None or package.origin is None:
+        return []
+    return [sys.executable, *bpy.app.python_args, str(Path(package.origin).parent)]
+
+
+def why_no_installation() -> str:
+    """Return why SUMO cannot be installed from here, or ""."""
+    if not bpy.app.online_access:
+        return OFFLINE
+    return "" if pip() else NO_PIP
 
 
 def cores() -> int | None:

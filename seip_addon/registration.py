@@ -11,8 +11,8 @@ PARTS = (
     "properties.traffic", "properties.detection", "properties.sections", "properties.scene",
     "session", "scene_survey", "sensor_types", "live_scan", "loose_pieces",
     "viewport.beam_preview", "viewport.overlays", "viewport.coverage",
-    "operators.base", "operators.site", "operators.sensors", "operators.visibility", "operators.placement",
-    "live_coverage",
+    "operators.base", "operators.sumo", "operators.site", "operators.sensors", "operators.visibility",
+    "operators.placement", "live_coverage",
     "operators.results", "operators.view", "operators.traffic", "operators.detection",
     "panels.sensor_table", "panels.placement", "panels.results", "panels.steps", "panels.front_door",
 )  # fmt: skip

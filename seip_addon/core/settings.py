@@ -21,8 +21,8 @@ class Setting:
         Least and largest value that is accepted.
     option : str
         Name of the command-line option, that of the field if empty.
-    metavar : str
-        Placeholder of the value in the help of a command.
+    metavar : str or tuple of str
+        Placeholder of the value in the help of a command, or one for each of several numbers.
     read : callable, optional
         Function that parses the texts of an option, for settings that are not plain numbers.
     """
@@ -32,7 +32,7 @@ class Setting:
     minimum: float | None = None
     maximum: float | None = None
     option: str = ""
-    metavar: str | None = None
+    metavar: str | tuple[str, ...] | None = None
     read: Callable[[Sequence[str]], Any] | None = None
 
 

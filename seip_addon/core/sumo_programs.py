@@ -2,9 +2,10 @@
 
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,9 @@ MISSING = (
 )
 SYSTEM_HOMES = (Path("/usr/share/sumo"), Path("/usr/local/share/sumo"), Path("/opt/homebrew/share/sumo"))
 """System folders for the data of SUMO."""
+START_SECONDS = 30.0
+"""Longest time in which SUMO states its version, also while Windows checks a new program."""
+_VERSION = re.compile(r"netconvert\s+(?:Version\s+)?v?(\d\S*)")
 
 
 @dataclass(frozen=True)
@@ -28,23 +32,65 @@ class Sumo:
     home: Path | None
 
 
-def find_sumo() -> Sumo:
-    """Find the programs of SUMO: on the PATH, in ``SUMO_HOME``, or in the package ``eclipse-sumo`` of this Python.
+def find_sumo(folders: Iterable[Path] = ()) -> Sumo:
+    """Find the programs of SUMO: in given folders, on the PATH, in ``SUMO_HOME``, or in this Python's ``eclipse-sumo``.
+
+    Parameters
+    ----------
+    folders : iterable of Path
+        Folders to search first. Each is SUMO's own folder, the ``bin`` in it, or a folder that pip installed
+        ``eclipse-sumo`` into.
 
     Raises
     ------
     SeipError
         SUMO is not installed.
     """
+    # pip writes scripts of the same names to `bin`, which only run in its Python: the programs themselves come first
+    named = [place for folder in folders for place in (folder / "sumo" / "bin", folder / "bin", folder)]
     package = importlib.util.find_spec("sumo")
     homes = [Path(package.origin).parent] if package is not None and package.origin is not None else []
     homes += [Path(os.environ["SUMO_HOME"])] if os.environ.get("SUMO_HOME") else []
-    where = os.pathsep.join([os.environ.get("PATH", ""), *(str(home / "bin") for home in homes)])
-    sumo, netconvert = shutil.which("sumo", path=where), shutil.which("netconvert", path=where)
+    places = [*map(str, named), os.environ.get("PATH", ""), *(str(home / "bin") for home in homes)]
+    sumo, netconvert = _program("sumo", places), _program("netconvert", places)
     if sumo is None or netconvert is None:
         raise SeipError(MISSING)
-    homes += [Path(netconvert).resolve().parents[1], *SYSTEM_HOMES]
-    return Sumo(Path(sumo), Path(netconvert), next((home for home in homes if (home / "data").is_dir()), None))
+    homes = [netconvert.resolve().parents[1], *homes, *SYSTEM_HOMES]
+    return Sumo(sumo, netconvert, next((home for home in homes if (home / "data").is_dir()), None))
+
+
+def _program(name: str, places: Iterable[str]) -> Path | None:
+    """Return the program of a name in the first of some places that has it, each a folder or several as on the PATH."""
+    return next((Path(found) for place in places if (found := shutil.which(name, path=place))), None)
+
+
+def sumo_version(programs: Sumo) -> str:
+    """Return the version of SUMO, such as 1.28.0, by starting netconvert.
+
+    Raises
+    ------
+    SeipError
+        It does not start.
+    """
+    try:
+        done = subprocess.run(  # noqa: S603  # SUMO's program, found by its name
+            [programs.netconvert, "--version"],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=START_SECONDS,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise _not_starting(programs, str(error)) from error
+    version = _VERSION.search(done.stdout.decode(errors="replace"))
+    if done.returncode != 0 or version is None:
+        raise _not_starting(programs, done.stderr.decode(errors="replace"))
+    return version[1]
+
+
+def _not_starting(programs: Sumo, complaint: str) -> SeipError:
+    reason = next((f" ({line.strip()})" for line in complaint.splitlines() if line.strip()), "")
+    return SeipError(f"SUMO does not start from {programs.netconvert.parent}{reason}: install it again")
 
 
 def run(programs: Sumo, program: Path, arguments: Sequence[object], what: str) -> Generator[Progress, None, None]:

@@ -153,11 +153,11 @@ def _stop(running: RunningWork) -> None:
 
 
 def _redraw(context: bpy.types.Context) -> None:
-    """Redraw the sidebars of all viewports, but not the viewports, which may take long."""
+    """Redraw the sidebars of all viewports and the preferences, but not the viewports, which may take long."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             for region in area.regions:
-                if area.type == "VIEW_3D" and region.type == "UI":
+                if (area.type, region.type) in {("VIEW_3D", "UI"), ("PREFERENCES", "WINDOW")}:
                     region.tag_redraw()
 
 

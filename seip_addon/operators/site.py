@@ -15,6 +15,7 @@ from ..core.output.results.placement_record import relevant_warnings
 from ..core.progress import Progress, finish
 from ..core.sensing.visibility.estimate import Estimate
 from ..core.site.check import SceneContents, SiteCheck, check_site
+from ..core.site.obstruction import NO_OBSTACLES_MESSAGE
 from ..core.site.roles import Role
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
@@ -24,11 +25,13 @@ from ..core.workflows.survey import Layout, lay_out
 from ..core.workflows.survey_settings import SurveySettings
 from ..core.workflows.visibility_estimate import estimate
 from ..core.world.streetscape.description import DESCRIPTION_SUFFIX
+from ..core.world.streetscape.mesh_place import MeshPlace, mesh_place
 from ..properties.site import ROLE_ITEMS, SEIP_PG_problem, SEIP_PG_site
 from ..scene import contract, roles
 from ..scene.build import build_scene, remove_site
 from ..scene.changes import watch
 from ..scene.check import contents_of
+from ..scene.imported import MeshFiles, import_mesh
 from ..scene.startup import remove_startup_objects
 from ..scene.views import frame_site, set_up_view
 from ..session import CheckedScene, session
@@ -37,6 +40,12 @@ from .base import LongWork, Outcome, attempt
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "scenes" / f"junction{DESCRIPTION_SUFFIX}"
 """The site that comes with SEIP: beside the package, in a checkout as in the extension."""
+NO_PLACE = "Choose a junction, or give latitude and longitude"
+COPIED = (
+    *("source", "position", "region_shape", "radius", "osm", "buildings", "buildings_epsg", "buildings_origin"),
+    *("terrain", "terrain_epsg", "meshes", "mesh_origin", "mesh_up"),
+)
+"""Properties of a choice that a site in a new scene takes over."""
 SHARE_OF_VIEW = 0.6
 """Of a drawn area in the size of the view."""
 AREA_ITEMS = tuple(item for item in ROLE_ITEMS if Role[item[0]] in roles.AREAS)
@@ -102,10 +111,14 @@ class _BuildsSite(LongWork[BuiltSite]):
     """A mixin for operators that build a site."""
 
     is_chosen = True
+    _meshes: MeshFiles | None = None
 
     def conclude(self, scene: bpy.types.Scene, result: BuiltSite) -> None:
         """Build the scene."""
         report = self.report  # type: ignore[attr-defined]  # of Blender's operators
+        origin = () if self._meshes is None else self._meshes.origin
+        paths = () if self._meshes is None else self._meshes.paths
+        places = [mesh_place(result.model, origin, path.name) for path in paths]  # fails before anything is built
         built = scene
         if self.is_chosen and is_of_choice(scene):
             remove_site(scene)
@@ -120,14 +133,27 @@ class _BuildsSite(LongWork[BuiltSite]):
         if self.is_chosen:
             built[contract.BUILT] = built.seip.site.place()
         _keep_map(built, result)
+        added = self._add_meshes(built, dict(zip(paths, places, strict=True)))
         show_site(built, result.model.region)
         for note in result.model.notes:
             report({"INFO"}, note)
         for warning in result.model.warnings:
-            report({"WARNING"}, warning)
+            if not (added and warning == NO_OBSTACLES_MESSAGE):
+                report({"WARNING"}, warning)
         report({"INFO"}, f"{counted(len(result.model.parts), 'object')}, region {result.model.region.area:,.0f} m²")
         if bpy.context.window is not None and not bpy.app.background:
             bpy.ops.seip.check_site("INVOKE_DEFAULT")
+
+    def _add_meshes(self, scene: bpy.types.Scene, places: dict[Path, MeshPlace]) -> int:
+        """Add meshes at their places, report those that cannot be imported, and return how many objects were added."""
+        added = 0
+        for path, place in places.items():
+            up = None if self._meshes is None else self._meshes.up_of(path)
+            try:
+                added += len(import_mesh(scene, path, place, up))
+            except SeipError as error:
+                self.report({"ERROR"}, f"{error}; the site is built without this mesh")  # type: ignore[attr-defined]  # of Blender's operators
+        return added
 
 
 class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
@@ -147,6 +173,7 @@ class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
         """Take what was chosen."""
         site = scene.seip.site
+        self._meshes = site.mesh_files()
         return build_site(Path(bpy.path.abspath(site.source)), site.request())
 
 
@@ -168,7 +195,7 @@ class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
 
 
 def _copy_choice(chosen: SEIP_PG_site, site: SEIP_PG_site) -> None:
-    for name in ("source", "position", "region_shape", "radius"):
+    for name in COPIED:
         setattr(site, name, getattr(chosen, name))
     for junction in chosen.junctions:
         one = site.junctions.add()
@@ -203,7 +230,9 @@ def missing_for_build(scene: bpy.types.Scene) -> str:
     site = scene.seip.site
     if not site.source:
         return "Choose a map first"
-    return "" if site.has_place() else "Choose a junction, or give latitude and longitude"
+    if site.is_extract() and preferences.sumo() is None:
+        return preferences.NO_SUMO
+    return "" if site.has_place() else NO_PLACE
 
 
 def is_of_choice(scene: bpy.types.Scene) -> bool:

@@ -156,6 +156,9 @@ def _draw_candidates(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None
             group.prop(survey, name)
     if survey.fog:
         column.prop(survey, "visibility")
+    column.prop(survey, "installed")
+    if survey.installed:
+        column.prop(survey, "installed_cost", placeholder="Shipped")
     column.prop(survey, "engine")
 
 

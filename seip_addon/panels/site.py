@@ -22,6 +22,7 @@ from ..operators.site import (
 )
 from ..properties.site import SEIP_PG_site
 from ..scene import roles
+from . import sumo
 from .run_button import draw_run
 from .sections import section
 from .sidebar import is_narrow, settings_column
@@ -68,32 +69,66 @@ def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     if not name:
         return
     draw_place(layout, site)
-    missing = missing_for_build(scene)
-    if missing:
-        draw_sentence(layout, f"{missing}.", icon="INFO")
-    elif is_of_choice(scene):
-        draw_sentence(layout, "The site is built again; your own objects and the sensors stay.", icon="INFO")
-    elif has_site(scene):
-        draw_sentence(layout, "The site is built in a new scene; this one stays.", icon="INFO")
+    if has_site(scene) and not missing_for_build(scene):
+        again = "The site is built again; your own objects and the sensors stay."
+        elsewhere = "The site is built in a new scene; this one stays."
+        draw_sentence(layout, again if is_of_choice(scene) else elsewhere, icon="INFO")
     draw_run(layout, SEIP_OT_build_site.bl_idname)
 
 
 def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
-    """Draw the choice of a place in the chosen file, and how large the site is."""
+    """Draw the choice of a place in the chosen file and how large the site is; no choice adds or removes a row."""
+    if site.is_extract():
+        sumo.draw_missing(layout)
     column = settings_column(layout)
     column.prop_search(site, "junction", site, "junctions", icon="DECORATE_DRIVER")
-    if site.is_extract() and not site.junction:
+    if site.is_extract():
         row = column.row()
-        row.alert = bool(site.position and site.wrong_position())
+        row.enabled = not site.junction
+        row.alert = bool(not site.junction and site.position and site.wrong_position())
         row.prop(site, "position")
+    size = column.column()
+    size.enabled = not site.is_described()
+    shape = size.row()
+    shape.enabled = bool(site.junction) or site.is_extract()
+    shape.prop(site, "region_shape")
+    size.prop(site, "radius", text="Along Them" if site.follows_approaches() else "Radius")
+    draw_sentence(layout, _place_text(site), icon="INFO")
+    body = section(layout, "sources")
+    if body is not None:
+        _draw_sources(body, site)
+
+
+def _draw_sources(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
+    """Draw further files of the site, each with the settings that say where it lies."""
+    column = settings_column(layout)
+    row = column.row()
+    row.enabled = not site.is_extract()  # which has its own buildings, trees and posts
+    row.prop(site, "osm")
+    column.prop(site, "buildings")
+    if site.buildings:
+        row = column.row()
+        row.enabled = not site.buildings_origin
+        row.prop(site, "buildings_epsg")
+        column.prop(site, "buildings_origin", placeholder="X Y Z")
+    column.prop(site, "terrain")
+    if site.terrain:
+        column.prop(site, "terrain_epsg")
+    column.prop(site, "meshes")
+    if site.meshes:
+        column.prop(site, "mesh_origin", placeholder="Lat Lon, or X Y")
+        column.prop(site, "mesh_up")
+
+
+def _place_text(site: SEIP_PG_site) -> str:
+    """Return which place is chosen, in so few words that it is one line for every choice."""
+    if site.junction:
+        return "The place: this junction."
     if site.is_described():
-        draw_sentence(layout, "The place is the one that the description names.")
-        return
-    if site.junction or site.is_extract():
-        column.prop(site, "region_shape")
-    column.prop(site, "radius", text="Along Them" if site.follows_approaches() else "Radius")
-    if not site.junction and not site.is_extract():
-        draw_sentence(layout, "No junction: the middle of the map.")
+        return "The description's own place."
+    if not site.is_extract():
+        return "The middle of the map."
+    return "The place: this position." if site.position else "No place is chosen yet."
 
 
 def _draw_check(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..core.errors import SeipError
 from ..core.settings import settings_of
@@ -18,6 +19,8 @@ _UNITS = {"m": {"unit": "LENGTH"}, "rad": {"subtype": "ANGLE"}}
 
 def of_setting(kind: type, field: str, name: str, **more: Any) -> Any:  # noqa: ANN401 -- what Blender makes of a property
     """Return the property of a field of a settings class, with its default, limits, unit and description.
+
+    A field without a default, such as a file, is a text that is empty where nothing is given.
 
     Parameters
     ----------
@@ -32,8 +35,25 @@ def of_setting(kind: type, field: str, name: str, **more: Any) -> Any:  # noqa: 
     description = about.help[0].upper() + about.help[1:]
     if isinstance(default, tuple):  # several of the items of a choice
         return EnumProperty(name=name, description=description, default=set(default), options={"ENUM_FLAG"}, **more)
+    default = more.get("default", default)
+    if default is None:
+        return StringProperty(name=name, description=description, **more)
     arguments = {"default": default} | given | _UNITS.get(about.unit, {}) | more
     return _KINDS[type(default)](name=name, description=description, **arguments)
+
+
+def numbers(text: str, what: str) -> tuple[float, ...]:
+    """Return the numbers of a text, which blanks or commas part.
+
+    Raises
+    ------
+    SeipError
+        It holds something else.
+    """
+    try:
+        return tuple(float(part) for part in re.split(r"[\s,;°]+", text) if part)
+    except ValueError as error:
+        raise SeipError(f"{what} must be numbers with blanks between them, not {text!r}") from error
 
 
 def absolute(text: str) -> Path:

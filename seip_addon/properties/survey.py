@@ -12,12 +12,13 @@ from ..core.choosing.placement.search_limits import DEFAULT_EFFORT
 from ..core.errors import SeipError
 from ..core.sensing.visibility.settings import VisibilitySettings
 from ..core.site.candidates import MAX_SENSOR_HEIGHT, CandidateSettings, heights_of, tilts_of
+from ..core.site.installed_cost import InstalledCost, load_installed_cost
 from ..core.site.post_rules import RULES
 from ..core.site.weather import Weather
 from ..core.workflows.survey_settings import SurveySettings
 from ..preferences import catalogue_files
 from ..sensor_types import DEFAULT_TYPE
-from .conversion import as_typed, of_setting
+from .conversion import absolute, as_typed, of_setting
 
 _CANDIDATES = CandidateSettings()
 _TILTS = " ".join(f"{math.degrees(tilt):g}" for tilt in _CANDIDATES.tilts)
@@ -79,6 +80,14 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         "allow",
         "Allow",
         items=[(name, rule.title, f"Positions {rule.reason}") for name, rule in RULES.items()],
+    )
+    installed: BoolProperty(name="Installed Cost", description="Include posts, power and backhaul in prices")
+    installed_cost: of_setting(
+        SurveySettings,
+        "installed_cost",
+        "Cost Table",
+        subtype="FILE_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     engine: EnumProperty(
         name="Ray Caster",
@@ -174,11 +183,17 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
             weather=self.weather(),
             grid_spacing=as_typed(self.grid),
             catalogue=catalogue_files(),
+            installed_cost=self._installed_cost(),
             engine=self.engine,
             solver=self.solver,
             time_limit=as_typed(self.time_limit) or None,
             effort=None if self.time_limit else as_typed(self.effort),
         )
+
+    def _installed_cost(self) -> InstalledCost | None:
+        if not self.installed:
+            return None
+        return load_installed_cost(absolute(self.installed_cost) if self.installed_cost else None)
 
 
 def _complaint(read: Callable[[], object]) -> str:

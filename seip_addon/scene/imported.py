@@ -8,6 +8,7 @@ import json
 import sys
 import tempfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import addon_utils
@@ -26,6 +27,8 @@ from .read import shown_parts
 
 MAX_FACES = 2_000_000
 UP_AXES = ("y", "z")
+WITHOUT_AXES = (".obj", ".ply", ".stl")
+"""Files that do not name the axis that points up."""
 IMPORT_SECONDS = 300.0  # for an import in a process of its own
 _FORWARD = {"y": "NEGATIVE_Z", "z": "Y"}
 
@@ -58,6 +61,42 @@ IMPORTERS: dict[str, Callable[[str, str | None], None]] = {
 """Blender's importers by what the names of files end in; each takes a path and the axis that points up, if given."""
 
 
+@dataclass(frozen=True)
+class MeshFiles:
+    """Files of meshes with one origin.
+
+    Parameters
+    ----------
+    paths : tuple of Path
+    origin : tuple of float
+        Position of their zero, as for `mesh_place`.
+    up : str, optional
+        Axis that points up in files that do not name it, `UP_AXES`.
+    """
+
+    paths: tuple[Path, ...]
+    origin: tuple[float, ...]
+    up: str | None = None
+
+    def up_of(self, path: Path) -> str | None:
+        """Return the axis that points up in a file, or None if it names the axis itself or the default holds."""
+        return self.up if path.suffix.lower() in WITHOUT_AXES else None
+
+
+def meshes_in(folder: Path) -> tuple[Path, ...]:
+    """Return the files with meshes in a folder, by name.
+
+    Raises
+    ------
+    SeipError
+        There is none.
+    """
+    found = sorted(path for path in folder.glob("*") if path.suffix.lower() in IMPORTERS)
+    if not found:
+        raise SeipError(f"{folder} has no file with a mesh ({', '.join(sorted(IMPORTERS))}): choose another folder")
+    return tuple(found)
+
+
 def check_mesh(path: Path, up: str | None = None) -> None:
     """Check that a file is there and of a kind that is read, before a scene is built.
 
@@ -71,7 +110,7 @@ def check_mesh(path: Path, up: str | None = None) -> None:
     kind = path.suffix.lower()
     if kind not in IMPORTERS:
         raise SeipError(f"{path.name} is of no kind that is imported: {', '.join(sorted(IMPORTERS))}; convert it")
-    if up is not None and kind not in (".obj", ".ply", ".stl"):
+    if up is not None and kind not in WITHOUT_AXES:
         raise SeipError(f"{path.name} says itself which axis points up: leave out --mesh-up")
     check_mesh_header(path)
 

@@ -13,6 +13,7 @@ from ..arrays import Float
 from ..errors import SeipError
 from ..geometry.geo_reference import GeoReference
 from ..progress import Progress
+from ..settings import setting
 from ..storage.files import whole_file
 from ..world.citymodel.at_place import BuildingsRequest, with_city_model
 from ..world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
@@ -68,6 +69,8 @@ class SiteRequest:
         Whether traffic of an extract keeps left; None to take it from the extract.
     anywhere : bool
         Whether to use the centre of a map if no position is given.
+    sumo : tuple of Path
+        Folders to search for SUMO first, which lays out the streets of an extract.
     """
 
     near: tuple[float, float] | None = None
@@ -77,12 +80,15 @@ class SiteRequest:
     approaches: float | None = None
     level: tuple[str, ...] = ()
     site: Path | None = None
-    osm: Path | None = None
+    osm: Path | None = setting(
+        None, "OpenStreetMap extract with buildings, trees and posts for a map", metavar="EXTRACT"
+    )
     buildings: BuildingsRequest | None = None
     terrain: TerrainRequest | None = None
     service: bool = False
     left_hand: bool | None = None
     anywhere: bool = False
+    sumo: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +163,7 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
         level=request.level,
     )
     with tempfile.TemporaryDirectory() as folder:
-        site = yield from site_of_extract(source, place, Path(folder) / "streets.xodr")
+        site = yield from site_of_extract(source, place, Path(folder) / "streets.xodr", request.sumo)
     found = site.description
     _, described = describe_place(source, site=request.site)
     description = replace(

@@ -60,7 +60,9 @@ class SurveySettings:
         metavar="UNITS",
     )
     time_limit: float | None = setting(None, "limit of each search in seconds, in place of counted work", metavar="S")
-    installed_cost: InstalledCost | None = None
+    installed_cost: InstalledCost | None = setting(
+        None, "include posts, power and backhaul in prices, from the shipped table or your own", metavar="TOML"
+    )
     spacings_because: str = ""
 
     def models(self) -> dict[str, LidarModel]:

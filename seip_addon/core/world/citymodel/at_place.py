@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Generator
-from dataclasses import dataclass, replace
+from dataclasses import MISSING, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from ...geometry.plan import outline
 from ...geometry.reference_systems import Transform, reprojection
 from ...limits import ELEVATION, HEIGHT, MAP_COORDINATE, SITE_RADIUS
 from ...progress import Progress
+from ...settings import setting
 from ...site.scene_geometry import FROM_CITY_MODEL
 from ..streetscape.description import PlacedSolid, SiteDescription, without_covered_buildings
 from ..streetscape.map_furniture import facade
@@ -44,9 +45,18 @@ class BuildingsRequest:
         Map coordinates of its zero, metres, instead of a reference system; its heights are then used unchanged.
     """
 
-    path: Path
-    epsg: int | None = None
-    origin: tuple[float, float, float] | None = None
+    path: Path = setting(
+        MISSING, "city model (CityJSON 1.1, 2.0) with buildings", option="buildings", metavar="CITYJSON"
+    )
+    epsg: int | None = setting(
+        None, "coordinate system of the city model, if it names none", option="buildings-epsg", metavar="CODE"
+    )
+    origin: tuple[float, float, float] | None = setting(
+        None,
+        "map coordinates of the city model's origin, metres, if it has no coordinate system",
+        option="buildings-origin",
+        metavar=("X", "Y", "Z"),
+    )
 
 
 def with_city_model(

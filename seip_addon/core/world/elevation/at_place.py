@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Generator
-from dataclasses import dataclass, field, replace
+from dataclasses import MISSING, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from ...geometry.plan import outline
 from ...geometry.reference_systems import reprojection
 from ...geometry.solids import Solid
 from ...progress import Progress
+from ...settings import setting
 from ...site.scene_geometry import FROM_SURVEY
 from ..streetscape.description import PlacedSolid, SiteDescription, without_covered_buildings
 from ..streetscape.terrain import Relief
@@ -59,8 +60,15 @@ class TerrainRequest:
         EPSG code of a survey's reference system; None to use the one in the file.
     """
 
-    path: Path
-    epsg: int | None = None
+    path: Path = setting(
+        MISSING,
+        "ground for a flat map: GeoTIFF, or a survey (LAS, LAZ), whose objects are added too",
+        option="terrain",
+        metavar="FILE",
+    )
+    epsg: int | None = setting(
+        None, "coordinate system of a survey, if it names none", option="terrain-epsg", metavar="CODE"
+    )
 
 
 @dataclass(frozen=True, eq=False)

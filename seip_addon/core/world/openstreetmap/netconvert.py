@@ -1,7 +1,7 @@
 """Streets of an extract as an OpenDRIVE map, made by SUMO's netconvert."""
 
 import re
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 from pathlib import Path
 
 from ...errors import SeipError
@@ -15,7 +15,9 @@ _ROAD = re.compile(r'<road [^>]*?id="([^"]*)"')
 TYPE_FILES = ("osmNetconvert.typ.xml", "osmNetconvertBicycle.typ.xml")
 
 
-def convert(streets: StreetFile, source: Path, target: Path) -> Generator[Progress, None, dict[str, str]]:
+def convert(
+    streets: StreetFile, source: Path, target: Path, sumo: Iterable[Path] = ()
+) -> Generator[Progress, None, dict[str, str]]:
     """Convert streets to an OpenDRIVE map.
 
     Parameters
@@ -24,6 +26,8 @@ def convert(streets: StreetFile, source: Path, target: Path) -> Generator[Progre
         Streets as written to ``source``.
     target : Path
         Map to write.
+    sumo : iterable of Path
+        Folders to search for SUMO first.
 
     Returns
     -------
@@ -36,7 +40,7 @@ def convert(streets: StreetFile, source: Path, target: Path) -> Generator[Progre
     SeipError
         SUMO is not installed, or refuses the streets.
     """
-    programs = find_sumo()
+    programs = find_sumo(sumo)
     if programs.home is None:
         raise SeipError("SUMO's data files were not found near its programs: set SUMO_HOME to the folder with them")
     types = ",".join(str(programs.home / "data" / "typemap" / name) for name in TYPE_FILES)

@@ -191,7 +191,9 @@ class ExtractSite:
             )
 
 
-def site_of_extract(path: Path, place: ExtractPlace, map_path: Path) -> Generator[Progress, None, ExtractSite]:
+def site_of_extract(
+    path: Path, place: ExtractPlace, map_path: Path, sumo: Iterable[Path] = ()
+) -> Generator[Progress, None, ExtractSite]:
     """Make a map of the streets of an extract around a place, and a description of the objects there.
 
     Parameters
@@ -202,6 +204,8 @@ def site_of_extract(path: Path, place: ExtractPlace, map_path: Path) -> Generato
         Place to study.
     map_path : Path
         Map of the streets to write (.xodr). A temporary file is written next to it.
+    sumo : iterable of Path
+        Folders to search for SUMO first.
 
     Raises
     ------
@@ -228,7 +232,7 @@ def site_of_extract(path: Path, place: ExtractPlace, map_path: Path) -> Generato
     try:
         if streets.streets == 0:
             raise _no_street(extract, near, place.reach + STREET_REACH)
-        sources = yield from convert(streets, streets_path, map_path)
+        sources = yield from convert(streets, streets_path, map_path, sumo)
     finally:
         streets_path.unlink(missing_ok=True)
     road_map = read_map(map_path)

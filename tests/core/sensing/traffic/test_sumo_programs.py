@@ -1,4 +1,4 @@
-"""Programs of SUMO that are stopped while they run."""
+"""Programs of SUMO: where they are found, and what happens when they fail or are stopped."""
 
 import sys
 import time
@@ -6,9 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from seip_addon.core import sumo_programs
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.sumo_programs import Sumo, run
+from seip_addon.core.sumo_programs import Sumo, find_sumo, run, sumo_version
+from tests.builders.sumo_wheel import write_programs
 
 PYTHON = Path(sys.executable)
 PROGRAMS = Sumo(PYTHON, PYTHON, None)
@@ -30,3 +32,55 @@ def test_a_program_that_fails_is_named_with_its_reason():
     script = "import sys; sys.exit('Error: Nothing to do.')"
     with pytest.raises(SeipError, match="failed: Nothing to do; check the map"):
         finish(run(PROGRAMS, PYTHON, ["-c", script], "waiting"))
+
+
+@pytest.fixture
+def nowhere(monkeypatch):
+    """A machine without SUMO."""
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("SUMO_HOME", raising=False)
+    monkeypatch.setattr(sumo_programs.importlib.util, "find_spec", lambda _name: None)
+
+
+@pytest.mark.usefixtures("nowhere")
+@pytest.mark.parametrize("named", [".", "bin", "installed"])
+def test_sumo_is_found_in_a_named_folder_its_bin_or_where_pip_installed_it(tmp_path, named):
+    home = tmp_path / "installed" / "sumo" if named == "installed" else tmp_path
+    write_programs(home)
+    found = find_sumo([tmp_path / "not there", tmp_path / named])
+    assert (found.sumo, found.netconvert) == (home / "bin" / "sumo", home / "bin" / "netconvert")
+    assert found.home == home
+    with pytest.raises(SeipError, match="SUMO is not installed"):
+        find_sumo([tmp_path / "not there"])
+
+
+@pytest.mark.usefixtures("nowhere")
+def test_the_programs_precede_scripts_of_the_same_name_that_pip_writes(tmp_path):
+    write_programs(tmp_path)
+    write_programs(tmp_path / "sumo")
+    assert find_sumo([tmp_path]).netconvert == tmp_path / "sumo" / "bin" / "netconvert"
+
+
+def test_a_named_folder_precedes_the_path_and_its_data_are_used(tmp_path, monkeypatch):
+    write_programs(tmp_path / "path")
+    write_programs(tmp_path / "named")
+    monkeypatch.setenv("PATH", str(tmp_path / "path" / "bin"))
+    monkeypatch.setenv("SUMO_HOME", str(tmp_path / "path"))
+    assert find_sumo([tmp_path / "named"]) == Sumo(
+        tmp_path / "named" / "bin" / "sumo", tmp_path / "named" / "bin" / "netconvert", tmp_path / "named"
+    )
+    assert find_sumo().home == tmp_path / "path"
+
+
+def test_the_version_is_the_one_that_netconvert_states(tmp_path):
+    write_programs(tmp_path, version="1.20.3")
+    assert sumo_version(find_sumo([tmp_path])) == "1.20.3"
+
+
+@pytest.mark.parametrize("script", ["echo 'libGL.so.1 is missing' >&2; exit 127", "echo nonsense"])
+def test_a_sumo_that_does_not_start_is_named(tmp_path, script):
+    write_programs(tmp_path, script=script)
+    with pytest.raises(
+        SeipError, match=r"SUMO does not start from .*bin( \(libGL.so.1 is missing\))?: install it again"
+    ):
+        sumo_version(find_sumo([tmp_path]))

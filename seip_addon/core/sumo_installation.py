@@ -1,0 +1,111 @@
+"""Installation of SUMO with pip into a folder of its own, for a Blender without it."""
+
+import re
+import shutil
+import sys
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from .child_process import run_logged
+from .errors import SeipError
+from .progress import Progress
+from .storage.files import check_folder, unfinished_name
+from .sumo_programs import Sumo, find_sumo, sumo_version
+
+SUMO_VERSION = "1.28.0"
+"""Version that is installed: that of the group ``traffic`` in pyproject.toml."""
+BY_HAND = "install Eclipse SUMO yourself and name its folder in the preferences of the extension"
+
+_ERROR = re.compile(r"^ERROR: (.+)$", re.MULTILINE)
+_MEGABYTE = 1_000_000
+
+
+@dataclass(frozen=True)
+class SumoSize:
+    """Size of SUMO on a platform: of its wheel and of what the wheel holds, megabytes."""
+
+    download: int
+    unpacked: int
+
+
+_SIZES = {"linux": SumoSize(149, 460), "win32": SumoSize(158, 470), "darwin": SumoSize(55, 181)}
+
+
+def sumo_size(platform: str = sys.platform) -> SumoSize:
+    """Return the size of SUMO on a platform, named as in `sys.platform`."""
+    return _SIZES.get(platform, _SIZES["linux"])
+
+
+def installed_sumo(folder: Path) -> Path:
+    """Return where SUMO is in the folder that `install_sumo` was called with."""
+    return folder / SUMO_VERSION
+
+
+def install_sumo(pip: Sequence[str], folder: Path) -> Generator[Progress, None, Sumo]:
+    """Install SUMO into a folder with pip, whole or not at all.
+
+    Parameters
+    ----------
+    pip : sequence of str
+        Command that starts pip.
+    folder : Path
+        Folder for SUMO and nothing else; a SUMO that is there is replaced.
+
+    Yields
+    ------
+    Progress
+        Progress in megabytes. Closing the generator ends pip and leaves the folder as it was.
+
+    Raises
+    ------
+    SeipError
+        The folder cannot be written, pip fails, or SUMO does not start afterwards.
+    """
+    check_folder(folder)
+    with TemporaryDirectory(prefix=unfinished_name(folder, "sumo-").name, dir=folder) as temporary:
+        new, log = Path(temporary) / "sumo", Path(temporary) / "log"
+        options = ["--no-deps", "--only-binary", ":all:", "--no-compile", "--no-cache-dir", "--no-input", "-q"]
+        command = [*pip, "install", f"eclipse-sumo=={SUMO_VERSION}", "--target", str(new), *options]
+        # pip downloads to the folder for temporary files, so that the size of ours shows how far it is
+        variables = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), temporary)
+        try:
+            status = yield from run_logged(command, log, lambda _: _progress(Path(temporary)), environment=variables)
+        except OSError as error:
+            raise SeipError(f"{pip[0]} cannot be started ({error.strerror}): {BY_HAND}") from error
+        if status != 0:
+            raise SeipError(_failure(log.read_text(encoding="utf-8", errors="replace"), status))
+        yield Progress(0, 0, "starting SUMO", counted=False)
+        sumo_version(find_sumo([new]))
+        for old in folder.iterdir():
+            if old.is_dir() and old != Path(temporary):
+                shutil.rmtree(old)
+        new.replace(installed_sumo(folder))
+    return find_sumo([installed_sumo(folder)])
+
+
+def _progress(temporary: Path) -> Progress:
+    """Return how far pip is, from the size of the files that it has written so far."""
+    size, written = sumo_size(), _megabytes(temporary)
+    if written < size.download:
+        return Progress(written, size.download, f"downloading SUMO, {size.download} MB")
+    done = min(written - size.download, size.unpacked)
+    return Progress(done, size.unpacked, f"unpacking SUMO, {size.unpacked} MB")
+
+
+def _megabytes(folder: Path) -> int:
+    total = 0
+    for path in folder.rglob("*"):
+        try:
+            total += path.stat().st_size
+        except OSError:  # pip has moved it in the meantime
+            continue
+    return total // _MEGABYTE
+
+
+def _failure(output: str, status: int) -> str:
+    """Return why pip failed: its last message."""
+    reasons = _ERROR.findall(output) or output.strip().splitlines()[-1:]
+    reason = reasons[-1].rstrip(".") if reasons else f"pip ended with status {status}"
+    return f"SUMO could not be installed ({reason}): check the connection to the internet, or {BY_HAND}"

@@ -1,0 +1,38 @@
+"""Status of SUMO, and the button that installs it, for sidebar, dialog and preferences."""
+
+from __future__ import annotations
+
+import bpy
+
+from .. import preferences
+from ..core.sumo_installation import sumo_size
+from ..operators.sumo import SEIP_OT_install_sumo
+from .run_button import draw_run
+from .wrapped_text import draw_sentence
+
+
+def draw_missing(layout: bpy.types.UILayout) -> None:
+    """Draw that SUMO is missing, and the ways to get it; nothing where it is there."""
+    if preferences.sumo() is not None:
+        return
+    draw_sentence(layout, f"{preferences.NO_SUMO}.", icon="ERROR")
+    _draw_installation(layout)
+    if preferences.own() is not None:
+        layout.operator("preferences.addon_show", text="Preferences").module = preferences.ADDON_ID
+
+
+def draw_status(layout: bpy.types.UILayout) -> None:
+    """Draw which SUMO there is, or the button that installs it."""
+    status, works = preferences.sumo_status()
+    draw_sentence(layout, f"{status}.", icon="CHECKMARK" if works else "ERROR")
+    if not works:
+        _draw_installation(layout)
+
+
+def _draw_installation(layout: bpy.types.UILayout) -> None:
+    reason = preferences.why_no_installation()
+    if reason:
+        draw_sentence(layout, f"{reason}.", icon="INFO")
+    size = sumo_size()
+    text = f"{SEIP_OT_install_sumo.bl_label} ({size.download} MB, unpacked {size.unpacked} MB)"
+    draw_run(layout, SEIP_OT_install_sumo.bl_idname, icon="IMPORT", text=text)
