@@ -145,7 +145,7 @@ def import_mesh(
     for mesh in meshes:
         obj = bpy.data.objects.new(path.stem, mesh)
         obj.matrix_world = matrix
-        obj[contract.SOURCE] = FROM_MESH
+        obj[contract.SOURCE], obj[contract.BUILT] = FROM_MESH, True
         into.objects.link(obj)
         objects.add(obj)
     for part in shown_parts(scene, {contract.OCCLUDERS: objects}):

@@ -145,8 +145,12 @@ def test_a_damaged_mesh_is_named_and_the_site_stays(scene, street, files):
 def test_a_site_in_a_new_scene_takes_the_files_over(scene, street, files):
     chosen = choose(scene, street)
     chosen.meshes, chosen.mesh_origin = str(files / "meshes"), "0 0"
-    for _ in range(2):
-        assert bpy.ops.seip.build_site() == {"FINISHED"}
+    assert bpy.ops.seip.build_site() == {"FINISHED"}
+    assert bpy.ops.seip.build_site() == {"FINISHED"}  # replaces the site, meshes included
+    assert len(bpy.data.scenes) == 1
+    assert len([obj for obj in scene.objects if obj.get(contract.SOURCE) == "mesh file"]) == 2
+    scene[contract.BUILT] = "another place"
+    assert bpy.ops.seip.build_site() == {"FINISHED"}
     new = next(each for each in bpy.data.scenes if each != scene)
     assert (new.seip.site.meshes, new.seip.site.mesh_origin) == (chosen.meshes, chosen.mesh_origin)
     placed = [obj for obj in new.objects if obj.get(contract.SOURCE) == "mesh file"]
