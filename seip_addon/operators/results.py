@@ -45,6 +45,7 @@ from .base import LongWork, Outcome, Result, attempt, started
 
 MOST_RANKED = 10
 """Number of candidates in the ranking: as many as the sidebar shows without scrolling the list."""
+OTHER_TARGETS = "The two placements were made on different targets: only their figures can be compared."
 EYE_DISTANCE = 10.0
 """Metres from a sensor's eye to the point that the view turns about."""
 
@@ -218,7 +219,7 @@ class SEIP_OT_drop_placement(bpy.types.Operator):
 
 
 class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
-    """Colour the road by what the present placement gains over the kept one, and what it loses"""
+    """Colour the road by which of the two placements see it: both, only the kept, only the present or neither"""
 
     bl_idname = "seip.show_comparison"
     bl_label = "Show Difference"
@@ -242,11 +243,11 @@ class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
             raise SeipError("keep a placement first, to compare the present one with it")
         kept = seip.kept[seip.active_kept]
         if kept.targets != seip.result.targets:
-            raise SeipError("the two placements were made on different targets: only their figures can be compared")
-        comparison = compare(unpacked_counts(kept.seen), present)
-        recolour(scene, comparison.colouring())
-        gained, lost = comparison.gained / len(present), comparison.lost / len(present)
-        self.report({"INFO"}, f"over {kept.name}: gained {gained:.2%}, lost {lost:.2%} of the targets")
+            raise SeipError(OTHER_TARGETS)
+        colours = compare(unpacked_counts(kept.seen), present)
+        recolour(scene, colours)
+        shares = ", ".join(f"{words} {share:.2%}" for words, share in zip(colours.words, colours.shares, strict=True))
+        self.report({"INFO"}, f"{kept.name} and the present placement: {shares} of the road")
 
 
 class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneState, VisibilityModel]], bpy.types.Operator):
