@@ -37,6 +37,8 @@ from .base import LongWork, Outcome, attempt
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "scenes" / f"junction{DESCRIPTION_SUFFIX}"
 """The site that comes with SEIP: beside the package, in a checkout as in the extension."""
+EXAMPLE_TRAFFIC = EXAMPLE.parent / f"{EXAMPLE.stem}_traffic" / "run-1.npz"
+"""Traffic of the example: beside it."""
 SHARE_OF_VIEW = 0.6
 """Of a drawn area in the size of the view."""
 AREA_ITEMS = tuple(item for item in ROLE_ITEMS if Role[item[0]] in roles.AREAS)
@@ -102,6 +104,8 @@ class _BuildsSite(LongWork[BuiltSite]):
     """A mixin for operators that build a site."""
 
     is_chosen = True
+    traffic_file: Path | None = None
+    """Traffic that comes with the site."""
 
     def conclude(self, scene: bpy.types.Scene, result: BuiltSite) -> None:
         """Build the scene."""
@@ -116,6 +120,8 @@ class _BuildsSite(LongWork[BuiltSite]):
             report({"INFO"}, "Blender's cube, light and camera were removed")
         finish(build_scene(built, result.model, result.map_name))
         _keep_map(built, result)
+        if self.traffic_file is not None:
+            built.seip.traffic.file = str(self.traffic_file)
         show_site(built, result.model.region)
         for note in result.model.notes:
             report({"INFO"}, note)
@@ -152,6 +158,7 @@ class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
     bl_idname = "seip.load_example"
     bl_label = "Load Example"
     is_chosen = False
+    traffic_file = EXAMPLE_TRAFFIC
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
