@@ -223,8 +223,8 @@ def front_text(record: PlacementRecord) -> str:
     """Return what the placements of other numbers of sensors are, and how much better they could be."""
     what = "Coverage by weight" if record.objective.kind == "weighted" else "Coverage"
     missed = max(point.missed for point in record.front)
-    limit = f"at most {missed:.1%} more is possible" if missed else "none sees more"
-    return f"{what} and price of the best placement found for each number, without a budget: {limit}."
+    limit = f"Others see at most {missed:.1%} of the road more." if missed else "No other sees more."
+    return f"{what} and price of the best placement found for each number, without a budget. {limit}"
 
 
 def _draw_details(layout: bpy.types.UILayout, record: PlacementRecord, *, certain: bool) -> None:

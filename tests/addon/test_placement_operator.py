@@ -18,6 +18,7 @@ from seip_addon.core.output.results.placement_file import comparable, load_place
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.visibility.grid import VisibilityGrid
 from seip_addon.core.sensing.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
+from seip_addon.panels import export as export_panel
 from seip_addon.panels import placement as placement_panel
 from seip_addon.scene.contract import WRITTEN
 from seip_addon.session import session
@@ -48,6 +49,30 @@ def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scen
     assert VisibilityGrid.load(tmp_path / "batch" / "visibility.npz").key == key
     for name in ("candidates.csv", "carla_spawn.json", "site.npz", "visibility.npz"):
         assert (tmp_path / "panel" / name).read_bytes() == (tmp_path / "batch" / name).read_bytes()
+
+
+def test_files_of_an_export_can_be_opened_while_they_are_of_the_placement(junction, tmp_path):
+    def opened():
+        layout = DrawnLayout()
+        export_panel.draw(layout, bpy.context)
+        paths = [getattr(button, "filepath", None) for name, _, button in layout.buttons if name == "wm.path_open"]
+        return "seip.show_plan" in dict(layout.operators), paths
+
+    bpy.ops.seip.solve_placement()
+    folder = tmp_path / "result"
+    junction.seip.result.folder = str(folder)
+    assert opened() == (False, [])
+    bpy.ops.seip.export_result()
+    assert opened() == (True, [str(folder)])
+    bpy.ops.seip.write_report()
+    assert opened() == (True, [str(folder / "report.html"), str(folder)])
+    bpy.ops.seip.export_result()  # the report is older than this
+    assert opened() == (True, [str(folder)])
+    junction.seip.goal.count = 1
+    bpy.ops.seip.solve_placement()
+    assert opened() == (False, [])
+    with pytest.raises(RuntimeError, match="no plan of this placement in the folder of the result"):
+        bpy.ops.seip.show_plan()
 
 
 @pytest.mark.slow
@@ -101,10 +126,10 @@ def test_the_text_on_numbers_of_sensors_states_how_much_better_they_could_be(jun
     bpy.ops.seip.solve_placement()
     record = parsed_record(junction.seip.result.record)
     front = tuple(replace(point, missed=0.0) for point in record.front)
-    text = "Coverage and price of the best placement found for each number, without a budget: "
-    assert placement_panel.front_text(replace(record, front=front)) == f"{text}none sees more."
+    text = "Coverage and price of the best placement found for each number, without a budget. "
+    assert placement_panel.front_text(replace(record, front=front)) == f"{text}No other sees more."
     open_ended = replace(record, front=(*front[:-1], replace(front[-1], missed=0.0123)))
-    assert placement_panel.front_text(open_ended) == f"{text}at most 1.2% more is possible."
+    assert placement_panel.front_text(open_ended) == f"{text}Others see at most 1.2% of the road more."
 
 
 def test_a_placement_with_the_grid_at_hand_casts_no_ray(junction, monkeypatch):
