@@ -22,7 +22,8 @@ from headless.set_up import LOCK
 ROOT = Path(__file__).resolve().parent.parent
 WHEELS = ROOT / "wheels"
 STAGING = ROOT / "build" / "extension"
-CONTENTS = ("__init__.py", "LICENSE", "seip_addon", "scenes/junction.toml", "scenes/junction.xodr")
+EXAMPLE = ("scenes/junction.toml", "scenes/junction.xodr", "scenes/junction_traffic/run-1.npz")
+CONTENTS = ("__init__.py", "LICENSE", "seip_addon", *EXAMPLE)
 
 WHEEL_TAGS = {
     "linux-x64": ("manylinux_2_28_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64"),

@@ -72,6 +72,22 @@ def _placed(
     return replace(state, solution=solution, durations=state.timed("placement", began))
 
 
+class SEIP_OT_choose_number(bpy.types.Operator):
+    """Make this number of sensors the goal of the next placement; the tick marks the present placement"""
+
+    bl_idname = "seip.choose_number"
+    bl_label = "Choose Number of Sensors"
+    bl_options = {"REGISTER", "UNDO"}
+
+    count: bpy.props.IntProperty(name="Sensors", description="Largest number of sensors", min=1, default=1)
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Set the goal."""
+        goal = context.scene.seip.goal
+        goal.limit, goal.count = "COUNT", self.count
+        return {"FINISHED"}
+
+
 class SEIP_OT_add_rule(bpy.types.Operator):
     """Demand, or forbid, a sensor at the position of the selected pole or sensor, or at the one that is named"""
 
@@ -121,4 +137,4 @@ class SEIP_OT_remove_rule(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (SEIP_OT_solve_placement, SEIP_OT_add_rule, SEIP_OT_remove_rule)
+CLASSES = (SEIP_OT_solve_placement, SEIP_OT_choose_number, SEIP_OT_add_rule, SEIP_OT_remove_rule)

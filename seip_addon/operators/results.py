@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -19,6 +20,7 @@ from ..core.errors import SeipError
 from ..core.output.report.write import write_report
 from ..core.output.results.answer import change_text
 from ..core.output.results.comparison import compare, packed_counts, unpacked_counts
+from ..core.output.results.file_names import REPORT_FILES
 from ..core.output.results.placement_file import load_placement, parsed_record
 from ..core.output.results.placement_record import PlacementRecord, Provenance
 from ..core.output.results.ranking import Ranked, rank_added, rank_alone
@@ -45,6 +47,9 @@ from .base import LongWork, Outcome, Result, attempt, started
 
 MOST_RANKED = 10
 """Number of candidates in the ranking: as many as the sidebar shows without scrolling the list."""
+OTHER_TARGETS = "The two placements were made on different targets: only their figures can be compared."
+PLAN, REPORT = "plan.png", REPORT_FILES[0]
+_RECORD = "placement.json"
 EYE_DISTANCE = 10.0
 """Metres from a sensor's eye to the point that the view turns about."""
 
@@ -218,7 +223,7 @@ class SEIP_OT_drop_placement(bpy.types.Operator):
 
 
 class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
-    """Colour the road by what the present placement gains over the kept one, and what it loses"""
+    """Colour the road by which of the two placements see it: both, only the kept, only the present or neither"""
 
     bl_idname = "seip.show_comparison"
     bl_label = "Show Difference"
@@ -242,11 +247,11 @@ class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
             raise SeipError("keep a placement first, to compare the present one with it")
         kept = seip.kept[seip.active_kept]
         if kept.targets != seip.result.targets:
-            raise SeipError("the two placements were made on different targets: only their figures can be compared")
-        comparison = compare(unpacked_counts(kept.seen), present)
-        recolour(scene, comparison.colouring())
-        gained, lost = comparison.gained / len(present), comparison.lost / len(present)
-        self.report({"INFO"}, f"over {kept.name}: gained {gained:.2%}, lost {lost:.2%} of the targets")
+            raise SeipError(OTHER_TARGETS)
+        colours = compare(unpacked_counts(kept.seen), present)
+        recolour(scene, colours)
+        shares = ", ".join(f"{words} {share:.2%}" for words, share in zip(colours.words, colours.shares, strict=True))
+        self.report({"INFO"}, f"{kept.name} and the present placement: {shares} of the road")
 
 
 class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneState, VisibilityModel]], bpy.types.Operator):
@@ -422,7 +427,7 @@ class SEIP_OT_write_report(_Writes[tuple[SceneState, tuple[Path, ...]]], bpy.typ
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, tuple[Path, ...]]]:
         """Return the work: the export where the folder holds another result, and the report."""
         folder = _checked_folder(scene)
-        if _holds(folder, scene.seip.result.record):
+        if _holds(folder, scene.seip.result.record, _time_of(folder / _RECORD)):
             return _reported(folder, scene_survey.with_placement(scene))
         return started(_reported(folder, _exported(folder, scene)))
 
@@ -440,10 +445,31 @@ def _reported(
     return state, (yield from write_report(folder))
 
 
-def _holds(folder: Path, record: str) -> bool:
-    """Return whether a folder holds the export of a placement."""
+def exported_files(scene: bpy.types.Scene) -> dict[str, Path]:
+    """Return the plan and the report of the present placement by name, as far as the folder of the result has them."""
+    folder = Path(bpy.path.abspath(scene.seip.result.folder))
+    written = _time_of(folder / _RECORD)
+    if no_folder(scene) or written is None or not _holds(folder, scene.seip.result.record, written):
+        return {}
+    times = {name: _time_of(folder / name) for name in (PLAN, REPORT)}
+    return {
+        name: folder / name for name, time in times.items() if time is not None and (name == PLAN or time >= written)
+    }
+
+
+def _time_of(path: Path) -> int | None:
+    """Return when a file was written, in nanoseconds, or None if it is not there."""
     try:
-        written = load_placement(folder / "placement.json")
+        return path.stat().st_mtime_ns
+    except OSError:
+        return None
+
+
+@lru_cache(maxsize=8)  # a panel asks at every redraw
+def _holds(folder: Path, record: str, _written: int | None) -> bool:
+    """Return whether a folder holds the export of a placement, whose record was written at the time given."""
+    try:
+        written = load_placement(folder / _RECORD)
     except SeipError:
         return False
     present = parsed_record(record)

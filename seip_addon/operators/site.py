@@ -46,6 +46,8 @@ COPIED = (
     *("terrain", "terrain_epsg", "meshes", "mesh_origin", "mesh_up"),
 )
 """Properties of a choice that a site in a new scene takes over."""
+EXAMPLE_TRAFFIC = EXAMPLE.parent / f"{EXAMPLE.stem}_traffic" / "run-1.npz"
+"""Traffic of the example: beside it."""
 SHARE_OF_VIEW = 0.6
 """Of a drawn area in the size of the view."""
 AREA_ITEMS = tuple(item for item in ROLE_ITEMS if Role[item[0]] in roles.AREAS)
@@ -112,6 +114,8 @@ class _BuildsSite(LongWork[BuiltSite]):
 
     is_chosen = True
     _meshes: MeshFiles | None = None
+    traffic_file: Path | None = None
+    """Traffic that comes with the site."""
 
     def conclude(self, scene: bpy.types.Scene, result: BuiltSite) -> None:
         """Build the scene."""
@@ -134,6 +138,8 @@ class _BuildsSite(LongWork[BuiltSite]):
             built[contract.BUILT] = built.seip.site.place()
         _keep_map(built, result)
         added = self._add_meshes(built, dict(zip(paths, places, strict=True)))
+        if self.traffic_file is not None:
+            built.seip.traffic.file = str(self.traffic_file)
         show_site(built, result.model.region)
         for note in result.model.notes:
             report({"INFO"}, note)
@@ -183,6 +189,7 @@ class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
     bl_idname = "seip.load_example"
     bl_label = "Load Example"
     is_chosen = False
+    traffic_file = EXAMPLE_TRAFFIC
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

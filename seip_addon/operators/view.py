@@ -24,7 +24,7 @@ from ..viewport import coverage, overlays
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
 from .base import LongWork, Outcome, attempt, started
-from .results import ForPlacement, not_evaluated
+from .results import PLAN, ForPlacement, exported_files, not_evaluated
 
 NO_COVERAGE = "There is no coverage to show: place sensors first."
 
@@ -189,6 +189,44 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operato
         self.report({"INFO"}, f"written {self._path}")
 
 
+class SEIP_OT_show_plan(bpy.types.Operator):
+    """Show the exported plan in the window in which Blender shows renderings"""
+
+    bl_idname = "seip.show_plan"
+    bl_label = "Show Plan"
+    bl_options = {"INTERNAL"}  # the panel offers it where there is a plan
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Open it."""
+        return attempt(self, lambda: self._show(context))
+
+    def _show(self, context: bpy.types.Context) -> None:
+        path = exported_files(context.scene).get(PLAN)
+        if path is None:
+            raise SeipError("there is no plan of this placement in the folder of the result: export it first")
+        image = bpy.data.images.load(str(path), check_existing=True)
+        image.reload()  # it may be that of an earlier export
+        editor = _image_window(context)
+        if editor is None:
+            raise SeipError(f"Blender has opened no window for the plan: open {path}")
+        editor.image = image
+
+
+def _image_window(context: bpy.types.Context) -> bpy.types.SpaceImageEditor | None:
+    """Open the window in which Blender shows renderings, or bring it to the front, and return its image editor."""
+    view = context.preferences.view
+    before = view.render_display_type
+    view.render_display_type = "WINDOW"  # other ways would change the layout of the present window
+    try:
+        if bpy.ops.render.view_show.poll():
+            bpy.ops.render.view_show("INVOKE_DEFAULT")
+    finally:
+        view.render_display_type = before
+    screens = [window.screen for window in context.window_manager.windows if window.screen.is_temporary]
+    areas = (area for screen in screens for area in screen.areas if area.type == "IMAGE_EDITOR")
+    return next((area.spaces.active for area in areas), None)
+
+
 def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area, state: SceneState) -> None:
     """Write what a viewport shows, and the plan beside it."""
     from PIL import Image  # noqa: PLC0415  # pictures take half a second to come, which nobody waits for at start
@@ -268,4 +306,5 @@ CLASSES = (
     SEIP_OT_show_sight_lines,
     SEIP_OT_hide_sight_lines,
     SEIP_OT_save_picture,
+    SEIP_OT_show_plan,
 )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 
 from ..operators import results
-from ..operators.view import SEIP_OT_save_picture
+from ..operators.view import SEIP_OT_save_picture, SEIP_OT_show_plan
 from .run_button import draw_run
 from .wrapped_text import draw_sentence
 
@@ -24,9 +26,22 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         draw_sentence(layout, sentence, icon="INFO")
     draw_run(layout, results.SEIP_OT_write_report.bl_idname, icon="FILE_TEXT")
     draw_run(layout, results.SEIP_OT_export_result.bl_idname, icon="EXPORT", text="Export Files")
+    _draw_files(layout, results.exported_files(scene))
     view = scene.seip.view
     column = layout.column(align=True)
     column.label(text="Picture")
     column.row(align=True).prop(view, "picture_of", expand=True)
     column.prop(view, "picture", text="")
     draw_run(column, SEIP_OT_save_picture.bl_idname, icon="IMAGE_DATA")
+
+
+def _draw_files(layout: bpy.types.UILayout, files: dict[str, Path]) -> None:
+    """Draw buttons that open the plan, the report and their folder, as far as they are there."""
+    if not files:
+        return
+    row = layout.row(align=True)
+    if results.PLAN in files:
+        row.operator(SEIP_OT_show_plan.bl_idname, icon="IMAGE_DATA")
+    if results.REPORT in files:
+        row.operator("wm.path_open", text="Open Report", icon="URL").filepath = str(files[results.REPORT])
+    row.operator("wm.path_open", text="", icon="FILE_FOLDER").filepath = str(next(iter(files.values())).parent)

@@ -14,7 +14,7 @@ from ..core.output.results.answer import answer, status_text
 from ..core.output.results.placement_file import parsed_record
 from ..core.output.results.placement_record import PlacementRecord, relevant_warnings
 from ..core.workflows.traffic_runs import traffic_folder
-from ..operators.placement import SEIP_OT_solve_placement
+from ..operators.placement import SEIP_OT_choose_number, SEIP_OT_solve_placement
 from ..operators.results import SEIP_OT_evaluate_sensors, no_placement
 from ..operators.sensors import SEIP_MT_survey_presets, SEIP_OT_add_survey_preset
 from ..operators.visibility import SEIP_OT_compare_scene
@@ -30,6 +30,10 @@ _SHOWN = {
     "traffic": ("risk", "weights_from_traffic", "instants", "held_out"),
 }
 """Properties of the objective that are shown for each kind of scenarios."""
+
+
+NUMBER_SHARE = 0.3
+"""Share of a row that a number of sensors takes, beside the bar of its coverage."""
 
 
 class SEIP_UL_rules(RowList, bpy.types.UIList):
@@ -192,10 +196,38 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         draw_sentence(column, scene.seip.result.change, icon="INFO", reserved=BOX)
     for sentence in answer(record):
         draw_sentence(column, sentence, reserved=BOX)
+    body = section(box, "numbers") if record.front else None
+    if body is not None:
+        body.active = not doubts
+        _draw_numbers(body, record, scene.seip.goal)
     body = section(box, "details")
     if body is not None:
         body.active = not doubts
         _draw_details(body, record, certain=not doubts)
+
+
+def _draw_numbers(layout: bpy.types.UILayout, record: PlacementRecord, goal: bpy.types.PropertyGroup) -> None:
+    """Draw coverage and price of the best placement of each number of sensors, with a button that chooses it."""
+    column = layout.column(align=True)
+    for point in record.front:
+        row = column.split(factor=NUMBER_SHARE, align=True)
+        button = row.operator(
+            SEIP_OT_choose_number.bl_idname,
+            text=str(point.count),
+            icon="CHECKMARK" if point.count == len(record.sensors) else "BLANK1",
+            depress=goal.limit == "COUNT" and goal.count == point.count,
+        )
+        button.count = point.count
+        row.progress(factor=point.coverage, text=f"{point.coverage:.1%} · ${point.price:,.0f}")
+    draw_sentence(layout, front_text(record), icon="INFO", reserved=BOX)
+
+
+def front_text(record: PlacementRecord) -> str:
+    """Return what the placements of other numbers of sensors are, and how much better they could be."""
+    what = "Coverage by weight" if record.objective.kind == "weighted" else "Coverage"
+    missed = max(point.missed for point in record.front)
+    limit = f"Others see at most {missed:.1%} of the road more." if missed else "No other sees more."
+    return f"{what} and price of the best placement found for each number, without a budget. {limit}"
 
 
 def _draw_details(layout: bpy.types.UILayout, record: PlacementRecord, *, certain: bool) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..core.errors import SeipError
+from ..core.output.results.comparison import BOTH, CLASS_WORDS, KEPT_ONLY, NEITHER, PRESENT_ONLY, compared_shares
 from ..core.output.results.placement_file import parsed_record
 from ..core.output.results.placement_record import PlacementRecord
 from ..operators import results
@@ -116,12 +117,17 @@ def _draw_comparison(layout: bpy.types.UILayout, context: bpy.types.Context) -> 
     if not 0 <= seip.active_kept < len(seip.kept):
         draw_sentence(layout, "Keep this placement with +, place again, and compare the two.", icon="INFO")
         return
+    kept, present = seip.kept[seip.active_kept], seip.result
     try:
-        kept = parsed_record(seip.kept[seip.active_kept].record)
+        _draw_table(layout, parsed_record(kept.record), parsed_record(present.record))
+        shares = compared_shares(kept.seen, present.seen) if kept.targets == present.targets else None
     except SeipError as error:
         draw_sentence(layout, str(error), icon="ERROR")
         return
-    _draw_table(layout, kept, parsed_record(seip.result.record))
+    if shares is None:
+        draw_sentence(layout, results.OTHER_TARGETS, icon="INFO")
+        return
+    _draw_shares(layout, shares)
     layout.operator("seip.show_comparison").back = False
     layout.operator("seip.show_comparison", text="Show Coverage").back = True
 
@@ -138,6 +144,16 @@ def _draw_table(layout: bpy.types.UILayout, kept: PlacementRecord, present: Plac
     ):
         for text in (name, one, other):
             grid.label(text=text)
+
+
+def _draw_shares(layout: bpy.types.UILayout, shares: tuple[float, ...]) -> None:
+    """Draw which share of the road both placements see, only one of them, and neither."""
+    layout.label(text="Share of the Road")
+    column = layout.column(align=True)
+    for number in (BOTH, KEPT_ONLY, PRESENT_ONLY, NEITHER):
+        row = column.split(factor=0.75)
+        row.label(text=f"  {CLASS_WORDS[number].capitalize()}")
+        row.label(text=f"{shares[number]:.2%}")
 
 
 def _share(value: float | None) -> str:

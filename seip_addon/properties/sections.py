@@ -50,6 +50,7 @@ class SEIP_PG_sections(bpy.types.PropertyGroup):
     contents: _section("Contents")
     about_sensor: _section("About the Sensor")
     beams: _section("Beam Preview")
+    numbers: _section("Number of Sensors")
     details: _section("Details")
     objective: _section("Criterion and Scenarios")
     rules: _section("Weights and Positions")

@@ -12,6 +12,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from seip_addon import loose_pieces, scene_status
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.panels import detection, export, front_door, placement, results, site, view
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
@@ -146,6 +147,23 @@ def test_the_example_is_the_shipped_junction(scene):
     shipped = read_scene(bpy.context.scene).geometry
     assert built.region.area == pytest.approx(shipped.region.area)
     assert len(built.occluders) == len(shipped.occluders)
+
+
+def test_the_example_comes_with_traffic_and_another_site_without(scene):
+    bpy.ops.seip.load_example()
+    assert bpy.ops.seip.load_traffic() == {"FINISHED"}
+    shipped = Trajectories.load(SCENES / "junction_traffic" / "run-1.npz")
+    road_users = [obj for obj in contract.find(scene, contract.TRAFFIC).objects if obj.parent is None]
+    assert len(road_users) == len(shipped)
+    assert scene.seip.traffic.loaded.startswith(f"{len(shipped)} road users")
+    assert bpy.ops.seip.load_example() == {"FINISHED"}  # in a scene of its own
+    (second,) = set(bpy.data.scenes) - {scene}
+    assert second.seip.traffic.file == scene.seip.traffic.file
+    assert bpy.context.scene == second
+    second.seip.site.source = str(SCENES / "junction.toml")
+    bpy.ops.seip.build_site()
+    (third,) = set(bpy.data.scenes) - {scene, second}
+    assert third.seip.traffic.file == ""
 
 
 def test_the_next_step_leads_to_placed_sensors(junction):

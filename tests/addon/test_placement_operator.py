@@ -18,8 +18,11 @@ from seip_addon.core.output.results.placement_file import comparable, load_place
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.visibility.grid import VisibilityGrid
 from seip_addon.core.sensing.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
+from seip_addon.panels import export as export_panel
+from seip_addon.panels import placement as placement_panel
 from seip_addon.scene.contract import WRITTEN
 from seip_addon.session import session
+from tests.builders.drawn_layout import DrawnLayout
 
 OPTIONS = ["--heights", "8", "--grid", "4", "--spacing", "12", "--count", "2", "--sensor", "type1", "--no-render"]
 
@@ -48,6 +51,30 @@ def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scen
         assert (tmp_path / "panel" / name).read_bytes() == (tmp_path / "batch" / name).read_bytes()
 
 
+def test_files_of_an_export_can_be_opened_while_they_are_of_the_placement(junction, tmp_path):
+    def opened():
+        layout = DrawnLayout()
+        export_panel.draw(layout, bpy.context)
+        paths = [getattr(button, "filepath", None) for name, _, button in layout.buttons if name == "wm.path_open"]
+        return "seip.show_plan" in dict(layout.operators), paths
+
+    bpy.ops.seip.solve_placement()
+    folder = tmp_path / "result"
+    junction.seip.result.folder = str(folder)
+    assert opened() == (False, [])
+    bpy.ops.seip.export_result()
+    assert opened() == (True, [str(folder)])
+    bpy.ops.seip.write_report()
+    assert opened() == (True, [str(folder / "report.html"), str(folder)])
+    bpy.ops.seip.export_result()  # the report is older than this
+    assert opened() == (True, [str(folder)])
+    junction.seip.goal.count = 1
+    bpy.ops.seip.solve_placement()
+    assert opened() == (False, [])
+    with pytest.raises(RuntimeError, match="no plan of this placement in the folder of the result"):
+        bpy.ops.seip.show_plan()
+
+
 @pytest.mark.slow
 def test_pose_errors_are_only_evaluated_where_that_is_the_risk_measure(junction, tmp_path, small_scene):
     junction.seip.goal.scenarios, junction.seip.goal.risk = "pose-errors", "none"
@@ -56,6 +83,53 @@ def test_pose_errors_are_only_evaluated_where_that_is_the_risk_measure(junction,
     assert any("in one of twenty cases" in note for note in panel.notes)
     place.main([str(small_scene), *OPTIONS, "--pose-errors", "--risk", "none", "-o", str(tmp_path)])
     assert comparable(panel) == comparable(load_placement(tmp_path / "placement.json"))
+
+
+def choices(scene: bpy.types.Scene) -> tuple[DrawnLayout, list[tuple[int, bool, bool]]]:
+    """Return the drawn step, and each number of sensors: whether it is the placement's, and whether it is the goal."""
+    layout = DrawnLayout()
+    placement_panel.draw(layout, bpy.context)
+    chosen = [(options, button) for name, options, button in layout.buttons if name == "seip.choose_number"]
+    return layout, [(button.count, options["icon"] == "CHECKMARK", options["depress"]) for options, button in chosen]
+
+
+def test_a_click_on_a_number_of_sensors_makes_it_the_goal(junction):
+    bpy.ops.seip.solve_placement()
+    record = parsed_record(junction.seip.result.record)
+    assert [point.count for point in record.front] == [1, 2, 3, 4]
+    assert choices(junction)[1] == []  # closed
+    junction.seip.sections.numbers = True
+    layout, numbers = choices(junction)
+    assert numbers == [(1, False, False), (2, True, True), (3, False, False), (4, False, False)]
+    assert layout.bars == [(point.coverage, f"{point.coverage:.1%} · ${point.price:,.0f}") for point in record.front]
+    junction.seip.goal.limit = "BUDGET"
+    assert bpy.ops.seip.choose_number(count=3) == {"FINISHED"}
+    assert placement_panel.button_text(junction).startswith("Place 3 Sensors")
+    assert choices(junction)[1] == [(1, False, False), (2, True, False), (3, False, True), (4, False, False)]
+    bpy.ops.seip.solve_placement()
+    placed = parsed_record(junction.seip.result.record)
+    assert len(placed.sensors) == 3
+    assert placed.coverage.whole == record.front[2].coverage  # of a site of this size, both are proven optimal
+    assert placed.price_usd == record.front[2].price
+
+
+def test_numbers_of_sensors_are_not_offered_where_the_record_has_none(junction):
+    bpy.ops.seip.solve_placement()
+    junction.seip.sections.numbers = True
+    record = json.loads(junction.seip.result.record)
+    junction.seip.result.record = json.dumps({**record, "front": []})
+    layout, numbers = choices(junction)
+    assert numbers == layout.bars == []
+
+
+def test_the_text_on_numbers_of_sensors_states_how_much_better_they_could_be(junction):
+    bpy.ops.seip.solve_placement()
+    record = parsed_record(junction.seip.result.record)
+    front = tuple(replace(point, missed=0.0) for point in record.front)
+    text = "Coverage and price of the best placement found for each number, without a budget. "
+    assert placement_panel.front_text(replace(record, front=front)) == f"{text}No other sees more."
+    open_ended = replace(record, front=(*front[:-1], replace(front[-1], missed=0.0123)))
+    assert placement_panel.front_text(open_ended) == f"{text}Others see at most 1.2% of the road more."
 
 
 def test_a_placement_with_the_grid_at_hand_casts_no_ray(junction, monkeypatch):

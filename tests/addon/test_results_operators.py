@@ -8,7 +8,10 @@ from seip_addon import live_coverage, preferences, selection
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.comparison import unpacked_counts
 from seip_addon.core.output.results.placement_file import parsed_record
+from seip_addon.panels import results as results_panel
 from seip_addon.session import scene_of, session
+from seip_addon.viewport.coverage import legend_of_coverage
+from tests.builders.drawn_layout import DrawnLayout
 
 
 @pytest.fixture
@@ -63,8 +66,29 @@ def test_two_placements_are_compared_target_by_target(placed):
     words = np.array([material.name.removeprefix("SEIP ") for material in mesh.materials])
     index = np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("material_index", index)
-    assert (words[index] == "lost").sum() == (before & ~after).sum() > 0
-    assert (words[index] == "gained").sum() == (after & ~before).sum()
+    assert (words[index] == "seen only by the kept").sum() == (before & ~after).sum() > 0
+    assert (words[index] == "seen only by the present").sum() == (after & ~before).sum()
+    legend = legend_of_coverage(placed)
+    assert [entry.words for entry in legend.entries] == [
+        f"seen by neither  {np.mean(~before & ~after):.1%}",
+        f"seen by both  {np.mean(before & after):.1%}",
+        f"seen only by the present  {np.mean(after & ~before):.1%}",
+        f"seen only by the kept  {np.mean(before & ~after):.1%}",
+    ]
+    layout = drawn_comparison(placed)
+    texts = [text for text, _ in layout.labels]
+    start = texts.index("Share of the Road")
+    assert texts[start + 1 : start + 9] == [
+        "  Seen by both",
+        f"{np.mean(before & after):.2%}",
+        "  Seen only by the kept",
+        f"{np.mean(before & ~after):.2%}",
+        "  Seen only by the present",
+        f"{np.mean(after & ~before):.2%}",
+        "  Seen by neither",
+        f"{np.mean(~before & ~after):.2%}",
+    ]
+    assert "seip.show_comparison" in dict(layout.operators)
     bpy.ops.seip.show_comparison(back=True)
     assert (shown(placed) > 0).sum() == after.sum()
 
@@ -75,6 +99,17 @@ def test_other_targets_are_not_compared(placed):
     bpy.ops.seip.solve_placement()
     with pytest.raises(RuntimeError, match="made on different targets"):
         bpy.ops.seip.show_comparison()
+    layout = drawn_comparison(placed)
+    assert "different targets" in layout.text
+    assert "Share of the Road" not in layout.text
+    assert "seip.show_comparison" not in dict(layout.operators)
+
+
+def drawn_comparison(scene: bpy.types.Scene) -> DrawnLayout:
+    scene.seip.sections.comparison = True
+    layout = DrawnLayout()
+    results_panel.draw(layout, bpy.context)
+    return layout
 
 
 def test_kept_placements_have_names_and_can_be_forgotten(placed):

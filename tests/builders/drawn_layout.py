@@ -12,12 +12,17 @@ class DrawnLayout:
     labels : list of (text, icon)
     properties : list of (name, options)
     operators : list of (operator, text)
+    buttons : list of (operator, options, properties)
+        Operators again, with the options of the button and the properties that were set.
+    bars : list of (factor, text)
     """
 
     def __init__(self) -> None:
         self.labels: list[tuple[str, str]] = []
         self.properties: list[tuple[str, dict[str, Any]]] = []
         self.operators: list[tuple[str, str | None]] = []
+        self.buttons: list[tuple[str, dict[str, Any], SimpleNamespace]] = []
+        self.bars: list[tuple[float, str]] = []
         self.lists: list[dict[str, Any]] = []
 
     def label(self, text: str = "", icon: str = "NONE", **_: Any) -> None:
@@ -29,9 +34,14 @@ class DrawnLayout:
     def prop_search(self, data: Any, name: str, *_: Any, **options: Any) -> None:
         self.prop(data, name, **options)
 
-    def operator(self, name: str, text: str | None = None, **_: Any) -> SimpleNamespace:
+    def operator(self, name: str, text: str | None = None, **options: Any) -> SimpleNamespace:
         self.operators.append((name, text))
-        return SimpleNamespace()
+        properties = SimpleNamespace()
+        self.buttons.append((name, options, properties))
+        return properties
+
+    def progress(self, *, factor: float, text: str) -> None:
+        self.bars.append((factor, text))
 
     def template_list(self, *_: Any, **options: Any) -> None:
         self.lists.append(options)

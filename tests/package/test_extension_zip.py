@@ -46,7 +46,7 @@ def test_the_zip_holds_the_add_on_and_nothing_else(built):
     with zipfile.ZipFile(built) as archive:
         names = set(archive.namelist())
     expected = {"blender_manifest.toml", "__init__.py", "LICENSE", f"wheels/{FAKE_WHEEL}"}
-    expected |= {"scenes/junction.toml", "scenes/junction.xodr"}
+    expected |= {"scenes/junction.toml", "scenes/junction.xodr", "scenes/junction_traffic/run-1.npz"}
     package = {
         path.relative_to(ROOT).as_posix()
         for path in (ROOT / "seip_addon").rglob("*")

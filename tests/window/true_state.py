@@ -231,6 +231,17 @@ def _exports_leave_the_window_alone(window: Window) -> Steps:
     assert (FOLDER / "view.png").is_file()
     sys.stdout.write(f"the window was away for {gaps.longest:.2f} s at most\n")
     assert gaps.longest < AT_MOST, f"the window did not answer for {gaps.longest:.1f} s"
+    layout = [(area.type, area.width, area.height) for area in window.window.screen.areas]
+    yield from window.click("seip.show_plan(")
+    yield 1.0
+    _, opened = bpy.context.window_manager.windows
+    (editor,) = opened.screen.areas
+    assert Path(bpy.path.abspath(editor.spaces.active.image.filepath)) == FOLDER / "plan.png"
+    yield from window.shot("plan")
+    with bpy.context.temp_override(window=opened):
+        bpy.ops.wm.window_close()
+    yield 1.0
+    assert [(area.type, area.width, area.height) for area in window.window.screen.areas] == layout
     before = {path.name: path.read_bytes() for path in FOLDER.iterdir()}
     yield from window.click("seip.export_result(")
     yield from window.until(lambda: session.running.work.progress.what == "rendering", 60)

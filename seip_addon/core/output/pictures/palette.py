@@ -15,7 +15,7 @@ SEEN_WORDS = ("not seen", "seen by one sensor", "seen by two or more")
 RETURNS_COLOURS = (SEEN_COLOURS[0], "#f6c9a8", *SEEN_COLOURS[1:])
 """Of places by the returns that a pedestrian has there, from fewest to most; the first two are too few to be found."""
 COMPARED_COLOURS = ("#8a8f94", "#cfd6db", SEEN_COLOURS[2], SEEN_COLOURS[0])
-"""Of targets seen in neither of two placements, in both, gained and lost."""
+"""Of targets seen by neither of two placements, by both, only by the present and only by the kept one."""
 DENSE_BEAMS, WIDE_BEAMS = "#4dbfff", "#ff8c1a"
 """Of beams on the road that leave no gap to the next, and of those that do: such road may go unseen."""
 HIDDEN_COLOUR, MISSED_COLOUR = INK, "#a3abb2"

@@ -1,9 +1,9 @@
-"""Comparison of two placements on the same targets."""
+"""Comparison of a kept placement with the present one on the same targets."""
 
 import base64
 import binascii
 import zlib
-from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -12,57 +12,49 @@ from ...errors import SeipError
 from ..pictures.coverage_colours import Colouring
 from ..pictures.palette import COMPARED_COLOURS
 
-NEITHER, BOTH, GAINED, LOST = range(4)
-COMPARED_WORDS = ("seen in neither", "seen in both", "gained", "lost")
+NEITHER, BOTH, PRESENT_ONLY, KEPT_ONLY = range(4)
+"""Classes of targets by which of the two placements see them."""
+CLASS_WORDS = ("seen by neither", "seen by both", "seen only by the present", "seen only by the kept")
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """Difference between two placements.
-
-    Parameters
-    ----------
-    classes : (t,) int64
-        `NEITHER`, `BOTH`, `GAINED` or `LOST` for each target.
-    """
-
-    classes: Integer
-
-    @property
-    def gained(self) -> int:
-        """How many targets the other sees and the one does not."""
-        return int(np.count_nonzero(self.classes == GAINED))
-
-    @property
-    def lost(self) -> int:
-        """How many targets the one sees and the other does not."""
-        return int(np.count_nonzero(self.classes == LOST))
-
-    def colouring(self) -> Colouring:
-        """Return the classes as the road shows them."""
-        return Colouring(COMPARED_WORDS, COMPARED_COLOURS, self.classes)
-
-
-def compare(one: Integer, other: Integer) -> Comparison:
-    """Compare two placements.
+def compare(kept: Integer, present: Integer) -> Colouring:
+    """Compare two placements target by target.
 
     Parameters
     ----------
-    one, other : (t,) int64
-        How many sensors see each target.
+    kept, present : (t,) int64
+        How many sensors of each placement see each target.
+
+    Returns
+    -------
+    Colouring
+        The class of each target: `NEITHER`, `BOTH`, `PRESENT_ONLY` or `KEPT_ONLY`.
 
     Raises
     ------
     SeipError
         They are of different targets.
     """
-    if one.shape != other.shape:
+    if kept.shape != present.shape:
         raise SeipError(
-            f"the placements were made on {len(one):,} and on {len(other):,} targets: "
+            f"the placements were made on {len(kept):,} and on {len(present):,} targets: "
             "place again with the same target grid to compare target by target"
         )
-    before, after = one > 0, other > 0
-    return Comparison(np.select([before & after, after, before], [BOTH, GAINED, LOST], NEITHER).astype(np.int64))
+    before, after = kept > 0, present > 0
+    classes = np.select([before & after, after, before], [BOTH, PRESENT_ONLY, KEPT_ONLY], NEITHER).astype(np.int64)
+    return Colouring(CLASS_WORDS, COMPARED_COLOURS, classes, "Kept and present placement")
+
+
+@lru_cache(maxsize=8)  # a panel asks at every redraw
+def compared_shares(kept: str, present: str) -> tuple[float, ...]:
+    """Return the share of the targets in each class, 0 to 1, from two texts of `packed_counts`.
+
+    Raises
+    ------
+    SeipError
+        A text is damaged, or they are of different targets.
+    """
+    return tuple(compare(unpacked_counts(kept), unpacked_counts(present)).shares.tolist())
 
 
 def packed_counts(seen_by: Integer) -> str:

@@ -9,10 +9,11 @@ from seip_addon.core.choosing.placement.solvers import check_solver, is_availabl
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.comparison import (
     BOTH,
-    GAINED,
-    LOST,
+    KEPT_ONLY,
     NEITHER,
+    PRESENT_ONLY,
     compare,
+    compared_shares,
     packed_counts,
     unpacked_counts,
 )
@@ -20,8 +21,25 @@ from seip_addon.core.output.results.ranking import rank_added, rank_alone
 
 
 def test_each_target_is_in_one_class():
-    classes = compare(np.array([0, 2, 0, 1]), np.array([0, 1, 3, 0])).classes
-    assert classes.tolist() == [NEITHER, BOTH, GAINED, LOST]
+    classes = compare(np.array([0, 2, 0, 1]), np.array([0, 1, 3, 0])).of
+    assert classes.tolist() == [NEITHER, BOTH, PRESENT_ONLY, KEPT_ONLY]
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 3)), min_size=1, max_size=50))
+def test_shares_are_those_of_sets_of_targets(pairs):
+    kept, present = ({i for i, pair in enumerate(pairs) if pair[side]} for side in (0, 1))
+    packed = [packed_counts(np.array([pair[side] for pair in pairs], dtype=np.int64)) for side in (0, 1)]
+    shares = compared_shares(*packed)
+    for number, targets in ((BOTH, kept & present), (KEPT_ONLY, kept - present), (PRESENT_ONLY, present - kept)):
+        assert shares[number] == len(targets) / len(pairs)
+    assert shares[NEITHER] == (len(pairs) - len(kept | present)) / len(pairs)
+
+
+def test_shares_of_a_pair_are_computed_once():
+    compared_shares.cache_clear()
+    pair = packed_counts(np.array([1, 0])), packed_counts(np.array([1, 1]))
+    assert compared_shares(*pair) == compared_shares(*pair)
+    assert (compared_shares.cache_info().misses, compared_shares.cache_info().hits) == (1, 1)
 
 
 def test_other_targets_are_refused():
