@@ -123,16 +123,7 @@ class _BuildsSite(LongWork[BuiltSite]):
         origin = () if self._meshes is None else self._meshes.origin
         paths = () if self._meshes is None else self._meshes.paths
         places = [mesh_place(result.model, origin, path.name) for path in paths]  # fails before anything is built
-        built = scene
-        if self.is_chosen and is_of_choice(scene):
-            remove_site(scene)
-        elif has_site(scene):
-            built = bpy.data.scenes.new(result.model.name)
-            if self.is_chosen:
-                _copy_choice(scene.seip.site, built.seip.site)
-            sensor_types.list_types(built)
-        elif remove_startup_objects(scene):
-            report({"INFO"}, "Blender's cube, light and camera were removed")
+        built = self._emptied(scene, result.model.name)
         finish(build_scene(built, result.model, result.map_name))
         if self.is_chosen:
             built[contract.BUILT] = built.seip.site.place()
@@ -149,6 +140,21 @@ class _BuildsSite(LongWork[BuiltSite]):
         report({"INFO"}, f"{counted(len(result.model.parts), 'object')}, region {result.model.region.area:,.0f} m²")
         if bpy.context.window is not None and not bpy.app.background:
             bpy.ops.seip.check_site("INVOKE_DEFAULT")
+
+    def _emptied(self, scene: bpy.types.Scene, name: str) -> bpy.types.Scene:
+        """Return the scene to build in: this one, without an earlier site of the same place, or a new one."""
+        if self.is_chosen and is_of_choice(scene):
+            remove_site(scene)
+            return scene
+        if has_site(scene):
+            new = bpy.data.scenes.new(name)
+            if self.is_chosen:
+                _copy_choice(scene.seip.site, new.seip.site)
+            sensor_types.list_types(new)
+            return new
+        if remove_startup_objects(scene):
+            self.report({"INFO"}, "Blender's cube, light and camera were removed")  # type: ignore[attr-defined]  # of Blender's operators
+        return scene
 
     def _add_meshes(self, scene: bpy.types.Scene, places: dict[Path, MeshPlace]) -> int:
         """Add meshes at their places, report those that cannot be imported, and return how many objects were added."""
