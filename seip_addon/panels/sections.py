@@ -8,7 +8,7 @@ from .wrapped_text import text_width
 
 UNIT = 20.0
 """Pixels of Blender's unit of width, at the usual scale of the interface."""
-GAP = 1.1
+GAP = 1.5
 """Units of a label's margins."""
 
 
