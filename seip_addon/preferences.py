@@ -18,7 +18,7 @@ from .core.workflows.detection import DetectingPython
 
 ADDON_ID = (__package__ or "").removesuffix(".seip_addon")
 """The extension's key among Blender's add-ons: not that of the package in it."""
-NO_SUMO = "SUMO is missing, which lays out the streets of an extract of OpenStreetMap"
+NO_SUMO = "SUMO is missing, which lays out the streets of an extract"
 OFFLINE = f"Blender may not go online: switch on Allow Online Access in Preferences, System, or {BY_HAND}"
 NO_PIP = f"This Blender has no pip to install SUMO with: {BY_HAND}"
 

@@ -45,7 +45,7 @@ class SEIP_OT_choose_place(bpy.types.Operator):
         """Draw the file, and the choice of the place."""
         site = context.scene.seip.site
         self.layout.label(text=bpy.path.basename(site.source), icon="FILE", translate=False)
-        draw_place(self.layout, site)
+        draw_place(self.layout, site, DIALOG_WIDTH)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Build the site."""

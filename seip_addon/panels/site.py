@@ -76,10 +76,16 @@ def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     draw_run(layout, SEIP_OT_build_site.bl_idname)
 
 
-def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
-    """Draw the choice of a place in the chosen file and how large the site is; no choice adds or removes a row."""
+def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site, width: float | None = None) -> None:
+    """Draw the choice of a place in the chosen file and how large the site is; no choice adds or removes a row.
+
+    Parameters
+    ----------
+    width : float, optional
+        Width of a dialog, as for `draw_sentence`.
+    """
     if site.is_extract():
-        sumo.draw_missing(layout)
+        sumo.draw_missing(layout, width)
     column = settings_column(layout)
     column.prop_search(site, "junction", site, "junctions", icon="DECORATE_DRIVER")
     if site.is_extract():
@@ -93,7 +99,7 @@ def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
     shape.enabled = bool(site.junction) or site.is_extract()
     shape.prop(site, "region_shape")
     size.prop(site, "radius", text="Along Them" if site.follows_approaches() else "Radius")
-    draw_sentence(layout, _place_text(site), icon="INFO")
+    draw_sentence(layout, _place_text(site), icon="INFO", width=width)
     body = section(layout, "sources")
     if body is not None:
         _draw_sources(body, site)

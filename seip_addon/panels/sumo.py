@@ -11,12 +11,18 @@ from .run_button import draw_run
 from .wrapped_text import draw_sentence
 
 
-def draw_missing(layout: bpy.types.UILayout) -> None:
-    """Draw that SUMO is missing, and the ways to get it; nothing where it is there."""
+def draw_missing(layout: bpy.types.UILayout, width: float | None = None) -> None:
+    """Draw that SUMO is missing, and the ways to get it; nothing where it is there.
+
+    Parameters
+    ----------
+    width : float, optional
+        Width of a dialog, as for `draw_sentence`.
+    """
     if preferences.sumo() is not None:
         return
-    draw_sentence(layout, f"{preferences.NO_SUMO}.", icon="ERROR")
-    _draw_installation(layout)
+    draw_sentence(layout, f"{preferences.NO_SUMO}.", icon="ERROR", width=width)
+    _draw_installation(layout, width)
     if preferences.own() is not None:
         layout.operator("preferences.addon_show", text="Preferences").module = preferences.ADDON_ID
 
@@ -29,10 +35,9 @@ def draw_status(layout: bpy.types.UILayout) -> None:
         _draw_installation(layout)
 
 
-def _draw_installation(layout: bpy.types.UILayout) -> None:
-    reason = preferences.why_no_installation()
+def _draw_installation(layout: bpy.types.UILayout, width: float | None = None) -> None:
+    reason, size = preferences.why_no_installation(), sumo_size()
     if reason:
-        draw_sentence(layout, f"{reason}.", icon="INFO")
-    size = sumo_size()
-    text = f"{SEIP_OT_install_sumo.bl_label} ({size.download} MB, unpacked {size.unpacked} MB)"
+        draw_sentence(layout, f"{reason}.", icon="INFO", width=width)
+    text = f"{SEIP_OT_install_sumo.bl_label} ({size.download} MB)"
     draw_run(layout, SEIP_OT_install_sumo.bl_idname, icon="IMPORT", text=text)

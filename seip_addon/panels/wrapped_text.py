@@ -18,38 +18,49 @@ DEFAULT_WIDTH = 250.0
 
 
 def draw_sentence(
-    layout: bpy.types.UILayout, text: str, *, icon: str = "NONE", alert: bool = False, reserved: float = 0.0
+    layout: bpy.types.UILayout,
+    text: str,
+    *,
+    icon: str = "NONE",
+    alert: bool = False,
+    reserved: float = 0.0,
+    width: float | None = None,
 ) -> None:
-    """Draw a sentence, wrapped to the width of the sidebar.
+    """Draw a sentence, wrapped to the width of the sidebar or of a dialog.
 
     Parameters
     ----------
     reserved : float, pixels at the usual scale of the interface
         Width that a button in the same row takes.
+    width : float, pixels at the usual scale of the interface, optional
+        Width of the dialog that is drawn; by default that of the region.
     """
     column = layout.column(align=True)
     column.alert = alert
     column.scale_y = 0.8
     rest = "NONE" if icon == "NONE" else "BLANK1"
-    for number, line in enumerate(wrapped(text, MARGIN + reserved + (ICON if icon != "NONE" else 0.0))):
+    for number, line in enumerate(wrapped(text, MARGIN + reserved + (ICON if icon != "NONE" else 0.0), width)):
         column.label(text=line, icon=icon if number == 0 else rest, translate=False)
 
 
-def wrapped(text: str, taken: float) -> list[str]:
+def wrapped(text: str, taken: float, width: float | None = None) -> list[str]:
     """Return the lines of a text in the sidebar.
 
     Parameters
     ----------
     taken : float, pixels at the usual scale of the interface
         Width of the sidebar that the text cannot use.
+    width : float, pixels at the usual scale of the interface, optional
+        Width in place of that of the region.
     """
     context = bpy.context
     scale = _scale()
-    width = (context.region.width / scale if context.region is not None else DEFAULT_WIDTH) - taken
+    if width is None:
+        width = context.region.width / scale if context.region is not None else DEFAULT_WIDTH
     lines: list[str] = []
     for word in text.split():
         longer = f"{lines[-1]} {word}" if lines else word
-        if lines and text_width(longer) <= width:
+        if lines and text_width(longer) <= width - taken:
             lines[-1] = longer
         else:
             lines.append(word)

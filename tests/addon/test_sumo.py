@@ -17,7 +17,7 @@ from tests.builders.osm_text import crossing
 from tests.builders.sumo_wheel import write_programs, write_wheel
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
-BUTTON = f"Install SUMO ({sumo_size().download} MB, unpacked {sumo_size().unpacked} MB)"
+BUTTON = f"Install SUMO ({sumo_size().download} MB)"
 
 
 @pytest.fixture
