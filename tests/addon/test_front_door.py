@@ -75,6 +75,7 @@ def test_all_main_operators_are_in_a_menu_that_the_search_goes_by(scene):
     assert front_door.draw_object in bpy.types.VIEW3D_MT_object._dyn_ui_initialize()  # noqa: SLF001  # Blender has no other list
 
 
+@needs_sumo
 def test_junctions_of_an_extract_are_listed_by_their_streets(scene, extract):
     assert bpy.ops.seip.choose_map(filepath=str(extract)) == {"FINISHED"}
     site = scene.seip.site
