@@ -92,12 +92,12 @@ def _pose_errors_are_asked_for(window: Window) -> Steps:
     rays = _counted_rays()
     yield from _press(window, "seip.solve_placement(")
     assert len(_sensors()) == 2
-    assert sum(rays) == 0, f"{sum(rays)} rays were cast with the grid at hand"
+    nominal = sum(rays)  # from the chosen poses to the crossings: the grid is at hand
     assert not any("one of twenty" in note for note in _record()["notes"])
     _scene().seip.goal.scenarios, _scene().seip.goal.risk = "pose-errors", "none"
     yield 0.5
     yield from _press(window, "seip.solve_placement(")
-    assert sum(rays) > 0
+    assert sum(rays) - nominal > 2 * nominal
     assert any("one of twenty" in note for note in _record()["notes"])
 
 
