@@ -72,10 +72,10 @@ def current_step(scene: bpy.types.Scene) -> str:
 
 
 def expected_seconds(scene: bpy.types.Scene) -> float | None:
-    """Return at most how long a placement takes, about; None where nothing is known of it.
+    """Return an approximate upper limit of the time that a placement takes, seconds; None if it is not known.
 
-    That is the estimate of the last check for visibility, scaled to the present sensors and poses, and the limit of the
-    search. Returns from road users take about twice as long as visibility.
+    It is the sum of the estimate of the last check for visibility, scaled to the present sensors and poses, and the
+    limit of the search. Returns from road users take about twice as long as visibility.
     """
     survey, check = scene.seip.survey, session.checks.get(scene.session_uid)
     state = session.state_of(scene)

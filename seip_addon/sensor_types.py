@@ -9,9 +9,9 @@ from .core.sensing.lidar.model import LidarModel
 from .session import session
 
 DEFAULT_TYPE = "os1_128"
-"""Sensor type that a new scene begins with: one that is sold, calibrated on sweeps, for a common price."""
+"""Sensor type that a new scene begins with: a product whose detection law is calibrated on measured sweeps."""
 PAPER = "generic"
-"""Manufacturer of the types of the SEIP paper, which are models and no products."""
+"""Manufacturer of the types of the SEIP paper, which are models, not products."""
 
 
 def title(model: LidarModel) -> str:
