@@ -1,10 +1,12 @@
 # make demo        set up, and place sensors at the shipped junction
 # make site        build a site from an OpenStreetMap extract, with sensors and a report (installs SUMO: 230 MB)
+# make network     spread one budget over the junctions of an invented town (installs SUMO)
 # make test        set up, and run the tests (the slow ones: make test-slow; those of the studies: make test-studies)
 # make lint        set up, and check style and types
 # make scenes      rebuild the shipped scenes from their sources
 # make detection   install PyTorch, for the detector; make test-detection tests it
 # make study       redo the study on the shipped junction: coverage and detection (make -j2 study: ten minutes)
+# make recording   simulate the shipped recording of an installation again
 # make detector    train the detector that ships: random placements at 20 random sites (half an hour)
 # make ingredients what each ingredient of its training gains at sites not trained on (an hour)
 # make settings    chart what other settings of the detector cost and gain (an hour)
@@ -22,10 +24,10 @@ VENV ?= .venv
 PLATFORMS ?= linux-x64
 PY := "$(VENV)/bin/python"
 SPREAD := -n auto --maxprocesses 4
-DEMO := scenes/junction.blend -o out/junction
+DEMO := scenes/junction.blend --sensor type1 type2 type3 -o out/junction
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo site test test-slow test-studies lint scenes sumo test-traffic traffic detection test-detection study coverage-study detection-study detector ingredients settings stability benchmark extension lock clean distclean
+.PHONY: help environment demo site network test test-slow test-studies lint scenes sumo test-traffic traffic detection test-detection study coverage-study detection-study recording detector ingredients settings stability benchmark extension lock clean distclean
 
 help:
 	@sed -n '/^#/!q; s/^#\( \|$$\)//p' Makefile
@@ -42,6 +44,10 @@ site: sumo
 	$(PY) -m headless.place out/harbour.blend --sensor type2 --count 4 -o out/harbour
 	$(PY) -m headless.report out/harbour
 	@echo "pictures and report: out/harbour/"; ls out/harbour/*.png out/harbour/report.*
+
+network: sumo
+	$(PY) -m headless.network scenes/town.osm --junctions all --budget 150_000 -o out/town
+	@echo "map: out/town/network.html, report: out/town/report.html, report.pdf"
 
 test: environment
 	$(PY) -m pytest $(SPREAD) --ignore tests/studies -m "not slow"
@@ -65,7 +71,7 @@ sumo: environment
 	@$(PYTHON) -m headless.set_up "$(VENV)" traffic
 
 test-traffic: sumo
-	$(PY) -m pytest tests/core/world/opendrive/test_shipped_maps.py tests/headless/test_traffic_simulation.py tests/headless/test_traffic.py \
+	$(PY) -m pytest tests/core/world/opendrive/test_shipped_maps.py tests/core/world/traffic_simulation tests/headless/test_traffic.py \
 	  tests/core/world/openstreetmap/test_sites.py
 
 # Runs of one scene differ by their seed, and by the second of the signals' cycle of 60 s at which they begin; dense ones
@@ -97,6 +103,13 @@ coverage-study: detection
 
 detection-study: detection
 	$(PY) -m headless study detection scenes/junction.blend -o out/study/detection
+
+# The recording of an installation that differs from its plan, docs/recordings.md.
+recording: detection
+	$(PY) -m headless place scenes/junction.blend --sensor vlp16 --count 1 --heights 5.4 --no-render -o out/recorded
+	cp out/recorded/placed.blend scenes/junction_recording/plan.blend
+	$(PY) -m headless study field-recordings scenes/junction_recording/plan.blend \
+	  --traffic scenes/junction_traffic/run-9.npz --example -o scenes/junction_recording/sweeps
 
 detector: detection sumo
 	$(PY) -m headless study random-sites -o out/sites --sites 20 --seed 1

@@ -9,11 +9,13 @@ import sys
 VERBS = {
     "build-scene": "build a scene from OpenStreetMap or an OpenDRIVE map",
     "place": "choose the sensors of a scene",
+    "network": "spread one budget over the junctions of a network",
     "report": "write a report on a placement, HTML and PDF",
     "traffic": "add traffic to a scene, recorded or simulated by SUMO",
     "simulate": "scan traffic with the sensors of a scene",
     "train": "train and test a detector",
-    "detect": "average precision of a detector with the sensors of a scene",
+    "detect": "detect road users in simulated scans or in a recording",
+    "verify": "compare installed sensors with their plan, by a recording",
     "study": "run a study of the program's methods",
 }
 

@@ -1,6 +1,7 @@
-"""Average precision of a trained detector with the sensors of a scene, on runs of traffic.
+"""Detection of road users in simulated scans of a scene's sensors, or in a recording of real sensors.
 
 seip detect out/placed.blend --traffic run-*.npz -o out/detection
+seip detect sweeps/ --sensor os1_128 -o out/detected
 blender -b --python-exit-code 1 out/placed.blend -P headless/detect.py -- --traffic run-*.npz -o out/detection
 
 Needs torch (make detection). The sensors are those of the scene, of any types and at any positions. The detector that
@@ -18,46 +19,55 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime
-from headless.charts.detection import PrecisionRecallLine, save_parts_chart, save_precision_recall_chart
-from headless.charts.error_view import save_error_view
-from headless.detection.average_precision import precision_recall, too_few_runs
-from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
-from headless.detection.chart_data import error_view, parts
+from headless.detect_recording import add_recording_options, detect_recording, is_recording
+from headless.detection.average_precision import too_few_runs
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
-from headless.detection.detector_evaluation import DetectorEvaluation, evaluate_detector
+from headless.detection.detector_evaluation import evaluate_detector
 from headless.detection.inference import seconds_of
 from headless.detection.recordings import MountedSensors, Simulator, sampled_runs
-from headless.detection.rules import MAIN_RULE
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import deterministic
+from headless.detection_results import (
+    DetectionSite,
+    print_precision,
+    remove_detections,
+    save_charts,
+    save_detections,
+)
 from headless.options import add_optics, add_rolling_shutter, add_settings, new_parser, read_settings, real_number
 
 import bpy
-import numpy as np
 
+from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import TIME_STEP
-from seip_addon.core.output.datasets.detection_files import kitti_results, openpcdet_results
-from seip_addon.core.output.results.detection_record import FORMATS, SCHEMA
+from seip_addon.core.output.results.detection_record import SCHEMA
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.run_overlap import require_independent, vehicle_positions
 from seip_addon.core.sensing.traffic.site_traffic import check_runs, require_own_traffic
 from seip_addon.core.site.weather import weather_of
-from seip_addon.core.storage.files import digest, save_json, whole_file
+from seip_addon.core.storage.files import digest, save_json
 from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import changed_beams, read_sensors
 
+_OF_SCENES = ("traffic", "every", "seed", "rolling_shutter", "weather", "reflectivity", "engine")
+_OF_RECORDINGS = ("sensor", "poses", "site", "labels", "radius", "score")
+
 
 def main(argv: list[str]) -> None:
     """Scan the runs, detect, and write figures, charts and detections to a folder."""
-    options = _parser().parse_args(argv)
+    options = _options(argv)
     check_device(options.device)
     detector = Detector.load(options.detector, options.device)
+    if is_recording(options.scene):
+        detect_recording(options, detector)
+        return
+    if not options.traffic:
+        raise SeipError("name the runs of traffic to detect in with --traffic, or a recording in place of the scene")
     runtime.check_folder(options.output)
     runtime.open_scene(options.scene)
     weather = weather_of(options.weather)
@@ -87,7 +97,12 @@ def main(argv: list[str]) -> None:
     runtime.warn(doubts)
     precisions = outcome.precisions
     with runtime.incomplete_if_interrupted(options.output):
-        _save(options.output, outcome, simulator, sensors)
+        site = DetectionSite(geometry.name, simulator.static.region, sensors, simulator.static.attribution)
+        save_charts(options.output, outcome, site)
+        remove_detections(options.output)
+        for number, one in enumerate(outcome.frames):
+            found = one.detected
+            save_detections(options.output, number, found.boxes, found.category.tolist(), found.score)
         record = {
             "schema": SCHEMA,
             "site": geometry.name,
@@ -102,13 +117,7 @@ def main(argv: list[str]) -> None:
             "versions": versions(blender=bpy.app.version_string),
         }
         save_json(options.output / "detection.json", record)
-    for name, found in precisions.items():
-        between = "" if found.interval is None else " ({:.1%} to {:.1%})".format(*found.interval)
-        runtime.print_line(f"{name}: AP {found.average_precision:.1%}{between} of {found.road_users:,} road users")
-    recall = (f"{name} {one['recall']:.0%} of {one['road_users']:,}" for name, one in outcome.recall.items())
-    runtime.print_line(
-        f"found at an overlap of {MAIN_RULE.iou:g} with a score of {outcome.score:.2f} or more: {', '.join(recall)}"
-    )
+    print_precision(outcome)
     cores = os.cpu_count() or 1
     with deterministic(cores):
         seconds = seconds_of(detector, area, outcome.scan)
@@ -117,42 +126,25 @@ def main(argv: list[str]) -> None:
     runtime.print_line(f"written to {options.output}/")
 
 
-def _save(folder: Path, outcome: DetectorEvaluation, simulator: Simulator, sensors: list[MountedSensor]) -> None:
-    """Write the charts, and the detections of each frame."""
-    evaluation, score, name = outcome.evaluation, outcome.score, simulator.site
-    far = "distance to the nearest sensor (m)"
-    panels = [
-        parts(far, "average precision", {name: average_precision_by(evaluation, "distance", DISTANCE_EDGES)}),
-        parts(far, "recall", {name: recall_by(evaluation, "distance", DISTANCE_EDGES, score)}),
-        parts("returns from the road user", "recall", {name: recall_by(evaluation, "points", POINT_EDGES, score)}),
-    ]
-    save_parts_chart(folder / "where.png", panels, name)
-    found = precision_recall(evaluation)
-    types = " + ".join(sorted({sensor.model.key for sensor in sensors}))
-    line = PrecisionRecallLine(types, len(sensors), found.recall, found.precision, evaluation.average_precision)
-    save_precision_recall_chart(folder / "precision_recall.png", [line], name)
-    frame = outcome.frames[outcome.fullest]
-    places = np.array([sensor.xyz for sensor in sensors])
-    title = f"{len(sensors)} × {types}: AP {evaluation.average_precision:.2f} over all frames"
-    cloud = outcome.scan.points
-    view = error_view(title, frame, MAIN_RULE, score=score, cloud=cloud, region=simulator.static.region, sensors=places)
-    where = f"{name}, {frame.run} at {frame.time:.1f} s"
-    save_error_view(folder / "errors.png", [view], where, simulator.static.attribution)
-    for form in FORMATS:
-        for stale in (folder / form).glob("*.txt"):  # of an earlier, longer run
-            stale.unlink()
-    for number, one in enumerate(outcome.frames):
-        boxes, categories, scores = one.detected.boxes, one.detected.category.tolist(), one.detected.score
-        for form, lines in zip(FORMATS, (kitti_results, openpcdet_results), strict=True):
-            with whole_file(folder / form / f"{number:06d}.txt") as temporary:
-                temporary.write_text(lines(boxes, categories, scores), encoding="utf-8")
+def _options(argv: list[str]) -> argparse.Namespace:
+    """Parse the arguments, and refuse options that do nothing for a recording, or for a scene."""
+    parser = _parser()
+    options = parser.parse_args(argv)
+    recording = is_recording(options.scene)
+    idle = _OF_SCENES if recording else _OF_RECORDINGS
+    given = [f"--{name.replace('_', '-')}" for name in idle if getattr(options, name) != parser.get_default(name)]
+    if given:
+        raise SeipError(f"{given[0]} is for a {'scene with traffic' if recording else 'recording'}: leave it out")
+    return options
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = new_parser("detect", "Compute the average precision of a detector with the sensors of a scene.")
-    parser.add_argument("scene", nargs="?", type=Path, help="the .blend with its sensors; in Blender the open scene")
+    parser = new_parser("detect", "Detect road users in simulated scans of a scene, or in a recording.")
+    parser.add_argument(
+        "scene", nargs="?", type=Path, help="the .blend with its sensors (in Blender the open scene), or a recording"
+    )
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the results")
-    parser.add_argument("--traffic", nargs="+", type=Path, required=True, metavar="NPZ", help="runs to detect in")
+    parser.add_argument("--traffic", nargs="+", type=Path, default=[], metavar="NPZ", help="runs to detect in")
     parser.add_argument(
         "--detector",
         type=Path,
@@ -165,6 +157,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--device", default="cpu", help="torch device: cpu or cuda")
     add_settings(parser, SurveySettings, "catalogue")
+    add_recording_options(parser)
     how = parser.add_argument_group("measurement")
     add_settings(how, ScanSettings, "seed")
     add_rolling_shutter(how)

@@ -11,6 +11,7 @@ or as plain Python on the bpy module::
 
 import argparse
 import sys
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -23,6 +24,8 @@ from headless.convergence import coarsest_settings
 from headless.objective_options import add_objective, read_objective
 from headless.options import new_parser, real_number
 
+import bpy
+
 from seip_addon.core.choosing.placement.deployment import price_text
 from seip_addon.core.choosing.placement.objective import Solution, check_objective
 from seip_addon.core.choosing.placement.returns_summary import share_reached
@@ -31,12 +34,17 @@ from seip_addon.core.progress import finish
 from seip_addon.core.workflows.placing import place, with_context
 from seip_addon.core.workflows.survey import Layout
 from seip_addon.core.workflows.traffic_runs import TrafficRuns, read_runs
+from seip_addon.scene.sensors import sensor_positions
 
 
 def main(argv: list[str]) -> None:
     """Place sensors in a scene and write the result to a folder."""
     options = _parser().parse_args(argv)
     objective = read_objective(options)
+    if options.keep_sensors:
+        runtime.open_scene(options.scene)
+        kept = sensor_positions(bpy.context.scene)
+        objective = replace(objective, mandatory=tuple(dict.fromkeys((*objective.mandatory, *kept))))
     tolerance = options.tolerance
     refine = None if tolerance is None else partial(coarsest_settings, objective=objective, tolerance=tolerance)
     traffic: list[TrafficRuns] = []
@@ -83,13 +91,18 @@ def _describe(solution: Solution) -> str:
 
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("place", "Place roadside LiDARs in a scene.")
-    survey.add_options(parser, in_full=True)
+    survey.add_options(parser)
     add_objective(parser)
     parser.add_argument(
         "--tolerance",
         type=real_number(SHARE),
         metavar="SHARE",
         help="choose the coarsest --grid and --spacing whose placement loses at most this share of coverage",
+    )
+    parser.add_argument(
+        "--keep-sensors",
+        action="store_true",
+        help="require a sensor at the position of each sensor of the scene, as --require with their names",
     )
     parser.add_argument("--no-render", action="store_true", help="leave out the rendered view")
     return parser

@@ -27,7 +27,7 @@ from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.triangle_culling import culling_message
 from seip_addon.core.settings import settings_of
-from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.candidates import PAPER_TYPES, CandidateSettings
 from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
@@ -65,16 +65,35 @@ class Stopwatch:
             return self.time(step, lambda: finish(steps, report))
 
 
-def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> None:
+def add_options(parser: argparse.ArgumentParser, *, study: bool = False) -> None:
     """Add the scene, the folder of results and the options of a survey to a command.
 
     Parameters
     ----------
-    in_full : bool
-        Whether the command's help explains the options of a survey; otherwise it names them.
+    study : bool
+        Whether the command is a study. Studies use the sensor types of the paper by default, and their help only names
+        the options of a survey.
     """
     parser.add_argument("scene", nargs="?", type=Path, help="the .blend; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the results")
+    groups = add_survey_settings(parser)
+    work = parser.add_argument_group("work")
+    add_settings(work, SurveySettings, "engine")
+    work.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask scheduler for ray casting: tcp://host:8786 or tls://host:8786",
+    )
+    add_settings(work, SurveySettings, "solver")
+    add_settings(work, SurveySettings, "effort", "time_limit")
+    if study:
+        parser.set_defaults(sensor=PAPER_TYPES)
+        for group in (*groups, work):
+            name_only(group, "see: seip place --help")
+
+
+def add_survey_settings(parser: argparse.ArgumentParser) -> tuple[argparse._ArgumentGroup, ...]:
+    """Add what a survey depends on to a command: sensors, grid and candidates, and returns; return their groups."""
     sensors = parser.add_argument_group("sensors")
     add_settings(sensors, CandidateSettings, "sensors")
     add_settings(sensors, SurveySettings, "catalogue")
@@ -95,18 +114,7 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
     returns = parser.add_argument_group("returns")
     add_settings(returns, VisibilitySettings, "detection", "min_intensity")
     add_optics(returns)
-    work = parser.add_argument_group("work")
-    add_settings(work, SurveySettings, "engine")
-    work.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="Dask scheduler for ray casting: tcp://host:8786 or tls://host:8786",
-    )
-    add_settings(work, SurveySettings, "solver")
-    add_settings(work, SurveySettings, "effort", "time_limit")
-    if not in_full:
-        for group in (sensors, metres, returns, work):
-            name_only(group, "see: seip place --help")
+    return sensors, metres, returns
 
 
 def runs_beside(scene: Path | None, kind: str = "") -> list[Path]:
@@ -131,7 +139,7 @@ def survey(
     refine : callable, optional
         Finds the spacings of targets and candidates.
     """
-    settings = _settings(options)
+    settings = read_survey_settings(options)
     settings.models()  # refuses unknown types before the scene is read
     runtime.check_folder(options.output)
     check_no_run(options.output)
@@ -170,8 +178,8 @@ def describe_sensor(sensor: Sensor) -> str:
     return f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m{sensor.turned}, {sensor.position_name}"
 
 
-def _settings(options: argparse.Namespace) -> SurveySettings:
-    """Return the settings that options name."""
+def read_survey_settings(options: argparse.Namespace) -> SurveySettings:
+    """Return the settings of a survey that options name."""
     candidates = read_settings(CandidateSettings, options)
     visibility = read_settings(VisibilitySettings, options)
     return read_settings(

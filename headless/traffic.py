@@ -18,20 +18,19 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime
-from headless.options import new_parser
-from headless.sumo.demand import Demand
-from headless.sumo.simulation import Scenario, SignalPlan
-from headless.sumo.traffic_run import simulate_run
+from headless.options import add_settings, new_parser, read_settings
 
 import bpy
 
 from seip_addon.core.counts import counted
-from seip_addon.core.errors import SeipError
 from seip_addon.core.sensing.traffic.floating_car_data import listed
 from seip_addon.core.sensing.traffic.source import TrafficFiles, describe_categories, load_traffic
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import locked_file
+from seip_addon.core.workflows.traffic_simulation import SimulationSettings
+from seip_addon.core.world.traffic_simulation.demand import Demand
+from seip_addon.core.world.traffic_simulation.simulation import SignalPlan
 from seip_addon.scene.blend_file import check_name, save_blend
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.traffic import animate
@@ -65,12 +64,9 @@ def _imported(options: argparse.Namespace, geometry: SceneGeometry) -> Trajector
 
 
 def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
-    if not 0.0 < options.duration < math.inf or not 0.0 <= options.warm_up < math.inf:
-        raise SeipError("--duration must be above 0 s, and --warm-up not below 0 s")
-    demand = Demand(options.flow, tuple(options.turns), options.pedestrians)
-    end = options.warm_up + options.duration
-    scenario = Scenario(demand, SignalPlan(options.green), options.seed, end)
-    run = runtime.finish_with_bar(simulate_run(options.simulate, scenario, options.warm_up, geometry))
+    demand, signals = read_settings(Demand, options), read_settings(SignalPlan, options)
+    settings = read_settings(SimulationSettings, options, demand=demand, signals=signals)
+    run = runtime.finish_with_bar(settings.run(options.simulate, options.seed, geometry))
     runtime.warn(run.warnings)
     if run.collided:
         runtime.LOG.info(
@@ -110,26 +106,11 @@ def _parser() -> argparse.ArgumentParser:
         "--begin", type=float, default=-math.inf, metavar="S", help="time at which the trajectories begin"
     )
     reading.add_argument("--end", type=float, default=math.inf, metavar="S", help="time at which the trajectories end")
-    demand, signals = Demand(), SignalPlan()
     making = parser.add_argument_group("with --simulate")
-    making.add_argument("--flow", type=float, default=demand.flow, metavar="N", help="vehicles per hour and arm")
-    making.add_argument(
-        "--turns",
-        type=float,
-        nargs=3,
-        default=demand.turns,
-        metavar=("LEFT", "STRAIGHT", "RIGHT"),
-        help="shares of turns",
-    )
-    making.add_argument(
-        "--pedestrians", type=float, default=demand.pedestrians, metavar="N", help="persons per hour and arm"
-    )
-    making.add_argument("--green", type=int, default=signals.green, metavar="S", help="green time of each signal phase")
+    add_settings(making, Demand, "flow", "turns", "pedestrians")
+    add_settings(making, SignalPlan, "green")
     making.add_argument("--seed", type=int, default=0, metavar="N", help="random seed")
-    making.add_argument("--duration", type=float, default=120.0, metavar="S", help="duration of the trajectories")
-    making.add_argument(
-        "--warm-up", type=float, default=120.0, metavar="S", help="duration of the simulation before the trajectories"
-    )
+    add_settings(making, SimulationSettings, "duration", "warm_up")
     return parser
 
 

@@ -18,7 +18,7 @@ from .core.workflows.detection import DetectingPython
 
 ADDON_ID = (__package__ or "").removesuffix(".seip_addon")
 """The extension's key among Blender's add-ons: not that of the package in it."""
-NO_SUMO = "SUMO is missing, which lays out the streets of an extract"
+NO_SUMO = "SUMO is missing, which lays out the streets of an extract and simulates traffic"
 OFFLINE = f"Blender may not go online: switch on Allow Online Access in Preferences, System, or {BY_HAND}"
 NO_PIP = f"This Blender has no pip to install SUMO with: {BY_HAND}"
 
@@ -57,8 +57,9 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
     sumo: bpy.props.StringProperty(
         name="SUMO",
         subtype="DIR_PATH",
-        description="Folder of Eclipse SUMO, which lays out the streets of an extract of OpenStreetMap: the one with "
-        "bin and data in it. Empty for the SUMO that was installed here, on the PATH or in SUMO_HOME",
+        description="Folder of Eclipse SUMO, which lays out the streets of an extract of OpenStreetMap and simulates "
+        "traffic: the one with bin and data in it. Empty for the SUMO that was installed here, on the PATH or in "
+        "SUMO_HOME",
     )
     catalogues: bpy.props.CollectionProperty(type=SEIP_PG_catalogue_file)
 

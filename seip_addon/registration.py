@@ -8,12 +8,14 @@ import bpy
 PARTS = (
     "preferences",
     "properties.site", "properties.survey", "properties.placement", "properties.results", "properties.view",
-    "properties.traffic", "properties.detection", "properties.sections", "properties.scene",
+    "properties.traffic", "properties.simulation", "properties.detection", "properties.verification",
+    "properties.sections", "properties.scene",
     "session", "scene_survey", "sensor_types", "live_scan", "loose_pieces",
     "viewport.beam_preview", "viewport.overlays", "viewport.coverage",
-    "operators.base", "operators.sumo", "operators.site", "operators.sensors", "operators.visibility",
-    "operators.placement", "live_coverage",
-    "operators.results", "operators.view", "operators.traffic", "operators.detection",
+    "operators.base", "operators.sumo", "operators.site", "operators.street_map", "operators.sensors",
+    "operators.visibility", "operators.placement", "live_coverage", "traffic_coverage",
+    "operators.results", "operators.view", "operators.traffic", "operators.simulation", "operators.detection",
+    "operators.verification",
     "panels.sensor_table", "panels.placement", "panels.results", "panels.steps", "panels.front_door",
 )  # fmt: skip
 """Modules of the add-on; most have ``CLASSES``.

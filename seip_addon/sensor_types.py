@@ -6,10 +6,9 @@ from . import preferences
 from .core.errors import SeipError
 from .core.sensing.lidar.catalogue import load_catalogue
 from .core.sensing.lidar.model import LidarModel
+from .core.site.candidates import DEFAULT_TYPE
 from .session import session
 
-DEFAULT_TYPE = "os1_128"
-"""Sensor type that a new scene begins with: a product whose detection law is calibrated on measured sweeps."""
 PAPER = "generic"
 """Manufacturer of the types of the SEIP paper, which are models, not products."""
 

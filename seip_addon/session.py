@@ -17,8 +17,11 @@ from .background import Background
 from .core.acceptance import Acceptance
 from .core.arrays import Boolean
 from .core.choosing.placement.objective import Solution
+from .core.choosing.robustness.visibility_in_traffic import PosesInTraffic
 from .core.errors import SeipError
+from .core.output.pictures.coverage_colours import Aspect
 from .core.sensing.lidar.model import LidarModel
+from .core.sensing.recordings.verification import Verification
 from .core.sensing.scans.frame import Frame
 from .core.sensing.scans.run_folder import Run
 from .core.sensing.scans.sensor import MountedSensor
@@ -28,6 +31,7 @@ from .core.sensing.traffic.trajectories import Trajectories
 from .core.sensing.visibility.estimate import Estimate
 from .core.sensing.visibility.visibility_model import VisibilityModel
 from .core.storage.files import check_folder
+from .core.workflows.site_places import SitePlaces
 from .core.workflows.survey import Layout, Survey
 from .core.workflows.survey_settings import SurveySettings
 from .overlay import Overlay
@@ -190,6 +194,34 @@ class FollowedSensors:
     problem: str = ""
 
 
+@dataclass
+class CoverageInTraffic:
+    """Coverage that follows the timeline of a scene with traffic.
+
+    Parameters
+    ----------
+    scene : int
+        The scene's session number.
+    visibility : PosesInTraffic
+        Visibility of the placement's sensors at any instant.
+    aspect : Aspect or None
+        Aspect of the coverage that was shown before.
+    coverage : float
+        Share of the targets that some sensor sees at the current frame.
+    seconds : float
+    problem : str
+        Why nothing is shown at the moment.
+    """
+
+    scene: int
+    state: SceneState
+    visibility: PosesInTraffic
+    aspect: Aspect | None = None
+    coverage: float = 0.0
+    seconds: float = 0.0
+    problem: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class SceneTraffic:
     """Traffic that was read from files.
@@ -235,14 +267,28 @@ class LastScan:
         self.facts = tuple(lines)
 
 
+@dataclass(frozen=True, eq=False)
+class LastVerification:
+    """The installation compared with the plan.
+
+    Parameters
+    ----------
+    watch : Watch
+        Whether the scene has changed since.
+    """
+
+    found: Verification
+    watch: Watch
+
+
 @dataclass
 class Session:
     """All that the add-on keeps in memory; by scene, under the scene's session number.
 
     Parameters
     ----------
-    states, checks, traffic, scans : dict
-        State, checks, traffic and scans of each scene.
+    states, checks, traffic, scans, verifications : dict
+        State, checks, traffic, scans and last verification of each scene.
     overlays : dict of int to dict of str to Overlay
         What is drawn in the views of each scene, by name.
     sensor_types : dict of str to LidarModel
@@ -253,17 +299,24 @@ class Session:
         There is one piece of work at a time.
     following : FollowedSensors or None
         One scene is followed at a time.
+    in_traffic : CoverageInTraffic or None
+        One scene is shown in traffic at a time.
+    places : SitePlaces or None
+        Junctions of the file that was read last, to choose from.
     """
 
     states: dict[int, SceneState] = field(default_factory=dict)
     checks: dict[int, CheckedScene] = field(default_factory=dict)
     traffic: dict[int, SceneTraffic] = field(default_factory=dict)
     scans: dict[int, LastScan] = field(default_factory=dict)
+    verifications: dict[int, LastVerification] = field(default_factory=dict)
     overlays: dict[int, dict[str, Overlay]] = field(default_factory=dict)
     sensor_types: dict[str, LidarModel] = field(default_factory=dict)
     catalogue_error: str = ""
     running: RunningWork | None = None
     following: FollowedSensors | None = None
+    in_traffic: CoverageInTraffic | None = None
+    places: SitePlaces | None = None
 
     def state_of(self, scene: bpy.types.Scene) -> SceneState | None:
         """Return what is known of a scene, or None."""
@@ -276,6 +329,10 @@ class Session:
     def scan_of(self, scene: bpy.types.Scene) -> LastScan | None:
         """Return the last scan of a scene, None where there is none."""
         return self.scans.get(scene.session_uid)
+
+    def verification_of(self, scene: bpy.types.Scene) -> LastVerification | None:
+        """Return the last verification of a scene, None where there is none."""
+        return self.verifications.get(scene.session_uid)
 
 
 session = Session()  # there is one Blender, and one file open in it
@@ -297,8 +354,9 @@ def scene_of(number: int) -> bpy.types.Scene:
 
 def forget() -> None:
     """Let go of what is known of the open file, and have work that is under way end."""
-    for kept in (session.states, session.checks, session.traffic, session.scans):
+    for kept in (session.states, session.checks, session.traffic, session.scans, session.verifications):
         kept.clear()
+    session.places = None
     if session.running is not None:
         session.running.stop = True
         session.running.work.stop()

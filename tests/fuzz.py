@@ -828,7 +828,7 @@ _mutate_network = _with_wrong_values(0.4, r'<edge id="[ab]".*?(?:length="([^"]*)
 
 
 def _read_network(path: Path, _: bytes) -> None:
-    from headless.sumo.street_network import read_network  # noqa: PLC0415
+    from seip_addon.core.world.traffic_simulation.street_network import read_network  # noqa: PLC0415
 
     network = read_network(path)
     require_physical([edge.lanes for edge in network.edges.values()], "lanes", most=1e8)
@@ -886,6 +886,16 @@ def _read_detection(path: Path, _: bytes) -> None:
     from seip_addon.core.output.results.detection_record import parsed_detection  # noqa: PLC0415
 
     require_physical(parsed_detection(path.read_bytes().decode("utf-8", "replace")), most=1e15)
+
+
+def _simulations(_: Path) -> list[bytes]:
+    return [json.dumps({"map": "m.xodr", "flow": 600.0, "runs": ["run-1.npz", "run-2.npz"]}, indent=1).encode()]
+
+
+def _read_simulation(path: Path, _: bytes) -> None:
+    from seip_addon.core.workflows.traffic_simulation import listed_runs  # noqa: PLC0415
+
+    assert all(isinstance(name, str) for name in listed_runs(path))
 
 
 # --- meshes, which Blender's importers read
@@ -964,6 +974,110 @@ def _read_mesh(path: Path, _: bytes) -> None:
             require_physical(places, "vertices", most=20_000.0)
 
 
+# --- recordings of sensors
+
+
+def _sweeps(suffix: str) -> Callable[[Path], list[bytes]]:
+    def samples(folder: Path) -> list[bytes]:
+        from tests.builders.recording_files import make_points, pcd_text, write_sweep_file  # noqa: PLC0415
+
+        columns = make_points(count=60)
+        if suffix == ".pcd":
+            return [pcd_text(columns, data, "1 2 3 0 0 0 1") for data in ("ascii", "binary", "binary_compressed")]
+        return [write_sweep_file(folder / f"sample{suffix}", columns).read_bytes()]
+
+    return samples
+
+
+def _mutate_pcd(random: Random, content: bytes) -> Case:
+    """Mutate the header, the points or both; or announce more points than there are."""
+    head, data, body = content.partition(b"DATA ")
+    if random.random() < 0.15:
+        more = str(random.integers(61, 2**40)).encode()
+        return Case(head.replace(b" 60\n", b" " + more + b"\n") + data + body, contradicts=True)
+    if random.random() < 0.6:
+        head = mutated_text(random, head)
+    if random.random() < 0.6:
+        body = mutated_bytes(random, body)
+    return Case(head + data + body)
+
+
+def _mutate_numbers(random: Random, content: bytes) -> Case:
+    """Put a wrong number in place of one of 32 bits; otherwise any mutation."""
+    if random.random() < 0.5:
+        return Case(mutated_bytes(random, content))
+    numbers = np.frombuffer(content, "<f4").copy()
+    wrong = (np.nan, np.inf, -np.inf, 1e30, -1e30, 1e-40, 2e4, 0.5, -1.0)
+    numbers[int(random.integers(len(numbers)))] = wrong[int(random.integers(len(wrong)))]
+    return Case(numbers.tobytes())
+
+
+def _mutate_npz(random: Random, content: bytes) -> Case:
+    """Put other values, types and shapes in place of those of an array; otherwise any mutation."""
+    if random.random() < 0.3:
+        return Case(mutated_bytes(random, content))
+    with np.load(io.BytesIO(content)) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    name = sorted(arrays)[int(random.integers(len(arrays)))]
+    array = arrays[name]
+    forms = (array[None], array[1:], array[:0], array.astype("U9"), array.astype("f8") * 1e300, array * 1j, array > 0)
+    kind = int(random.integers(len(forms) + 2))
+    arrays[name] = forms[kind] if kind < len(forms) else array.astype("f4") * np.float32(random.normal(0, 1e3))
+    if kind > len(forms):
+        arrays[name][int(random.integers(len(array)))] = np.nan
+    file = io.BytesIO()
+    np.savez(file, **arrays)
+    return Case(file.getvalue())
+
+
+def _read_sweep(path: Path, _: bytes) -> None:
+    from seip_addon.core.sensing.recordings.sweep_files import read_sweep  # noqa: PLC0415
+
+    sweep = read_sweep(path)
+    require_physical(sweep.points, "points", most=10_000.0)
+    require_physical(sweep, most=1e11)
+    assert sweep.points.any(axis=1).all(), "a point that is no return"
+
+
+def _sensor_poses(_: Path) -> list[bytes]:
+    from seip_addon.core.output.datasets.kitti import CALIBRATION  # noqa: PLC0415
+
+    rows = [[0.0, -1.0, 0.0, 12.5], [1.0, 0.0, 0.0, -3.25], [0.0, 0.0, 1.0, 6.0], [0.0, 0.0, 0.0, 1.0]]
+    turned = {"rotation": [row[:3] for row in rows[:3]], "translation": [row[3:] for row in rows[:3]]}
+    listed = {"sensors": [{"id": "S1", "pose": rows}, {"name": "S2", "pose": rows}]}
+    block = "".join(f"S{number}:\n" + "".join(f"- {row}\n" for row in rows) for number in (1, 2))
+    return [*(json.dumps(one).encode() for one in ({"S1": rows}, turned, listed)), block.encode(), CALIBRATION.encode()]
+
+
+def _read_poses(path: Path, _: bytes) -> None:
+    from seip_addon.core.sensing.recordings.poses import read_poses  # noqa: PLC0415
+
+    poses = read_poses(path)
+    require_physical(poses, "poses", most=1e7)
+    for pose in poses.values():
+        assert np.allclose(pose[:3, :3].T @ pose[:3, :3], np.eye(3), rtol=0.0, atol=1e-9), "no rotation"
+        assert np.linalg.det(pose[:3, :3]) > 0, "mirrored"
+
+
+def _box_labels(_: Path) -> list[bytes]:
+    from seip_addon.core.output.datasets.detection_files import kitti_results, openpcdet_results  # noqa: PLC0415
+    from tests.builders.recording_files import dair_text, openlabel_text  # noqa: PLC0415
+
+    kinds = ["car", "bus", "pedestrian"]
+    boxes = np.array(
+        [[10.0, -5.0, 0.8, 4.5, 1.8, 1.6, 0.3], [30, 4, 1.5, 12, 2.5, 3, -2], [7, 7, 0.9, 0.6, 0.7, 1.8, 1]]
+    )
+    text = (openlabel_text(boxes.tolist(), kinds), dair_text(boxes.tolist(), kinds))
+    lines = [results(boxes, kinds, np.ones(3)) for results in (kitti_results, openpcdet_results)]
+    return [one.encode() for one in (*text, *lines)]
+
+
+def _read_box_labels(path: Path, _: bytes) -> None:
+    from seip_addon.core.sensing.recordings.box_labels import read_labels  # noqa: PLC0415
+
+    require_physical(read_labels(path), "labels", most=10_000.0)
+
+
 FORMATS = {
     "map": Format((".xodr",), _maps, _mutate_map, _read_map),
     "site": Format((".toml",), _descriptions, _mutate_description, _read_description),
@@ -980,6 +1094,7 @@ FORMATS = {
     "site.npz": Format((".npz",), _site_files, _mutate_signed, _read_site_file),
     "placement": Format((".json",), _records, _mutate_record, _read_record),
     "detection": Format((".json",), _detections, _mutate_detection, _read_detection),
+    "simulation": Format((".json",), _simulations, _mutate_text, _read_simulation),
     "cost": Format((".toml",), _costs, _mutate_text, _read_costs),
     "network": Format((".xml",), _networks, _mutate_network, _read_network),
     "flows": Format((".xml",), _flows, _mutate_flow, _read_flow),
@@ -991,6 +1106,16 @@ FORMATS = {
         f"survey{suffix}": Format((suffix,), _surveys(suffix), _mutate_survey, _read_survey)
         for suffix in (".las", ".laz")
     },
+    "sweep.pcd": Format((".pcd",), _sweeps(".pcd"), _mutate_pcd, _read_sweep),
+    "sweep.bin": Format((".bin",), _sweeps(".bin"), _mutate_numbers, _read_sweep),
+    "sweep.pcd.bin": Format((".pcd.bin",), _sweeps(".pcd.bin"), _mutate_numbers, _read_sweep),
+    "sweep.npz": Format((".npz",), _sweeps(".npz"), _mutate_npz, _read_sweep),
+    "sweep.csv": Format((".csv",), _sweeps(".csv"), _mutate_text, _read_sweep),
+    **{
+        f"sweep{suffix}": Format((suffix,), _sweeps(suffix), _mutate_survey, _read_sweep) for suffix in (".las", ".laz")
+    },
+    "poses": Format((".json",), _sensor_poses, _mutate_text, _read_poses),
+    "boxes": Format((".json",), _box_labels, _mutate_text, _read_box_labels),
     "manifest": Format((".json",), _manifests, _mutate_manifest, _read_manifest),
     "run": Format((".json",), _runs, _mutate_run, _read_run),
     **{

@@ -7,8 +7,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from headless.charts.style import (
-    COLOURS,
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.errors import SeipError
+from seip_addon.core.output.pictures.chart_style import (
     FAINT_COLOUR,
     colour,
     mark,
@@ -16,14 +21,7 @@ from headless.charts.style import (
     save_chart,
     style_axes,
 )
-
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-from seip_addon.core.arrays import Float
-from seip_addon.core.errors import SeipError
-from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
+from seip_addon.core.output.pictures.palette import INK, PAPER, SERIES_COLOURS, SOFT_INK
 
 PANEL_SIZE = (6.0, 4.4)  # inches
 RING_MARK: dict[str, Any] = {"linestyle": "none", "marker": "o", "mfc": "none", "mec": INK}
@@ -129,7 +127,9 @@ def save_training_chart(
     figure, (panel,) = new_figure(PANEL_SIZE[0] * 1.25, PANEL_SIZE[1])
     each = np.arange(1, len(loss) + 1)
     panel.plot(each, loss, color=FAINT_COLOUR, linewidth=0.7, label="loss")
-    panel.plot(each, _smoothed(np.asarray(loss, dtype=np.float64)), color=COLOURS[0], linewidth=1.6, label="smoothed")
+    panel.plot(
+        each, _smoothed(np.asarray(loss, dtype=np.float64)), color=SERIES_COLOURS[0], linewidth=1.6, label="smoothed"
+    )
     panel.set_yscale("log")
     panel.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -141,7 +141,7 @@ def save_training_chart(
         beside = panel.twinx()
         panels.append(beside)
         steps, reached = list(validation), list(validation.values())
-        beside.plot(steps, reached, color=COLOURS[1], marker="s", markersize=4, label="validation AP")
+        beside.plot(steps, reached, color=SERIES_COLOURS[1], marker="s", markersize=4, label="validation AP")
         best = max(validation, key=lambda step: validation[step])
         label = f"best: {validation[best]:.2f} after {best} steps"
         beside.plot([best], [validation[best]], label=label, markersize=12, mew=1.3, **RING_MARK)

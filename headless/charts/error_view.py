@@ -5,8 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from headless.charts.style import limits_around, new_figure, save_chart
-
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
@@ -17,7 +15,8 @@ from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.pictures.drawing import SENSOR_MARK, draw_attribution, draw_polygons
+from seip_addon.core.output.pictures.chart_style import limits_around, new_figure, save_chart
+from seip_addon.core.output.pictures.drawing import SENSOR_MARK, box_corners, draw_attribution, draw_polygons
 from seip_addon.core.output.pictures.palette import INK, SOFT_INK
 
 TRUTH_COLOUR, DETECTED_COLOUR, IGNORED_COLOUR = "#00875a", "#d1242f", "#a9b1b8"
@@ -109,20 +108,11 @@ def _draw(panel: Axes, view: ErrorView) -> None:
 
 def _boxes(panel: Axes, boxes: Float, colour: str, zorder: int, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
     """Draw boxes, each with a stroke from its middle to its front."""
-    draw_polygons(panel, corners(boxes), **{"facecolor": "none"} | style, edgecolor=colour, zorder=zorder)
+    draw_polygons(panel, box_corners(boxes), **{"facecolor": "none"} | style, edgecolor=colour, zorder=zorder)
     ahead = np.column_stack([np.cos(boxes[:, 4]), np.sin(boxes[:, 4])]) * np.maximum(boxes[:, 2:3] / 2, MIN_NOSE_LENGTH)
     strokes = np.stack([boxes[:, :2], boxes[:, :2] + ahead], axis=1)
     line: dict[str, Any] = {"edgecolor": colour, "facecolor": "none", "linewidth": 0.7}
     draw_polygons(panel, strokes, closed=False, zorder=zorder, **line)
-
-
-def corners(boxes: Float) -> Float:
-    """Return the corners (k, 4, 2) of boxes in plan (k, 5), counter-clockwise from the front left one."""
-    ahead = np.column_stack([np.cos(boxes[:, 4]), np.sin(boxes[:, 4])]) * boxes[:, 2:3] / 2
-    left = np.column_stack([-np.sin(boxes[:, 4]), np.cos(boxes[:, 4])]) * boxes[:, 3:4] / 2
-    around = np.stack([ahead + left, left - ahead, -ahead - left, ahead - left], axis=1)
-    placed: Float = boxes[:, None, :2] + around
-    return placed
 
 
 def _rings(panel: Axes, boxes: Float, colour: str, *, dashed: bool) -> None:

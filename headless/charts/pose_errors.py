@@ -3,8 +3,14 @@
 import os
 from textwrap import fill
 
-from headless.charts.style import (
-    COLOURS,
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import PercentFormatter
+
+from seip_addon.core.choosing.robustness.pose_study import PoseStudy
+from seip_addon.core.choosing.robustness.robust_study import Contender, RobustStudy
+from seip_addon.core.estimates import IntervalEstimate
+from seip_addon.core.output.pictures.chart_style import (
     DASHED,
     add_legend,
     colour,
@@ -14,15 +20,7 @@ from headless.charts.style import (
     save_chart,
     style_axes,
 )
-
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.ticker import PercentFormatter
-
-from seip_addon.core.choosing.robustness.pose_study import PoseStudy
-from seip_addon.core.choosing.robustness.robust_study import Contender, RobustStudy
-from seip_addon.core.estimates import IntervalEstimate
-from seip_addon.core.output.pictures.palette import SOFT_INK
+from seip_addon.core.output.pictures.palette import SERIES_COLOURS, SOFT_INK
 
 FIGURE_SIZE = (7.6, 4.4)  # inches
 
@@ -59,8 +57,8 @@ def save_loss_chart(path: str | os.PathLike[str], study: PoseStudy, title: str) 
     figure, (axes,) = new_figure(*FIGURE_SIZE)
     sensors = list(zip(study.labels, study.loss_by_sensor(), strict=True))
     kinds = list(study.loss_by_kind().items())
-    rows = [(f"{label} alone", loss, COLOURS[1]) for label, loss in sensors]
-    rows += [(f"{kind} alone", loss, COLOURS[0]) for kind, loss in kinds]
+    rows = [(f"{label} alone", loss, SERIES_COLOURS[1]) for label, loss in sensors]
+    rows += [(f"{kind} alone", loss, SERIES_COLOURS[0]) for kind, loss in kinds]
     for place, (_, loss, shown) in enumerate(rows):
         _interval(axes, loss, place, shown, "o", None)
     axes.axvline(0.0, color=SOFT_INK, linewidth=0.8, zorder=0)

@@ -3,8 +3,7 @@
 import os
 from collections.abc import Sequence
 
-from headless.charts.style import MARKERS, colour, new_figure, save_chart, style_axes
-
+from seip_addon.core.output.pictures.chart_style import MARKERS, colour, new_figure, save_chart, style_axes
 from seip_addon.core.output.pictures.palette import INK, SOFT_INK
 from seip_addon.core.world.elevation.obstacles import MAX_CHANGED, RAYS, Merging, chosen_merging
 

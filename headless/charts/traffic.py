@@ -3,8 +3,6 @@
 import os
 from collections.abc import Sequence
 
-from headless.charts.style import COLOURS, interval_ends, limits_around, new_figure, save_chart, style_axes
-
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
@@ -16,8 +14,15 @@ from seip_addon.core.choosing.placement.deployment import Deployment
 from seip_addon.core.choosing.robustness.traffic_study import LAYER_NAMES, TrafficEvaluation, TrafficStudy
 from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.geometry.plan import closed, outline
+from seip_addon.core.output.pictures.chart_style import (
+    interval_ends,
+    limits_around,
+    new_figure,
+    save_chart,
+    style_axes,
+)
 from seip_addon.core.output.pictures.drawing import draw_attribution, draw_polygons, draw_sensors
-from seip_addon.core.output.pictures.palette import INK, SEEN_COLOURS, SOFT_INK
+from seip_addon.core.output.pictures.palette import INK, SEEN_COLOURS, SERIES_COLOURS, SOFT_INK
 from seip_addon.core.output.pictures.plan_map import MAX_GAP, draw_area
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.site.site import Site
@@ -106,7 +111,13 @@ def _draw_place(panel: Axes, geometry: SceneGeometry) -> None:
 def _bars(axes: Axes, place: int, estimates: Sequence[IntervalEstimate], label: str) -> None:
     at = np.arange(len(estimates)) + place * BAR_STEP
     values = np.array([estimate.value for estimate in estimates])
-    axes.bar(at, values, width=0.9 * BAR_STEP, color=(SEEN_COLOURS[1], COLOURS[1], COLOURS[2])[place + 1], label=label)
+    axes.bar(
+        at,
+        values,
+        width=0.9 * BAR_STEP,
+        color=(SEEN_COLOURS[1], SERIES_COLOURS[1], SERIES_COLOURS[2])[place + 1],
+        label=label,
+    )
     for x, estimate in zip(at, estimates, strict=True):
         axes.plot([x, x], interval_ends(estimate), color=INK, linewidth=1.4)
 
@@ -114,5 +125,5 @@ def _bars(axes: Axes, place: int, estimates: Sequence[IntervalEstimate], label: 
 def _dots(axes: Axes, place: float, estimates: Sequence[IntervalEstimate], colour: int, label: str) -> None:
     at = np.arange(len(estimates)) + place * BAR_STEP
     for x, estimate in zip(at, estimates, strict=True):
-        axes.plot([x, x], interval_ends(estimate), color=COLOURS[colour], linewidth=2.4)
-    axes.plot(at, [each.value for each in estimates], "o", color=COLOURS[colour], label=label)
+        axes.plot([x, x], interval_ends(estimate), color=SERIES_COLOURS[colour], linewidth=2.4)
+    axes.plot(at, [each.value for each in estimates], "o", color=SERIES_COLOURS[colour], label=label)

@@ -1,4 +1,4 @@
-"""A detector: network and weights, and the file that holds them."""
+"""Detector: network and weights, and its file."""
 
 from __future__ import annotations
 
@@ -34,23 +34,25 @@ SHIPPED_DETECTOR = Path(__file__).with_name("shipped_detector.pt")
 """Trained by `make detector` on random placements at random sites."""
 
 _MAX_BYTES = 1 << 32  # bytes of a file: 4 GiB
-_SEED_LOCK = threading.Lock()  # torch draws first weights from one source of random numbers for all threads
+_SEED_LOCK = threading.Lock()  # all threads share the generator of random numbers from which torch draws weights
 
 
 @dataclass(frozen=True)
 class TrainingRecord:
-    """Sensor types and sites that a detector has been trained on, as far as known.
+    """Sensor types and sites in the training of a detector.
 
     Parameters
     ----------
     sensors : tuple of str
-        Catalogue keys of the sensor types in its training, in alphabetical order; empty if unknown.
+        Catalogue keys of the sensor types, in alphabetical order; empty if unknown.
+    sites : tuple of str
+        Names of the sites, in alphabetical order; empty if unknown.
     """
 
     sensors: tuple[str, ...] = ()
     sites: tuple[str, ...] = ()
 
-    def with_that_of(self, other: TrainingRecord) -> TrainingRecord:
+    def merged_with(self, other: TrainingRecord) -> TrainingRecord:
         """Return the union of both records, for a detector whose training continues from another detector."""
         return TrainingRecord(*(tuple(sorted({*getattr(self, f.name), *getattr(other, f.name)})) for f in fields(self)))
 
@@ -63,7 +65,7 @@ class Detector(nn.Module):
     seed : int
         Seed of the initial weights.
     training_record : TrainingRecord
-        Sensor types and sites of its training.
+        Sensor types and sites in its training.
     """
 
     def __init__(
@@ -87,12 +89,20 @@ class Detector(nn.Module):
         return next(self.parameters()).device
 
     @property
-    def found_by(self) -> DetectionHead:
+    def detection_head(self) -> DetectionHead:
         """The head, typed by its interface rather than as a module."""
         return cast("DetectionHead", self.head)
 
     def forward(self, pillars: Pillars, shape: tuple[int, int, int]) -> Tensor:
-        """Return the head's output for some clouds; ``shape`` is their number and the rows and columns of a cloud."""
+        """Return the head's output for a batch of clouds.
+
+        Parameters
+        ----------
+        pillars : Pillars
+            Pillars of all clouds of the batch.
+        shape : (int, int, int)
+            Number of clouds, and rows and columns of the pillar grid of each.
+        """
         features = torch.from_numpy(pillars.features).to(self.device)
         pillar = torch.from_numpy(pillars.pillar).to(self.device)
         with torch.autocast(self.device.type, torch.bfloat16, enabled=has_bfloat16(self.device)):
@@ -127,117 +137,119 @@ class Detector(nn.Module):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], device: str = "cpu") -> Detector:
-        """Read a detector, or that of a training that is under way.
+        """Read a detector from its file, or from the file of an unfinished training.
 
         Raises
         ------
         SeipError
-            The file is not there, damaged, something else, or of another version.
+            The file cannot be read, is damaged, is not a detector, or has a different version.
         """
         state = load_state(path)
-        with fault_of(path):
+        with reading_detector(path):
             settings = NetworkSettings(**{**state["settings"], "blocks": tuple(state["settings"]["blocks"])})
             training_record = _training_record(state.get("experience", {}))
             if not all(bool(torch.isfinite(tensor).all()) for tensor in state["weights"].values()):
-                raise _ContentError("its weights are not finite")
+                raise _ContentError("its weights are not finite numbers")
             detector = cls(settings, training_record=training_record)
             detector.load_state_dict(state["weights"])
         return detector.to(device).eval()
 
 
 def has_bfloat16(device: torch.device) -> bool:
-    """Return whether a device multiplies numbers of 16 bits faster than of 32 (bfloat16)."""
+    """Return whether a device multiplies 16-bit numbers (bfloat16) faster than 32-bit numbers."""
     if device.type == "cuda":
         return torch.cuda.is_bf16_supported(including_emulation=False)
     return device.type == "cpu" and torch.cpu._is_avx512_bf16_supported()  # noqa: SLF001  # there is no other way
 
 
 def check_device(device: str) -> None:
-    """Raise SeipError where torch cannot use a device.
+    """Check that PyTorch can use a device.
 
     Raises
     ------
     SeipError
-        It cannot.
+        PyTorch cannot use it.
     """
     try:
         torch.zeros(1, device=device)
     except (RuntimeError, AssertionError) as error:
-        raise SeipError(f"torch cannot use the device {device!r} here: name cpu, or mend its driver") from error
+        raise SeipError(f"PyTorch cannot use the device {device!r}: choose cpu, or repair its driver") from error
 
 
 def save_state(path: str | os.PathLike[str], state: Mapping[str, Any]) -> None:
-    """Write plain values and tensors, with a digest of them."""
+    """Write plain values and tensors, with a digest of them; equal values give equal bytes."""
     full = {"schema": SCHEMA, "version": VERSION, **state}
-    content = io.BytesIO()  # to no file: its name would go into the bytes, and a full disk leave it unclosed
-    # Equal texts as one object, which pickle writes once: equal values give equal bytes.
+    # In memory first: torch.save writes the name of a file into its bytes, and leaves it open if the disk is full.
+    content = io.BytesIO()
+    # pickle writes an object that occurs twice only once. Interning makes equal texts one object, so that the bytes
+    # depend on the values and not on how the texts were made.
     torch.save(_replaced({**full, "digest": _digest(full)}, str, sys.intern), content)
     with whole_file(path) as temporary:
         temporary.write_bytes(content.getvalue())
 
 
 def load_state(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read what `save_state` wrote, to the CPU.
+    """Read a file of `save_state`, with tensors on the CPU.
 
     Raises
     ------
     SeipError
-        The file is not there, damaged, something else, or of another version.
+        The file cannot be read, is damaged, is not a detector, or has a different version.
     """
     try:
         with Path(path).open("rb") as file:
             content = file.read(_MAX_BYTES + 1)
     except OSError as error:
-        raise SeipError(f"there is no detector {path}: train one, or name another file") from error
-    with fault_of(path):
+        raise SeipError(f"detector {path} cannot be read: check its path, or train one with seip train") from error
+    with reading_detector(path):
         _check_archive(content)
         state: dict[str, Any] = torch.load(io.BytesIO(content), map_location="cpu", weights_only=True)
         if sum(tensor.numel() * tensor.element_size() for tensor in _tensors(state)) > len(content):
-            raise _ContentError("it has tensors larger than itself")
+            raise _ContentError("its tensors are larger than the file")
         version = state["version"]
         known = state["schema"] == SCHEMA and version == VERSION
         if known and state.pop("digest", None) != _digest(state):
-            raise _ContentError("its content is not what was written")
+            raise _ContentError("its digest does not match its content")
     if not known:
-        raise SeipError(f"{path} is no detector of this version; train it again")
+        raise SeipError(f"{path} is not a detector of this version of the program: train it again")
     return state
 
 
 @contextmanager
-def fault_of(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Raise errors within the block as errors of the file."""
+def reading_detector(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Report errors raised in the block as a damaged detector file."""
     try:
         yield
     except SeipError as error:
-        raise SeipError(f"{path} is no detector, or is damaged: {error}; train it again") from error
+        raise SeipError(f"{path} is not a detector file, or is damaged ({error}): train it again") from error
     except _READ_ERRORS as error:
-        raise SeipError(f"{path} is no detector, or is damaged; train it again") from error
+        raise SeipError(f"{path} is not a detector file, or is damaged: train it again") from error
 
 
 class _ContentError(SeipError):
-    """Fault in the content of a file, as a part of a sentence."""
+    """Fault in the content of a file; the message is part of a sentence."""
 
 
 _READ_ERRORS = (*READ_ERRORS, AssertionError, ImportError, pickle.UnpicklingError, struct.error)
-"""What torch raises on reading what it has not written, or taking from it what should be there."""
+"""Errors that torch raises on reading files that it has not written, or that lack expected values."""
 
 
 def _check_archive(content: bytes) -> None:
-    """Check the archive of `torch.save` against its checksums, which torch itself does not compare."""
+    """Check the checksums of an archive of `torch.save`, which `torch.load` ignores."""
     if len(content) > _MAX_BYTES:
         raise _ContentError(f"it is larger than {_MAX_BYTES >> 30} GiB")
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         infos = archive.infolist()
         if any(info.compress_type != zipfile.ZIP_STORED or info.file_size > len(content) for info in infos):
-            raise _ContentError("it is packed as torch packs none")
+            raise _ContentError("it is not packed as torch.save does")
         if archive.testzip() is not None:
-            raise _ContentError("its checksums do not fit")
+            raise _ContentError("its checksums do not match its content")
 
 
 def _training_record(known: Mapping[str, Any]) -> TrainingRecord:
     listed = all(isinstance(values, list | tuple) for values in known.values())
     if not listed or not all(isinstance(name, str) for values in known.values() for name in values):
-        raise _ContentError("its training record has no names")
+        raise _ContentError("its training record is not a list of names")
     return TrainingRecord(**{name: tuple(values) for name, values in known.items()})
 
 
@@ -255,7 +267,7 @@ def _digest(state: Mapping[str, Any]) -> str:
 
 
 def _replaced(value: Any, kind: type, change: Callable[[Any], Any]) -> Any:  # noqa: ANN401  # plain values of any kind
-    """Return nested values with each part of some kind changed, tuples as lists."""
+    """Return nested values with `change` applied to each part of type `kind`; tuples become lists."""
     if isinstance(value, kind):
         return change(value)
     if isinstance(value, Mapping):

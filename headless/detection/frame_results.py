@@ -17,13 +17,14 @@ DENSITY_RADIUS = 3.0  # radius in metres of the circle around a box in which the
 
 @dataclass(frozen=True, eq=False)
 class Detections:
-    """Boxes that a detector finds in one cloud, in any order; k boxes.
+    """Boxes that a detector outputs for one cloud; k boxes in any order.
 
     Parameters
     ----------
     boxes : (k, 7) float64
         x, y, z of the middle, length, width, height (metres), yaw (radians, counter-clockwise from +x).
     score : (k,) float64, 0 to 1
+        Confidence of the detector.
     category : (k,) int64
         Index into the detector's classes.
     """
@@ -38,23 +39,24 @@ class Detections:
 
 @dataclass(frozen=True, eq=False)
 class GroundTruth:
-    """The road users of a frame, all of them; g boxes.
+    """All road users of a frame, inside the region of interest and outside it; g boxes.
 
     Parameters
     ----------
     boxes : (g, 7) float64
         x, y, z of the middle, length, width, height (metres), yaw (radians, counter-clockwise from +x).
     category : (g,) str
+        Category of the road user: car, van, truck, bus, motorcycle, bicycle or pedestrian.
     points : (g,) int64
-        Returns from it, of all sensors.
+        Number of returns from the road user, all sensors together.
     visibility : (g,) float64, 0 to 1
-        Share of the rays on it that are not occluded.
+        Share of the rays towards the road user that no other object blocks.
     inside : (g,) bool
-        Whether its middle is in the region of interest.
+        Whether the middle of the box is in the region of interest.
     distance : (g,) float64, metres
-        From its middle to the nearest sensor.
+        Distance from the middle of the box to the nearest sensor; infinite without sensors.
     parked : (g,) bool
-        Whether it does not move during its run; false if unknown.
+        Whether the road user does not move during its run; false if unknown.
     """
 
     boxes: Float
@@ -71,21 +73,24 @@ class GroundTruth:
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedBoxes:
-    """The detections of a frame; k boxes.
+    """Detections of a frame with the attributes by which errors are broken down; k boxes.
 
     Parameters
     ----------
     boxes : (k, 7) float64
-        As in `GroundTruth`.
-    score : (k,) float64
+        x, y, z of the middle, length, width, height (metres), yaw (radians, counter-clockwise from +x).
+    score : (k,) float64, 0 to 1
+        Confidence of the detector.
     category : (k,) str
-        Detected category; a class of several categories is named by its first.
+        Detected category; for a class of several categories, the first of them.
     points : (k,) int64
-        Returns in the box.
+        Number of returns in the box.
     density : (k,) float64, per square metre
-        Returns within `DENSITY_RADIUS` of its middle in plan.
-    inside, distance
-        As in `GroundTruth`.
+        Returns per area within `DENSITY_RADIUS` of the middle of the box in plan.
+    inside : (k,) bool
+        Whether the middle of the box is in the region of interest.
+    distance : (k,) float64, metres
+        Distance from the middle of the box to the nearest sensor; infinite without sensors.
     """
 
     boxes: Float
@@ -106,8 +111,14 @@ class FrameResult:
 
     Parameters
     ----------
+    run : str
+        Name of the recording.
     time : float, seconds
-        In that run.
+        Time of the frame since the start of the run.
+    truth : GroundTruth
+        Road users of the frame.
+    detected : EvaluatedBoxes
+        Detections in the frame.
     """
 
     run: str
@@ -116,7 +127,7 @@ class FrameResult:
     detected: EvaluatedBoxes
 
 
-def frame_result(  # noqa: PLR0913  # a frame, what was made of it, and what errors are told apart by
+def frame_result(  # noqa: PLR0913  # frame, detections, and the attributes of errors
     frame: Frame,
     cloud: CloudInPlan,
     detections: Detections,
@@ -132,11 +143,15 @@ def frame_result(  # noqa: PLR0913  # a frame, what was made of it, and what err
     Parameters
     ----------
     cloud : CloudInPlan
-        Of the frame's points: sorted once for all detectors that look at them.
+        Points of the frame, sorted once for all detectors that are evaluated on it.
     classes : sequence of sequence of str
         Categories of road users in each of the detector's classes.
     region : shapely geometry, metres
+        Region of interest in plan, local site axes.
     sensors : (s, 3) float64, metres
+        Positions of the sensors, local site axes.
+    run : str
+        Name of the recording.
     parked : (u,) bool, optional
         Mask of the trajectories' road users that do not move during the run.
     """
@@ -174,12 +189,14 @@ def _nearest(points: Float, sensors: Float) -> Float:
 
 
 def _returns_around(boxes: Float, cloud: CloudInPlan) -> tuple[Integer, Float]:
-    """Return the number of returns in each box, and how dense they are in the plan around it."""
+    """Return the number of returns in each box, and their density around it in plan (per square metre), (k,) each."""
     inside, near = np.zeros(len(boxes), dtype=np.int64), np.zeros(len(boxes), dtype=np.int64)
     for row, (x, y, z, length, width, height, yaw) in enumerate(boxes):
+        # One query serves both: this circle contains the box, whose corners are half a diagonal from its middle.
         reach = max(DENSITY_RADIUS, np.hypot(length, width) / 2)
         here = cloud.about(x, y, reach) - (x, y, z)
         near[row] = np.count_nonzero(here[:, 0] ** 2 + here[:, 1] ** 2 <= DENSITY_RADIUS**2)
+        # along the axes of the box, where it is an interval in each
         ahead = np.cos(yaw) * here[:, 0] + np.sin(yaw) * here[:, 1]
         aside = np.cos(yaw) * here[:, 1] - np.sin(yaw) * here[:, 0]
         within = (np.abs(ahead) <= length / 2) & (np.abs(aside) <= width / 2) & (np.abs(here[:, 2]) <= height / 2)

@@ -113,11 +113,11 @@ class TrainingSettings:
     steps: int = setting(1800, "updates of the weights", minimum=1)
     batch: int = setting(16, "windows in a step", minimum=1)
     window: float = 25.6
-    learning_rate: float = 6e-3
+    learning_rate: float = setting(6e-3, "highest of the schedule", minimum=1e-6, maximum=1.0, metavar="R")
     weight_decay: float = 0.01
     least_points: int = 3
     validate_every: int = 300
-    patience: int = 3
+    patience: int = setting(3, "validations without improvement before it stops", minimum=1)
     seed: int = setting(1, "of weights and order", minimum=0)
     threads: int = setting(1, "of torch on the CPU", minimum=1)
 

@@ -24,7 +24,7 @@ from seip_addon.core.storage.source_digest import source_digest
 
 from .average_precision import evaluate
 from .detection_area import DetectionArea
-from .detector import Detector, fault_of, load_state, save_state
+from .detector import Detector, load_state, reading_detector, save_state
 from .frame_results import EvaluatedBoxes, FrameResult, GroundTruth
 from .frames import SampledRecording, TrainingSample, drawn, require_separate, spread, training_record_of
 from .heads import TrainingTargets
@@ -155,7 +155,7 @@ class _Run:
         self.training_set, self.aside = _with_frames(recordings), _with_frames(validation)
         training_record = training_record_of([sampled.recording for sampled in self.training_set])
         if start is not None:
-            training_record = training_record.with_that_of(start.training_record)
+            training_record = training_record.merged_with(start.training_record)
         self.detector = Detector(network, settings.seed, training_record).to(device)
         self.start = "" if start is None else start.key
         if start is not None:
@@ -190,7 +190,7 @@ class _Run:
         pillars = stacked([fill_pillars(one.points, grid, self.detector.settings.most_points) for one in varied], grid)
         targets = [_targets(one, self.settings.least_points, self.detector.device) for one in varied]
         output = self.detector(pillars, (len(targets), grid.rows, grid.columns))
-        loss = torch.stack(list(self.detector.found_by.loss(output, targets, grid, LOSS_MARGIN).values())).sum()
+        loss = torch.stack(list(self.detector.detection_head.loss(output, targets, grid, LOSS_MARGIN).values())).sum()
         self.optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self.detector.parameters(), MAX_GRADIENT_NORM)
@@ -264,7 +264,7 @@ class _Run:
                 f"{path} is of a training with other settings or recordings, or of another version of the program: "
                 "delete it, or choose another file"
             )
-        with fault_of(path):
+        with reading_detector(path):
             self.step = int(earlier["step"])
             self.curve = LearningCurve(**earlier["curve"])
             self.best = state["weights"]

@@ -15,16 +15,6 @@ from headless.charts.detection import (
     mark_style,
     placement_name,
 )
-from headless.charts.style import (
-    DASHED,
-    FAINT_COLOUR,
-    add_legend,
-    colour,
-    new_figure,
-    save_chart,
-    set_title,
-    style_axes,
-)
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -34,6 +24,16 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.output.pictures.callouts import place_callouts
+from seip_addon.core.output.pictures.chart_style import (
+    DASHED,
+    FAINT_COLOUR,
+    add_legend,
+    colour,
+    new_figure,
+    save_chart,
+    set_title,
+    style_axes,
+)
 from seip_addon.core.output.pictures.drawing import save_png
 from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
 

@@ -203,6 +203,12 @@ EFFORT = Limits(0.0, 1e9)
 LIDAR_RANGE = Limits(0.0, 10_000.0, "m")
 """Distance of a return from its sensor."""
 
+SENSOR_COORDINATE = Limits(-10_000.0, 10_000.0, "m")
+"""Coordinate in the axes of a sensor."""
+
+SWEEP_POINTS = Limits(0, 20_000_000)
+"""Points of a sensor in one revolution."""
+
 DETECTION_RANGE = Limits(0.1, 10_000.0, "m")
 """Range at which a data sheet says that a surface is detected."""
 

@@ -1,5 +1,6 @@
 """Installation of SUMO with pip into a folder of its own, for a Blender without it."""
 
+import os
 import re
 import shutil
 import sys
@@ -96,11 +97,12 @@ def _progress(temporary: Path) -> Progress:
 
 def _megabytes(folder: Path) -> int:
     total = 0
-    for path in folder.rglob("*"):
-        try:
-            total += path.stat().st_size
-        except OSError:  # pip has moved it in the meantime
-            continue
+    for parent, _, names in os.walk(folder):  # passes over folders that pip removes in the meantime
+        for name in names:
+            try:
+                total += (Path(parent) / name).stat().st_size
+            except OSError:  # pip has moved it
+                continue
     return total // _MEGABYTE
 
 

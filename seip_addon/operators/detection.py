@@ -85,7 +85,7 @@ class SEIP_OT_detect(LongWork[str], bpy.types.Operator):
 
 def _detected(job: DetectionJob, folder: Path) -> Generator[Progress, None, str]:
     with (
-        _folder_of_result(folder),
+        folder_of_result(folder),
         TemporaryDirectory(prefix=unfinished_name(folder, "detection-").name, dir=folder) as temporary,
     ):
         scene = Path(temporary) / "placed.blend"
@@ -95,16 +95,16 @@ def _detected(job: DetectionJob, folder: Path) -> Generator[Progress, None, str]
 
 
 @contextmanager
-def _folder_of_result(folder: Path) -> Iterator[None]:
+def folder_of_result(folder: Path) -> Iterator[None]:
     """Make a folder where it is missing, and take it away again where nothing was written to it."""
-    new = not folder.exists()
+    new = [one for one in (folder, *folder.parents) if not one.exists()]
     check_folder(folder)
     try:
         yield
     finally:
-        if new:
-            with suppress(OSError):  # it holds something
-                folder.rmdir()
+        with suppress(OSError):  # it holds something
+            for one in new:
+                one.rmdir()
 
 
 CLASSES = (SEIP_OT_detect,)

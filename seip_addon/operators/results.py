@@ -13,9 +13,10 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from .. import live_coverage, preferences, scene_status, scene_survey, selection
+from .. import live_coverage, preferences, scene_status, scene_survey, selection, traffic_coverage
 from ..core.choosing.placement.deployment import sensor_at
 from ..core.choosing.placement.objective import Objective, target_weights
+from ..core.choosing.robustness.visibility_in_traffic import PosesInTraffic, poses_in_traffic
 from ..core.errors import SeipError
 from ..core.output.report.write import write_report
 from ..core.output.results.answer import change_text
@@ -31,7 +32,7 @@ from ..core.sensing.visibility.visibility_model import VisibilityModel, visibili
 from ..core.storage.files import check_folder, digest
 from ..core.workflows.moved_sensors import evaluate_moved_sensors
 from ..core.workflows.records import record_of
-from ..core.workflows.survey import Survey
+from ..core.workflows.survey import Survey, surroundings
 from ..scene.blend_file import save_blend
 from ..scene.coverage_colours import recolour, show_seen_by
 from ..scene.gltf import save_glb
@@ -280,7 +281,59 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneState, Visibility
         """Begin to follow."""
         state, model = result
         session.keep_state(scene, state)
+        traffic_coverage.stop()
         live_coverage.start(scene, state, model)
+
+
+class SEIP_OT_show_in_traffic(ForPlacement, LongWork[tuple[SceneState, PosesInTraffic]], bpy.types.Operator):
+    """Show the coverage among the vehicles of the current frame as the timeline moves; press again to end it"""
+
+    bl_idname = "seip.show_in_traffic"
+    bl_label = "Coverage in Traffic"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether there is a placement, and traffic."""
+        if not super().poll(context):
+            return False
+        if context.scene.session_uid not in session.traffic:
+            cls.poll_message_set("load the traffic first")
+        return context.scene.session_uid in session.traffic
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
+        """End it at once, or begin in a thread."""
+        return self.execute(context) if session.in_traffic is not None else super().invoke(context, event)
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """End it, or begin."""
+        if session.in_traffic is not None:
+            traffic_coverage.stop()
+            return {"FINISHED"}
+        return super().execute(context)
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, PosesInTraffic]]:
+        """Return the job that restores the placement and casts its rays on the empty road."""
+        return _cast(scene_survey.with_placement(scene))
+
+    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, PosesInTraffic]) -> None:
+        """Begin to follow the timeline."""
+        state, visibility = result
+        session.keep_state(scene, state)
+        live_coverage.stop()
+        traffic_coverage.start(scene, state, visibility)
+
+
+def _cast(
+    finding: Generator[Progress, None, SceneState],
+) -> Generator[Progress, None, tuple[SceneState, PosesInTraffic]]:
+    state = yield from finding
+    survey, solution = state.placed()
+    poses = [sensor.pose for sensor in solution.deployment.sensors]
+    if None in poses:
+        raise SeipError("sensors were moved by hand: place them again to see them in traffic")
+    visibility = yield from poses_in_traffic(surroundings(survey), np.array(poses, dtype=np.int64))
+    return state, visibility
 
 
 def _set_up(
@@ -473,7 +526,9 @@ def _holds(folder: Path, record: str, _written: int | None) -> bool:
     except SeipError:
         return False
     present = parsed_record(record)
-    return (written.sensors, written.inputs, written.notes) == (present.sensors, present.inputs, present.notes)
+    # The goal is compared too: with other shares of the road users, the same sensors have another value in the files.
+    one, other = ((of.sensors, of.inputs, of.notes, of.request.goal) for of in (written, present))
+    return one == other
 
 
 CLASSES = (
@@ -483,6 +538,7 @@ CLASSES = (
     SEIP_OT_drop_placement,
     SEIP_OT_show_comparison,
     SEIP_OT_follow_sensors,
+    SEIP_OT_show_in_traffic,
     SEIP_OT_evaluate_sensors,
     SEIP_OT_export_result,
     SEIP_OT_write_report,

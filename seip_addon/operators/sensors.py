@@ -75,7 +75,9 @@ class SEIP_OT_add_catalogue(bpy.types.Operator):
     bl_idname = "seip.add_catalogue"
     bl_label = "Add Catalogue"
 
-    filepath: bpy.props.StringProperty(name="File", description="The catalogue", subtype="FILE_PATH")
+    filepath: bpy.props.StringProperty(
+        name="File", description="The catalogue", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}
+    )
     filter_glob: bpy.props.StringProperty(default="*.toml;*.json;*.xml;*.yaml;*.yml;*.csv", options={"HIDDEN"})
 
     @classmethod

@@ -26,6 +26,8 @@ from ..core.workflows.survey_settings import SurveySettings
 from ..core.workflows.visibility_estimate import estimate
 from ..core.world.streetscape.description import DESCRIPTION_SUFFIX
 from ..core.world.streetscape.mesh_place import MeshPlace, mesh_place
+from ..properties import traffic
+from ..properties.conversion import absolute
 from ..properties.site import ROLE_ITEMS, SEIP_PG_problem, SEIP_PG_site
 from ..scene import contract, roles
 from ..scene.build import build_scene, remove_site
@@ -46,8 +48,6 @@ COPIED = (
     *("terrain", "terrain_epsg", "meshes", "mesh_origin", "mesh_up"),
 )
 """Properties of a choice that a site in a new scene takes over."""
-EXAMPLE_TRAFFIC = EXAMPLE.parent / f"{EXAMPLE.stem}_traffic" / "run-1.npz"
-"""Traffic of the example: beside it."""
 SHARE_OF_VIEW = 0.6
 """Of a drawn area in the size of the view."""
 AREA_ITEMS = tuple(item for item in ROLE_ITEMS if Role[item[0]] in roles.AREAS)
@@ -60,7 +60,10 @@ class SEIP_OT_choose_map(LongWork[SitePlaces], bpy.types.Operator):
     bl_label = "Choose Map"
 
     filepath: bpy.props.StringProperty(
-        name="File", description="The map, extract or site description", subtype="FILE_PATH", options={"SKIP_SAVE"}
+        name="File",
+        description="The map, extract or site description",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     filter_glob: bpy.props.StringProperty(
         default=f"*.xodr;*{DESCRIPTION_SUFFIX};*.osm;*.osm.gz;*.osm.pbf", options={"HIDDEN", "SKIP_SAVE"}
@@ -90,17 +93,30 @@ class SEIP_OT_choose_map(LongWork[SitePlaces], bpy.types.Operator):
 
     def conclude(self, scene: bpy.types.Scene, result: SitePlaces) -> None:
         """List the junctions in place of those of another file, and ask for the place."""
-        site = scene.seip.site
-        site.source, site.radius = self.filepath, result.radius
-        site.junction = site.position = ""
+        site, before = scene.seip.site, ""
+        if site.source == self.filepath:
+            before = site.junction  # it stays until another one is chosen
+        else:
+            site.radius, site.position = result.radius, ""
+        site.source, site.junction = self.filepath, ""
         site.junctions.clear()
         for place in result.places:
             one = site.junctions.add()
             one.name, one.id = place.name, place.key
+        site.junction = before if before in site.junctions else ""
         self.report({"INFO"}, counted(len(site.junctions), "junction"))
+        session.places = result
         if self._by_hand and not bpy.app.background:
-            site.junction = result.places[0].name if len(result.places) == 1 else ""
-            bpy.ops.seip.choose_place("INVOKE_DEFAULT")
+            self._ask(site, result)
+
+    def _ask(self, site: SEIP_PG_site, found: SitePlaces) -> None:
+        """Ask for the place: on the map of an extract, in a dialog where there is no map or only one junction."""
+        if len(found.places) == 1:
+            site.junction = found.places[0].name
+        elif bpy.ops.seip.pick_junction.poll():
+            bpy.ops.seip.pick_junction("INVOKE_DEFAULT")
+            return
+        bpy.ops.seip.choose_place("INVOKE_DEFAULT")
 
 
 def _is_own(operator: type[bpy.types.Operator], scene: bpy.types.Scene) -> bool:
@@ -114,8 +130,6 @@ class _BuildsSite(LongWork[BuiltSite]):
 
     is_chosen = True
     _meshes: MeshFiles | None = None
-    traffic_file: Path | None = None
-    """Traffic that comes with the site."""
 
     def conclude(self, scene: bpy.types.Scene, result: BuiltSite) -> None:
         """Build the scene."""
@@ -129,8 +143,8 @@ class _BuildsSite(LongWork[BuiltSite]):
             built[contract.BUILT] = built.seip.site.place()
         _keep_map(built, result)
         added = self._add_meshes(built, dict(zip(paths, places, strict=True)))
-        if self.traffic_file is not None:
-            built.seip.traffic.file = str(self.traffic_file)
+        if not self.is_chosen:
+            built.seip.traffic.file = built.seip.simulation.map = traffic.EXAMPLE
         show_site(built, result.model.region)
         for note in result.model.notes:
             report({"INFO"}, note)
@@ -195,7 +209,6 @@ class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
     bl_idname = "seip.load_example"
     bl_label = "Load Example"
     is_chosen = False
-    traffic_file = EXAMPLE_TRAFFIC
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -217,12 +230,18 @@ def _copy_choice(chosen: SEIP_PG_site, site: SEIP_PG_site) -> None:
 
 
 def _keep_map(scene: bpy.types.Scene, built: BuiltSite) -> None:
-    """Keep the map of an extract's streets in the file, as a text: traffic is simulated on it."""
-    if built.map_text is not None:
+    """Keep the map for the simulation of traffic: its path, or that of an extract's streets as a text in the file."""
+    simulation = scene.seip.simulation
+    if built.map_text is None:
+        source = scene.seip.site.source  # as it was named: relative to the file, or not
+        simulation.map = source if absolute(source) == built.map_path else str(built.map_path)
+    else:
         name = f"{scene.name}.xodr"
         if name in bpy.data.texts:  # of the site that this one replaces
             bpy.data.texts.remove(bpy.data.texts[name])
-        bpy.data.texts.new(name).from_string(built.map_text)
+        text = bpy.data.texts.new(name)
+        text.from_string(built.map_text)
+        simulation.map = text.name
 
 
 def show_site(scene: bpy.types.Scene, region: BaseGeometry) -> None:
@@ -255,7 +274,7 @@ def is_of_choice(scene: bpy.types.Scene) -> bool:
 
 def has_site(scene: bpy.types.Scene) -> bool:
     """Return whether a scene has any of the collections that a site is read from."""
-    return any(contract.kind(collection) in contract.INPUTS for collection in scene.collection.children_recursive)
+    return any(contract.base_name(collection) in contract.INPUTS for collection in scene.collection.children_recursive)
 
 
 class _RoleOperator:

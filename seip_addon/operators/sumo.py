@@ -15,7 +15,7 @@ from .base import LongWork, Outcome
 
 
 class SEIP_OT_install_sumo(LongWork[Sumo], bpy.types.Operator):
-    """Download Eclipse SUMO from PyPI into the extension's own folder, where it takes up to 470 MB. It lays out the streets of an extract of OpenStreetMap"""  # noqa: E501  # a tooltip is one line
+    """Download Eclipse SUMO from PyPI into the extension's own folder, where it takes up to 470 MB. It lays out the streets of an extract of OpenStreetMap and simulates traffic"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.install_sumo"
     bl_label = "Install SUMO"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -103,12 +103,18 @@ class SEIP_OT_load_traffic(LongWork[LoadedTraffic], bpy.types.Operator):
 
     def conclude(self, scene: bpy.types.Scene, result: LoadedTraffic) -> None:
         """Animate the road users."""
-        animate(scene, result.trajectories)
-        session.traffic[scene.session_uid] = SceneTraffic(self._files, self._changed, result.trajectories)
-        scene.seip.traffic.loaded = "\n".join((*_facts(result.trajectories), *result.warnings))
+        show_traffic(scene, SceneTraffic(self._files, self._changed, result.trajectories), result.warnings)
         for sentence in result.warnings:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"{counted(len(result.trajectories), 'road user')}; press play")
+
+
+def show_traffic(scene: bpy.types.Scene, traffic: SceneTraffic, warnings: Sequence[str]) -> None:
+    """Animate road users read from files, in place of earlier ones and of their scan, and note what there is."""
+    animate(scene, traffic.trajectories)
+    live_scan.hide_cloud(scene)
+    session.traffic[scene.session_uid] = traffic
+    scene.seip.traffic.loaded = "\n".join((*_facts(traffic.trajectories), *warnings))
 
 
 class SEIP_OT_clear_traffic(bpy.types.Operator):

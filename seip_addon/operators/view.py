@@ -26,6 +26,8 @@ from ..viewport.sight_lines import sight_overlay
 from .base import LongWork, Outcome, attempt, started
 from .results import PLAN, ForPlacement, exported_files, not_evaluated
 
+LAID_OUT = 0.2
+"""Seconds after which Blender has laid out a window that was opened."""
 NO_COVERAGE = "There is no coverage to show: place sensors first."
 
 
@@ -204,16 +206,40 @@ class SEIP_OT_show_plan(bpy.types.Operator):
         path = exported_files(context.scene).get(PLAN)
         if path is None:
             raise SeipError("there is no plan of this placement in the folder of the result: export it first")
-        image = bpy.data.images.load(str(path), check_existing=True)
-        image.reload()  # it may be that of an earlier export
-        editor = _image_window(context)
-        if editor is None:
-            raise SeipError(f"Blender has opened no window for the plan: open {path}")
-        editor.image = image
+        show_picture(context, path)
 
 
-def _image_window(context: bpy.types.Context) -> bpy.types.SpaceImageEditor | None:
-    """Open the window in which Blender shows renderings, or bring it to the front, and return its image editor."""
+def show_picture(context: bpy.types.Context, path: Path) -> None:
+    """Show a picture in the window in which Blender shows renderings, as large as the window.
+
+    Raises
+    ------
+    SeipError
+        There is no such picture, or no window.
+    """
+    if not path.is_file():
+        raise SeipError(f"the picture {path} is no longer there: write it again")
+    image = bpy.data.images.load(str(path), check_existing=True)
+    image.reload()  # it may be that of an earlier result
+    found = _image_window(context)
+    if found is None:
+        raise SeipError(f"Blender has opened no window for the picture: open {path}")
+    window, area = found
+    area.spaces.active.image = image
+    bpy.app.timers.register(lambda: _fit(window, area), first_interval=LAID_OUT)
+
+
+def _fit(window: bpy.types.Window, area: bpy.types.Area) -> None:
+    """Show the whole image of an editor as large as its window, unless that was closed meanwhile."""
+    if window not in bpy.context.window_manager.windows[:] or area not in window.screen.areas[:]:
+        return
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.image.view_all(fit_view=True)
+
+
+def _image_window(context: bpy.types.Context) -> tuple[bpy.types.Window, bpy.types.Area] | None:
+    """Open the window in which Blender shows renderings, or bring it to the front, and return it with its editor."""
     view = context.preferences.view
     before = view.render_display_type
     view.render_display_type = "WINDOW"  # other ways would change the layout of the present window
@@ -222,9 +248,9 @@ def _image_window(context: bpy.types.Context) -> bpy.types.SpaceImageEditor | No
             bpy.ops.render.view_show("INVOKE_DEFAULT")
     finally:
         view.render_display_type = before
-    screens = [window.screen for window in context.window_manager.windows if window.screen.is_temporary]
-    areas = (area for screen in screens for area in screen.areas if area.type == "IMAGE_EDITOR")
-    return next((area.spaces.active for area in areas), None)
+    windows = [window for window in context.window_manager.windows if window.screen.is_temporary]
+    found = ((window, area) for window in windows for area in window.screen.areas if area.type == "IMAGE_EDITOR")
+    return next(found, None)
 
 
 def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area, state: SceneState) -> None:

@@ -10,6 +10,7 @@ from ..operators.detection import SEIP_OT_detect
 from ..operators.placement import SEIP_OT_solve_placement
 from ..operators.results import SEIP_OT_evaluate_sensors, SEIP_OT_export_result, SEIP_OT_rank_candidates
 from ..operators.sensors import SEIP_OT_add_catalogue, SEIP_OT_preview_beams
+from ..operators.simulation import SEIP_OT_simulate_traffic
 from ..operators.site import (
     SEIP_OT_add_area,
     SEIP_OT_build_site,
@@ -107,7 +108,7 @@ STEPS: tuple[tuple[type[bpy.types.Operator], ...], ...] = (
     (SEIP_OT_add_catalogue, SEIP_OT_preview_beams, SEIP_OT_compute_visibility, SEIP_OT_solve_placement),
     (SEIP_OT_evaluate_sensors, SEIP_OT_rank_candidates, SEIP_OT_export_result),
     (SEIP_OT_colour_coverage, SEIP_OT_save_picture),
-    (SEIP_OT_load_traffic, SEIP_OT_scan_frame, SEIP_OT_write_dataset, SEIP_OT_detect),
+    (SEIP_OT_load_traffic, SEIP_OT_simulate_traffic, SEIP_OT_scan_frame, SEIP_OT_write_dataset, SEIP_OT_detect),
     (SEIP_OT_stop,),
 )
 """Operators of the menu, by step of the work."""

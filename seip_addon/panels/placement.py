@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -20,7 +21,7 @@ from ..operators.sensors import SEIP_MT_survey_presets, SEIP_OT_add_survey_prese
 from ..operators.visibility import SEIP_OT_compare_scene
 from ..sensor_edits import sensor_edits
 from .run_button import draw_run
-from .sections import section
+from .sections import draw_sections
 from .sidebar import RowList, is_narrow, settings_column
 from .wrapped_text import BOX, draw_sentence
 
@@ -82,15 +83,16 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         draw_sentence(layout, obstacle, icon="ERROR")
     if not no_placement(scene):
         _draw_answer(layout, scene)
-    for name, draw_body in (
-        ("objective", _draw_objective),
-        ("rules", _draw_rules),
-        ("candidates", _draw_candidates),
-        ("search", _draw_search),
-    ):
-        body = section(layout, name)
-        if body is not None:
-            draw_body(body, scene)
+    draw_sections(
+        layout,
+        {
+            "objective": _draw_objective,
+            "rules": _draw_rules,
+            "candidates": _draw_candidates,
+            "search": _draw_search,
+        },
+        scene,
+    )
 
 
 def button_text(scene: bpy.types.Scene) -> str:
@@ -196,34 +198,51 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         draw_sentence(column, scene.seip.result.change, icon="INFO", reserved=BOX)
     for sentence in answer(record):
         draw_sentence(column, sentence, reserved=BOX)
-    body = section(box, "numbers") if record.front else None
-    if body is not None:
-        body.active = not doubts
-        _draw_numbers(body, record, scene.seip.goal)
-    body = section(box, "details")
-    if body is not None:
-        body.active = not doubts
-        _draw_details(body, record, certain=not doubts)
+    others = {"numbers": partial(_draw_numbers, goal=scene.seip.goal, certain=not doubts)} if numbers(record) else {}
+    draw_sections(box, {**others, "details": partial(_draw_details, certain=not doubts)}, record)
 
 
-def _draw_numbers(layout: bpy.types.UILayout, record: PlacementRecord, goal: bpy.types.PropertyGroup) -> None:
-    """Draw coverage and price of the best placement of each number of sensors, with a button that chooses it."""
+def _draw_numbers(
+    layout: bpy.types.UILayout, record: PlacementRecord, *, goal: bpy.types.PropertyGroup, certain: bool
+) -> None:
+    """Draw quality and price of the best placement of each number of sensors, with a button that chooses it."""
+    layout.active = certain
     column = layout.column(align=True)
-    for point in record.front:
+    for count, share, text in numbers(record):
         row = column.split(factor=NUMBER_SHARE, align=True)
         button = row.operator(
             SEIP_OT_choose_number.bl_idname,
-            text=str(point.count),
-            icon="CHECKMARK" if point.count == len(record.sensors) else "BLANK1",
-            depress=goal.limit == "COUNT" and goal.count == point.count,
+            text=str(count),
+            icon="CHECKMARK" if count == len(record.sensors) else "BLANK1",
+            depress=goal.limit == "COUNT" and goal.count == count,
         )
-        button.count = point.count
-        row.progress(factor=point.coverage, text=f"{point.coverage:.1%} · ${point.price:,.0f}")
+        button.count = count
+        row.progress(factor=share, text=text)
     draw_sentence(layout, front_text(record), icon="INFO", reserved=BOX)
+
+
+def numbers(record: PlacementRecord) -> list[tuple[int, float, str]]:
+    """Return numbers of sensors, each with the length of its bar and its quality and price as text."""
+    if record.returns is None:
+        return [(point.count, point.coverage, f"{point.coverage:.1%} · ${point.price:,.0f}") for point in record.front]
+    front = record.returns.front
+    most = max((point.returns for point in front), default=0.0) or 1.0
+    return [
+        (point.count, point.returns / most, f"{returns_text(point.returns)} returns · ${point.price:,.0f}")
+        for point in front
+    ]
 
 
 def front_text(record: PlacementRecord) -> str:
     """Return what the placements of other numbers of sensors are, and how much better they could be."""
+    if record.returns is not None:
+        gaps = [point.gap for point in record.returns.front]
+        if None in gaps:
+            limit = "Others may have more."
+        else:
+            most = max(gap for gap in gaps if gap is not None)
+            limit = f"Others have at most {most:.1%} more." if most else "No other has more."
+        return f"Returns and price of the best placement found for each number, without a budget. {limit}"
     what = "Coverage by weight" if record.objective.kind == "weighted" else "Coverage"
     missed = max(point.missed for point in record.front)
     limit = f"Others see at most {missed:.1%} of the road more." if missed else "No other sees more."
@@ -232,6 +251,7 @@ def front_text(record: PlacementRecord) -> str:
 
 def _draw_details(layout: bpy.types.UILayout, record: PlacementRecord, *, certain: bool) -> None:
     """Draw all figures by topic, the certificate while it holds, and the notes."""
+    layout.active = certain
     for topic, lines in figures(record).items():
         if not lines:
             continue

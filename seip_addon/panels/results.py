@@ -12,7 +12,7 @@ from ..operators import results
 from ..session import FollowedSensors, session
 from . import view
 from .run_button import draw_run
-from .sections import section
+from .sections import draw_sections
 from .sidebar import RowList, is_narrow
 from .wrapped_text import draw_sentence
 
@@ -74,10 +74,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     else:
         layout.operator("seip.follow_sensors", text="Stop Following", icon="PAUSE", depress=True)
         _draw_followed(layout, session.following)
-    for name, draw_body in (("view", view.draw), ("ranking", _draw_ranking), ("comparison", _draw_comparison)):
-        body = section(layout, name)
-        if body is not None:
-            draw_body(body, context)
+    draw_sections(layout, {"view": view.draw, "ranking": _draw_ranking, "comparison": _draw_comparison}, context)
 
 
 def _draw_list(

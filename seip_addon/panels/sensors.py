@@ -17,7 +17,7 @@ from ..operators.sensors import SEIP_OT_about_sensor, SEIP_OT_drop_sensor_type, 
 from ..scene.materials import REFLECTIVITY
 from ..session import session
 from ..viewport import beam_preview
-from .sections import section
+from .sections import draw_sections
 from .sensor_table import SEIP_OT_choose_sensors, pedestrian_range
 from .sidebar import is_narrow, settings_column
 from .wrapped_text import draw_sentence
@@ -61,12 +61,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         draw_sentence(column, "Choose at least one sensor.", icon="ERROR", alert=True)
     layout.operator(SEIP_OT_choose_sensors.bl_idname, icon="ADD")
     _draw_mounting(layout, context)
-    body = section(layout, "about_sensor")
-    if body is not None:
-        _draw_about(body, context)
-    body = section(layout, "beams")
-    if body is not None:
-        _draw_beams(body, context)
+    draw_sections(layout, {"about_sensor": _draw_about, "beams": _draw_beams}, context)
 
 
 def _draw_product(layout: bpy.types.UILayout, key: str) -> None:

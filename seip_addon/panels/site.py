@@ -24,7 +24,7 @@ from ..properties.site import SEIP_PG_site
 from ..scene import roles
 from . import sumo
 from .run_button import draw_run
-from .sections import section
+from .sections import draw_sections
 from .sidebar import is_narrow, settings_column
 from .wrapped_text import draw_sentence
 
@@ -51,15 +51,8 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         _draw_map(layout, scene)
     else:
         _draw_check(layout, scene)
-        body = section(layout, "contents")
-        if body is not None:
-            _draw_contents(body, scene)
-        body = section(layout, "change_site")
-        if body is not None:
-            _draw_map(body, scene)
-    body = section(layout, "roles")
-    if body is not None:
-        _draw_roles(body, context)
+        draw_sections(layout, {"contents": _draw_contents, "change_site": _draw_map}, scene)
+    draw_sections(layout, {"roles": _draw_roles}, context)
 
 
 def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
@@ -68,12 +61,20 @@ def _draw_map(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     draw_run(layout, SEIP_OT_choose_map.bl_idname, icon="FILE_FOLDER", text=name or "Choose Map…")
     if not name:
         return
+    if site.is_extract():
+        draw_pick(layout, site)
     draw_place(layout, site)
     if has_site(scene) and not missing_for_build(scene):
         again = "The site is built again; your own objects and the sensors stay."
         elsewhere = "The site is built in a new scene; this one stays."
         draw_sentence(layout, again if is_of_choice(scene) else elsewhere, icon="INFO")
     draw_run(layout, SEIP_OT_build_site.bl_idname)
+
+
+def draw_pick(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
+    """Draw the button that shows the chosen extract as a map to pick a junction on."""
+    button = layout.operator(SEIP_OT_choose_map.bl_idname, icon="VIEWZOOM", text="Pick on Map…")
+    button.filepath = site.source
 
 
 def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site, width: float | None = None) -> None:
@@ -100,9 +101,7 @@ def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site, width: float | No
     shape.prop(site, "region_shape")
     size.prop(site, "radius", text="Along Them" if site.follows_approaches() else "Radius")
     draw_sentence(layout, _place_text(site), icon="INFO", width=width)
-    body = section(layout, "sources")
-    if body is not None:
-        _draw_sources(body, site)
+    draw_sections(layout, {"sources": _draw_sources}, site)
 
 
 def _draw_sources(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:

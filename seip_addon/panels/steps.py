@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from . import export, placement, results, sensors, site, traffic
-from .sections import section
+from .sections import draw_sections
 from .sidebar import Sidebar
 
 
@@ -18,15 +18,11 @@ class SEIP_PT_steps(Sidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the sections."""
-        for name, step in (("site", site), ("sensors", sensors), ("placement", placement)):
-            body = section(self.layout, name, step.status(context.scene))
-            if body is not None:
-                step.draw(body, context)
+        steps = {"site": site, "sensors": sensors, "placement": placement}
+        status = {name: step.status(context.scene) for name, step in steps.items()}
+        draw_sections(self.layout, {name: step.draw for name, step in steps.items()}, context, status)
         self.layout.separator(type="LINE")
-        for name, part in (("results", results), ("traffic", traffic), ("export", export)):
-            body = section(self.layout, name)
-            if body is not None:
-                part.draw(body, context)
+        draw_sections(self.layout, {"results": results.draw, "traffic": traffic.draw, "export": export.draw}, context)
 
 
 CLASSES = (SEIP_PT_steps,)

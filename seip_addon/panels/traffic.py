@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..operators.results import SEIP_OT_show_in_traffic, no_placement
 from ..operators.traffic import (
     SEIP_OT_clear_traffic,
     SEIP_OT_load_traffic,
@@ -15,9 +16,9 @@ from ..operators.traffic import (
     why_no_trial,
 )
 from ..session import session
-from . import detection
+from . import detection, simulation, verification
 from .run_button import draw_run
-from .sections import section
+from .sections import draw_sections
 from .sidebar import settings_column
 from .wrapped_text import draw_sentence
 
@@ -27,7 +28,8 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     traffic = context.scene.seip.traffic
     column = layout.column(align=True)
     column.prop(traffic, "file", text="", placeholder="Traffic (.npz, .xml)")
-    if traffic.file and not traffic.file.lower().endswith(".npz"):
+    files = traffic.files()
+    if files is not None and not files.trajectories:
         column.prop(traffic, "routes", text="", placeholder="Routes (vehicle types)")
         column.prop(traffic, "net", text="", placeholder="Network (.net.xml)")
     reason = why_no_load(context.scene)
@@ -41,10 +43,32 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         draw_sentence(layout, line)
     if not why_no_trial(context.scene):
         draw_run(layout, SEIP_OT_try_in_traffic.bl_idname)
-    for name, draw_body in (("scan", _draw_scan), ("dataset", _draw_dataset), ("detection", detection.draw)):
-        body = section(layout, name)
-        if body is not None:
-            draw_body(body, context)
+    if context.scene.session_uid in session.traffic and not no_placement(context.scene):
+        _draw_coverage(layout)
+    draw_sections(
+        layout,
+        {
+            "simulation": simulation.draw,
+            "scan": _draw_scan,
+            "dataset": _draw_dataset,
+            "detection": detection.draw,
+            "verification": verification.draw,
+        },
+        context,
+    )
+
+
+def _draw_coverage(layout: bpy.types.UILayout) -> None:
+    """Draw the button that shows the coverage of the current frame, and that coverage."""
+    shown = session.in_traffic
+    if shown is None:
+        draw_run(layout, SEIP_OT_show_in_traffic.bl_idname, icon="ORIENTATION_GLOBAL")
+        return
+    layout.operator(SEIP_OT_show_in_traffic.bl_idname, text="Coverage of Empty Road", icon="PAUSE", depress=True)
+    if shown.problem:
+        draw_sentence(layout, shown.problem, icon="ERROR", alert=True)
+    else:
+        layout.label(text=f"Coverage at this frame {shown.coverage:.2%}", icon="HIDE_OFF")
 
 
 def _draw_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -7,12 +7,12 @@ import bpy
 
 FONT = 0
 """Number of the font of the interface."""
-MARGIN = 46.0
-"""Width of a panel's frame, of the tabs and of the scroll bar, pixels at the usual scale of the interface."""
+MARGIN = 62.0
+"""Width of a panel's frame, of the tabs, of the scroll bar and before a text, pixels at the usual scale."""
 BOX = 22.0
 """Width of the frame of a box, pixels at the usual scale."""
-ICON = 22.0
-"""Width of an icon before a text, pixels at the usual scale."""
+ICON = 18.0
+"""Width that an icon before a text takes from it, pixels at the usual scale."""
 DEFAULT_WIDTH = 250.0
 """Width of the sidebar where there is no region, pixels at the usual scale."""
 

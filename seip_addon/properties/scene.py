@@ -10,9 +10,11 @@ from .detection import SEIP_PG_detection
 from .placement import SEIP_PG_goal
 from .results import SEIP_PG_placement, SEIP_PG_result
 from .sections import SEIP_PG_sections
+from .simulation import SEIP_PG_simulation
 from .site import SEIP_PG_site
 from .survey import SEIP_PG_survey
 from .traffic import SEIP_PG_traffic
+from .verification import SEIP_PG_verification
 from .view import SEIP_PG_view
 
 
@@ -29,7 +31,9 @@ class SEIP_PG_scene(bpy.types.PropertyGroup):
     active_kept: IntProperty(name="Kept Placement", description="The one that the present placement is compared with")
     view: PointerProperty(type=SEIP_PG_view)
     traffic: PointerProperty(type=SEIP_PG_traffic)
+    simulation: PointerProperty(type=SEIP_PG_simulation)
     detection: PointerProperty(type=SEIP_PG_detection)
+    verification: PointerProperty(type=SEIP_PG_verification)
 
 
 CLASSES = (SEIP_PG_scene,)

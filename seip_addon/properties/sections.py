@@ -61,9 +61,11 @@ class SEIP_PG_sections(bpy.types.PropertyGroup):
     ranking: _section("Candidate Ranking")
     comparison: _section("Compare")
     traffic: _section("Traffic and Detection")
+    simulation: _section("Traffic Simulation")
     scan: _section("Scan")
     dataset: _section("Dataset")
     detection: _section("Detection")
+    verification: _section("Verification")
     export: _section("Export")
 
     def follow_steps(self) -> None:

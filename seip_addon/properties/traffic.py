@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
@@ -12,6 +14,12 @@ from ..core.sensing.scans.simulation import ScanSettings
 from ..core.sensing.traffic.source import TrafficFiles
 from ..core.workflows.recording import RecordingSettings
 from .conversion import absolute, as_typed, of_setting
+
+EXAMPLE = "Example"
+"""In place of a traffic file: the traffic of the example, which is at another path on every machine."""
+EXAMPLES = Path(__file__).resolve().parents[2] / "scenes"
+"""Folder of the example: beside the package, in a checkout as in the extension."""
+EXAMPLE_RUN = EXAMPLES / "junction_traffic" / "run-1.npz"
 
 
 def _follow(_own: object, _context: bpy.types.Context) -> None:
@@ -24,7 +32,7 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
     file: StringProperty(
         name="Traffic",
         description="Trajectories (.npz) or floating car data of SUMO (.xml, .csv, packed or not); "
-        "empty for objects that are animated in the scene",
+        f"{EXAMPLE} for the traffic of the example; empty for objects that are animated in the scene",
         subtype="FILE_PATH",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
@@ -100,6 +108,8 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
         """Return the files that traffic is read from, None where it is animated in the scene."""
         if not self.file:
             return None
+        if self.file == EXAMPLE:
+            return TrafficFiles(EXAMPLE_RUN)
         routes = (absolute(self.routes),) if self.routes else ()
         return TrafficFiles(absolute(self.file), routes, absolute(self.net) if self.net else None)
 

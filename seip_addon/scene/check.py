@@ -157,7 +157,7 @@ def _without_role(
 
 def _needs_no_role(obj: bpy.types.Object) -> bool:
     return obj.display_type in {"BOUNDS", "WIRE"} or any(
-        contract.kind(collection) in NEVER_IN_THE_WAY for collection in obj.users_collection
+        contract.base_name(collection) in NEVER_IN_THE_WAY for collection in obj.users_collection
     )
 
 

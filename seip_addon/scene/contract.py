@@ -1,4 +1,4 @@
-"""The scene contract's names: collections and custom properties, as docs/architecture.md explains them."""
+"""Names of collections and custom properties in the scene contract, which docs/architecture.md describes."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ COVERAGE = "SEIP Coverage"
 TRAFFIC = "SEIP Traffic"
 
 AREAS = (REGION, CANDIDATE_AREAS, WEIGHTED_REGIONS, FORBIDDEN_AREAS, MANDATORY_AREAS)
-"""Collections whose objects mean an area in plan."""
+"""Collections whose objects outline areas in plan."""
 INPUTS = (*AREAS, ROADS, GROUND, OCCLUDERS, POLES)
-"""The collections that a site is read from; `SENSORS` and `COVERAGE` are written, `TRAFFIC` is either."""
+"""Collections that a site is read from. `SENSORS` and `COVERAGE` are written; `TRAFFIC` is read and written."""
 
 WEIGHT = "seip_weight"
 FORBIDDEN = "seip_forbidden"
@@ -48,27 +48,28 @@ CATEGORY = "seip_category"
 PAINT = "seip_paint"
 SHAPE = "seip_shape"
 BUILT = "seip_built"
-"""Mark of every object that was built from a map, and on the scene the place on that map."""
+"""Mark of every object that was built from a map; on a scene, the place on that map."""
 WRITTEN = "seip_result"
-"""Mark of every object that this program writes as a result or from trajectories: the next ones replace it only."""
+"""Mark of every object that this program writes as a result or from trajectories. The next ones replace only these."""
 
 NUMBER = re.compile(r"\.\d{3,}$")
+"""Number that Blender appends to a name that exists already, as in ``SEIP Roads.001``."""
 
 
-def kind(collection: bpy.types.Collection) -> str:
-    """Return the name that counts: without the number that Blender adds where another scene has the name already."""
+def base_name(collection: bpy.types.Collection) -> str:
+    """Return the name of a collection without the number that Blender adds if another scene has the same name."""
     return NUMBER.sub("", collection.name)
 
 
 def find(scene: bpy.types.Scene, name: str) -> bpy.types.Collection | None:
     """Return the scene's own collection of that name, anywhere below its root, or None."""
     below = scene.collection.children_recursive
-    own = (collection for collection in below if collection.library is None and kind(collection) == name)
+    own = (collection for collection in below if collection.library is None and base_name(collection) == name)
     return next(own, None)
 
 
 def find_or_make(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
-    """Return the scene's own collection of that name, made under the root where it is missing."""
+    """Return the scene's own collection of that name, created below the root if it is missing."""
     collection = find(scene, name)
     if collection is None:
         collection = bpy.data.collections.new(name)
@@ -77,7 +78,7 @@ def find_or_make(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
 
 
 def leave_shared(scene: bpy.types.Scene, name: str) -> None:
-    """Unlink a scene's collection of that name where other scenes have it too, as after Blender's Linked Copy."""
+    """Unlink a scene's collection if other scenes have it too, as after Blender's Linked Copy."""
     top = scene.collection.children
     shared = find(scene, name)
     others = (other for other in bpy.data.scenes if other != scene)
@@ -86,25 +87,26 @@ def leave_shared(scene: bpy.types.Scene, name: str) -> None:
 
 
 def has_members(scene: bpy.types.Scene, name: str) -> bool:
-    """Return whether a collection that is read holds any object."""
-    return any(kind(collection) == name and len(collection.all_objects) > 0 for collection in _reached(scene))
+    """Return whether the collections of a name, which may be several, contain an object."""
+    return any(base_name(collection) == name and len(collection.all_objects) > 0 for collection in _reached(scene))
 
 
 def members(scene: bpy.types.Scene) -> dict[str, set[bpy.types.Object]]:
-    """Return the objects of each collection that is read.
+    """Return the objects of each collection in `INPUTS`.
 
-    Collections count below the scene's root, linked ones included, and within
-    the collections that objects of the scene instance.
+    This includes linked collections below the scene's root, and collections within those that objects instance.
     """
     found: dict[str, set[bpy.types.Object]] = {name: set() for name in INPUTS}
     for collection in _reached(scene):
-        if kind(collection) in found:
-            found[kind(collection)].update(collection.all_objects)
+        if base_name(collection) in found:
+            found[base_name(collection)].update(collection.all_objects)
     return found
 
 
 def _reached(scene: bpy.types.Scene) -> set[bpy.types.Collection]:
     """Return the collections below the scene's root and, at any depth, within instanced ones."""
+    # Objects can instance collections that contain other instances. Each collection is visited once, also if it can be
+    # reached in several ways.
     reached = {scene.collection}
     waiting = [scene.collection]
     while waiting:

@@ -142,7 +142,7 @@ def rendered_pictures(
     """
     shots = shots_of(site, deployment) if close_ups else shots_of(site, deployment)[:1]
     raws = raw_files(folder, shots)
-    with _silence():
+    with silenced():
         taken = take(shots, scene, raws)
     return labelled_pictures(shots, taken, raws, site, deployment)
 
@@ -184,7 +184,7 @@ def _stage(scene: bpy.types.Scene) -> Iterator[bpy.types.Scene]:
 
 
 @contextmanager
-def _silence() -> Iterator[None]:
+def silenced() -> Iterator[None]:
     """Keep Blender's lines about each step of a render from standard output, where results are printed."""
     sys.stdout.flush()
     kept = os.dup(1)
@@ -203,7 +203,7 @@ def _rendered_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     layers = [scene.view_layers[0].layer_collection]
     while layers:
         layer = layers.pop()
-        if layer.exclude or layer.collection.hide_render or contract.kind(layer.collection) in contract.AREAS:
+        if layer.exclude or layer.collection.hide_render or contract.base_name(layer.collection) in contract.AREAS:
             continue
         layers.extend(layer.children)
         found |= {obj.name_full: obj for obj in layer.collection.objects}

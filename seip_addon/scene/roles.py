@@ -38,9 +38,9 @@ SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 def roles_of(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[Role, ...]:
     """Return the roles that an object is linked to, directly or in a sub-collection."""
     kinds = {
-        contract.kind(collection)
+        contract.base_name(collection)
         for collection in scene.collection.children_recursive
-        if contract.kind(collection) in contract.INPUTS and collection.all_objects.get(obj.name) == obj
+        if contract.base_name(collection) in contract.INPUTS and collection.all_objects.get(obj.name) == obj
     }
     return tuple(role for role, collection in ROLES.items() if collection in kinds)
 
@@ -76,7 +76,7 @@ def take_out(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object], role: 
         None of them has the role by a collection of this file.
     """
     count = 0
-    top = [c for c in scene.collection.children_recursive if contract.kind(c) == ROLES[role]]
+    top = [c for c in scene.collection.children_recursive if contract.base_name(c) == ROLES[role]]
     own = {c for collection in top for c in (collection, *collection.children_recursive) if c.library is None}
     for obj in objects:
         linked = [collection for collection in own if obj.name in collection.objects]

@@ -71,6 +71,26 @@ def labelled_sensors(scene: bpy.types.Scene, *, hidden: bool = False) -> dict[st
     return {labels[obj.name]: obj for obj in sorted(empties, key=lambda obj: _natural(labels[obj.name]))}
 
 
+def sensor_positions(scene: bpy.types.Scene) -> tuple[str, ...]:
+    """Return the names of the positions at which the sensors of a scene were placed.
+
+    Raises
+    ------
+    SeipError
+        There is no sensor, or one that was not placed at a candidate position.
+    """
+    empties = labelled_sensors(scene)
+    if not empties:
+        raise SeipError("the scene has no sensors to keep: place some first")
+    found = {label: str(empty.get(contract.POSITION, "")) for label, empty in empties.items()}
+    others = [label for label, position in found.items() if not position]
+    if others:
+        raise SeipError(
+            f"sensor {', '.join(others)} was not placed at a candidate position: name positions with --require instead"
+        )
+    return tuple(found.values())
+
+
 def _is_shown(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
     return obj.name in layer.objects and bool(obj.visible_get(view_layer=layer))
 

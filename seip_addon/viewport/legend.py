@@ -4,44 +4,61 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import blf
-import bpy
 import gpu
 from gpu_extras.batch import batch_for_shader
 
 from ..overlay import Block, Colour, Entry
+from .free_frame import Box
 
 TEXT_SIZE, LINE, SWATCH, GAP, MARGIN = 12.0, 20.0, 22.0, 8.0, 14.0  # pixels at the interface's usual scale
+LEAST_SCALE = 0.6
+"""Scale below which letters could not be read; a legend that has no room even so is cut."""
 PAPER: Colour = (0.06, 0.08, 0.10, 0.82)
 INK: Colour = (0.95, 0.96, 0.97, 1.0)
 EDGE: Colour = (0.55, 0.58, 0.62, 1.0)
 FONT = 0
 
 
-def draw_legend(blocks: Sequence[Block], region: bpy.types.Region, area: bpy.types.Area, scale: float) -> None:
-    """Draw the legend into a viewport, beside its sidebar.
+def placed_legend(blocks: Sequence[Block], frame: Box, scale: float, gizmos: Sequence[Box] = ()) -> tuple[Box, float]:
+    """Return the box of the legend in the lower right corner of a frame, and the scale at which it fits there.
+
+    It is below the gizmos where it has room, otherwise beside as many of them as leaves it largest.
 
     Parameters
     ----------
-    region : bpy.types.Region
-        The viewport's window.
+    frame : (left, bottom, right, top), pixels
+        Part of a viewport that nothing covers.
     scale : float
-        Scale of the interface.
+        Scale of the interface, and of the legend where there is room.
+    gizmos : sequence of Box
+        Boxes in the upper right corner that the legend keeps off, the widest first and each lower than the one before.
     """
-    overlaps = bpy.context.preferences.system.use_region_overlap
-    beside = next((other.width for other in area.regions if other.type == "UI" and overlaps and other.width > 1), 0)
-    draw_legend_at(blocks, region.width - beside - MARGIN * scale, MARGIN * scale, scale)
+    left, bottom, right, top = frame
+    rights = [right, *(box[0] for box in reversed(gizmos))]
+    tops = [*(box[1] for box in reversed(gizmos)), top]
+    frames = [(left, bottom, max(left, x), max(bottom, y)) for x, y in zip(rights, tops, strict=True)]
+    return max((_placed(blocks, one, scale) for one in frames), key=lambda placed: placed[1])
 
 
-def draw_legend_at(blocks: Sequence[Block], right: float, bottom: float, scale: float) -> None:
-    """Draw the legend with its lower right corner at a place in pixels."""
-    if not blocks:
-        return
+def _placed(blocks: Sequence[Block], frame: Box, scale: float) -> tuple[Box, float]:
+    """Return the box of the legend in the lower right corner of a frame, and the scale at which it fits there."""
+    left, bottom, right, top = frame
+    wide, tall = _size(blocks, scale)
+    room = max(right - left - 2 * MARGIN * scale, 1.0), max(top - bottom - 2 * MARGIN * scale, 1.0)
+    share = min(1.0, room[0] / wide, room[1] / tall)
+    if share < 1.0:
+        scale *= max(share, LEAST_SCALE / scale)
+        wide, tall = _size(blocks, scale)
+    x, y = right - MARGIN * scale, bottom + MARGIN * scale
+    return (x - wide, y, x, y + tall), scale
+
+
+def draw_legend(blocks: Sequence[Block], box: Box, scale: float) -> None:
+    """Draw the legend into its box, see `placed_legend`."""
+    left, bottom, right, top = box
     blf.size(FONT, TEXT_SIZE * scale)
-    wide = max(_width(block) for block in blocks) + 2 * GAP * scale + (SWATCH + GAP) * scale
-    lines = sum(1 + len(block.entries) for block in blocks)
-    tall = (lines * LINE + (len(blocks) + 1) * GAP) * scale
-    fill(right - wide, bottom, wide, tall, (PAPER, PAPER))
-    x, y = right - wide + GAP * scale, bottom + tall - GAP * scale
+    fill(left, bottom, right - left, top - bottom, (PAPER, PAPER))
+    x, y = left + GAP * scale, top - GAP * scale
     for block in blocks:
         y -= LINE * scale
         write(block.title, x, y, scale)
@@ -49,6 +66,14 @@ def draw_legend_at(blocks: Sequence[Block], right: float, bottom: float, scale: 
             y -= LINE * scale
             _draw_entry(entry, x, y, scale)
         y -= GAP * scale
+
+
+def _size(blocks: Sequence[Block], scale: float) -> tuple[float, float]:
+    """Return width and height of the legend, pixels."""
+    blf.size(FONT, TEXT_SIZE * scale)
+    wide = max(_width(block) for block in blocks) + 2 * GAP * scale + (SWATCH + GAP) * scale
+    lines = sum(1 + len(block.entries) for block in blocks)
+    return wide, (lines * LINE + (len(blocks) + 1) * GAP) * scale
 
 
 def _width(block: Block) -> float:

@@ -3,16 +3,19 @@
 Blender's draw handlers are registered only while there is an overlay.
 """
 
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
 import bpy
 import gpu
+from mathutils import Matrix
 
 from ..overlay import Block, Label, Overlay
 from ..session import session
+from .free_frame import Box, free_frame, navigation_boxes
 from .labels import draw_labels
-from .legend import draw_legend
+from .legend import draw_legend, placed_legend
 
 TAB = "SEIP"
 DRAWN = 0.5
@@ -118,8 +121,40 @@ def _draw_view() -> None:
 def _draw_pixels() -> None:
     context = bpy.context
     region, scale = context.region, context.preferences.system.ui_scale
-    draw_labels(labels_of(context.scene), context.region_data.perspective_matrix, (region.width, region.height), scale)
-    draw_legend(legend_blocks(context.scene), region, context.area, scale)
+    size = (region.width, region.height)
+    frame = free_frame(context.area, region)
+    gizmos = navigation_boxes(context.space_data, frame, scale)
+    draw_words(context.scene, context.region_data.perspective_matrix, size, frame, scale, gizmos)
+
+
+def draw_words(  # where words may be is of several kinds
+    scene: bpy.types.Scene,
+    to_view: Matrix,
+    size: tuple[int, int],
+    frame: Box,
+    scale: float,
+    gizmos: Sequence[Box] = (),
+) -> None:
+    """Draw the legend of a scene's overlays and the labels, which keep off it.
+
+    Parameters
+    ----------
+    to_view : (4, 4) Matrix
+        See `draw_labels`.
+    size : (width, height), pixels
+    frame : (left, bottom, right, top), pixels
+        Part of the viewport that nothing covers.
+    scale : float
+        Scale of the interface.
+    gizmos : sequence of Box
+        Boxes that the legend keeps off, see `placed_legend`.
+    """
+    blocks, taken = legend_blocks(scene), []
+    if blocks:
+        box, legend_scale = placed_legend(blocks, frame, scale, gizmos)
+        draw_legend(blocks, box, legend_scale)
+        taken.append(box)
+    draw_labels(labels_of(scene), to_view, size, frame, taken, scale)
 
 
 def forget() -> None:

@@ -6,9 +6,7 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from .labels import draw_labels
-from .legend import MARGIN, draw_legend_at
-from .overlays import draw_overlays, labels_of, legend_blocks
+from .overlays import draw_overlays, draw_words
 
 WIDTH = 1920  # pixels
 
@@ -40,8 +38,7 @@ def _draw_over(scene: bpy.types.Scene, view: Matrix, projection: Matrix, height:
         draw_overlays(scene)
         gpu.matrix.load_matrix(Matrix.Identity(4))
         gpu.matrix.load_projection_matrix(_pixels(WIDTH, height))
-        draw_labels(labels_of(scene), projection @ view, (WIDTH, height), scale)
-        draw_legend_at(legend_blocks(scene), WIDTH - MARGIN, MARGIN, scale)
+        draw_words(scene, projection @ view, (WIDTH, height), (0, 0, WIDTH, height), scale)
 
 
 def _pixels(width: int, height: int) -> Matrix:

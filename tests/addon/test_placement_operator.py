@@ -14,10 +14,13 @@ import pytest
 
 from seip_addon import scene_status, selection
 from seip_addon import session as session_data
+from seip_addon.core.choosing.placement.returns_summary import ReturnsPoint, ReturnsSummary
 from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.visibility.grid import VisibilityGrid
 from seip_addon.core.sensing.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
+from seip_addon.core.storage.json_dataclass import as_json
+from seip_addon.operators import results
 from seip_addon.panels import export as export_panel
 from seip_addon.panels import placement as placement_panel
 from seip_addon.scene.contract import WRITTEN
@@ -75,6 +78,20 @@ def test_files_of_an_export_can_be_opened_while_they_are_of_the_placement(juncti
         bpy.ops.seip.show_plan()
 
 
+def test_files_of_another_objective_are_not_opened_as_those_of_the_placement(junction, tmp_path):
+    """A batch run with other shares of the road users may choose the same sensors, of another value."""
+    bpy.ops.seip.solve_placement()
+    junction.seip.result.folder = str(tmp_path)
+    bpy.ops.seip.export_result()
+    assert results.exported_files(junction)
+    path = tmp_path / "placement.json"
+    content = json.loads(path.read_text(encoding="utf-8"))
+    assert content["settings"]["goal"]["shares"] == [1.0, 1.0, 1.0]
+    content["settings"]["goal"]["shares"] = [1.0, 2.0, 2.0]
+    path.write_text(json.dumps(content), encoding="utf-8")
+    assert not results.exported_files(junction)
+
+
 @pytest.mark.slow
 def test_pose_errors_are_only_evaluated_where_that_is_the_risk_measure(junction, tmp_path, small_scene):
     junction.seip.goal.scenarios, junction.seip.goal.risk = "pose-errors", "none"
@@ -111,6 +128,25 @@ def test_a_click_on_a_number_of_sensors_makes_it_the_goal(junction):
     assert len(placed.sensors) == 3
     assert placed.coverage.whole == record.front[2].coverage  # of a site of this size, both are proven optimal
     assert placed.price_usd == record.front[2].price
+
+
+def test_numbers_of_sensors_placed_by_returns_show_returns(junction):
+    front = (ReturnsPoint(1, 4.0, 1000.0, 0.0), ReturnsPoint(2, 16.0, 2000.0, 0.0))
+    bpy.ops.seip.solve_placement()
+    record = parsed_record(junction.seip.result.record)
+    by_returns = replace(record, front=(), returns=ReturnsSummary(16.0, {"car": 16.0}, (), front))
+    assert placement_panel.numbers(by_returns) == [(1, 0.25, "4 returns · $1,000"), (2, 1.0, "16 returns · $2,000")]
+    text = "Returns and price of the best placement found for each number, without a budget. "
+    assert placement_panel.front_text(by_returns) == f"{text}No other has more."
+    for gap, limit in ((0.031, "Others have at most 3.1% more."), (None, "Others may have more.")):
+        open_ended = replace(by_returns.returns, front=(front[0], replace(front[1], gap=gap)))
+        assert placement_panel.front_text(replace(by_returns, returns=open_ended)) == f"{text}{limit}"
+    stored = json.loads(junction.seip.result.record) | {"front": [], "returns": as_json(by_returns.returns)}
+    junction.seip.result.record = json.dumps(stored)
+    junction.seip.sections.numbers = True
+    layout, numbers = choices(junction)
+    assert [number[0] for number in numbers] == [1, 2]
+    assert [bar[1] for bar in layout.bars] == ["4 returns · $1,000", "16 returns · $2,000"]
 
 
 def test_numbers_of_sensors_are_not_offered_where_the_record_has_none(junction):

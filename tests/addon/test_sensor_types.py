@@ -15,9 +15,8 @@ from seip_addon.core.geometry.orientation import orientation
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.visibility.ray_casting import MAX_THREADS
 from seip_addon.core.sensing.visibility.ring_resolution import unresolved_from
-from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.candidates import DEFAULT_TYPE, CandidateSettings
 from seip_addon.panels import sensor_table, sensors
-from seip_addon.sensor_types import DEFAULT_TYPE
 from seip_addon.session import session
 from seip_addon.viewport import beam_preview
 from tests.builders.drawn_layout import DrawnLayout

@@ -137,7 +137,7 @@ def test_an_unknown_junction_is_named(scene):
     choose(scene).junction = "777"
     with pytest.raises(RuntimeError, match="no junction '777'"):
         bpy.ops.seip.build_site()
-    assert not any(contract.kind(collection) in contract.INPUTS for collection in bpy.data.collections)
+    assert not any(contract.base_name(collection) in contract.INPUTS for collection in bpy.data.collections)
 
 
 def test_roles_by_operator(scene):

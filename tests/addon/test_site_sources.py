@@ -117,7 +117,7 @@ def test_the_fields_are_those_of_the_request(scene, street):
     ("buildings_origin", "1 2", "must be three numbers"),
     ("buildings_origin", "here", "the origin of the city model must be numbers"),
     ("mesh_origin", "here", "the origin of the meshes must be numbers"),
-    ("mesh_origin", "", "the place of first.obj must be"),
+    ("mesh_origin", "", "the origin of first.obj must be"),
     ("mesh_origin", "9000 9000", "is not within 2,000 m of the site"),
     ("meshes", "//nowhere", "has no file with a mesh"),
     ("terrain", "//none.tif", "no such file"),

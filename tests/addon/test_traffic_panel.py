@@ -9,12 +9,19 @@ import bpy
 import numpy as np
 import pytest
 
+from seip_addon import live_scan, traffic_coverage
+from seip_addon.core.choosing.robustness.traffic_instants import obstacles_of
+from seip_addon.core.choosing.robustness.visibility_in_traffic import visibility_in_traffic
 from seip_addon.core.output.results.placement_file import load_placement
+from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scans.frame import Frame
-from seip_addon.scene.write import write_result
+from seip_addon.core.workflows.survey import surroundings
+from seip_addon.panels import traffic as traffic_panel
+from seip_addon.scene.write import ASPECT, SEEN_BY, coverage_of, write_result
 from seip_addon.session import session
 from seip_addon.viewport import overlays
 from seip_addon.viewport.point_cloud import NAME as CLOUD
+from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import ORIGIN, make_example
 
@@ -120,6 +127,18 @@ def test_the_cloud_is_drawn_in_the_colours_asked_for(placed):
     assert overlays.find(placed, CLOUD) is None
 
 
+def test_other_traffic_ends_the_scan_of_the_earlier(placed, small_scene):
+    bpy.ops.seip.load_traffic()
+    bpy.ops.seip.scan_frame()
+    placed.seip.traffic.follow = True
+    placed.seip.traffic.file = str(small_scene.parent / "small_traffic" / "run-2.npz")
+    bpy.ops.seip.load_traffic()
+    assert session.scan_of(placed) is None
+    assert overlays.find(placed, CLOUD) is None
+    placed.frame_set(300)
+    assert session.scan_of(placed) is None
+
+
 def test_animated_objects_are_scanned_as_the_file_is(placed):
     bpy.ops.seip.load_traffic()
     placed.frame_set(480)
@@ -200,3 +219,54 @@ def test_floating_car_data_are_put_on_the_road(placed, tmp_path):
     assert placed.seip.traffic.loaded.startswith("1 road user, 0 to 5 s\n1 car")
     bpy.ops.seip.scan_frame()
     assert session.scan_of(placed).run.trajectories.source == "run.fcd.xml"
+
+
+def shown_seen_by(scene):
+    attribute = coverage_of(scene).data.attributes[SEEN_BY]
+    counts = np.empty(len(attribute.data), dtype=np.int32)
+    attribute.data.foreach_get("value", counts)
+    return counts
+
+
+def test_coverage_follows_the_timeline_and_is_that_of_the_empty_road_again(placed):
+    empty, aspect = shown_seen_by(placed), coverage_of(placed)[ASPECT]
+    with pytest.raises(RuntimeError, match="load the traffic first"):
+        bpy.ops.seip.show_in_traffic()
+    bpy.ops.seip.load_traffic()
+    placed.frame_set(0)
+    assert bpy.ops.seip.show_in_traffic() == {"FINISHED"}
+    survey, solution = session.state_of(placed).placed()
+    run = session.traffic[placed.session_uid].trajectories
+    hidden = 0
+    for frame in (0, 150, 300, 450):
+        placed.frame_set(frame)
+        traffic_coverage.update()  # as the timer does, which does not run without a window
+        present = obstacles_of(run, run.at(live_scan.now(placed)))
+        views = finish(visibility_in_traffic(surroundings(survey), solution.placement.chosen, [present]))
+        assert shown_seen_by(placed).tolist() == views.seen(0).sum(axis=0).tolist()
+        assert session.in_traffic.coverage == pytest.approx((shown_seen_by(placed) > 0).mean())
+        hidden += int(((empty > 0) & (shown_seen_by(placed) == 0)).sum())
+    assert hidden > 0
+    layout = DrawnLayout()
+    traffic_panel.draw(layout, bpy.context)
+    assert "seip.show_in_traffic" in dict(layout.operators)
+    assert bpy.ops.seip.show_in_traffic() == {"FINISHED"}
+    assert session.in_traffic is None
+    assert shown_seen_by(placed).tolist() == empty.tolist()
+    assert coverage_of(placed)[ASPECT] == aspect
+
+
+def test_coverage_in_traffic_of_another_placement_or_without_traffic_says_so(placed):
+    bpy.ops.seip.load_traffic()
+    bpy.ops.seip.show_in_traffic()
+    own = session.traffic.pop(placed.session_uid)
+    traffic_coverage.update()
+    assert "load it again" in session.in_traffic.problem
+    session.traffic[placed.session_uid] = own
+    traffic_coverage.update()
+    assert session.in_traffic.problem == ""
+    placed.seip.result.record += " "
+    traffic_coverage.update()
+    assert "another placement" in session.in_traffic.problem
+    bpy.ops.seip.show_in_traffic()
+    assert session.in_traffic is None

@@ -137,7 +137,7 @@ def test_the_certificate_of_a_placement_for_traffic_is_about_that_and_has_no_tic
     [
         (None, "the scene or its settings have changed: place again"),
         (-1, r"sensors\[0\]\.pose is -1, not 0 to"),
-        (10**6, "a sensor has the pose 1000000, and there are 16"),
+        (10**6, "a sensor has the pose 1000000, but poses end at 15"),
     ],
 )
 def test_a_record_of_a_pose_that_is_not_there_has_its_sentence(placed, pose, sentence):

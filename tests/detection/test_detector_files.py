@@ -53,14 +53,14 @@ def _experience(value):
 
 
 CHANGES = {
-    "a weight that is no number": (_first(math.nan), "weights are not finite"),
-    "an endless weight": (_first(math.inf), "weights are not finite"),
+    "a weight that is no number": (_first(math.nan), "weights are not finite numbers"),
+    "an endless weight": (_first(math.inf), "weights are not finite numbers"),
     "a width out of range": (_set("settings", "width", 10**6), "width must lie between"),
     "a width in halves": (_set("settings", "width", 8.5), "width must lie between"),
     "a setting that nobody knows": (_set("settings", "depth", 3), "damaged"),
     "a number for what it has been trained on": (_experience(3), "damaged"),
-    "numbers for sensors": (_experience({"sensors": [1, 2]}), "no names"),
-    "letters for sensors": (_experience({"sensors": "type1"}), "no names"),
+    "numbers for sensors": (_experience({"sensors": [1, 2]}), "not a list of names"),
+    "letters for sensors": (_experience({"sensors": "type1"}), "not a list of names"),
 }
 
 
@@ -76,14 +76,14 @@ def test_tensors_larger_than_the_file_are_refused(stored):
     state = torch.load(stored, weights_only=True)
     state["weights"][next(iter(state["weights"]))] = torch.zeros(1).expand(2**34)
     torch.save(state, stored)
-    with pytest.raises(SeipError, match="larger than itself"):
+    with pytest.raises(SeipError, match="tensors are larger than the file"):
         Detector.load(stored)
 
 
 def test_a_file_of_another_version_is_refused(stored):
     state = torch.load(stored, weights_only=True) | {"version": 2}
     torch.save(state, stored)
-    with pytest.raises(SeipError, match="no detector of this version; train it again"):
+    with pytest.raises(SeipError, match="not a detector of this version of the program: train it again"):
         Detector.load(stored)
 
 
@@ -91,7 +91,7 @@ def test_other_weights_than_were_written_are_noticed(stored):
     state = torch.load(stored, weights_only=True)
     next(iter(state["weights"].values())).flatten()[0] += 1.0
     torch.save(state, stored)
-    with pytest.raises(SeipError, match="not what was written"):
+    with pytest.raises(SeipError, match="digest does not match"):
         Detector.load(stored)
 
 

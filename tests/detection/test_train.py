@@ -115,7 +115,7 @@ def test_the_same_traffic_under_another_name_is_refused(folder):
 def test_what_is_no_run_and_no_device_is_refused(folder):
     with pytest.raises(SeipError, match="does not contain a run of scans"):
         train.main(arguments(folder, "none", test="nowhere"))
-    with pytest.raises(SeipError, match="torch cannot use the device 'abacus'"):
+    with pytest.raises(SeipError, match="PyTorch cannot use the device 'abacus'"):
         train.main(arguments(folder, "none", more=("--device", "abacus")))
 
 

@@ -244,12 +244,12 @@ def test_a_detector_is_read_back_as_it_was(tmp_path, learning, aside):
 def test_what_is_no_detector_is_refused(tmp_path, content):
     path = tmp_path / "detector.pt"
     path.write_bytes(content)
-    with pytest.raises(SeipError, match="is no detector, or is damaged"):
+    with pytest.raises(SeipError, match="is not a detector file, or is damaged"):
         Detector.load(path)
     torch.save({"schema": "seip.detector", "version": 99}, path)
-    with pytest.raises(SeipError, match="no detector of this version"):
+    with pytest.raises(SeipError, match="not a detector of this version"):
         Detector.load(path)
-    with pytest.raises(SeipError, match="there is no detector"):
+    with pytest.raises(SeipError, match=r"missing\.pt cannot be read"):
         Detector.load(tmp_path / "missing.pt")
 
 

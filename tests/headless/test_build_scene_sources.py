@@ -105,7 +105,7 @@ def test_the_map_is_written_where_the_level_must_be_chosen(tmp_path):
     extract.way([(0, -300), (0, 300)], highway="trunk", name="Trunk Road")
     path, output = extract.write(tmp_path / "place.osm"), tmp_path / "site.blend"
     asked = [str(path), "--near-latlon", "52.5, 13.4", "--radius", "60", "-o", str(output)]
-    with pytest.raises(SeipError, match=r"--level 'High Road' or --level 'Trunk Road'; .*site\.xodr is written"):
+    with pytest.raises(SeipError, match=r"level 'High Road' or level 'Trunk Road'\); .*site\.xodr is written"):
         build_scene.main(asked)
     assert not output.exists()
     assert {road.name for road in read_map(tmp_path / "site.xodr").roads} >= {"High Road", "Trunk Road"}

@@ -2,7 +2,7 @@
 
 import math
 
-from headless.charts import error_view, style
+from headless.charts import error_view
 from headless.charts.detection import (
     BinnedFigure,
     PrecisionRecallLine,
@@ -18,6 +18,8 @@ import shapely
 from matplotlib.collections import PolyCollection
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.output.pictures import chart_style as style
+from seip_addon.core.output.pictures.drawing import box_corners
 from tests.builders.charts import is_drawn, legend, line, record_figures, words
 
 
@@ -129,7 +131,7 @@ def test_the_legend_of_errors_is_whole(tmp_path, figures, count):
 
 def test_corners_of_a_turned_box():
     """4 × 2 m about (10, 0), a right angle to the left: the front left corner is at (9, 2)."""
-    (turned,) = error_view.corners(np.array([[10, 0, 4, 2, np.pi / 2]]))
+    (turned,) = box_corners(np.array([[10, 0, 4, 2, np.pi / 2]]))
     assert turned == pytest.approx(np.array([[9, 2], [9, -2], [11, -2], [11, 2]]))
 
 

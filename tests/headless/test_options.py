@@ -17,7 +17,7 @@ from seip_addon.core.limits import Limits
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.settings import settings_of
-from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.candidates import DEFAULT_TYPE, PAPER_TYPES, CandidateSettings
 from seip_addon.core.workflows.survey_settings import SurveySettings
 
 ALL = (CandidateSettings, VisibilitySettings, SurveySettings, Objective, Scenarios, ScanSettings)
@@ -34,6 +34,16 @@ def test_options_left_alone_give_the_defaults(kind):
     parser = argparse.ArgumentParser()
     add_settings(parser, kind, *settings_of(kind))
     assert read_settings(kind, parser.parse_args([])) == kind()
+
+
+def test_commands_start_from_a_product_and_studies_from_the_types_of_the_paper():
+    for study, types in ((False, (DEFAULT_TYPE,)), (True, PAPER_TYPES)):
+        parser = argparse.ArgumentParser()
+        add_options(parser, study=study)
+        assert read_settings(CandidateSettings, parser.parse_args(["-o", "out"])).sensors == types
+        assert read_settings(CandidateSettings, parser.parse_args(["-o", "out", "--sensor", "vlp16"])).sensors == (
+            "vlp16",
+        )
 
 
 @pytest.mark.parametrize(
@@ -65,11 +75,11 @@ def test_what_is_typed_reaches_its_setting_or_is_refused(typed, kind, changed):
 def test_help_has_a_line_for_each_option_and_names_its_default(monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")
     parser = new_parser("place", "Place sensors.")
-    add_options(parser, in_full=True)
+    add_options(parser)
     lines = parser.format_help().splitlines()
     assert lines[0] == "usage: place [scene] -o OUTPUT [options]"
     assert "  -o, --output OUTPUT         folder for the results" in lines
-    assert "  --sensor KEY ...            types to choose from (default: type1 type2 type3)" in lines
+    assert "  --sensor KEY ...            types to choose from (default: os1_128)" in lines
     (assumed,) = (line for line in lines if "--assumed-poles" in line)
     assert "default" not in assumed
     assert len(lines) <= 41
@@ -78,7 +88,7 @@ def test_help_has_a_line_for_each_option_and_names_its_default(monkeypatch):
 def test_help_names_the_options_of_a_survey_where_another_command_explains_them(monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")
     parser = new_parser("study coverage", "Study coverage.")
-    add_options(parser)
+    add_options(parser, study=True)
     text = parser.format_help()
     assert "--heights --tilts --yaws --assumed-poles --installed-cost (see: seip place --help)\n" in text
     assert "types to choose from" not in text

@@ -67,6 +67,28 @@ def test_the_record_says_how_far_it_can_be_trusted(folder):
     assert any("neighbouring rings" in warning for warning in record.warnings)
 
 
+def test_the_next_placement_keeps_the_positions_of_the_installed_sensors(folder, tmp_path):
+    first = {sensor.position for sensor in load_placement(folder / "placement.json").sensors}
+    place.main([str(folder / "placed.blend"), "-o", str(tmp_path / "more"), *QUICK, "--count", "3", "--keep-sensors"])
+    record = load_placement(tmp_path / "more" / "placement.json")
+    assert len(record.sensors) == 3
+    assert first < {sensor.position for sensor in record.sensors}
+    assert set(record.request.goal.mandatory) == first
+
+
+def test_sensors_that_are_not_at_a_position_are_not_kept(small_scene, folder, tmp_path):
+    arguments = ["-o", str(tmp_path / "more"), *QUICK, "--count", "3", "--keep-sensors"]
+    with pytest.raises(SeipError, match="no sensors to keep"):
+        place.main([str(small_scene), *arguments])
+    runtime.open_scene(folder / "placed.blend")
+    for obj in bpy.data.objects:
+        if obj.get("seip_label") == "S2":
+            del obj["seip_position"]
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "own.blend"))
+    with pytest.raises(SeipError, match="sensor S2 was not placed at a candidate position"):
+        place.main([str(tmp_path / "own.blend"), *arguments])
+
+
 def test_tables_agree_with_the_record(folder):
     record = load_placement(folder / "placement.json")
     rows = list(csv.DictReader((folder / "candidates.csv").read_text(encoding="utf-8").splitlines()))

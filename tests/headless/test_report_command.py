@@ -112,7 +112,7 @@ def test_the_command_of_a_record_asks_for_the_same_again(folder, tmp_path, monke
 def test_every_option_survives_the_record(folder, typed):
     parse = place._parser().parse_args  # noqa: SLF001  # what the command itself reads options with
     asked = parse(["a.blend", "-o", "out", *typed])
-    settings = surveys._settings(asked)  # noqa: SLF001  # as above
+    settings = surveys.read_survey_settings(asked)
     record = load_placement(folder / "placement.json")
     goal = read_objective(asked)
     content = record.as_json()
@@ -124,7 +124,7 @@ def test_every_option_survives_the_record(folder, typed):
     (folder.parent / "typed.json").write_text(json.dumps(content), encoding="utf-8")
     words = shlex.split(repeating_command(load_placement(folder.parent / "typed.json")))
     again = parse(words[2:])
-    assert surveys._settings(again) == settings  # noqa: SLF001  # as above
+    assert surveys.read_survey_settings(again) == settings
     assert read_objective(again) == goal
     assert again.no_render == asked.no_render
 

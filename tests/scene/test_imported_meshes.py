@@ -115,7 +115,7 @@ FLAT = [(x, 0, 0) for x, _, _ in CORNERS]
     ("box.dxf", "nothing", (90, 12), "of no kind that is imported"),
     ("box.obj", obj_text(), (90_000, 12), "90000, 12 is not within 2,000 m of the site"),
     ("box.obj", obj_text(), (90, float("nan")), "--mesh-origin must be a finite number"),
-    ("box.obj", obj_text(), (90, 2, 3, 4), "the place of box.obj must be"),
+    ("box.obj", obj_text(), (90, 2, 3, 4), "the origin of box.obj must be"),
     ("box.obj", obj_text(), None, "each --mesh its own --mesh-origin"),
     ("box.obj", None, (90, 12), "no such file"),
 ])  # fmt: skip

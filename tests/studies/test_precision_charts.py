@@ -2,7 +2,6 @@
 
 import math
 
-from headless.charts import style
 from headless.studies import precision_charts
 from headless.studies.precision_charts import (
     DetectorSetting,
@@ -17,6 +16,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.output.pictures import chart_style as style
 from tests.builders.charts import is_drawn, legend, line, record_figures, words
 
 CELLS = (

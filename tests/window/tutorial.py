@@ -35,10 +35,12 @@ run_button.times_text = _noted(run_button.times_text)
 OUT = Path(sys.argv[sys.argv.index("--") + 1])
 RUN = "junction_traffic/run-1.npz"
 """Of the traffic beside the scene."""
+SUMO = next(Path(".venv").glob("lib/python*/site-packages/sumo"), None)
+"""Folder of SUMO in the environment of the checkout."""
 
 
 def scenario(window: Window) -> Steps:
-    """Check, choose sensors, place, stop, place, look, undo, save, reopen, and scan traffic."""
+    """Check, choose sensors, place, stop, place, look, undo, save, reopen, scan traffic, and simulate some."""
     yield from _begin(window)
     yield from _check(window)
     yield from _choose(window)
@@ -47,6 +49,7 @@ def scenario(window: Window) -> Steps:
     yield from _undo_and_redo(window)
     yield from _save_and_reopen(window)
     yield from _scan(window)
+    yield from _simulate(window)
     yield from _take_picture(window)
 
 
@@ -56,6 +59,7 @@ def _begin(window: Window) -> Steps:
     preferences.own().cache = str(cache)
     copy = OUT / "junction.blend"
     shutil.copy(bpy.data.filepath, copy)
+    shutil.copy(Path(bpy.data.filepath).with_suffix(".xodr"), OUT)  # traffic is simulated on it
     (OUT / RUN).parent.mkdir(exist_ok=True)
     shutil.copy(Path(bpy.data.filepath).parent / RUN, OUT / RUN)
     bpy.ops.wm.open_mainfile(filepath=str(copy))
@@ -164,6 +168,47 @@ def _scan(window: Window) -> Steps:
     yield from window.until(lambda: session.running is None, 60)
     yield 1.0
     yield from window.picture("9-scan")
+
+
+def _simulate(window: Window) -> Steps:
+    """Simulate traffic, stop that, simulate again, undo it and redo it; where SUMO is missing its button is there."""
+    preferences.own().sumo = str(SUMO.resolve()) if SUMO is not None else ""
+    _scene().seip.sections.scan = False
+    yield from window.open_section("simulation")
+    if preferences.sumo() is None:
+        yield from window.find("seip.install_sumo(")
+        sys.stdout.write("no traffic was simulated: SUMO is missing\n")
+        return
+    runs = OUT / "seip-traffic"
+    shutil.rmtree(runs, ignore_errors=True)
+    loaded = _scene().seip.traffic.file
+    button = yield from window.find("seip.simulate_traffic(")
+    yield from window.press("LEFTMOUSE", button)
+    yield from window.until(lambda: session.running is not None, 10)
+    stop = yield from window.beside(button, "seip.stop(")
+    yield from window.until(lambda: window.filled(stop) > 0.1, 60)  # the first run is done
+    yield from window.shot("10-simulating")
+    assert session.running is not None, "the simulation ended before it could be stopped"
+    yield from window.press("LEFTMOUSE", stop)
+    yield from window.until(lambda: session.running is None, 0.5)
+    yield from window.until(lambda: not runs.exists(), 5)  # SUMO's process has ended
+    assert _scene().seip.traffic.file == loaded
+    yield 0.5
+    yield from window.press("LEFTMOUSE", button)
+    yield from window.until((runs / "run-4.npz").exists, 300)
+    yield from window.until(lambda: session.running is None, 10)
+    assert _scene().seip.traffic.file == "//seip-traffic/run-1.npz", _scene().seip.traffic.file
+    assert _scene().seip.detection.runs == _scene().seip.goal.runs == "//seip-traffic/"
+    yield from window.press("Z", ctrl=True)
+    yield from window.until(lambda: _scene().seip.traffic.file == loaded, 5)
+    yield from window.press("Z", ctrl=True, shift=True)
+    yield from window.until(lambda: _scene().seip.traffic.file != loaded, 5)
+    _scene().frame_set(600)
+    yield from window.click("seip.show_in_traffic(")
+    yield 2.0
+    yield from window.find("seip.simulate_traffic(")
+    yield from window.picture("11-simulated")
+    yield from window.click("seip.show_in_traffic(")
 
 
 def _take_picture(window: Window) -> Steps:

@@ -1,4 +1,4 @@
-"""Simplified scans and scenes (fewer rays, channels or targets, simpler objects), to compare with the full ones."""
+"""Approximations of visibility: fewer rays, channels or targets, or simpler objects."""
 
 from __future__ import annotations
 
@@ -18,47 +18,53 @@ from seip_addon.core.site.site import Site, make_site
 
 @dataclass(frozen=True, eq=False)
 class Approximation:
-    """A simplification of scans or scene.
+    """A simplified site and simplified sensor types, with the same candidate poses as the exact ones.
 
     Parameters
     ----------
+    name : str
+        Name of the approximation, as in ``azimuth ÷ 2``.
+    family : str
+        Group of approximations of one kind, which share a colour in charts.
     site : Site
-        Simplified site, with the poses of the exact one.
-    stands_for : (t,) int64
-        Target of ``site`` whose visibility is taken for each target of the exact site.
+        Simplified site.
+    models : mapping of str to LidarModel
+        Simplified sensor types by catalogue key.
+    nearest_target : (t,) int64
+        Index of the target of ``site`` that represents each target of the exact site.
     """
 
     name: str
     family: str
     site: Site
     models: Mapping[str, LidarModel]
-    stands_for: Integer
+    nearest_target: Integer
 
-    def spread(self, visible: Boolean) -> Boolean:
-        """Turn a grid of this site into one of the exact site, (c, t) bool."""
-        spread: Boolean = visible[:, self.stands_for]
-        return spread
+    def on_exact_targets(self, visible: Boolean) -> Boolean:
+        """Return a visibility grid of the simplified site as one for the targets of the exact site, (c, t) bool."""
+        visible_exact: Boolean = visible[:, self.nearest_target]
+        return visible_exact
 
 
 def approximations(
     geometry: SceneGeometry, site: Site, models: Mapping[str, LidarModel], layout: CandidateSettings
 ) -> list[Approximation]:
-    """Return the simplifications: fewer azimuth steps, fewer channels, a coarser grid, simpler objects."""
-    same = np.arange(len(site.targets))
+    """Return the approximations: fewer azimuth steps, fewer channels, a coarser grid, simpler objects."""
+    same_targets = np.arange(len(site.targets))
     return [
         *(
-            Approximation(f"azimuth ÷ {n}", "azimuth", site, _changed(models, partial(thinner, times=n)), same)
+            Approximation(f"azimuth ÷ {n}", "azimuth", site, _changed(models, partial(thinner, times=n)), same_targets)
             for n in (2, 4, 8)
         ),
-        Approximation("channels ÷ 2", "channels", site, _changed(models, every_other_channel), same),
+        Approximation("channels ÷ 2", "channels", site, _changed(models, every_other_channel), same_targets),
         *(_coarser(geometry, site, models, layout, factor) for factor in (2, 4)),
-        Approximation("objects as boxes", "objects", _with_objects(geometry, site, bounding_box), models, same),
-        Approximation("objects decimated", "objects", _with_objects(geometry, site, decimated), models, same),
+        Approximation("objects as boxes", "objects", _with_objects(geometry, site, bounding_box), models, same_targets),
+        Approximation("objects decimated", "objects", _with_objects(geometry, site, decimated), models, same_targets),
     ]
 
 
 def thinner(model: LidarModel, times: int) -> LidarModel:
-    """Return a model with `times` times wider azimuth steps."""
+    """Return a model whose azimuth steps are `times` as wide."""
     return replace(model, points_per_second=model.points_per_second / times)
 
 
@@ -71,8 +77,9 @@ def every_other_channel(model: LidarModel) -> LidarModel:
 
 
 def bounding_box(mesh: Mesh) -> Float:
-    """Return the twelve triangles of the upright box about a mesh, (12, 3, 3) float64."""
+    """Return the twelve triangles of the axis-aligned bounding box of a mesh, (12, 3, 3) float64."""
     corners = mesh.triangles.reshape(-1, 3)
+    # Corner i of the box has the maximum along an axis if bit number `axis` of i is set, otherwise the minimum.
     ends = np.stack([corners.min(axis=0), corners.max(axis=0)])
     box = np.array([[ends[(i >> axis) & 1, axis] for axis in range(3)] for i in range(8)])
     sides = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
@@ -111,11 +118,11 @@ def _coarser(
     layout: CandidateSettings,
     factor: int,
 ) -> Approximation:
-    """Build a coarser grid; each target of the finer grid takes the visibility of the nearest coarse target."""
+    """Return a coarser grid of targets; the nearest coarse target represents each target of the exact grid."""
     spacing = site.targets.spacing * factor
     coarse = make_site(geometry, layout, spacing, models=models)
-    gap = site.targets.xyz[:, None, :2] - coarse.targets.xyz[None, :, :2]
-    nearest = (gap**2).sum(axis=2).argmin(axis=1)
+    offset = site.targets.xyz[:, None, :2] - coarse.targets.xyz[None, :, :2]
+    nearest = (offset**2).sum(axis=2).argmin(axis=1)
     return Approximation(f"grid of {spacing:g} m", "grid", coarse, models, nearest)
 
 

@@ -18,8 +18,8 @@ Result = TypeVar("Result")
 _ROOT = Path(__file__).resolve().parents[3]
 
 
-def alone(work: Callable[[], Result]) -> Result:
-    """Return the result of ``work``, a picklable function, run in a process of its own."""
+def in_fresh_process(work: Callable[[], Result]) -> Result:
+    """Return the result of ``work``, a picklable function, run in a new process."""
     command = [sys.executable, "-m", __name__]
     outcome = subprocess.run(command, input=pickle.dumps(work), stdout=subprocess.PIPE, check=True, cwd=_ROOT)  # noqa: S603 - our own interpreter and module
     result: Result = pickle.loads(outcome.stdout)  # noqa: S301 - written by this very module

@@ -1,4 +1,4 @@
-"""Growth of time and memory with the numbers of candidates, targets and triangles, each size in its own process."""
+"""Growth of time and memory with the numbers of candidates, targets and triangles; each size runs in a new process."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from headless.studies.benchmark.baselines import ours
-from headless.studies.benchmark.fresh_process import alone
+from headless.studies.benchmark.fresh_process import in_fresh_process
 from headless.studies.benchmark.pareto_front import growth_exponent
 from headless.studies.benchmark.resource_usage import Expense, peak_memory
 from headless.studies.benchmark.street_visibility import street_problem
@@ -33,20 +33,20 @@ STREET_SENSORS = 4
 
 @dataclass(frozen=True, eq=False)
 class Growth:
-    """Cost against one size.
+    """Cost of a task at several sizes of its input; benchmark.json holds its fields by name.
 
     Parameters
     ----------
     what : str
-        Name of the work.
+        Name of the task.
     size_of : str
         Name of the quantity that grows.
     size : tuple of float
-        Sizes measured.
+        Values of that quantity.
     seconds : tuple of float
         Processor time at each size.
     memory : tuple of float or None, MB
-        Growth of the process at each size.
+        Memory that the process allocated at each size; None if it was not measured.
     """
 
     what: str
@@ -68,25 +68,29 @@ class Growth:
 
 
 @dataclass(frozen=True, eq=False)
-class Scaled:
-    """A site with the sizes to be measured.
+class ScaledSite:
+    """Site of one size in a series, with the sample of positions that is measured.
 
     Parameters
     ----------
-    looked_from : int
+    size : float
+        Value of the quantity that grows.
+    site : Site
+        Site of this size.
+    sample : int
         Number of evenly spread positions at which visibility is computed.
-    stand_for : float
-        Number of positions that each of them represents.
+    positions_per_sample : float
+        Number of positions of the site that each of them represents.
     """
 
     size: float
     site: Site
-    looked_from: int
-    stand_for: float = 1.0
+    sample: int
+    positions_per_sample: float = 1.0
 
 
 def repeated(site: Site, copies: int) -> Site:
-    """Repeat a site side by side along x."""
+    """Return a site that consists of copies of a site next to each other along x."""
     corners = site.triangles.reshape(-1, 3)
     pitch = float(np.ptp(corners[:, 0]))
     shift = np.arange(copies) * pitch
@@ -106,17 +110,18 @@ def repeated(site: Site, copies: int) -> Site:
 
 
 def visibility_cost(
-    scaled: Scaled, models: dict[str, LidarModel], settings: VisibilitySettings
+    scaled: ScaledSite, models: dict[str, LidarModel], settings: VisibilitySettings
 ) -> tuple[float, float | None]:
-    """Compute visibility from places of a site; return the processor seconds and MB of it.
+    """Compute visibility at a sample of positions; return processor seconds and MB for the whole site.
 
-    Work done once for a site counts once; work at a position is scaled by the number of positions that it represents.
+    Work for the site as a whole is counted once. Work at a position is scaled by the number of positions that it
+    represents.
     """
     site, poses = scaled.site, scaled.site.candidates
-    every = sharing_rays(poses.xyz, poses.yaw, poses.tilt)
-    sample = [every[n] for n in np.unique(np.linspace(0, len(every) - 1, scaled.looked_from).astype(int))]
+    groups = sharing_rays(poses.xyz, poses.yaw, poses.tilt)
+    sample = [groups[n] for n in np.unique(np.linspace(0, len(groups) - 1, scaled.sample).astype(int))]
     longest = max(model.max_range for model in models.values())
-    once, each = Expense(), Expense()
+    for_site, for_positions = Expense(), Expense()
 
     def make() -> VisibilityModel:
         needed = needed_triangles(site.triangles, poses.xyz, site.targets.xyz, settings.delta, longest)
@@ -124,16 +129,16 @@ def visibility_cost(
         return VisibilityModel(site, settings, caster)
 
     def work() -> None:
-        model = once.time(make)
-        for members in sample:
-            each.time(partial(compute_rows, model, poses, models, members))
+        model = for_site.time(make)
+        for group in sample:
+            for_positions.time(partial(compute_rows, model, poses, models, group))
 
     _, memory = peak_memory(work)
-    return once.cpu + each.cpu * scaled.stand_for, memory
+    return for_site.cpu + for_positions.cpu * scaled.positions_per_sample, memory
 
 
-def place(positions: int, targets: int, blocks: int, seconds: float) -> tuple[float, float | None]:
-    """Place sensors in a synthetic street grid, three poses at each position; return processor seconds and MB."""
+def placement_cost(positions: int, targets: int, blocks: int, seconds: float) -> tuple[float, float | None]:
+    """Optimise a placement in a street grid with three poses at each position; return processor seconds and MB."""
     problem = street_problem(positions, targets, blocks=blocks, count=STREET_SENSORS)
     expense = Expense()
     _, memory = peak_memory(lambda: expense.time(lambda: ours(problem, seconds)))
@@ -141,28 +146,40 @@ def place(positions: int, targets: int, blocks: int, seconds: float) -> tuple[fl
 
 
 def visibility_growth(
-    what: str, size_of: str, steps: Sequence[Scaled], models: dict[str, LidarModel], settings: VisibilitySettings
+    work: str, quantity: str, steps: Sequence[ScaledSite], models: dict[str, LidarModel], settings: VisibilitySettings
 ) -> Growth:
-    """Measure visibility at each size."""
-    found = [alone(partial(visibility_cost, step, models, settings)) for step in steps]
-    return _growth(what, size_of, [step.size for step in steps], found)
+    """Measure the cost of visibility at each size."""
+    costs = [in_fresh_process(partial(visibility_cost, step, models, settings)) for step in steps]
+    return _growth(work, quantity, [step.size for step in steps], costs)
 
 
 def placement_growth(
-    size_of: str, size: Sequence[int], steps: Sequence[tuple[int, int, int]], seconds: float
+    quantity: str, size: Sequence[int], steps: Sequence[tuple[int, int, int]], seconds: float
 ) -> Growth:
-    """Measure placement in streets with the positions, targets and blocks of each step."""
-    found = [alone(partial(place, *step, seconds)) for step in steps]
-    return _growth(f"placement, N = {STREET_SENSORS}", size_of, size, found)
+    """Measure the cost of placement in street grids.
+
+    Parameters
+    ----------
+    quantity : str
+        Name of the quantity that grows.
+    size : sequence of int
+        Value of that quantity at each step.
+    steps : sequence of (int, int, int)
+        Positions, targets and blocks of the street grid at each step.
+    seconds : float
+        Time limit of each placement.
+    """
+    costs = [in_fresh_process(partial(placement_cost, *step, seconds)) for step in steps]
+    return _growth(f"placement, N = {STREET_SENSORS}", quantity, size, costs)
 
 
-def relax(positions: int, targets: int, blocks: int) -> tuple[int, float, float | None]:
-    """Solve the first linear relaxation of the program of a synthetic street grid.
+def relaxation_cost(positions: int, targets: int, blocks: int) -> tuple[int, float, float | None]:
+    """Solve the linear relaxation at the root of the integer program of a synthetic street grid.
 
     Returns
     -------
     (int, float, float or None)
-        Entries of V that the exact reductions leave, processor seconds, and MB.
+        Number of entries of V that remain after the exact reductions, processor seconds, and MB.
     """
     instance, _ = make_instance(street_problem(positions, targets, blocks=blocks, count=STREET_SENSORS))
     program = CoverProgram(instance)
@@ -174,21 +191,22 @@ def relax(positions: int, targets: int, blocks: int) -> tuple[int, float, float 
 
 
 def relaxation_growth(steps: Sequence[tuple[int, int, int]]) -> Growth:
-    """Measure the first linear relaxation in streets of given positions, targets and blocks.
+    """Measure the cost of the linear relaxation at the root, in street grids of given positions, targets and blocks.
 
-    `integer_program.ROOT_OPERATIONS` is ``OPERATIONS_PER_UNIT`` times the seconds, per squared entry.
+    The constant `integer_program.ROOT_OPERATIONS` comes from this: seconds per squared entry, times
+    ``OPERATIONS_PER_UNIT``.
     """
-    found = [alone(partial(relax, *step)) for step in steps]
-    entries = [entries for entries, *_ in found]
-    return _growth("first linear relaxation", "entries of V", entries, [(cpu, memory) for _, cpu, memory in found])
+    results = [in_fresh_process(partial(relaxation_cost, *step)) for step in steps]
+    entries = [entries for entries, *_ in results]
+    return _growth("first linear relaxation", "entries of V", entries, [(cpu, memory) for _, cpu, memory in results])
 
 
-def _growth(what: str, size_of: str, size: Sequence[float], found: Sequence[tuple[float, float | None]]) -> Growth:
-    return Growth(what, size_of, tuple(size), tuple(s for s, _ in found), tuple(m for _, m in found))
+def _growth(work: str, quantity: str, size: Sequence[float], costs: Sequence[tuple[float, float | None]]) -> Growth:
+    return Growth(work, quantity, tuple(size), tuple(cpu for cpu, _ in costs), tuple(memory for _, memory in costs))
 
 
 def _shifted(xyz: Float, shift: Float) -> Float:
-    """Return copies of points, each shifted along x."""
+    """Return copies of points (n, 3), each shifted along x by one of the given distances, as one array."""
     return np.concatenate([xyz + np.array([dx, 0.0, 0.0]) for dx in shift])
 
 

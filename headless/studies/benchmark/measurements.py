@@ -14,10 +14,10 @@ from pathlib import Path
 from headless import runtime
 from headless.studies.benchmark.approximations import approximations, with_triangles
 from headless.studies.benchmark.baselines import BASELINES, can_run
-from headless.studies.benchmark.fresh_process import alone
+from headless.studies.benchmark.fresh_process import in_fresh_process
 from headless.studies.benchmark.growth import (
     Growth,
-    Scaled,
+    ScaledSite,
     placement_growth,
     relaxation_growth,
     repeated,
@@ -50,7 +50,7 @@ from seip_addon.core.sensing.scans.static_scene import static_scene
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
-from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.candidates import PAPER_TYPES, CandidateSettings
 from seip_addon.core.site.obstruction import bareness_warnings
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site, make_site
@@ -93,7 +93,7 @@ class BenchmarkScope:
         Number of poses at which the lazy engine is compared with casting every diverging beam.
     """
 
-    layout: CandidateSettings = field(default_factory=CandidateSettings)
+    layout: CandidateSettings = field(default_factory=lambda: CandidateSettings(sensors=PAPER_TYPES))
     street: tuple[int, int, int] = (333, 5000, 3)
     counts: tuple[int, int] = (4, 16)
     largest: tuple[int, int, int] = (1000, 20000, 8)
@@ -220,7 +220,7 @@ def placements(
     street = street_problem(positions, targets, blocks=blocks, count=scope.counts[-1])
     quick = ("greedy", "local search", "ours")
     # in a process of its own: a requirement limits its memory, and memory of earlier work would hide a part
-    runs += _logged(alone(partial(compare, names[-1], street, quick, 2 * time_limit)))
+    runs += _logged(in_fresh_process(partial(compare, names[-1], street, quick, 2 * time_limit)))
     return runs, (names[0], names[1], names[2])
 
 
@@ -242,24 +242,24 @@ def growth(
         visibility_growth(
             "visibility",
             "places",
-            [Scaled(n, site, n) for n in (scope.places * times for times in scope.multiples)],
+            [ScaledSite(n, site, n) for n in (scope.places * times for times in scope.multiples)],
             models,
             settings,
         ),
         visibility_growth(
-            "visibility", "targets", [Scaled(len(s.targets), s, scope.places) for s in finer], models, settings
+            "visibility", "targets", [ScaledSite(len(s.targets), s, scope.places) for s in finer], models, settings
         ),
         visibility_growth(
             "visibility",
             "triangles",
-            [Scaled(len(r.triangles), with_triangles(site, r.triangles), scope.places) for r in rows.values()],
+            [ScaledSite(len(r.triangles), with_triangles(site, r.triangles), scope.places) for r in rows.values()],
             models,
             settings,
         ),
         visibility_growth(
             "visibility of a corridor",
             "kilometres (poses, targets, triangles)",
-            [Scaled(c * pitch, row, scope.places, c * every / scope.places) for c, row in rows.items()],
+            [ScaledSite(c * pitch, row, scope.places, c * every / scope.places) for c, row in rows.items()],
             models,
             settings,
         ),

@@ -34,12 +34,12 @@ class Method:
     interval: tuple[float, float] | None = None
 
 
-def front(ways: Sequence[Method]) -> list[Method]:
+def front(methods: Sequence[Method]) -> list[Method]:
     """Return the Pareto front of methods by run time and error, the fastest first."""
     best: list[Method] = []
-    for way in sorted(ways, key=lambda w: (w.seconds, w.error)):
-        if not best or way.error < best[-1].error:
-            best.append(way)
+    for method in sorted(methods, key=lambda one: (one.seconds, one.error)):
+        if not best or method.error < best[-1].error:
+            best.append(method)
     return best
 
 

@@ -180,7 +180,7 @@ def degradations(
         visible = finish(compute_visibility(one.site, one.models, settings)).visible
         placement = placed(one.site, models, visible, time_limit)
         found[one.name] = Degradation(
-            wrong=float((one.spread(visible) != exact).sum() / exact.sum()),
+            wrong=float((one.on_exact_targets(visible) != exact).sum() / exact.sum()),
             claimed=placement.objective / len(one.site.targets),
             coverage=float(exact[placement.chosen].any(axis=0).mean()),
             kept=len(np.intersect1d(placement.chosen, best.chosen)),

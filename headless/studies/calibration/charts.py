@@ -1,11 +1,13 @@
-"""Charts of LiDAR models and measured sweeps: share returned, range noise, and correlation of fates."""
+"""Charts that compare LiDAR models with measured sweeps.
+
+They show the share of rays that return, the noise of ranges, and the correlation between neighbouring rays.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
 
-from headless.charts.style import COLOURS, DASHED, new_figure, save_chart, style_axes
 from headless.studies.calibration.comparison import CHART_LAGS, Comparison
 from headless.studies.calibration.reference import NoiseBin, ShareBin
 from headless.studies.calibration.share_fit import VERTICAL_REFLECTIVITY, fitted, ground_reflected
@@ -16,17 +18,22 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator, PercentFormatter
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.output.pictures.palette import INK
+from seip_addon.core.output.pictures.chart_style import DASHED, new_figure, save_chart, style_axes
+from seip_addon.core.output.pictures.palette import INK, SERIES_COLOURS
 
 PANEL, HEIGHT, NARROWEST = 3.4, 3.9, 6.0  # inches
 FARTHEST = 100.0  # metres
-_MEASURED = "measured, 95 % interval over sectors"
+_MEASURED = "measured share, with 95 % interval"
 
 
 def save_ground_chart(path: str | os.PathLike[str], comparisons: Sequence[Comparison]) -> None:
     """Draw the share of rays at ground that return against range, as PNG."""
     _save_share_chart(
-        path, comparisons, "Rays that return from the ground", lambda one: one.sensor.ground_by_range_m, _on_ground
+        path,
+        comparisons,
+        "Share of rays to the ground that return",
+        lambda one: one.sensor.ground_by_range_m,
+        _on_ground,
     )
 
 
@@ -35,7 +42,7 @@ def save_vertical_chart(path: str | os.PathLike[str], comparisons: Sequence[Comp
     _save_share_chart(
         path,
         comparisons,
-        "Rays that return from vertical surfaces",
+        "Share of rays to vertical surfaces that return",
         lambda one: one.sensor.vertical_by_range_m,
         _on_vertical,
     )
@@ -46,10 +53,12 @@ def save_noise_chart(path: str | os.PathLike[str], comparisons: Sequence[Compari
     figure, panels = _new_figure(len(comparisons))
     distance = np.linspace(1.0, FARTHEST, 200)
     for panel, one in zip(panels, comparisons, strict=True):
-        panel.plot(distance, 1000.0 * one.model.range_noise(distance), color=COLOURS[0], label="model")
-        for what, marker, bins in (
-            ("vertical surfaces", "s", one.sensor.range_noise_vertical),
-            ("ground, with its unevenness", "o", one.sensor.range_noise_ground),
+        panel.plot(
+            distance, 1000.0 * one.model.range_noise(distance), color=SERIES_COLOURS[0], label="model of the sensor"
+        )
+        for surface, marker, bins in (
+            ("walls and other vertical surfaces", "s", one.sensor.range_noise_vertical),
+            ("ground, including its unevenness", "o", one.sensor.range_noise_ground),
         ):
             shown: list[NoiseBin] = [each for each in bins if each.high <= FARTHEST]
             panel.plot(
@@ -59,28 +68,34 @@ def save_noise_chart(path: str | os.PathLike[str], comparisons: Sequence[Compari
                 linestyle="none",
                 color=INK,
                 markerfacecolor=INK if marker == "s" else "none",
-                label=f"measured, {what}",
+                label=f"measured on {surface}",
             )
         panel.set_yscale("log")
         panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         panel.yaxis.set_major_formatter("{x:g}")
         panel.yaxis.set_minor_locator(NullLocator())
-        _finish(panel, one, "range, m", "standard deviation of ranges, mm" if panel is panels[0] else "")
-    save_chart(path, figure, "Range noise", panels[:1])
+        _finish(panel, one, "range, m", "standard deviation of range, mm" if panel is panels[0] else "")
+    save_chart(path, figure, "Noise of measured ranges", panels[:1])
 
 
 def save_fate_chart(path: str | os.PathLike[str], comparisons: Sequence[Comparison]) -> None:
-    """Draw the correlation of the fates of rays (returned or lost) against their distance in rays, as PNG."""
+    """Draw the correlation between rays of being returned or lost, against their distance along the ring, as PNG."""
     figure, panels = _new_figure(len(comparisons))
     for panel, one in zip(panels, comparisons, strict=True):
         model = one.fates.along_ring
         if model:
-            panel.plot(CHART_LAGS, [model[lag] for lag in CHART_LAGS], color=COLOURS[0], label="model")
+            panel.plot(
+                CHART_LAGS, [model[lag] for lag in CHART_LAGS], color=SERIES_COLOURS[0], label="model of the sensor"
+            )
         measured = one.sensor.fate_correlation
         panel.plot(list(measured), list(measured.values()), "o", color=INK, label="measured")
-        _finish(panel, one, "rays apart along the ring", "correlation of fate" if panel is panels[0] else "")
+        _finish(
+            panel, one, "distance along the ring, in rays", "correlation (0: independent)" if panel is panels[0] else ""
+        )
         panel.set_ylim(min([0.0, *measured.values()]), 1.0)
-    save_chart(path, figure, "Correlation of the fates of neighbouring rays, 20 to 100 m away", panels[:1])
+    save_chart(
+        path, figure, "Correlation between neighbouring rays of being returned or lost, at 20 to 100 m", panels[:1]
+    )
 
 
 def _save_share_chart(
@@ -95,15 +110,17 @@ def _save_share_chart(
     for panel, one in zip(panels, comparisons, strict=True):
         if one.fits is not None:
             for law, label, colour, dashes in (
-                (one.fits.catalogue, "catalogue", COLOURS[0], "-"),
-                (one.fits.gain, "one gain fitted", COLOURS[1], DASHED),
-                (one.fits.free, "m, s and c fitted", COLOURS[2], "-"),
+                (one.fits.catalogue, "model with the values of the catalogue", SERIES_COLOURS[0], "-"),
+                (one.fits.gain, "model with fitted sensitivity (m)", SERIES_COLOURS[1], DASHED),
+                (one.fits.free, "model with all values fitted (m, s, c)", SERIES_COLOURS[2], "-"),
             ):
                 share = law.chance(distance, reflected(one, distance))
                 panel.plot(distance, share, color=colour, linestyle=dashes, label=label)
         closed = [each for each in bins_of(one) if each.high <= FARTHEST]
         _draw_measured(panel, [each for each in closed if fitted(each)], INK, _MEASURED)
-        _draw_measured(panel, [each for each in closed if not fitted(each)], "none", "the same, not fitted")
+        _draw_measured(
+            panel, [each for each in closed if not fitted(each)], "none", "measured share, not used for the fit"
+        )
         panel.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
         panel.set_ylim(0.0, 1.03)
         _finish(panel, one, "range, m", "share of rays" if panel is panels[0] else "")

@@ -4,12 +4,19 @@ import math
 import os
 from collections.abc import Sequence
 
-from headless.charts.style import DASHED, add_legend, colour, mark, new_figure, save_chart, style_axes
-
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
+from seip_addon.core.output.pictures.chart_style import (
+    DASHED,
+    add_legend,
+    colour,
+    mark,
+    new_figure,
+    save_chart,
+    style_axes,
+)
 from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
 
 from .cells import CENTRAL_WEIGHTS, COUNTS, CoverageStudy

@@ -51,5 +51,5 @@ def main(argv: list[str]) -> None:
 def _parser() -> argparse.ArgumentParser:
     what = "Reproduce the paper's coverage figures on a scene; name sensor types from the simplest to the best."
     parser = new_parser("study coverage", what)
-    survey.add_options(parser)
+    survey.add_options(parser, study=True)
     return parser

@@ -6,14 +6,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from headless.charts.style import COLOURS, DASHED, FAINT_COLOUR, colour, interval_ends, mark, new_figure, save_chart
-from headless.charts.style import style_axes as style
-
 from matplotlib.ticker import FuncFormatter
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import Interval, IntervalEstimate
-from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
+from seip_addon.core.output.pictures.chart_style import (
+    DASHED,
+    FAINT_COLOUR,
+    colour,
+    interval_ends,
+    mark,
+    new_figure,
+    save_chart,
+)
+from seip_addon.core.output.pictures.chart_style import style_axes as style
+from seip_addon.core.output.pictures.palette import INK, PAPER, SERIES_COLOURS, SOFT_INK
 
 PANEL_SIZE = (6.4, 4.6)  # inches
 BAR_HEIGHT = 0.5  # inches that a criterion takes
@@ -110,7 +117,7 @@ def save_criteria_chart(
         raise SeipError("there is nothing to draw a chart of criteria from: evaluate some placements first")
     figure, (panel,) = new_figure(PANEL_SIZE[0] * 1.25, 1.6 + BAR_HEIGHT * len(criteria))
     for row, one in enumerate(criteria):
-        face = COLOURS[1] if one.beforehand else FAINT_COLOUR
+        face = SERIES_COLOURS[1] if one.beforehand else FAINT_COLOUR
         value = 0.0 if math.isnan(one.correlation.value) else one.correlation.value
         panel.barh(row, value, height=0.62, color=face, zorder=2)
         if math.isfinite(one.correlation.high - one.correlation.low):

@@ -132,7 +132,7 @@ def _study(options: argparse.Namespace, settings: CriteriaStudySettings) -> Mapp
 def _parser() -> argparse.ArgumentParser:
     what = "Compare the criteria by which sensors can be placed by what a detector finds with them."
     parser = new_parser("study criteria", what)
-    survey.add_options(parser)
+    survey.add_options(parser, study=True)
     parser.add_argument("scenes", nargs="*", type=Path, help="more scenes")
     study = parser.add_argument_group("study")
     study.add_argument("--count", nargs="+", type=whole_number(SENSORS), default=[1, 2, 4], metavar="N", help="sensors")

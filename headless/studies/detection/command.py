@@ -218,7 +218,7 @@ def check_every(seconds: float) -> None:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of a survey and of what detectors learn from to a command."""
-    survey.add_options(parser)
+    survey.add_options(parser, study=True)
     detection = parser.add_argument_group("detection")
     detection.add_argument(
         "--traffic",

@@ -5,14 +5,21 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
-from headless.charts.style import COLOURS, DASHED, MARKERS, colour, mark, new_figure, save_chart, style_axes
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
+from seip_addon.core.output.pictures.chart_style import (
+    DASHED,
+    MARKERS,
+    colour,
+    mark,
+    new_figure,
+    save_chart,
+    style_axes,
+)
+from seip_addon.core.output.pictures.palette import INK, PAPER, SERIES_COLOURS, SOFT_INK
 
 from .disturbances import CappedPillars, SensorFailure
 from .study import DisturbanceCurve, LimitsStudy, TransferResult
@@ -49,8 +56,8 @@ def save_transfer_chart(path: str | os.PathLike[str], study: LimitsStudy) -> Non
     figure, (panel,) = new_figure(9.0, 1.2 + 0.42 * len(changes), dpi=150)
     for row, one in enumerate(changes):
         low, high = one.change.low * 100, one.change.high * 100
-        panel.plot((low, high), (row, row), color=COLOURS[0], linewidth=1.2, marker="|")
-        panel.plot(one.change.value * 100, row, color=COLOURS[0], marker=MARKERS[0], mec=PAPER)
+        panel.plot((low, high), (row, row), color=SERIES_COLOURS[0], linewidth=1.2, marker="|")
+        panel.plot(one.change.value * 100, row, color=SERIES_COLOURS[0], marker=MARKERS[0], mec=PAPER)
     panel.axvline(0.0, color=SOFT_INK, linewidth=1.0, linestyle=DASHED)
     panel.set_yticks(range(len(changes)), [_label(one) for one in changes], fontsize=8.5, parse_math=False)
     panel.invert_yaxis()

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from headless.detection.detector import Detector
+from headless.detection.frame_points import POINT_FIELDS, recounted, some_points
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import Simulation
-from seip_addon.core.sensing.traffic.trajectories import Trajectories
+from seip_addon.core.sensing.traffic.trajectories import Trajectories, some_users
 from seip_addon.core.sensing.traffic.varied_bodies import resized
 
 ERROR_AXIS = np.array([1.0, 1.0, 0.0]) / math.sqrt(2)
@@ -143,7 +144,7 @@ class Rain(Disturbance):
         way = frame.points - places
         distance = np.linalg.norm(way, axis=1)
         drop = places + way * (near * np.minimum(DROP_RANGE, distance) / np.maximum(distance, 1e-9))[:, None]
-        return _recounted(
+        return recounted(
             replace(
                 frame,
                 points=np.where(wet[:, None], drop, frame.points).astype(np.float32),
@@ -246,7 +247,7 @@ class SensorFailure(OfOneSensor):
 
     def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
         """Return the frame without this sensor's points."""
-        return _recounted(_some(frame, frame.sensor != self.sensor))
+        return recounted(some_points(frame, frame.sensor != self.sensor))
 
 
 @dataclass(frozen=True)
@@ -260,14 +261,7 @@ class Thinned(Disturbance):
     def disturbed_traffic(self, trajectories: Trajectories) -> Trajectories:
         """Return the motion of the remaining road users."""
         stays = np.random.default_rng(self.seed).random(len(trajectories)) >= self.size
-        counts = np.diff(trajectories.first)
-        samples = np.repeat(stays, counts)
-        return replace(
-            trajectories,
-            users=tuple(user for user, here in zip(trajectories.users, stays.tolist(), strict=True) if here),
-            first=np.concatenate([[0], np.cumsum(counts[stays])]).astype(np.int64),
-            **{name: getattr(trajectories, name)[samples] for name in ("time", "position", "yaw", "pitch", "speed")},
-        )
+        return some_users(trajectories, stays)
 
 
 @dataclass(frozen=True)
@@ -323,31 +317,13 @@ def _moved(frame: Frame, sensor: int, about: Float, turn: Float, by: Float) -> F
     return replace(frame, points=points)
 
 
-POINT_FIELDS = ("points", "sensor", "delay", "intensity", "instance", "foreground")
-
-
-def _some(frame: Frame, kept: Boolean) -> Frame:
-    return replace(frame, **{name: getattr(frame, name)[kept] for name in POINT_FIELDS})
-
-
 def _merged(one: Frame, of_one: Boolean, other: Frame, of_other: Boolean) -> Frame:
     """Return selected points of two frames, ordered by sensor, with the road users of the first."""
-    kept = [_some(one, of_one), _some(other, of_other)]
+    kept = [some_points(one, of_one), some_points(other, of_other)]
     sensor = np.concatenate([part.sensor for part in kept])
     order = np.argsort(sensor, kind="stable")
     points = {name: np.concatenate([getattr(part, name) for part in kept])[order] for name in POINT_FIELDS}
-    return _recounted(replace(one, **points))
-
-
-def _recounted(frame: Frame) -> Frame:
-    """Return the frame with updated numbers of returns in its labels."""
-    labels = frame.labels
-    most = max(int(labels.user.max(initial=0)), int(frame.instance.max(initial=0))) + 1
-    on_users = frame.instance != STATIC_INSTANCE
-    sensors = labels.points.shape[1]
-    cell = frame.instance[on_users].astype(np.int64) * sensors + frame.sensor[on_users]
-    counts = np.bincount(cell, minlength=most * sensors).reshape(most, sensors)
-    return replace(frame, labels=replace(labels, points=counts[labels.user]))
+    return recounted(replace(one, **points))
 
 
 def keeping_at_most(detector: Detector, points: int) -> Detector:

@@ -4,11 +4,17 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from headless.charts.style import COLOURS, DASHED, MARKERS, interval_ends, new_figure, save_chart, style_axes
-
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import IntervalEstimate
-from seip_addon.core.output.pictures.palette import INK, PAPER, SOFT_INK
+from seip_addon.core.output.pictures.chart_style import (
+    DASHED,
+    MARKERS,
+    interval_ends,
+    new_figure,
+    save_chart,
+    style_axes,
+)
+from seip_addon.core.output.pictures.palette import INK, PAPER, SERIES_COLOURS, SOFT_INK
 
 PANEL_WIDTH, ROW_HEIGHT = 2.7, 0.42  # inches
 
@@ -34,8 +40,8 @@ def save_ingredients_chart(path: str | os.PathLike[str], marks: Sequence[Ingredi
             if one.test == test:
                 row = variants.index(one.variant)
                 ends = [100 * end for end in interval_ends(one.change)]
-                panel.plot(ends, (row, row), color=COLOURS[0], linewidth=1.2, marker="|")
-                panel.plot(100 * one.change.value, row, color=COLOURS[0], marker=MARKERS[0], mec=PAPER)
+                panel.plot(ends, (row, row), color=SERIES_COLOURS[0], linewidth=1.2, marker="|")
+                panel.plot(100 * one.change.value, row, color=SERIES_COLOURS[0], marker=MARKERS[0], mec=PAPER)
         panel.axvline(0.0, color=SOFT_INK, linewidth=1.0, linestyle=DASHED)
         panel.set_title(test.replace(", ", ",\n"), fontsize=9, color=INK, parse_math=False)
         style_axes(panel, "change of AP@0.7 (points)", fontsize=8.5)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 from headless.detection.detection_area import DetectionArea
 from headless.detection.recordings import SampledRun
-from headless.sumo.demand import MODELS
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.core.sensing.traffic.varied_bodies import resized, with_sizes
+from seip_addon.core.world.traffic_simulation.demand import MODELS
 
 SIZE_CHANGE = 0.15  # largest relative change of the dimensions of road users, in a training and in a test
 FEW_SITES = 2  # training sites of the variant without many sites

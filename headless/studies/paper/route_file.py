@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from headless.sumo.demand import poisson_departures
-
 import numpy as np
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress
 from seip_addon.core.storage.files import whole_file
 from seip_addon.core.storage.xml_stream import Attributes, quoted, read_tags
+from seip_addon.core.world.traffic_simulation.demand import poisson_departures
 
 DEFAULT_CLASS = "passenger"  # SUMO's vClass of a vehicle whose flow names no type
 MIN_GAP = (1.0, 4.0)  # metres to the vehicle in front; on average SUMO's 2.5

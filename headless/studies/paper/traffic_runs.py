@@ -8,9 +8,6 @@ from itertools import combinations, pairwise
 from pathlib import Path
 
 from headless.studies.paper.route_file import RouteDemand, read_demand, write_run
-from headless.sumo.simulation import run_sumo
-from headless.sumo.street_network import DRIVING, StreetNetwork, read_network
-from headless.sumo.traffic_run import recorded_run
 
 import numpy as np
 import shapely
@@ -27,6 +24,9 @@ from seip_addon.core.storage.files import digest, save_json
 from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.workflows.traffic_runs import traffic_folder
+from seip_addon.core.world.traffic_simulation.simulation import run_sumo
+from seip_addon.core.world.traffic_simulation.street_network import DRIVING, StreetNetwork, read_network
+from seip_addon.core.world.traffic_simulation.traffic_run import recorded_run
 
 MIN_ON_ROAD = 0.8  # least share of a network's lanes in the region on the scene's road, for a network of its map
 SIGNAL_CYCLE = 120  # seconds; the start of a drawn run is random within it, so that the phases of signals differ
@@ -121,7 +121,7 @@ def read_traffic_of_site(
 
 def _share_on_road(network: StreetNetwork, geometry: SceneGeometry, shift: Float) -> float | None:
     """Return the share of the network's driving lanes in the region that is on the road; None without any."""
-    lines = [lane.line - shift for edge in network.edges.values() for lane in edge.of(DRIVING)]
+    lines = [lane.line - shift for edge in network.edges.values() for lane in edge.lanes_for(DRIVING)]
     near = [one for one in map(shapely.LineString, lines) if one.intersects(geometry.region)]
     parts = [shapely.segmentize(one, _SAMPLING) for one in near]
     points = np.concatenate([np.empty((0, 2)), *map(shapely.get_coordinates, parts)])

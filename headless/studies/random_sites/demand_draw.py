@@ -1,9 +1,9 @@
 """Traffic of a training site: volumes, mix and signals drawn randomly for each run."""
 
-from headless.sumo.demand import VEHICLE_SHARES, Demand, KerbParking
-from headless.sumo.simulation import SignalPlan
-
 import numpy as np
+
+from seip_addon.core.world.traffic_simulation.demand import VEHICLE_SHARES, Demand, KerbParking
+from seip_addon.core.world.traffic_simulation.simulation import SignalPlan
 
 from .street_plan import StreetPlan
 

@@ -7,9 +7,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from headless.sumo.simulation import Scenario
-from headless.sumo.traffic_run import simulate_run
-
 import bpy
 import numpy as np
 
@@ -18,6 +15,7 @@ from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.sensing.traffic.source import describe_categories
 from seip_addon.core.sensing.traffic.varied_bodies import shaped
+from seip_addon.core.site.candidates import PAPER_TYPES, CandidateSettings
 from seip_addon.core.site.check import check_site
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
@@ -29,6 +27,8 @@ from seip_addon.core.workflows.survey import lay_out
 from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.core.workflows.traffic_runs import traffic_folder
 from seip_addon.core.world.elevation.at_place import TerrainRequest
+from seip_addon.core.world.traffic_simulation.simulation import Scenario
+from seip_addon.core.world.traffic_simulation.traffic_run import simulate_run
 from seip_addon.scene.blend_file import new_file, save_blend
 from seip_addon.scene.build import build_scene
 from seip_addon.scene.check import contents_of
@@ -199,7 +199,7 @@ def _build(folder: Path, plan: StreetPlan, settings: SiteSettings) -> Generator[
 
 
 def _laid_out(geometry: SceneGeometry) -> tuple[Site, Sequence[str]]:
-    return lay_out(geometry, SurveySettings()).site, ()
+    return lay_out(geometry, SurveySettings(CandidateSettings(sensors=PAPER_TYPES))).site, ()
 
 
 def _run_of_traffic(

@@ -10,13 +10,13 @@ validation, which decides when to stop. Rerun the command to resume an interrupt
 import argparse
 import math
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
 from headless import runtime, survey
 from headless.charts.detection import save_training_chart
-from headless.detection.detector import check_device
+from headless.detection.detector import Detector, check_device
 from headless.detection.frames import SampledRecording
 from headless.detection.recordings import Simulator, sampled_runs
 from headless.detection.run_detection import AT_ONCE
@@ -25,7 +25,7 @@ from headless.detection.training import train
 from headless.options import add_settings, new_parser, read_settings, real_number
 from headless.side_by_side import side_by_side
 from headless.studies.detection.case_study import simulated
-from headless.studies.site_training.training_site import TrainingSite
+from headless.studies.site_training.training_site import TrainingSite, field_runs
 
 import bpy
 import numpy as np
@@ -33,6 +33,7 @@ import numpy as np
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import TIME_STEP
 from seip_addon.core.progress import Progress
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.site_traffic import require_own_traffic
 from seip_addon.core.site.candidates import CandidateSettings
@@ -68,7 +69,10 @@ def main(argv: list[str]) -> None:
     """Simulate scans of random placements at every site, and train a detector on them."""
     options = _parser().parse_args(argv)
     network, training = read_settings(NetworkSettings, options), read_settings(TrainingSettings, options)
-    learning = LearningSettings(tuple(options.sensor), options.placements, options.every, training.seed)
+    every_type = tuple(load_catalogue(())) if options.field_conditions else TYPES
+    learning = LearningSettings(
+        tuple(options.sensor or every_type), options.placements, options.every, training.seed, options.field_conditions
+    )
     check_device(options.device)
     runtime.check_folder(options.output)
     training_recordings, validation = (
@@ -80,7 +84,10 @@ def main(argv: list[str]) -> None:
         for scenes in set_aside(list(enumerate(options.scenes)))
     )
     store = options.output / "training.pt"
-    steps = train(training_recordings, validation, network, training, device=options.device, store=store)
+    start = None if options.start is None else Detector.load(options.start, options.device)
+    if start is not None and start.settings != network:
+        raise SeipError(f"{options.start} is of another network: give the network's options as in its training")
+    steps = train(training_recordings, validation, network, training, device=options.device, store=store, start=start)
     trained = runtime.finish_with_bar(steps)
     best = trained.curve.best
     trained.detector.save(options.output / "detector.pt", half=True)
@@ -105,12 +112,16 @@ class LearningSettings:
         Time between frames.
     seed : int
         Seed of random placements, and of the noise of scans.
+    field_conditions : bool
+        Whether half of the frames are changed to be as recordings are (`headless.detection.field_conditions`), with
+        a rolling shutter, groups of pedestrians, and sizes changed by up to `SIZE_CHANGE` in half of the runs.
     """
 
     sensors: tuple[str, ...] = TYPES
     placements: int = 1
     every: float = 2.5
     seed: int = 1
+    field_conditions: bool = False
 
 
 def read_site(scene: Path, learning: LearningSettings) -> TrainingSite:
@@ -135,7 +146,7 @@ def read_site(scene: Path, learning: LearningSettings) -> TrainingSite:
         raise SeipError(f"{scene} has no runs of traffic in the folder next to it: simulate some with `seip traffic`")
     for run in runs:
         require_own_traffic(run.trajectories, geometry, run.name)
-    simulator = Simulator(geometry, ScanSettings(seed=learning.seed))
+    simulator = Simulator(geometry, ScanSettings(seed=learning.seed, rolling_shutter=learning.field_conditions))
     return TrainingSite(f"{scene.parent.name}/{scene.stem}", geometry, candidates, models, runs, simulator)
 
 
@@ -158,7 +169,12 @@ def _sampled(
 ) -> Generator[Progress, None, list[SampledRecording]]:
     """Simulate scans of random placements in all runs of a site."""
     area = site.simulator.area(network.pillar)
-    scans = site.scans(learning.placements, np.random.default_rng([learning.seed, number]))
+    random = np.random.default_rng([learning.seed, number])
+    if learning.field_conditions:
+        site = replace(site, runs=(yield from field_runs(site.runs, random)))
+        scans = site.field_scans(learning.placements, random, area, [learning.seed, number])
+    else:
+        scans = site.scans(learning.placements, random)
     recordings = [SampledRecording(one, area, network.most_points) for one in scans]
     yield from side_by_side([simulated([one]) for one in recordings], AT_ONCE)
     site.simulator.forget()
@@ -174,7 +190,10 @@ def _parser() -> argparse.ArgumentParser:
     learning = parser.add_argument_group("training data")
     default = LearningSettings()
     learning.add_argument(
-        "--sensor", nargs="+", default=list(default.sensors), metavar="KEY", help="types in the placements"
+        "--sensor",
+        nargs="+",
+        metavar="KEY",
+        help="types in the placements (default: several, in field conditions all of the catalogue)",
     )
     learning.add_argument(
         "--placements",
@@ -186,13 +205,19 @@ def _parser() -> argparse.ArgumentParser:
     learning.add_argument(
         "--every", type=real_number(TIME_STEP), default=default.every, metavar="S", help="time between frames, seconds"
     )
+    learning.add_argument(
+        "--field-conditions",
+        action="store_true",
+        help="change half of the frames to be as recordings are, and vary groups and sizes of road users",
+    )
     net = parser.add_argument_group("network")
     add_settings(net, NetworkSettings, "head", "pillar", "most_points", "width", "blocks")
     learning.add_argument(
         "--seed", type=int, default=default.seed, metavar="N", help="seed for placements, noise, weights and order"
     )
     work = parser.add_argument_group("training")
-    add_settings(work, TrainingSettings, "steps", "batch")
+    work.add_argument("--start", type=Path, metavar="PT", help="detector to start from (default: random weights)")
+    add_settings(work, TrainingSettings, "steps", "batch", "learning_rate", "patience")
     work.add_argument("--device", default="cpu", help="device of torch: cpu, cuda")
     add_settings(work, TrainingSettings, "threads")
     return parser

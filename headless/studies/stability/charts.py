@@ -6,8 +6,6 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
-from headless.charts.style import DASHED, MARKERS, new_figure, save_chart, style_axes
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,6 +13,7 @@ from matplotlib.ticker import FuncFormatter
 
 from seip_addon.core.choosing.placement.near_optimal import NearOptimalSet
 from seip_addon.core.choosing.placement.problem import TIE_TOLERANCE
+from seip_addon.core.output.pictures.chart_style import DASHED, MARKERS, new_figure, save_chart, style_axes
 from seip_addon.core.output.pictures.palette import INK, SOFT_INK
 from seip_addon.core.sensing.visibility.float32_precision import FLOAT32_STEP, MAX_STEP
 

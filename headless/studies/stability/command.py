@@ -80,7 +80,7 @@ def _check_other(scene: Path) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("study stability", "Find the limits of every method, and write a page with charts.")
-    survey.add_options(parser)
+    survey.add_options(parser, study=True)
     parser.add_argument(
         "--other", nargs="+", type=Path, default=[], metavar="BLEND", help="other scenes to test the detectors on"
     )

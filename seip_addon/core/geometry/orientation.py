@@ -16,6 +16,7 @@ import numpy as np
 from ..arrays import Float
 
 VERTICAL_SINE = 1 - 1e-12  # sine of the tilt from which on azimuth zero counts as pointing straight down, or up
+UNIT_TOLERANCE = 1e-3  # of rotations and quaternions in files, which have few digits
 
 
 def orientations(yaw: Float, tilt: Float, roll: Float) -> Float:
@@ -98,3 +99,53 @@ def describe_turn(tilt: float, yaw: float | None = None) -> str:
     """
     tilted = f", tilted {np.degrees(tilt):.3g}°" if tilt else ""
     return tilted if yaw is None else f"{tilted}, yaw {np.degrees(yaw) % 360:.3g}°"
+
+
+def quaternion_rotation(quaternion: Float) -> Float:
+    """Return the rotation (3, 3) float64 of a quaternion w, x, y, z whose length is 1 within `UNIT_TOLERANCE`.
+
+    Raises
+    ------
+    ValueError
+        The length differs.
+    """
+    length = math.hypot(*quaternion.tolist())  # does not overflow, unlike the root of a sum of squares
+    if not abs(length - 1.0) <= UNIT_TOLERANCE:
+        raise ValueError("the quaternion does not have the length 1")
+    w, *vector = (quaternion / length).tolist()
+    x, y, z = vector
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    turn: Float = np.eye(3) + 2.0 * (w * cross + cross @ cross)
+    return turn
+
+
+def quaternion_of(matrix: Float) -> Float:
+    """Return the unit quaternion w, x, y, z, (4,) float64, of a rotation (3, 3)."""
+    (sin_yaw, cos_yaw), (sin_tilt, cos_tilt), (sin_roll, cos_roll) = (
+        (math.sin(angle / 2), math.cos(angle / 2)) for angle in angles_of(matrix)
+    )
+    return np.array(
+        [
+            cos_yaw * cos_tilt * cos_roll + sin_yaw * sin_tilt * sin_roll,
+            cos_yaw * cos_tilt * sin_roll - sin_yaw * sin_tilt * cos_roll,
+            cos_yaw * sin_tilt * cos_roll + sin_yaw * cos_tilt * sin_roll,
+            sin_yaw * cos_tilt * cos_roll - cos_yaw * sin_tilt * sin_roll,
+        ]
+    )
+
+
+def nearest_rotation(matrix: Float) -> Float:
+    """Return the rotation (3, 3) float64 closest to a matrix that is a rotation within `UNIT_TOLERANCE`.
+
+    Raises
+    ------
+    ValueError
+        The matrix is mirrored, scaled or skewed.
+    """
+    if not np.allclose(matrix.T @ matrix, np.eye(3), rtol=0.0, atol=UNIT_TOLERANCE):
+        raise ValueError("the rotation is scaled or skewed: its columns are not perpendicular vectors of length 1")
+    if np.linalg.det(matrix) < 0.0:
+        raise ValueError("the rotation is mirrored: its determinant is -1")
+    left, _, right = np.linalg.svd(matrix)
+    closest: Float = left @ right
+    return closest

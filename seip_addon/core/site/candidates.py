@@ -21,6 +21,12 @@ from .pavement_sampling import spread
 from .post_rules import RULES, RuleName, check_allowed, excluded_posts
 from .scene_geometry import ASSUMED, NamedArea, Pole, SceneGeometry, joined
 
+DEFAULT_TYPE = "os1_128"
+"""Catalogue key of the sensor type of a new survey: a product whose detection law is calibrated on measured sweeps."""
+
+PAPER_TYPES = ("type1", "type2", "type3")
+"""Catalogue keys of the sensor models of the SEIP paper."""
+
 _MAX_ABOVE_POLE = 0.5
 """Metres that a sensor may be mounted above the top of its pole, on a short mast."""
 
@@ -67,9 +73,7 @@ class CandidateSettings:
         Names of the rules of `post_rules.RULES` that do not apply; by default all apply.
     """
 
-    sensors: tuple[str, ...] = setting(
-        ("type1", "type2", "type3"), "types to choose from", option="sensor", metavar="KEY"
-    )
+    sensors: tuple[str, ...] = setting((DEFAULT_TYPE,), "types to choose from", option="sensor", metavar="KEY")
     heights: tuple[float, ...] = setting(
         (3.5, 5.4, 8.0),
         "metres, or FROM:TO:STEP",

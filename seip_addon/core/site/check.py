@@ -248,7 +248,9 @@ def _missing(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterato
     if not _of(contents, "roads"):
         yield Problem("ERROR", "There is no road: assign the meshes of the carriageway to the roads.")
     if plans["candidate_areas"].is_empty and not contents.poles:
-        yield Problem("ERROR", "Sensors can stand nowhere: assign pavements to the candidate areas, or assign poles.")
+        yield Problem(
+            "ERROR", "There is no position for a sensor: assign pavements to the candidate areas, or assign poles."
+        )
 
 
 def _wrong_size(contents: SceneContents, region: BaseGeometry) -> Iterator[Problem]:
@@ -273,8 +275,8 @@ def _far(contents: SceneContents) -> Iterator[Problem]:
         yield Problem(
             "WARNING",
             f"{name!r} and {counted(len(far) - 1, 'other object')} lie up to {reach / 1000:,.0f} km from the origin, "
-            f"where Blender rounds places to {1000 * np.spacing(np.float32(reach)):.0f} mm: move all to the origin and "
-            "put the map's coordinates of it into the scene's property seip_origin.",
+            f"where Blender rounds coordinates to {1000 * np.spacing(np.float32(reach)):.0f} mm: move all to the "
+            "origin, and store the map coordinates of the origin in the scene's property seip_origin.",
             name,
         )
 
@@ -331,12 +333,12 @@ def _pole_problems(contents: SceneContents, region: BaseGeometry) -> Iterator[Pr
     distance = shapely.distance(region, shapely.points(feet[:, :2])) if not region.is_empty else np.zeros(len(feet))
     yield from _named(
         [
-            (pole.name, f"The pole {pole.name!r} stands {away:,.0f} m from the region: take it out of the poles.")
+            (pole.name, f"The pole {pole.name!r} stands {away:,.0f} m from the region: remove it from the poles.")
             for pole, away in zip(poles, distance, strict=True)
             if away > MAX_POLE_DISTANCE
         ],
-        f"pole stands more than {MAX_POLE_DISTANCE:g} m from the region: take it out of the poles",
-        f"poles stand more than {MAX_POLE_DISTANCE:g} m from the region: take them out of the poles",
+        f"pole stands more than {MAX_POLE_DISTANCE:g} m from the region: remove it from the poles",
+        f"poles stand more than {MAX_POLE_DISTANCE:g} m from the region: remove them from the poles",
     )
     under = np.concatenate([np.empty((0, 3, 3)), *_triangles(contents, "roads"), *_triangles(contents, "ground")])
     above = feet[:, 2] - surface_height(feet[:, :2], under) if len(under) else np.full(len(feet), np.nan)
@@ -357,12 +359,12 @@ def _pole_problems(contents: SceneContents, region: BaseGeometry) -> Iterator[Pr
     )
     yield from _named(
         [
-            (poles[b].name, f"The poles {poles[a].name!r} and {poles[b].name!r} stand at one place: take one out.")
+            (poles[b].name, f"The poles {poles[a].name!r} and {poles[b].name!r} stand at one place: remove one.")
             for a, b in nearest.T
             if a < b
         ],
-        "pole stands where another one stands: take one of the two out",
-        "poles stand where another one stands: take one of each two out",
+        "pole stands where another one stands: remove one of the two",
+        "poles stand where others stand: remove one of each two",
     )
 
 
@@ -386,14 +388,14 @@ def _duplicates(contents: SceneContents) -> Iterator[Problem]:
             yield Problem(
                 "WARNING",
                 f"The weighted regions {first[key]!r} and {surface.name!r} are the same: their weights multiply; "
-                "take one out.",
+                "remove one.",
                 surface.name,
             )
         elif key in first:
             yield Problem(
                 "WARNING",
                 f"{first[key]!r} and {surface.name!r} among the {ROLES[surface.role].lower()} are the same: "
-                "rays are cast at both; take one out.",
+                "rays are cast at both; remove one.",
                 surface.name,
             )
         first.setdefault(key, surface.name)
@@ -425,7 +427,7 @@ def _holes(contents: SceneContents, road: BaseGeometry, region: BaseGeometry) ->
         yield Problem(
             "WARNING",
             f"The road has {counted(len(holes), 'hole')} of up to {largest.area:.2g} m², as at {_place(largest)}: "
-            "there are no targets in them; close them where faces are missing.",
+            "there are no targets in them; add the missing faces, unless they are islands.",
             _nearest_road(contents, largest),
         )
 
@@ -442,7 +444,7 @@ def _steps(contents: SceneContents, places: Float, spacing: float) -> Iterator[P
         yield Problem(
             "WARNING",
             f"The road has steps or slopes over {MAX_ROAD_STEP:.0%} at {counted(len(steep), 'place')}, up to "
-            f"{rise[worst]:.2g} m at {_place(point)}: targets there are not on the road, unless it is a bridge's edge.",
+            f"{rise[worst]:.2g} m at {_place(point)}: targets there may be off the road, except at a bridge's edge.",
             _nearest_road(contents, point),
         )
 
@@ -456,7 +458,7 @@ def _layers(contents: SceneContents, places: Float, triangles: Float) -> Iterato
         yield Problem(
             "WARNING",
             f"Road lies {LAYER_DISTANCES[0]:g} to {LAYER_DISTANCES[1]:g} m above other road at "
-            f"{counted(len(hidden), 'place')}, as at {_place(at)}: targets lie on the upper one; remove surfaces that "
+            f"{counted(len(hidden), 'place')}, as at {_place(at)}: targets are on the upper one; remove surfaces that "
             "are not road.",
             _nearest_road(contents, at),
         )

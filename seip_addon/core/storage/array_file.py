@@ -175,6 +175,27 @@ class ArrayFile:
             raise ContentError(f"it holds more than {MAX_BYTES >> 30} GiB")
 
 
+def read_npz(path: Path, most: int) -> dict[str, NDArray[Any]]:
+    """Return all arrays of an npz file of another program, by name.
+
+    Raises
+    ------
+    SeipError
+        The file does not exist, is damaged, or holds more than ``most`` bytes of arrays.
+    """
+    try:
+        with path.open("rb") as file, _archive(file) as archive:
+            members = archive.namelist()
+            if sum(_claim(archive, member).size for member in members) > most:
+                raise ContentError(f"it holds more than {most / 1e6:,.0f} MB")
+            return {member.removesuffix(".npy"): _array(archive, member) for member in members}
+    except FileNotFoundError as error:
+        raise SeipError(f"no such file: {path}; check its path") from error
+    except READ_ERRORS as error:
+        reason = f": {error}" if isinstance(error, ContentError) else ""
+        raise SeipError(f"{path.name} is damaged or not an npz file{reason}; write it again") from error
+
+
 def _archive(file: BinaryIO) -> zipfile.ZipFile:
     """Open an archive that starts at the first byte, as NumPy requires; zip archives may have other data before."""
     if file.read(4) != b"PK\x03\x04":

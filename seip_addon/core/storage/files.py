@@ -5,6 +5,7 @@ import functools
 import hashlib
 import json
 import os
+import re
 import secrets
 import shutil
 import sys
@@ -13,7 +14,7 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -211,6 +212,51 @@ def unlock_folder(folder: Path, lock: int) -> None:
     if sys.platform == "win32":
         with suppress(OSError):  # another process has it by now
             (folder / _LOCK_NAME).unlink()
+
+
+def natural_order(path: Path) -> list[tuple[int, str]]:
+    """Return the key that sorts file names by the numbers in them: ``2.pcd`` before ``10.pcd``."""
+    parts = [*re.split(r"([0-9]+)", path.stem), path.suffix]  # the suffix last: "run.npz" is before "run-1.npz"
+    return [(int(part), "") if part.isdecimal() else (0, part) for part in parts]
+
+
+def read_small(path: Path, most: int, cure: str) -> bytes:
+    """Return the content of a file of a user that has one to ``most`` bytes.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be read, is empty, or is larger; ``cure`` ends the message of the last two.
+    """
+    try:
+        with path.open("rb") as file:
+            size = os.fstat(file.fileno()).st_size
+            content = file.read(most + 1) if size <= most else b""
+    except FileNotFoundError as error:
+        raise SeipError(f"no such file: {path}; check its path") from error
+    except OSError as error:
+        raise SeipError(f"cannot read {path}: {error.strerror or error}; check that it is a readable file") from error
+    if size > most or len(content) > most:
+        raise SeipError(f"{path.name} has more than {most / 1e6:,.0f} MB; {cure}")
+    if not content:
+        raise SeipError(f"{path.name} is empty; {cure}")
+    return content
+
+
+def parse_json(text: str) -> Any:  # noqa: ANN401  # any JSON
+    """Return the content of a JSON text; raise `ValueError` or `RecursionError` if it is damaged or has NaN."""
+
+    def refuse(name: str) -> NoReturn:
+        raise ValueError(f"it has the number {name}")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def content_fault(error: Exception) -> str:
+    """Return the reason for which the content of a file cannot be used, from what parsing or using it raised."""
+    if isinstance(error, KeyError):
+        return f"it has no {error}"
+    return str(error)[:200] if isinstance(error, ValueError) else "its structure is another one"
 
 
 def save_json(path: str | os.PathLike[str], value: object) -> None:

@@ -34,7 +34,7 @@ from ..choosing.robustness.traffic_study import LAYER_NAMES, traffic_message, tr
 from ..choosing.robustness.visibility_in_traffic import TrafficLayer
 from ..errors import SeipError
 from ..progress import Progress
-from .returns import crossing_returns, place_by_returns
+from .returns import crossing_returns, place_by_returns, with_returns_front
 from .survey import Survey, surroundings
 from .traffic_runs import TrafficRuns
 
@@ -89,6 +89,7 @@ def with_context(survey: Survey, solution: Solution) -> Generator[Progress, None
     """Return a solution with what reports add: other numbers of sensors, and a pedestrian's returns on crossings."""
     problem = placement_problem(survey.site, survey.grid.visible, survey.models, solution.objective)
     front = yield from price_front(problem, solution)
+    solution = yield from with_returns_front(survey, solution)
     return replace(solution, front=front, crossings=crossing_returns(survey, solution))
 
 

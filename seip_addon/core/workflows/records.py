@@ -26,14 +26,14 @@ from .survey import Layout, Survey, grid_key
 
 STALE = "the placement is stale, as the scene or its settings have changed: place again"
 _RETURNS = "returns"
-"""Name of the digest of what only a placement by returns depends on."""
+"""Name of the digest of inputs that only a placement by returns has."""
 
 
 def inputs_of(layout: Layout) -> dict[str, str]:
-    """Return digests of the inputs of a placement: of the visibility grid, of the rest of the site, of the returns.
+    """Return digests of the inputs of a placement: the visibility grid, the rest of the site, and the returns.
 
-    Two layouts with the same digests have the same solution for the same objective. Those of the visibility grid and
-    of the site are enough for objectives other than returns.
+    Two layouts with the same digests have the same solution for the same objective. For criteria other than returns,
+    the digests of the visibility grid and of the site are sufficient.
     """
     targets, candidates = layout.site.targets, layout.site.candidates
     site = digest(

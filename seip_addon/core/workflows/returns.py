@@ -18,6 +18,8 @@ from ..choosing.placement.objective import (
     weights_in_regions,
     with_count,
 )
+from ..choosing.placement.problem import Placement, PlacementProblem
+from ..choosing.placement.returns_front import returns_front
 from ..choosing.placement.returns_solver import greedy_returns, solve_returns
 from ..choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
 from ..choosing.placement.search_limits import SolverLimits
@@ -46,22 +48,52 @@ def place_by_returns(survey: Survey, objective: Objective, limits: SolverLimits)
     site, models = survey.site, survey.models
     users = road_users(survey.geometry)
     grid = yield from stored_returns(survey.returns_path, site, users, models, survey.settings.engine)
-    problem = placement_problem(site, grid.returns > 0, models, objective)
-    problem = replace(problem, weights=user_weights(users, objective))
+    problem = _returns_problem(survey, grid, users, objective)
     placement = yield from solve_returns(problem, grid.returns, limits)
     greedy = yield from greedy_returns(problem, grid.returns)
-    summary = summarised(grid, users, objective, placement.chosen)
+    return returns_solution(survey, grid, users, objective, (placement, greedy))
+
+
+def returns_solution(
+    survey: Survey,
+    grid: ReturnsGrid,
+    users: RoadUsers,
+    objective: Objective,
+    placements: tuple[Placement, Placement | None],
+) -> Solution:
+    """Return the solution of a placement that was chosen for returns, with the greedy placement if there is one."""
+    placement, greedy = placements
+    chosen = placement.chosen
+    summary = summarised(grid, users, objective, chosen)
     note = f"{CHOSEN_FOR}for returns from road users: {summary.describe()} in one revolution (geometric means)"
     return Solution(
-        with_count(objective, site),
+        with_count(objective, survey.site),
         replace(placement, notes=(note, *summary.warnings(), *placement.notes)),
         greedy,
         replace(
-            deploy(site, models, survey.grid.rows(placement.chosen), placement.chosen),
+            deploy(survey.site, survey.models, survey.grid.rows(chosen), chosen),
             returns=summary,
-            pedestrian_returns=_near_targets(site.targets, users, grid, placement.chosen),
+            pedestrian_returns=_near_targets(survey.site.targets, users, grid, chosen),
         ),
     )
+
+
+def with_returns_front(survey: Survey, solution: Solution) -> Generator[Progress, None, Solution]:
+    """Return a solution that was chosen for returns with the returns of other numbers of sensors."""
+    site, models, summary = survey.site, survey.models, solution.deployment.returns
+    if summary is None:
+        return solution
+    users = road_users(survey.geometry)
+    grid = yield from stored_returns(survey.returns_path, site, users, models, survey.settings.engine)
+    problem = _returns_problem(survey, grid, users, solution.objective)
+    front = yield from returns_front(problem, grid.returns, solution)
+    return replace(solution, deployment=replace(solution.deployment, returns=replace(summary, front=front)))
+
+
+def _returns_problem(survey: Survey, grid: ReturnsGrid, users: RoadUsers, objective: Objective) -> PlacementProblem:
+    """Return the problem whose weights are those of the road users."""
+    problem = placement_problem(survey.site, grid.returns > 0, survey.models, objective)
+    return replace(problem, weights=user_weights(users, objective))
 
 
 def crossing_returns(survey: Survey, solution: Solution) -> tuple[CrossingReturns, ...]:

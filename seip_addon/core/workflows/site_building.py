@@ -93,12 +93,23 @@ class SiteRequest:
 
 @dataclass(frozen=True, eq=False)
 class BuiltSite:
-    """Model of a site with the name of its map, the map itself if made from an extract, and laser-survey boxes."""
+    """Model of a site with the name of its map, the map itself if made from an extract, and laser-survey boxes.
+
+    Parameters
+    ----------
+    map_name : str
+        Name of the map's file, or of the extract's.
+    map_text : str or None
+        Map of the streets of an extract.
+    map_path : path or None
+        Map that is not made from an extract.
+    """
 
     map_name: str
     model: SiteModel
     map_text: str | None = None
     merging: tuple[Merging, ...] = ()
+    map_path: Path | None = None
 
 
 def build_site(
@@ -128,7 +139,7 @@ def build_site(
         description, notes = yield from surroundings_of_map(request.osm, road_map, description, middle, reach)
     description, more, merging = yield from _with_sources(road_map, description, request)
     model = yield from site_model(road_map, description)
-    return BuiltSite(map_path.name, replace(model, notes=(*notes, *more, *model.notes)), merging=merging)
+    return BuiltSite(map_path.name, replace(model, notes=(*notes, *more, *model.notes)), None, merging, map_path)
 
 
 def save_map(built: BuiltSite, path: Path) -> None:

@@ -14,6 +14,7 @@ from ..world.opendrive.read import read_map
 from ..world.openstreetmap.crossings import Crossing, named_crossings
 from ..world.openstreetmap.extract import MAX_LATITUDE, read_extract
 from ..world.openstreetmap.site import is_extract
+from ..world.openstreetmap.street_plan import StreetPlan, street_plan
 from ..world.streetscape.description import DEFAULT_RADIUS, describe_place
 
 ROADS_PER_STEP = 20
@@ -47,10 +48,18 @@ class SitePlaces:
         Default radius of a site.
     places : tuple of NamedPlace
         Junctions of the file.
+    plan : StreetPlan or None
+        Streets of an extract in plan, with the junctions in the order of ``places``.
     """
 
     radius: float
     places: tuple[NamedPlace, ...]
+    plan: StreetPlan | None = None
+
+    @property
+    def has_map(self) -> bool:
+        """Whether there is a map on which a junction can be chosen."""
+        return self.plan is not None and len(self.places) > 0
 
 
 def site_places(source: Path) -> Generator[Progress, None, SitePlaces]:
@@ -67,7 +76,7 @@ def site_places(source: Path) -> Generator[Progress, None, SitePlaces]:
         crossings = named_crossings(extract)
         named = _unlike([one.name for one in crossings])
         places = tuple(NamedPlace(name, _position(one)) for name, one in zip(named, crossings, strict=True))
-        return SitePlaces(DEFAULT_RADIUS, places)
+        return SitePlaces(DEFAULT_RADIUS, places, street_plan(extract, crossings))
     map_path, description = describe_place(source)
     road_map = read_map(map_path)
     lanes: list[LaneSurface] = []

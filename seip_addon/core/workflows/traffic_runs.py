@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -15,6 +14,7 @@ from ..sensing.traffic.run_overlap import require_independent, vehicle_positions
 from ..sensing.traffic.site_traffic import check_runs, load_trajectories
 from ..sensing.traffic.trajectories import Trajectories
 from ..site.site import Site
+from ..storage.files import natural_order
 from .survey import Layout
 
 _Run = TypeVar("_Run")
@@ -59,11 +59,7 @@ def traffic_folder(scene: Path, kind: str = "") -> Path:
 
 def runs_in(folder: Path) -> list[Path]:
     """Return the files of runs in a folder in natural order of their names; none if there is no such folder."""
-
-    def by_number(path: Path) -> list[tuple[int, str]]:
-        return [(int(part), "") if part.isdecimal() else (0, part) for part in re.split(r"([0-9]+)", path.stem)]
-
-    return sorted(folder.glob("*.npz"), key=by_number)
+    return sorted(folder.glob("*.npz"), key=natural_order)
 
 
 def found_runs(folder: Path) -> list[Path]:
@@ -78,7 +74,7 @@ def found_runs(folder: Path) -> list[Path]:
     if not paths:
         raise SeipError(
             f"there is no run of traffic (.npz) in {folder}: choose another folder, or make two or more runs with "
-            "seip traffic, each with its own seed"
+            "Simulate Traffic in the panel or with seip traffic, each with its own seed"
         )
     return paths
 
@@ -111,8 +107,8 @@ def independent_runs(runs: Mapping[str, Trajectories], site: Site) -> TrafficRun
     """
     if len(runs) < 2:
         raise SeipError(
-            f"two runs of traffic or more are needed, not {len(runs)}: make them with seip traffic, each with its own "
-            "seed; the last third is held out for evaluation"
+            f"two runs of traffic or more are needed, not {len(runs)}: make them with Simulate Traffic in the panel or "
+            "with seip traffic, each with its own seed; the last third is held out for evaluation"
         )
     check_runs(list(runs.values()), site.region)
     positions = [vehicle_positions(name, run) for name, run in runs.items()]

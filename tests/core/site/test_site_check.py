@@ -73,7 +73,12 @@ def test_everything_is_counted():
 def test_what_is_missing_stops_a_survey():
     problems = found()
     assert [severity for severity, _, _ in problems] == ["ERROR"] * 3
-    assert one(problems, "no region") == one(problems, "no road") == one(problems, "stand nowhere") == ("ERROR", "")
+    assert (
+        one(problems, "no region")
+        == one(problems, "no road")
+        == one(problems, "no position for a sensor")
+        == ("ERROR", "")
+    )
 
 
 def test_poles_do_for_candidate_areas():

@@ -15,7 +15,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import NamedArea
 from seip_addon.core.site.weather import Weather
 from seip_addon.core.workflows import records
-from seip_addon.core.workflows.placing import place
+from seip_addon.core.workflows.placing import place, with_context
 from seip_addon.core.workflows.records import inputs_of, record_of, restored_solution
 from seip_addon.core.workflows.survey import lay_out, see
 
@@ -29,7 +29,7 @@ def by_returns(small_survey):
     geometry = replace(small_survey.geometry, places=(CROSSING,))
     survey = replace(small_survey, geometry=geometry)
     goal = Objective(count=2, criterion="returns", shares=(1.0, 2.0, 3.0))
-    return survey, record_of(survey, finish(place(survey, goal)), MADE)
+    return survey, record_of(survey, finish(with_context(survey, finish(place(survey, goal)))), MADE)
 
 
 def test_weights_change_the_site_but_not_the_visibility(small_layout):
@@ -56,6 +56,11 @@ def test_a_solution_by_returns_is_restored_with_its_shares_and_returns(by_return
     restored = finish(restored_solution(survey, record))
     assert restored.objective.shares == (1.0, 2.0, 3.0)
     assert restored.deployment.returns == record.returns
+    front = record.returns.front
+    assert [point.count for point in front] == [1, 2, 3, 4]
+    assert front[1].returns == pytest.approx(record.returns.typical, rel=1e-3)
+    assert (front[1].price, front[1].gap) == (record.price_usd, 0.0)
+    assert record.front == ()  # of coverage, for which it was not chosen
     assert restored.deployment.pedestrian_returns is not None
 
 

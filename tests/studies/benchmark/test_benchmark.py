@@ -9,7 +9,7 @@ from functools import partial
 from headless.studies.benchmark import command as benchmark
 from headless.studies.benchmark.approximations import bounding_box, decimated, every_other_channel, thinner
 from headless.studies.benchmark.baselines import BASELINES, can_run
-from headless.studies.benchmark.fresh_process import alone
+from headless.studies.benchmark.fresh_process import in_fresh_process
 from headless.studies.benchmark.growth import relaxation_growth, repeated
 from headless.studies.benchmark.measurements import BenchmarkScope
 from headless.studies.benchmark.placement import SolverRun, compare
@@ -200,6 +200,6 @@ def test_expense_sums_and_memory_counts_what_was_in_use():
     assert expense.time(lambda: "result") == "result"
     assert expense.cpu >= 0
     assert expense.wall > 0
-    array, grown = alone(partial(peak_memory, partial(np.ones, 40_000_000, dtype=np.int8)))
+    array, grown = in_fresh_process(partial(peak_memory, partial(np.ones, 40_000_000, dtype=np.int8)))
     assert array.all()
     assert grown is None or 35 < grown < 80

@@ -2,13 +2,13 @@
 
 import math
 
-from headless.charts import style
 from headless.studies.criteria.charts import CriterionBar, PlacementMark, save_criteria_chart, save_placements_chart
 
 import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import IntervalEstimate
+from seip_addon.core.output.pictures import chart_style as style
 
 MARKS = (
     PlacementMark("optimal", 0.8, 0.75, (0.7, 0.8)),

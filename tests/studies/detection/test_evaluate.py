@@ -163,7 +163,7 @@ def test_runs_beside_a_scene_are_ordered_by_their_numbers(tmp_path):
         ((), (0, 1, 2, 0), "run-1 and run-1 are nearly the same traffic"),
         (("--every", "0"), (0, 1, 2, 3), "--every must be"),
         (("--trainings", "0"), (0, 1, 2, 3), "--trainings must be 1 or more without --placements, not 0"),
-        (("--device", "abacus"), (0, 1, 2, 3), "torch cannot use the device 'abacus'"),
+        (("--device", "abacus"), (0, 1, 2, 3), "PyTorch cannot use the device 'abacus'"),
     ],
 )
 def test_what_cannot_be_evaluated_gets_a_sentence(run, runs, tmp_path, options, named, sentence):

@@ -24,7 +24,6 @@ from headless.studies.ingredients.variants import (
     with_bodies,
 )
 from headless.studies.site_training.training_site import TrainingSite
-from headless.sumo.demand import MODELS
 
 import numpy as np
 
@@ -34,6 +33,7 @@ from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.workflows.survey import lay_out
 from seip_addon.core.workflows.survey_settings import SurveySettings
+from seip_addon.core.world.traffic_simulation.demand import MODELS
 from tests.builders.sloping_road import hill
 from tests.builders.small_junction import make_geometry
 from tests.builders.small_scene import make_run

@@ -8,14 +8,14 @@ import pytest
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless.studies.paper import command as paper_case
-from headless.sumo.simulation import SignalPlan, _network
-from headless.sumo.street_network import read_network
 
 from matplotlib.image import imread
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.sumo_programs import find_sumo
+from seip_addon.core.world.traffic_simulation.simulation import SignalPlan, _network
+from seip_addon.core.world.traffic_simulation.street_network import read_network
 from tests.sumo_here import needs_sumo
 
 MAP = Path(__file__).resolve().parents[3] / "scenes" / "junction.xodr"
@@ -100,7 +100,7 @@ def test_without_sumo_is_one_sentence(run, tmp_path, monkeypatch):
 def test_the_page_is_written_with_its_charts(run, network, tmp_path, capsys):
     streets = read_network(network)
     arm = streets.arms[0]
-    way = f"{arm.id} {streets.onward[arm.id][0][0]}"
+    way = f"{arm.id} {streets.turns[arm.id][0][0]}"
     brief = ["--runs", "4", "--duration", "12", "--warm-up", "30", "--every", "9", "--steps", "1", "--trainings", "1"]
     few = ["--approaches", "20", "--time-limit", "2"]
     run(*brief, *few, net=network.read_text(encoding="utf-8"), edges=way)

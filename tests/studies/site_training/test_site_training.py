@@ -65,6 +65,23 @@ def test_a_finished_training_is_not_done_again(sites, tmp_path, capsys):
     assert "best after 2 steps" in capsys.readouterr().out
 
 
+def test_field_conditions_change_the_training_and_it_continues_from_a_detector(sites, tmp_path):
+    train_on_sites.main([*sites, *BRIEF, "type1", "-o", str(tmp_path / "plain")])
+    plain = tmp_path / "plain" / "detector.pt"
+    again = [*sites, *BRIEF, "type1", "--start", str(plain), "--learning-rate", "0.0001", "--field-conditions"]
+    for output in ("one", "other"):
+        train_on_sites.main([*again, "-o", str(tmp_path / output)])
+    one, other = ((tmp_path / name / "detector.pt").read_bytes() for name in ("one", "other"))
+    assert one == other != plain.read_bytes()
+    name = "feature_map.encoder.linear.weight"
+    near, far = (Detector.load(path).state_dict()[name] for path in (plain, tmp_path / "one" / "detector.pt"))
+    assert 0 < (near - far).abs().max() < 0.01
+    with pytest.raises(SeipError, match="is of another network"):
+        train_on_sites.main(
+            [*sites, *BRIEF, "type1", "--start", str(plain), "--width", "16", "-o", str(tmp_path / "x")]
+        )
+
+
 def test_mistakes_are_named(sites, tmp_path):
     with pytest.raises(SeipError, match="two sites or more"):
         train_on_sites.main([sites[0], *BRIEF, "type1", "-o", str(tmp_path)])

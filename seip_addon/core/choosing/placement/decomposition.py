@@ -39,7 +39,7 @@ class _Part:
     targets : (s,) int64
         Indices of these targets in the instance.
     matrix : (n, s) float
-        1 where a candidate sees a target, else 0.
+        1 if a candidate sees a target, otherwise 0.
     excluded : (n, n) bool
         Pairs that cannot be chosen together, each candidate with itself included.
     """
@@ -85,7 +85,7 @@ def decomposition_bound(
     goal : float
         Covered weight below which the descent may stop.
     seconds : float
-        Maximum time, in units of work where the clock counts these.
+        Maximum time, in units of work if the clock counts these.
     """
     parts = _partition(instance)
     end = clock.elapsed + min(seconds, clock.left)
@@ -135,7 +135,7 @@ def _part(instance: Instance, members: Integer) -> _Part:
 
 @dataclass(frozen=True, eq=False)
 class _PartsBound:
-    """The bound L(λ), its multipliers λ, and how many times each target counts in Σ F; arrays (t,) float64."""
+    """The bound L(λ), its multipliers λ, and the number of times each target counts in Σ F; arrays (t,) float64."""
 
     value: float
     multipliers: Float

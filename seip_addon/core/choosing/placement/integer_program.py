@@ -31,11 +31,11 @@ TOTAL_WEIGHT = 1e4  # total weight in a program: far above the solvers' absolute
 TOLERANCE = 2e-6  # share of all weight that a solver's tolerance of 1e-6 on every variable may add up to, doubled
 MAX_ENTRIES = 1_000_000  # entries of V up to which a program is built: PuLP takes 0.5 kB for each
 MAX_REJECTED = 100  # choices in a row that a solver's tolerance admits and exact arithmetic does not, before giving up
-MIN_SECONDS = 0.01  # seconds that a solver is given where none are left
+MIN_SECONDS = 0.01  # seconds that a solver is given if no time remains
 OPERATIONS_PER_ENTRY = 1e4  # multiplications per entry of a program that count as the work of one branch of a solver
 CALL_OPERATIONS = 1e8  # multiplications that take as long as handing the smallest program to a solver
 ROOT_OPERATIONS = 5.0  # multiplications per squared entry that count as the work of the first linear relaxation
-UNLIMITED_SECONDS = 1e7  # seconds that solvers are given where there is no limit: not all of them take infinity
+UNLIMITED_SECONDS = 1e7  # seconds that solvers are given without a limit: not all of them accept infinity
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ class PlacementProgram:
     def maximise(
         self, objective: Expression, solver: str, clock: Clock, share: float = 1.0
     ) -> Generator[Progress, None, Outcome]:
-        """Solve for the largest objective within a share of what is left of the limits.
+        """Solve for the largest objective within a share of the remaining limits.
 
         The solver runs in a thread of its own. Closing the generator asks it to stop.
         """
@@ -240,12 +240,12 @@ def _root_operations(entries: int) -> float:
 
 
 def is_affordable(instance: Instance, clock: Clock, share: float = 1.0) -> bool:
-    """Return whether an instance's program fits into memory, and its first relaxation into what is left of limits."""
+    """Return whether an instance's program fits into memory and its first relaxation into the remaining limits."""
     return fits(np.count_nonzero(instance.visible), clock, share)
 
 
 def fits(entries: int, clock: Clock, share: float = 1.0) -> bool:
-    """Return whether a program fits into memory, and its first relaxation into what is left of limits.
+    """Return whether a program fits into memory and its first relaxation into the remaining limits.
 
     A solver cannot be stopped by counted work within a relaxation, and PuLP takes long to build a large program.
     """
@@ -308,7 +308,7 @@ class _Highs(pulp.HiGHS):  # type: ignore[misc]
 
 @contextmanager
 def _engine(solver: str, limits: tuple[float, int | None], stop: threading.Event) -> Iterator[Any]:
-    """Yield PuLP's interface to a solver, set to prove optimality within seconds and, where given, branches.
+    """Yield PuLP's interface to a solver that proves optimality within seconds and, if given, a number of branches.
 
     HiGHS ends soon after ``stop`` is set; PuLP offers no way to stop the others before their time limit.
     """

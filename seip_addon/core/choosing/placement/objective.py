@@ -141,11 +141,13 @@ class Objective:
         if kind == "nominal":
             self._require_no_settings_of_scenarios()
         if self.criterion == "height" and (kind != "traffic" or measure is None):
-            raise SeipError("the criterion height needs traffic: add --traffic, or choose another criterion")
+            raise SeipError("the criterion height needs traffic: choose traffic as scenarios, or another criterion")
         if measure is None:
             return
         # With failures the risk none is refused: only evaluating is no cure there.
-        instead = "leave out --failures and --seen-by" if self._multi_cover else "only evaluate (--risk none)"
+        instead = (
+            "leave out failures and several sensors per target" if self._multi_cover else "only evaluate (risk none)"
+        )
         if self.cheapest:
             raise SeipError(
                 "optimising over scenarios or for failures needs a number of sensors or a budget, not a coverage to "
@@ -163,16 +165,16 @@ class Objective:
         """Raise SeipError if a setting of several scenarios is given, which the nominal scenario would ignore."""
         scenarios = self.scenarios
         given = {
-            "--risk": self.risk != "auto",
-            "--scenarios": scenarios.count is not None,
-            "--held-out": scenarios.held_out is not None,
-            "--seed": scenarios.seed != 0,
+            "the risk measure": self.risk != "auto",
+            "the number of scenarios": scenarios.count is not None,
+            "the number of held-out scenarios": scenarios.held_out is not None,
+            "the seed of the scenarios": scenarios.seed != 0,
         }
-        idle = next((option for option, there in given.items() if there), None)
+        idle = next((setting for setting, there in given.items() if there), None)
         if idle is not None:
             raise SeipError(
-                f"{idle} has no effect on nominal poses and the empty road: add --pose-errors or --traffic, or leave "
-                f"out {idle}"
+                f"{idle} has no effect on nominal poses and the empty road: choose pose errors or traffic as "
+                "scenarios, or leave it out"
             )
 
     @property

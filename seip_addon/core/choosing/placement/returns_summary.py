@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
-from ...limits import COUNT, Limits
+from ...limits import COUNT, PRICE, Limits
 
 RETURNS = Limits(0.0, COUNT.most)
 FEW_RETURNS = 5.0
@@ -46,6 +46,26 @@ class CrossingReturns:
 
 
 @dataclass(frozen=True)
+class ReturnsPoint:
+    """The placement with the most returns found with at most ``count`` sensors.
+
+    Parameters
+    ----------
+    returns : float
+        Typical number of returns, as of `ReturnsSummary`.
+    price : float, dollars
+    gap : float or None
+        Largest share by which the geometric mean of 1 + returns of another placement could be larger; 0 where this one
+        is proven optimal, None where nothing is proven.
+    """
+
+    count: Annotated[int, COUNT]
+    returns: Annotated[float, RETURNS]
+    price: Annotated[float, PRICE]
+    gap: Annotated[float, RETURNS] | None
+
+
+@dataclass(frozen=True)
 class ReturnsSummary:
     """Expected returns from road users of all sensors together in one revolution.
 
@@ -57,11 +77,14 @@ class ReturnsSummary:
         The same mean for each kind of road user.
     crossings : tuple of CrossingReturns
         Returns from a pedestrian at each crossing.
+    front : tuple of ReturnsPoint
+        Best placements found with fewer and more sensors, see `returns_front`. Empty if they were not searched for.
     """
 
     typical: Annotated[float, RETURNS]
     of_each: Mapping[str, Annotated[float, RETURNS]]
     crossings: tuple[CrossingReturns, ...]
+    front: tuple[ReturnsPoint, ...] = ()
 
     def describe(self) -> str:
         """Return the number of returns from each kind of road user as text."""

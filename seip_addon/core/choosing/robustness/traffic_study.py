@@ -160,7 +160,7 @@ class TrafficStudy:
         gain = self.gain(self.layer)
         messages = [f"this placement sees {gain.as_change()} {seen}, in traffic that neither was chosen on"]
         if not self.is_converged():
-            messages.append("half of the instants give a different result: evaluate on more instants (--held-out)")
+            messages.append("half of the instants give a different result: evaluate on more held-out instants")
         messages += [
             f"the best placement for the empty road sees {seen.mean.value:.1%} of the {LAYER_NAMES[layer]} on average "
             f"over time in traffic ({self.road_users:.0f} road users at a time), not {seen.empty:.1%}: "
@@ -171,7 +171,7 @@ class TrafficStudy:
         if gain.low <= 0 and not np.array_equal(self.empty.placement.chosen, self.traffic.placement.chosen):
             messages.append(
                 "on held-out traffic this placement is not significantly better than the empty-road optimum: use more "
-                "instants (--scenarios), or keep that one"
+                "instants, or keep that one"
             )
         return tuple(messages)
 

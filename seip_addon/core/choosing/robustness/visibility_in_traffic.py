@@ -71,34 +71,103 @@ def visibility_in_traffic(
         Visibility at each instant. For the layer ``road`` it is identical to that of full scans with all triangles in
         one ray caster.
     """
-    site, candidates = around.site, around.site.candidates
-    engine = engine_name(around.engine)
-    caster = make_ray_caster(site.triangles, engine)
+    setting = _Setting(around, layer)
     vehicles = [_vehicle_caster(around, one) for one in instants]
-    wanted = site.targets.xyz + np.array([0.0, 0.0, LAYER_HEIGHT if layer == "height" else 0.0])
-    index = TargetIndex(wanted, around.sight.delta)
-    surfaces = near_surfaces(site.triangles, wanted, around.sight.delta, site.reflectivity)
-    packed = np.zeros((len(instants), len(poses), (len(wanted) + 7) // 8), dtype=np.uint8)
+    packed = np.zeros((len(instants), len(poses), (len(setting.wanted) + 7) // 8), dtype=np.uint8)
 
     def compute(number: int) -> None:
-        pose = int(poses[number])
+        from_pose = _PoseInTraffic(setting, int(poses[number]))
+        for instant, vehicle in enumerate(vehicles):
+            packed[instant, number] = np.packbits(from_pose.seen(vehicle))
+
+    threads = setting.caster.threads
+    yield from each_in_threads(compute, range(len(poses)), threads, "computing visibility in traffic")
+    return ScenarioVisibility(packed, len(setting.wanted))
+
+
+class PosesInTraffic:
+    """Visibility of the road from poses at any instant of traffic, with their rays on the empty road kept.
+
+    Parameters
+    ----------
+    around : Surroundings
+    poses : sequence of _PoseInTraffic
+        The poses; see `poses_in_traffic`.
+    """
+
+    def __init__(self, around: Surroundings, poses: Sequence[_PoseInTraffic]) -> None:
+        self._around, self._poses = around, poses
+
+    def seen_by(self, present: TrafficObstacles) -> Integer:
+        """Return the number of poses that see each target while road users are present, (t,) int64."""
+        vehicles = _vehicle_caster(self._around, present)
+        count = np.zeros(len(self._around.site.targets), dtype=np.int64)
+        for pose in self._poses:
+            count += pose.seen(vehicles)
+        return count
+
+
+def poses_in_traffic(around: Surroundings, poses: Integer) -> Generator[Progress, None, PosesInTraffic]:
+    """Cast the rays of poses on the empty road, for their visibility at any instant of traffic.
+
+    Parameters
+    ----------
+    poses : (s,) int64
+        Indices among the site's candidates.
+
+    Yields
+    ------
+    Progress
+        Progress after each pose.
+    """
+    setting = _Setting(around, "road")
+    found: dict[int, _PoseInTraffic] = {}
+
+    def compute(number: int) -> None:
+        found[number] = _PoseInTraffic(setting, int(poses[number]))
+
+    threads = setting.caster.threads
+    yield from each_in_threads(compute, range(len(poses)), threads, "casting rays on the empty road")
+    return PosesInTraffic(around, [found[number] for number in range(len(poses))])
+
+
+class _Setting:
+    """What all poses have in common: ray caster of the scene, and the points that may be seen."""
+
+    def __init__(self, around: Surroundings, layer: TrafficLayer) -> None:
+        site = around.site
+        self.around, self.layer = around, layer
+        self.caster = make_ray_caster(site.triangles, engine_name(around.engine))
+        self.wanted = site.targets.xyz + np.array([0.0, 0.0, LAYER_HEIGHT if layer == "height" else 0.0])
+        self.index = TargetIndex(self.wanted, around.sight.delta)
+        self.surfaces = near_surfaces(site.triangles, self.wanted, around.sight.delta, site.reflectivity)
+
+
+class _PoseInTraffic:
+    """Visibility from one pose: its rays on the empty road, of which vehicles stop some."""
+
+    def __init__(self, setting: _Setting, pose: int) -> None:
+        around, candidates = setting.around, setting.around.site.candidates
         model, xyz, yaw = around.models[str(candidates.sensor[pose])], candidates.xyz[pose], candidates.yaw[pose]
-        place = ScanPosition(caster, xyz, float(yaw), [model], around.sight, site.reflectivity)
-        points, near, found, present = wanted, surfaces, index, vehicles
+        place = ScanPosition(setting.caster, xyz, float(yaw), [model], around.sight, around.site.reflectivity)
+        points, near, found = setting.wanted, setting.surfaces, setting.index
+        self._tilted: tuple[ScanPosition, Float] | None = None
         if candidates.tilt[pose] != 0:  # computed in the axes of the sensor, as visibility on the empty road is
             orientation = candidates.orientation(pose)
-            present = [one.rotated(place, orientation) for one in vehicles]
-            place, near = in_sensor_axes(place, orientation), rotated_surfaces(surfaces, xyz, orientation)
+            self._tilted = place, orientation
+            place, near = in_sensor_axes(place, orientation), rotated_surfaces(setting.surfaces, xyz, orientation)
             points, found = near.xyz, TargetIndex(near.xyz, around.sight.delta)
-        static = _StaticScan(place, points)
-        visibility: _LayerVisibility = (
-            _HeightVisibility(static, points) if layer == "height" else _RoadVisibility(static, found, near)
+        self._static = _StaticScan(place, points)
+        self._visibility: _LayerVisibility = (
+            _HeightVisibility(self._static, points)
+            if setting.layer == "height"
+            else _RoadVisibility(self._static, found, near)
         )
-        for instant, vehicle in enumerate(present):
-            packed[instant, number] = np.packbits(visibility.seen(static.blocked_by(vehicle)))
 
-    yield from each_in_threads(compute, range(len(poses)), caster.threads, "computing visibility in traffic")
-    return ScenarioVisibility(packed, len(wanted))
+    def seen(self, vehicles: _VehicleCaster) -> Boolean:
+        """Return the targets that are seen while vehicles are present, (t,) bool."""
+        present = vehicles if self._tilted is None else vehicles.rotated(*self._tilted)
+        return self._visibility.seen(self._static.blocked_by(present))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,20 +1,23 @@
 """Point Cloud Data files, binary, as PCL and Open3D read them: the merged cloud, and that of each sensor.
 
-All clouds are in the site's local axes, so that they lie over each other when they are opened together; where the
-sensors stand is in the manifest. Source: Point Cloud Library, "The PCD (Point Cloud Data) file format", version 0.7.
+All clouds are in the site's local axes, so that they lie over each other when they are opened together. The viewpoint
+of a sensor's cloud is the sensor's pose, that of the merged cloud is the identity. Source: Point Cloud Library, "The
+PCD (Point Cloud Data) file format", version 0.7.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SeipError
+from ...geometry.orientation import quaternion_of
 from .format_interface import Format
 from .sample import Sample, TrafficRun, cloud
 
 MERGED = "merged"
+IDENTITY = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # viewpoint in the origin
 POINT_TYPE = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4")])
 
 
@@ -23,7 +26,9 @@ def sample_files(sample: Sample) -> dict[str, Callable[[], bytes]]:
     points = cloud(sample.frame)
 
     def only(number: int) -> Callable[[], bytes]:
-        return lambda: encode(points[sample.frame.sensor == number].view(POINT_TYPE)[:, 0])
+        sensor = sample.run.sensors[number]
+        viewpoint = (*sensor.xyz.tolist(), *quaternion_of(sensor.orientation).tolist())
+        return lambda: encode(points[sample.frame.sensor == number].view(POINT_TYPE)[:, 0], viewpoint)
 
     labels = [sensor.label for sensor in sample.run.sensors]
     clouds = {MERGED: lambda: encode(points.view(POINT_TYPE)[:, 0])}
@@ -32,8 +37,14 @@ def sample_files(sample: Sample) -> dict[str, Callable[[], bytes]]:
     return {f"{run.split}/{run.name}/{folder}/{sample.frame_id}.pcd": content for folder, content in clouds.items()}
 
 
-def encode(points: NDArray[Any]) -> bytes:
-    """Return a structured array of little-endian float32 fields, (n,), as a binary PCD file."""
+def encode(points: NDArray[Any], viewpoint: Sequence[float] = IDENTITY) -> bytes:
+    """Return a structured array of little-endian float32 fields, (n,), as a binary PCD file.
+
+    Parameters
+    ----------
+    viewpoint : sequence of 7 float
+        Position (metres) and orientation (quaternion w, x, y, z) of the sensor in the axes of the points.
+    """
     names = points.dtype.names or ()
     lines = (
         "# .PCD v0.7 - Point Cloud Data file format",
@@ -44,7 +55,7 @@ def encode(points: NDArray[Any]) -> bytes:
         f"COUNT {' '.join('1' for _ in names)}",
         f"WIDTH {len(points)}",
         "HEIGHT 1",
-        "VIEWPOINT 0 0 0 1 0 0 0",
+        f"VIEWPOINT {' '.join(f'{round(number, 9) + 0.0:.12g}' for number in viewpoint)}",
         f"POINTS {len(points)}",
         "DATA binary",
     )

@@ -66,7 +66,7 @@ def place_callouts(  # what a label must keep off is of several kinds
     return centres
 
 
-def stack_upwards(boxes: Float, gap: float) -> Float:
+def stack_upwards(boxes: Float, gap: float, taken: Float | None = None) -> Float:
     """Return how far up each box must move so that none overlaps another, (k,) float64; the lowest stay.
 
     Parameters
@@ -75,21 +75,23 @@ def stack_upwards(boxes: Float, gap: float) -> Float:
         Left, bottom, width and height of each.
     gap : float
         Between two boxes, upwards.
+    taken : (n, 4) float64, optional
+        Left, bottom, width and height of boxes that stay, and that the others move above.
     """
-    rise = np.zeros(len(boxes))
-    left, bottom, right = boxes[:, 0], boxes[:, 1], boxes[:, 0] + boxes[:, 2]
-    placed: list[int] = []
-    for one in np.argsort(bottom, kind="stable").tolist():
+    fixed = np.empty((0, 4)) if taken is None else taken
+    everything = np.concatenate((fixed, boxes))
+    rise = np.zeros(len(everything))
+    left, bottom, height = everything[:, 0], everything[:, 1], everything[:, 3]
+    right = left + everything[:, 2]
+    placed = list(range(len(fixed)))
+    for one in (len(fixed) + np.argsort(boxes[:, 1], kind="stable")).tolist():
         beside = [other for other in placed if left[one] < right[other] and left[other] < right[one]]
         for other in sorted(beside, key=lambda other: bottom[other] + rise[other]):
-            low = bottom[other] + rise[other]
-            if (
-                low - gap < bottom[one] + rise[one] + boxes[one, 3]
-                and bottom[one] + rise[one] < low + boxes[other, 3] + gap
-            ):
-                rise[one] = low + boxes[other, 3] + gap - bottom[one]
+            low, own = bottom[other] + rise[other], bottom[one] + rise[one]
+            if low - gap < own + height[one] and own < low + height[other] + gap:
+                rise[one] = low + height[other] + gap - bottom[one]
         placed.append(one)
-    return rise
+    return rise[len(fixed) :]
 
 
 def _is_apart(centres: Float, reach: Float, taken_low: Float, taken_high: Float) -> Boolean:

@@ -60,6 +60,15 @@ def as_png(figure: Figure) -> bytes:
     return content.getvalue()
 
 
+def box_corners(boxes: Float) -> Float:
+    """Return the corners (k, 4, 2) of boxes in plan (k, 5), counter-clockwise from the front left one."""
+    ahead = np.column_stack([np.cos(boxes[:, 4]), np.sin(boxes[:, 4])]) * boxes[:, 2:3] / 2
+    left = np.column_stack([-np.sin(boxes[:, 4]), np.cos(boxes[:, 4])]) * boxes[:, 3:4] / 2
+    around = np.stack([ahead + left, left - ahead, -ahead - left, ahead - left], axis=1)
+    placed: Float = boxes[:, None, :2] + around
+    return placed
+
+
 def draw_polygons(axes: Axes, polygons: Iterable[Float], **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
     """Draw polygons by their corners, (k, 2) each; the limits of the axes stay."""
     axes.add_collection(PolyCollection(list(polygons), **style), autolim=False)

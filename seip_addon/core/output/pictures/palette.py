@@ -18,6 +18,8 @@ COMPARED_COLOURS = ("#8a8f94", "#cfd6db", SEEN_COLOURS[2], SEEN_COLOURS[0])
 """Of targets seen by neither of two placements, by both, only by the present and only by the kept one."""
 DENSE_BEAMS, WIDE_BEAMS = "#4dbfff", "#ff8c1a"
 """Of beams on the road that leave no gap to the next, and of those that do: such road may go unseen."""
+SHARE_COLOURS = ("#dcebf6", "#a9cfe9", "#6fa9d4", "#2c72a8", "#123f68")
+"""Of whole sites, from the least coverage or the fewest returns to the most; lightness alone tells them apart."""
 HIDDEN_COLOUR, MISSED_COLOUR = INK, "#a3abb2"
 """Of road that something hides from a sensor, and of road in its view that no beam of it returns from."""
 COVERAGE_COLOURS = (
@@ -26,6 +28,7 @@ COVERAGE_COLOURS = (
     *COMPARED_COLOURS,
     DENSE_BEAMS,
     WIDE_BEAMS,
+    *SHARE_COLOURS,
     HIDDEN_COLOUR,
     MISSED_COLOUR,
 )
@@ -44,6 +47,15 @@ WEIGHT_COLOURS = ("#f1e6f7", "#d7b8e8", "#b584d3", "#8a4fb3", "#4f2374")
 """From the lightest weight to the heaviest, in the hue of weighted areas; lightness alone tells them apart."""
 AREA_VEILS = (REGION_VEIL, WEIGHTED_VEIL, FORBIDDEN_VEIL, MANDATORY_VEIL)
 AREA_COLOURS = (WEIGHTED, FORBIDDEN, MANDATORY, *AREA_VEILS, *WEIGHT_COLOURS)
+
+MAP_GROUND, MAP_STREETS, MAP_JUNCTION = "#17191b", ("#53575b", "#83888d", "#b4b9be"), "#ffffff"
+"""Of the map on which a junction is chosen: streets by importance. Greys: nothing on it is coverage or a sensor."""
+PAPER_STREETS = ("#e3e7ea", "#cfd5d9", "#b7bfc5")
+"""Of the streets on a map of sites, on paper, by importance."""
+SERIES_COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+"""Of the series of a chart, distinct for colour-blind readers (Okabe and Ito 2008)."""
+NEW_COLOUR, GONE_COLOUR = "#d1242f", SERIES_COLOURS[1]
+"""Of what a scene lacks, and of what is no longer there."""
 
 STATIC_COLOUR = "#7d8790"  # of points on what stands still, where road users have colours
 INTENSITY_COLOURS = ("#27408b", "#1fa187", "#fde725", "#ffffff")

@@ -21,7 +21,8 @@ def draw_scale(plan: Axes, inch: float, longest: float = 2.0) -> None:
     for part in range(4):
         style: Style = {"facecolor": INK if part % 2 == 0 else PAPER, "edgecolor": INK, "linewidth": 0.7}
         plan.add_patch(Rectangle((left + part * length / 4, bottom), length / 4, 0.08 * inch, zorder=TEXT, **style))
-    ends = ((0.0, "0"), (length / 2, f"{length / 2:g}"), (length, f"{length:g} m"))
+    unit, name = (1000.0, "km") if length >= 2000.0 else (1.0, "m")
+    ends = ((0.0, "0"), (length / 2, f"{length / 2 / unit:g}"), (length, f"{length / unit:g} {name}"))
     for at, words in ends if longest > 1.0 else ends[::2]:
         style = {"ha": "center", "va": "bottom", "size": SCALE_SIZE, "color": INK, "zorder": TEXT}
         plan.text(left + at, bottom + 0.13 * inch, words, **style)

@@ -113,7 +113,7 @@ class Report:
     Parameters
     ----------
     created : str
-        Time of the placement (ISO 8601); the time of the report is not recorded.
+        Time of the placement (ISO 8601), "" if unknown; the time of the report is not recorded.
     first : tuple of Block
         Content of the first page.
     """

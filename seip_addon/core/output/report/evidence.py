@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,13 +15,22 @@ from ...arrays import Boolean, Integer
 from ...errors import SeipError
 from ...geometry.geo_reference import GeoReference
 from ..pictures.close_up_sheet import close_ups
-from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
+from ..results.file_names import (
+    POSE_ERROR_PICTURES,
+    TRAFFIC_PICTURES,
+    VERIFICATION_FILE,
+    VERIFICATION_FOLDER,
+    VERIFICATION_PICTURES,
+)
 from ..results.placement_file import load_placement
 from ..results.placement_record import PlacementRecord, RecordedSensor
 from ..results.site_file import SiteFile, load_site_file
+from ..results.verification_record import VerificationRecord, load_verification
 
 PICTURES = ("view.png", "plan.png")
 CLOSE_UPS = "sensors.png"
+SAME_PLACE = 0.001
+"""Metres by which the planned position in a verification may differ from the placement: poses in scenes are rounded."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +43,15 @@ class Evidence:
         PNG by file name, those that are there.
     close_ups : tuple of tuple of bytes
         For each sensor, or for the first ones, its plan and its view as PNG, those that are there.
+    verification : VerificationRecord or None
+        Its installation compared with the plan, if it was verified; its pictures are among the others.
     """
 
     record: PlacementRecord
     site: SiteFile
     pictures: Mapping[str, bytes]
     close_ups: tuple[tuple[bytes, ...], ...] = ()
+    verification: VerificationRecord | None = None
 
     @property
     def sensors(self) -> tuple[RecordedSensor, ...]:
@@ -94,7 +107,24 @@ def load_evidence(folder: Path) -> Evidence:
     names += POSE_ERROR_PICTURES if record.request.goal.scenarios.errs else ()
     names += TRAFFIC_PICTURES if record.request.goal.scenarios.kind == "traffic" else ()
     pictures = {name: _picture(folder / name) for name in names if (folder / name).is_file()}
-    return Evidence(record, site, pictures, _close_ups(folder / CLOSE_UPS, len(record.sensors)))
+    verification = _verification(folder / VERIFICATION_FOLDER, record)
+    if verification is not None:
+        paths = [folder / VERIFICATION_FOLDER / name for name in VERIFICATION_PICTURES]
+        pictures |= {path.name: _picture(path, "verify the installation again") for path in paths if path.is_file()}
+    return Evidence(record, site, pictures, _close_ups(folder / CLOSE_UPS, len(record.sensors)), verification)
+
+
+def _verification(folder: Path, record: PlacementRecord) -> VerificationRecord | None:
+    """Return the verification of a placement, None without one."""
+    path = folder / VERIFICATION_FILE
+    if not path.is_file():
+        return None
+    found, planned = load_verification(path), {sensor.id: sensor for sensor in record.sensors}
+    for one in found.sensors:
+        plan = planned.get(one.id)
+        if plan is None or plan.sensor != one.sensor or math.dist(plan.local_m, one.planned_m) > SAME_PLACE:
+            raise SeipError(f"{path} is of another placement: verify the installation again, or move {folder} away")
+    return found
 
 
 def _close_ups(path: Path, count: int) -> tuple[tuple[bytes, ...], ...]:
@@ -107,11 +137,11 @@ def _close_ups(path: Path, count: int) -> tuple[tuple[bytes, ...], ...]:
         raise SeipError(f"{path} is of another placement: place the sensors again") from error
 
 
-def _picture(path: Path) -> bytes:
+def _picture(path: Path, cure: str = "place the sensors again") -> bytes:
     try:
         content = path.read_bytes()
         with Image.open(io.BytesIO(content), formats=("PNG",)) as picture:
             picture.load()
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise SeipError(f"{path} is damaged or no picture: place the sensors again") from error
+        raise SeipError(f"{path} is damaged or no picture: {cure}") from error
     return content

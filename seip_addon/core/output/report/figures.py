@@ -1,8 +1,9 @@
-"""Pictures that only a report has: the map of blind spots, and coverage against the number of sensors."""
+"""Pictures that only a report has: the map of blind spots, and quality against the number of sensors."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -11,6 +12,7 @@ from matplotlib.figure import Figure
 
 from ...arrays import Float
 from ...choosing.placement.objective import FrontPoint
+from ...choosing.placement.returns_summary import ReturnsPoint, returns_text
 from ..pictures.drawing import as_png, draw_attribution, draw_callouts
 from ..pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
 from ..pictures.plan_style import Style
@@ -91,33 +93,95 @@ def _apart(points: Float, distance: float) -> Float:
     return moved
 
 
-def front_chart(points: Sequence[FrontPoint], placed: tuple[int, float]) -> bytes:
-    """Return coverage against the number of sensors as PNG.
+@dataclass(frozen=True)
+class FrontPlot:
+    """Values to chart against the number of sensors.
+
+    Parameters
+    ----------
+    counts : sequence of int
+        Numbers of sensors.
+    values : sequence of float
+        Value of the best placement found for each number.
+    more : sequence of float
+        Largest amount by which the value of another placement could be larger.
+    placed : (int, float)
+        Number of sensors and value of the placement itself.
+    label : str
+        Label of the axis.
+    text : callable
+        Function that returns a value as text.
+    high : float
+        Upper end of the axis.
+    """
+
+    counts: Sequence[int]
+    values: Sequence[float]
+    more: Sequence[float]
+    placed: tuple[int, float]
+    label: str
+    text: Callable[[float], str]
+    high: float
+
+
+def coverage_front(points: Sequence[FrontPoint], placed: tuple[int, float]) -> FrontPlot:
+    """Return the road seen against the number of sensors.
 
     Parameters
     ----------
     placed : (int, float)
         Number of sensors and covered share of the weight of the placement.
     """
+    return FrontPlot(
+        counts=[point.count for point in points],
+        values=[100 * point.coverage for point in points],
+        more=[100 * point.missed for point in points],
+        placed=(placed[0], 100 * placed[1]),
+        label="road seen, %",
+        text=lambda value: f"{value:.1f}%",
+        high=100.0,
+    )
+
+
+def returns_front_plot(points: Sequence[ReturnsPoint], placed: tuple[int, float]) -> FrontPlot:
+    """Return the typical number of returns against the number of sensors.
+
+    Parameters
+    ----------
+    placed : (int, float)
+        Number of sensors and typical number of returns of the placement.
+    """
+    more = [(1.0 + point.returns) * (point.gap or 0.0) for point in points]  # gaps are shares of 1 + returns
+    return FrontPlot(
+        counts=[point.count for point in points],
+        values=[point.returns for point in points],
+        more=more,
+        placed=placed,
+        label="typical points on a road user",
+        text=returns_text,
+        high=max(point.returns + extra for point, extra in zip(points, more, strict=True)),
+    )
+
+
+def front_chart(plot: FrontPlot) -> bytes:
+    """Return values against the number of sensors as PNG."""
     figure = Figure(CHART_SIZE, dpi=DPI, facecolor=PAPER, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    count = [point.count for point in points]
-    share = [100 * point.coverage for point in points]
-    missed = [100 * point.missed for point in points]
     style: Style = {"color": SEEN_COLOURS[2], "ecolor": SOFT_INK, "capsize": 4, "markersize": 8}
-    axes.errorbar(count, share, yerr=np.array([np.zeros(len(points)), missed]), marker="o", linewidth=1.6, **style)
-    for number, percent in zip(count, share, strict=True) if len(points) <= MOST_LABELLED else ():
-        place: Style = {"xytext": (0, -18), "textcoords": "offset points", "ha": "center", "size": 10}
-        axes.annotate(f"{percent:.1f}%", (number, percent), **place)
+    more = np.array([np.zeros(len(plot.more)), plot.more])
+    axes.errorbar(plot.counts, plot.values, yerr=more, marker="o", linewidth=1.6, **style)
+    for place in zip(plot.counts, plot.values, strict=True) if len(plot.counts) <= MOST_LABELLED else ():
+        about: Style = {"xytext": (0, -18), "textcoords": "offset points", "ha": "center", "size": 10}
+        axes.annotate(plot.text(place[1]), place, **about)
     ring: Style = {"markersize": 17, "mfc": "none", "mec": INK, "mew": 1.8, "linestyle": "none"}
-    axes.plot(placed[0], 100 * placed[1], marker="o", label="this placement", **ring)
+    axes.plot(*plot.placed, marker="o", label="this placement", **ring)
     axes.set_xlabel("number of sensors", size=11)
-    axes.set_ylabel("road seen, %", size=11)
-    axes.set_xticks(count)
+    axes.set_ylabel(plot.label, size=11)
+    axes.set_xticks(plot.counts)
     axes.tick_params(labelsize=10)
-    low = min(share)
-    axes.set_ylim(low - max(4.0, 0.2 * (100 - low)), 100 + max(1.0, 0.06 * (100 - low)))
+    low, high = min(plot.values), plot.high
+    axes.set_ylim(low - max(0.04 * high, 0.2 * (high - low)), high + max(0.01 * high, 0.06 * (high - low)))
     axes.margins(x=0.08)
     axes.grid(visible=True, color="#d8dde1", linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)

@@ -40,7 +40,7 @@ def as_pdf(report: Report) -> bytes:
     """
     logging.getLogger("fpdf").setLevel(logging.ERROR)  # it warns of each character that the type lacks
     pdf = _Document(report.title)
-    pdf.set_creation_date(datetime.fromisoformat(report.created))
+    pdf.set_creation_date(datetime.fromisoformat(report.created) if report.created else None)
     pdf.add_page()
     pdf.text_lines(report.title, TITLE, style="B")
     pdf.text_lines(report.subtitle, HEADING - 2.0, color=SOFT_INK)

@@ -11,22 +11,36 @@ import numpy as np
 from ...arrays import Float
 from ...choosing.placement.deployment import BAND, UNRANKED
 from ...choosing.placement.objective import CHOSEN_FOR, MOVED, SAME_PRICE, purpose
-from ...choosing.placement.returns_summary import FEW_RETURNS, returns_text
+from ...choosing.placement.returns_summary import FEW_RETURNS, ReturnsSummary, returns_text
 from ...counts import counted
 from ...sensing.visibility.settings import VisibilitySettings
+from ...site.candidates import PAPER_TYPES
 from ..pictures.drawing import percent
 from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
 from ..results.located import LOCATED_FILES
-from ..results.placement_record import RecordedSensor, relevant_warnings
+from ..results.placement_record import PlacementRecord, RecordedSensor, relevant_warnings
+from ..results.verification_record import RecordedChange
+from ..results.verification_text import (
+    LEAST_COST,
+    change_text,
+    cost_text,
+    coverage_rows,
+    coverage_text,
+    gain_text,
+    objects,
+    pose_text,
+    returns_sentence,
+    signed_points,
+    vehicles,
+)
 from .blind_spots import BlindSpot, blind_spots, centres, seen_places
 from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Report, Section, Table
 from .costs import Costs, costs_of
 from .evidence import Evidence
-from .figures import blind_spot_map, front_chart
+from .figures import blind_spot_map, coverage_front, front_chart, returns_front_plot
 from .losses import failures
 from .repeat import repeating_command
 from .wording import (
-    PAPER_TYPES,
     date,
     dollars,
     geographic,
@@ -75,6 +89,7 @@ def make_report(evidence: Evidence) -> Report:
     costs = costs_of(record)
     sections = (
         Section("Plan", tuple(_plan(evidence))),
+        Section("Verification of the installation", tuple(_verification(evidence))),
         Section("Sensors", tuple(_sensors(evidence, costs))),
         Section("Costs", tuple(_costs(costs))),
         Section("Streets and crossings", tuple(_places(evidence))),
@@ -184,6 +199,82 @@ def _central(evidence: Evidence) -> str:
 def _plan(evidence: Evidence) -> Iterator[Block]:
     if "plan.png" in evidence.pictures and "view.png" in evidence.pictures:
         yield Picture(evidence.pictures["plan.png"], "Plan with the sensors and what they see; north is up.", tall=True)
+
+
+def _verification(evidence: Evidence) -> Iterator[Block]:
+    found = evidence.verification
+    if found is None:
+        return
+    steps, origin = found.coverage, np.array(evidence.record.site.origin_m)
+    yield Paragraph(
+        f"The recording “{found.recording}” of the installed sensors was compared with the plan, beam by beam. "
+        f"{coverage_text(steps)}"
+    )
+    yield Table(
+        ("Coverage", "Seen", "Difference, points"),
+        tuple(
+            (cause[:1].upper() + cause[1:], percent(share), "" if effect is None else signed_points(effect))
+            for cause, share, effect in coverage_rows(steps)
+        ),
+        frozenset({1, 2}),
+    )
+    yield Paragraph(
+        "Each row includes those above it, and all are computed on the same squares of road. In the recording itself, "
+        f"{percent(steps.returned)} of the squares have a measured point nearby in most turns of the sensors."
+        f"{_of_verification(evidence, steps.promised)}"
+    )
+    missing = [sensor.id for sensor in evidence.sensors if sensor.id not in {one.id for one in found.sensors}]
+    if missing:
+        yield Paragraph(f"The recording does not contain {', '.join(missing)}: the coverage above is without.")
+    for one in found.sensors:
+        lines = (pose_text(one), " ".join(part for part in (gain_text(one), returns_sentence(one)) if part))
+        yield Card(f"{one.id} as installed", tuple(Paragraph(line) for line in lines))
+    if "returns.png" in evidence.pictures:
+        yield Picture(
+            evidence.pictures["returns.png"],
+            "Share of the beams that return from each kind of surface, by distance: recorded (marks), promised "
+            "(dotted) and with the gain of the unit (lines). It is the power that the unit receives, as a multiple of "
+            "what its model says.",
+        )
+    yield from _changes(evidence, objects(found), origin)
+    standing = vehicles(found)
+    if standing:
+        stood = counted(standing, "standing vehicle is", "standing vehicles are")
+        yield Paragraph(f"{stood} not counted as changes.")
+    if "changes.png" in evidence.pictures:
+        yield Picture(
+            evidence.pictures["changes.png"],
+            "The recording on the plan: grey is as planned, red is nearer than planned, blue is farther.",
+            tall=True,
+        )
+
+
+def _of_verification(evidence: Evidence, promised: float) -> str:
+    """Return sentences on how coverage in a verification differs from that of the placement, or ""."""
+    planned = evidence.record.coverage.whole
+    if abs(promised - planned) < LEAST_COST:
+        return ""
+    return f" Settings other than those of the placement, which promised {percent(planned)}, were used."
+
+
+def _changes(evidence: Evidence, changes: Sequence[RecordedChange], origin: Float) -> Iterator[Block]:
+    if not changes:
+        yield Paragraph("No object has appeared or disappeared that the sensors could measure.")
+        return
+    middles = np.array([change.box[:3] for change in changes]) + origin
+    rows = tuple(
+        (f"{change.name}: {change_text(change)}", _size(change), place, cost_text(change.coverage_cost))
+        for change, place in zip(changes, _located(evidence, middles), strict=True)
+    )
+    yield Paragraph(
+        "These objects differ from the plan. Sizes are of the parts that the sensors measure, and the last column is "
+        "the coverage that each of them costs."
+    )
+    yield Table(("What", "Size, m", "Where", "Coverage"), rows)
+
+
+def _size(change: RecordedChange) -> str:
+    return " × ".join(f"{side:.1f}" for side in change.box[3:6])
 
 
 def _sensors(evidence: Evidence, costs: Costs) -> Iterator[Block]:
@@ -340,7 +431,9 @@ def _other_choices(evidence: Evidence) -> Iterator[Block]:
     notes += [same_price] if same_price else []
     notes.append("“Proven” refers to the model: this scene, these sensor models and this definition of seen.")
     yield Bullets(tuple(notes))
-    if record.front:
+    if record.returns is not None and record.returns.front:
+        yield from _returns_front(record, record.returns)
+    elif record.front:
         yield from _front(evidence)
 
 
@@ -368,17 +461,14 @@ def _weighted_share(evidence: Evidence) -> float:
 def _front(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
     weighted = " Coverage is weighted here." if np.ptp(evidence.site.problem.weights) > 0 else ""
-    budget = record.request.goal.budget
-    limit = "" if budget is None else f" The budget of {dollars(budget)} does not limit the choices of this table."
     yield Paragraph(
         "With fewer or more sensors under the same rules, regardless of price, the best choices found by a short "
-        f"search see:{weighted}{limit}"
+        f"search see:{weighted}{_without_budget(record)}"
     )
     yield Picture(
-        front_chart(record.front, (len(record.sensors), _weighted_share(evidence))),
+        front_chart(coverage_front(record.front, (len(record.sensors), _weighted_share(evidence)))),
         "Road seen by number of sensors; a line above a point extends to what no choice can exceed.",
     )
-    price = "Installed, $" if record.installed else "Sensors, $"
     rows = tuple(
         (
             str(point.count),
@@ -388,7 +478,42 @@ def _front(evidence: Evidence) -> Iterator[Block]:
         )
         for point in record.front
     )
-    yield Table(("Sensors", price, "Seen", "Other choices"), rows, frozenset({0, 1, 2}))
+    yield Table(("Sensors", _price_head(record), "Seen", "Other choices"), rows, frozenset({0, 1, 2}))
+
+
+def _returns_front(record: PlacementRecord, returns: ReturnsSummary) -> Iterator[Block]:
+    """Return the table of numbers of sensors of a placement that was chosen for returns."""
+    yield Paragraph(
+        "With fewer or more sensors under the same rules, regardless of price, the best choices found by a short "
+        "search typically measure these numbers of points on a road user in each turn; shares in the last column "
+        f"are of 1 + points.{_without_budget(record)}"
+    )
+    yield Picture(
+        front_chart(returns_front_plot(returns.front, (len(record.sensors), returns.typical))),
+        "Typical points on a road user by number of sensors; where there is a proof, a line above a point extends to "
+        "what no choice can exceed.",
+    )
+    rows = tuple(
+        (str(point.count), f"{point.price:,.0f}", returns_text(point.returns), _others_have(point.gap))
+        for point in returns.front
+    )
+    yield Table(("Sensors", _price_head(record), "Points", "Other choices"), rows, frozenset({0, 1, 2}))
+
+
+def _others_have(gap: float | None) -> str:
+    """Return how many more returns other choices of a number of sensors can have, as text."""
+    if gap is None:
+        return "may have more"
+    return f"at most {math.ceil(gap * 1000 - 1e-9) / 10:.1f}% more" if gap else "none has more"
+
+
+def _without_budget(record: PlacementRecord) -> str:
+    budget = record.request.goal.budget
+    return "" if budget is None else f" The budget of {dollars(budget)} does not limit the choices of this table."
+
+
+def _price_head(record: PlacementRecord) -> str:
+    return "Installed, $" if record.installed else "Sensors, $"
 
 
 def _losses(evidence: Evidence) -> Iterator[Block]:

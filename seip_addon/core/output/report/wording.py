@@ -12,8 +12,6 @@ from ...counts import counted
 from ..results.placement_record import RecordedObjective, RecordedSensor
 from .evidence import Evidence
 
-PAPER_TYPES = ("type1", "type2", "type3")
-"""Catalogue keys of the sensor models of the SEIP study."""
 _RINGS = re.compile(r"beyond (.*?) neighbouring rings on a level road are more than 2δ = ([\d.]+) m apart.*")
 _RANGE = re.compile(r"detects this road \((.*?) reflectivity\) with (.*?) probability up to (.*?)(?:;.*)?$")
 

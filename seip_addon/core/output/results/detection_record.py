@@ -10,6 +10,8 @@ from ...errors import SeipError
 from ...storage.json_dataclass import from_json
 
 SCHEMA = "seip-detection/1"
+RECORDING_SCHEMA = "seip-recording/1"
+"""Of a ``detection.json`` on the recording of real sensors."""
 MAIN_RULE = "bev_0.7"
 """Counts all road users; in every record."""
 FORMATS = ("kitti", "openpcdet")

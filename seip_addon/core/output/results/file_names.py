@@ -3,3 +3,7 @@
 POSE_ERROR_PICTURES = ("spread.png", "blame.png", "frontier.png")
 TRAFFIC_PICTURES = ("time_seen.png", "traffic.png")
 REPORT_FILES = ("report.html", "report.pdf")
+VERIFICATION_FOLDER = "verification"
+"""Folder in that of a placement, for the verification of its installation."""
+VERIFICATION_FILE = "verification.json"
+VERIFICATION_PICTURES = ("changes.png", "returns.png")

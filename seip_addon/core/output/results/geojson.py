@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import shapely
@@ -28,27 +28,32 @@ def save_geojson(path: str | os.PathLike[str], placed: Located) -> None:
     about: dict[str, object] = {"type": "FeatureCollection", "name": placed.site.name}
     if placed.site.attribution:
         about["attribution"] = placed.site.attribution
+    save_features(path, about, _features(placed))
+
+
+def save_features(path: str | os.PathLike[str], about: dict[str, object], features: Iterable[Feature]) -> None:
+    """Write the members of a feature collection, and its features on a line each."""
     head = json.dumps(about, ensure_ascii=False)[:-1]
-    lines = (json.dumps(one, ensure_ascii=False, allow_nan=False, separators=(",", ":")) for one in _features(placed))
+    lines = (json.dumps(one, ensure_ascii=False, allow_nan=False, separators=(",", ":")) for one in features)
     with whole_file(path) as temporary:
         temporary.write_text(f'{head}, "features": [\n' + ",\n".join(lines) + "\n]}\n", encoding="utf-8")
 
 
 def _features(placed: Located) -> Iterator[Feature]:
     for sensor, point in zip(placed.sensors, placed.points.tolist(), strict=True):
-        yield _feature("sensor", {"type": "Point", "coordinates": point}, **_described(sensor))
-    yield _feature("region of interest", _multipolygon(placed.region), name=placed.site.name)
+        yield feature("sensor", {"type": "Point", "coordinates": point}, **_described(sensor))
+    yield feature("region of interest", _multipolygon(placed.region), name=placed.site.name)
     for area, polygons in placed.weighted:
-        yield _feature("weighted region", _multipolygon(polygons), name=area.name, weight=area.weight)
+        yield feature("weighted region", _multipolygon(polygons), name=area.name, weight=area.weight)
     if len(placed.site.targets) > MOST_CELLS:
         for seers, polygons in placed.patches():
             patch = _multipolygon(polygons)
-            yield _feature("coverage patch", patch, seen_by=seers, times_seen=len(seers))
+            yield feature("coverage patch", patch, seen_by=seers, times_seen=len(seers))
         return
     for target, square in enumerate(placed.squares().tolist()):
         cell = {"type": "Polygon", "coordinates": [[*square, square[0]]]}
         seers = placed.seers(target)
-        yield _feature("coverage cell", cell, target=target, seen_by=seers, times_seen=len(seers))
+        yield feature("coverage cell", cell, target=target, seen_by=seers, times_seen=len(seers))
 
 
 def _described(sensor: Sensor) -> dict[str, Any]:
@@ -66,7 +71,8 @@ def _described(sensor: Sensor) -> dict[str, Any]:
     }
 
 
-def _feature(kind: str, geometry: dict[str, Any], **properties: object) -> Feature:
+def feature(kind: str, geometry: dict[str, Any], **properties: object) -> Feature:
+    """Return a feature with its kind among its properties."""
     return {"type": "Feature", "geometry": geometry, "properties": {"kind": kind, **properties}}
 
 

@@ -15,7 +15,7 @@ from ...arrays import Float, Integer
 from ...choosing.placement.deployment import GainBand, Sensor, TypeBand, price_text
 from ...choosing.placement.objective import FrontPoint, Objective, Solution
 from ...choosing.placement.problem import Placement
-from ...choosing.placement.returns_summary import CrossingReturns, ReturnsSummary, share_reached
+from ...choosing.placement.returns_summary import CrossingReturns, ReturnsPoint, ReturnsSummary, share_reached
 from ...geometry.geo_reference import GeoReference
 from ...geometry.orientation import orientation
 from ...sensing.lidar.model import LidarModel
@@ -456,7 +456,13 @@ def _sought(solution: Solution) -> Literal["most coverage", "most returns", "lea
 def _rounded_returns(returns: ReturnsSummary) -> ReturnsSummary:
     """Round to what single precision holds."""
     of_each = {name: _rounded(number, 3) for name, number in returns.of_each.items()}
-    return ReturnsSummary(_rounded(returns.typical, 3), of_each, _rounded_crossings(returns.crossings))
+    front = tuple(
+        ReturnsPoint(
+            one.count, _rounded(one.returns, 3), _rounded(one.price, 2), None if one.gap is None else _share(one.gap)
+        )
+        for one in returns.front
+    )
+    return ReturnsSummary(_rounded(returns.typical, 3), of_each, _rounded_crossings(returns.crossings), front)
 
 
 def _rounded_crossings(crossings: Iterable[CrossingReturns]) -> tuple[CrossingReturns, ...]:

@@ -41,11 +41,11 @@ def _check_sensors(record: PlacementRecord) -> None:
         value, times = Counter(values).most_common(1)[0] if values else (None, 0)
         _require(times <= 1, f"{times} sensors have the {what} {str(value)[:40]!r}")
     for sensor in record.sensors:
-        off = max(
+        distance = max(
             abs(local + origin - on_map)
             for local, origin, on_map in zip(sensor.local_m, record.site.origin_m, sensor.map_m, strict=True)
         )
-        _require(off <= 1e-5, f"local_m and map_m of sensor {sensor.id[:40]!r} are {off:g} m apart")
+        _require(distance <= 1e-5, f"local_m and map_m of sensor {sensor.id[:40]!r} are {distance:g} m apart")
         known, projected = record.site.geo_reference, (sensor.easting_m, sensor.northing_m)
         if known is not None:
             for on_map, offset, value in zip(sensor.map_m, known.header_offset_m, projected, strict=False):
@@ -75,7 +75,7 @@ def _check_coverage(record: PlacementRecord) -> None:
             sensor.coverage_marginal <= sensor.coverage_added + _SHARE_ERROR
             and sensor.coverage_added <= sensor.coverage_alone + _SHARE_ERROR
             and sensor.coverage_alone <= coverage.whole + _SHARE_ERROR,
-            f"the coverage of sensor {sensor.id[:40]!r} contradicts itself",
+            f"the coverages of sensor {sensor.id[:40]!r} contradict each other",
         )
 
 
@@ -89,14 +89,14 @@ def _check_objective(record: PlacementRecord) -> None:
     _require(not beyond, f"objective.value {value:g} is better than objective.bound {bound:g}")
     _require(
         objective.status != "optimal" or abs(bound - value) <= slack,
-        f"objective.status is 'optimal', and objective.bound {bound:g} is not objective.value {value:g}",
+        f"objective.status is 'optimal', but objective.bound {bound:g} is not objective.value {value:g}",
     )
     if objective.gap is not None and value > 0:
         of_returns = objective.sought == "most returns"  # whose values are logarithms
         gap = math.expm1(min(bound - value, 700.0)) if of_returns else abs(bound - value) / value
         _require(
             abs(objective.gap - gap) <= _VALUE_ERROR * (1 + gap),
-            f"objective.gap is {objective.gap:g}, and value and bound are {gap:g} apart",
+            f"objective.gap is {objective.gap:g}, but the gap of value and bound is {gap:g}",
         )
 
 
@@ -115,7 +115,7 @@ def _check_times(record: PlacementRecord) -> None:
     try:
         datetime.fromisoformat(record.times.created)
     except ValueError:
-        _require(False, f"times.created is no date and time: {record.times.created[:40]!r}")  # noqa: FBT003
+        _require(False, f"times.created is not a date and time: {record.times.created[:40]!r}")  # noqa: FBT003
 
 
 def _check_counts(record: PlacementRecord) -> None:
@@ -124,13 +124,13 @@ def _check_counts(record: PlacementRecord) -> None:
     _require(counts.positions_on_poles <= counts.positions, "counts.positions_on_poles is above counts.positions")
     poses = [sensor.pose for sensor in record.sensors] + list(record.greedy.poses if record.greedy else ())
     highest = max((pose for pose in poses if pose is not None), default=-1)
-    _require(highest < counts.poses, f"a sensor has the pose {highest}, and there are {counts.poses} from 0 on")
+    _require(highest < counts.poses, f"a sensor has the pose {highest}, but poses end at {counts.poses - 1}")
 
 
 def _require_sum(name: str, value: float, what: str, parts: Sequence[float], error: float) -> None:
     """Require a value to be the sum of its parts; each number may be rounded by an error."""
     total = sum(parts)
-    fault = f"{name} is {value:g}, and {what} add up to {total:g}"
+    fault = f"{name} is {value:g}, but {what} add up to {total:g}"
     _require(abs(total - value) <= error * (1 + len(parts)), fault)
 
 

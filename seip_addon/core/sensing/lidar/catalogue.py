@@ -6,6 +6,7 @@ import difflib
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -13,7 +14,7 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from ...errors import SeipError
-from ...limits import ACCUMULATION, CHANNELS
+from ...limits import ACCUMULATION, CHANNELS, GAIN
 from ...storage.toml_table import Key, number, parse_toml, read_table
 from .carla_dropoff import CarlaDropoff
 from .model import DetectionLaw, LidarModel
@@ -43,7 +44,7 @@ def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, Li
         A file cannot be read, or a model in it is invalid.
     """
     shipped = resources.files(__package__).joinpath("catalogue.toml").read_text(encoding="utf-8")
-    catalogue = _parse(shipped, "catalogue.toml")
+    catalogue = _parse(shipped, "catalogue.toml", {})
     for path in map(Path, extra):
         if is_unit_file(path):
             model = _unit(path, catalogue)
@@ -53,7 +54,7 @@ def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, Li
             content = path.read_text(encoding="utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
             raise SeipError(f"cannot read the LiDAR catalogue {path}: {error}; name a TOML file") from error
-        catalogue |= _parse(content, str(path))
+        catalogue |= _parse(content, str(path), catalogue)
     return catalogue
 
 
@@ -80,12 +81,31 @@ def _unit(named: Path, catalogue: Mapping[str, LidarModel]) -> LidarModel:
     if path is named:
         key = beams.key or path.stem.lower()
         if key not in catalogue:
-            raise SeipError(f"{path} does not say which LiDAR it is of: name one, as in --catalogue KEY={path.name}")
+            raise SeipError(f"{path} does not say which LiDAR it is of: name one, as in KEY={path.name}")
     return beams.as_model(find_models(catalogue, [key])[key], path.name)
 
 
-def _parse(content: str, file: str) -> dict[str, LidarModel]:
-    return {key: _model(key, table, file) for key, table in parse_toml(content, file).items()}
+def _parse(content: str, file: str, known: Mapping[str, LidarModel]) -> dict[str, LidarModel]:
+    """Return the models of a file; those of single units refer to the known ones."""
+    return {
+        key: _like(key, table, file, known) if isinstance(table, dict) and "like" in table else _model(key, table, file)
+        for key, table in parse_toml(content, file).items()
+    }
+
+
+def _like(key: str, table: Any, file: str, known: Mapping[str, LidarModel]) -> LidarModel:  # noqa: ANN401 - as `_model`
+    """Return a known model with the received power of a single unit, as `seip verify` writes it."""
+    where = f"LiDAR '{key}' in {file}"
+    values = read_table(table, where, _UNIT)
+    try:
+        model = find_models(known, [values["like"]])[values["like"]]
+        calibration = values["calibration"]
+        gains = tuple(values["gain_band"] or (CALIBRATED if calibration else model.gains))
+        unit = model.amplified(values["gain"])
+        name, calibration = values["name"] or model.name, calibration or model.calibration
+        return replace(unit, key=key, name=name, calibration=calibration, gains=gains)
+    except SeipError as error:
+        raise SeipError(f"{where}: {error}") from error
 
 
 def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - whatever the file holds
@@ -283,6 +303,15 @@ _DETECTION = {
     "detection_law": Key(_several(3), None),
 }
 """Figures of the range equation."""
+
+_UNIT = {
+    "like": Key(str),
+    "gain": Key(number(GAIN)),
+    "gain_band": Key(_pair, None),
+    "name": Key(str, ""),
+    "calibration": Key(str, ""),
+}
+"""Keys of a single unit of a known model."""
 
 _KEYS = {
     "name": Key(str),

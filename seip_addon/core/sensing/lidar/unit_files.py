@@ -94,7 +94,7 @@ class UnitBeams:
         if len(self.elevations) != base.channels:
             raise SeipError(
                 f"{source} has {len(self.elevations)} beams, but LiDAR '{base.key}' has {base.channels}: name another "
-                f"one, as in --catalogue KEY={source}"
+                f"one, as in KEY={source}"
             )
         rate = base.rotation_rate if self.rotation_rate is None else self.rotation_rate
         steps = base.azimuth_count if self.columns is None else self.columns

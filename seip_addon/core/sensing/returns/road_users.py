@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from ...arrays import Boolean, Float, Integer
@@ -23,7 +24,7 @@ SPACING = 2.0  # metres between neighbouring road users: less than the length of
 
 @dataclass(frozen=True, eq=False)
 class RoadUsers:
-    """Road users at m points: all bodies at each point of the carriageway, a pedestrian at each of a pavement's edge.
+    """Road users at m points: all bodies at each point of the carriageway, a pedestrian at each point of a kerb line.
 
     Parameters
     ----------
@@ -57,7 +58,7 @@ class RoadUsers:
 
 
 def road_users(geometry: SceneGeometry, spacing: float = SPACING) -> RoadUsers:
-    """Place road users in a scene's region: all bodies on the carriageway, pedestrians at the edges of pavements too.
+    """Place road users in a scene's region: all bodies on the carriageway, and pedestrians at the edges of pavements.
 
     Parameters
     ----------
@@ -71,7 +72,7 @@ def road_users(geometry: SceneGeometry, spacing: float = SPACING) -> RoadUsers:
     """
     road = joined(geometry.roads)
     on_road = generate_targets(geometry.region, road, spacing, geometry.weighted_regions)
-    edge = _pavement_edge(geometry, outline(road).intersection(geometry.region), spacing)
+    edge = _kerb_points(geometry, outline(road).intersection(geometry.region), spacing)
     weight, central = _weights(edge, geometry.weighted_regions)
     xyz = np.concatenate([*[on_road.xyz] * len(BODIES), edge])
     body = np.repeat(np.arange(len(BODIES)), len(on_road))
@@ -92,23 +93,47 @@ def road_users(geometry: SceneGeometry, spacing: float = SPACING) -> RoadUsers:
     )
 
 
-def _pavement_edge(geometry: SceneGeometry, road: BaseGeometry, spacing: float) -> Float:
-    """Return evenly spaced points at the pavements' edges towards the carriageway, (e, 3) float64."""
-    pavement = geometry.candidate_areas
-    line = pavement.buffer(-KERB_DISTANCE).boundary.intersection(road.buffer(FARTHEST_EDGE))
-    parts = [part for part in shapely.get_parts(line) if part.length > 0]
-    merged = shapely.normalize(shapely.line_merge(shapely.MultiLineString(parts)))
-    along = [shapely.line_interpolate_point(part, _marks(part.length, spacing)) for part in shapely.get_parts(merged)]
+def _kerb_points(geometry: SceneGeometry, road: BaseGeometry, spacing: float) -> Float:
+    """Return evenly spaced points of waiting pedestrians on pavements along the carriageway, (e, 3) float64, metres."""
+    lines = _inset_edges(geometry.candidate_areas, road)
+    along = [shapely.line_interpolate_point(line, _marks(line.length, spacing)) for line in lines]
     points = np.concatenate([np.zeros(0, dtype=object), *along])
+    plan = shapely.get_coordinates(points[_faces_road(points, geometry.candidate_areas, road)])
+    return _on_surface(plan, geometry)
+
+
+def _inset_edges(pavement: BaseGeometry, road: BaseGeometry) -> Sequence[BaseGeometry]:
+    """Return the lines in pavements at `KERB_DISTANCE` from their edges, near the carriageway."""
+    line = pavement.buffer(-KERB_DISTANCE).boundary.intersection(road.buffer(FARTHEST_EDGE))
+    # A line that only touches the buffer gives a single point, which a MultiLineString cannot hold.
+    parts = [part for part in shapely.get_parts(line) if part.length > 0]
+    # A boundary starts at an arbitrary vertex, and the intersection cuts it there too. Merged and normalised, the lines
+    # depend on the shape only, and so do the points that are spaced along them.
+    edges: Sequence[BaseGeometry] = shapely.get_parts(
+        shapely.normalize(shapely.line_merge(shapely.MultiLineString(parts)))
+    )
+    return edges
+
+
+def _faces_road(points: NDArray[np.object_], pavement: BaseGeometry, road: BaseGeometry) -> Boolean:
+    """Return the mask of points on the side of a pavement that faces the carriageway, (k,) bool."""
+    # The inset line runs around the whole pavement. From its side at the kerb, the shortest way to the road leaves the
+    # pavement after `KERB_DISTANCE`; from its far side, the way crosses the width of the pavement first. The factor 2
+    # allows for ways that leave obliquely, as at corners.
     way = shapely.shortest_line(points, road)
-    inside = shapely.length(shapely.intersection(way, pavement))
-    points = points[(shapely.length(way) <= FARTHEST_EDGE) & (inside <= 2 * KERB_DISTANCE)]
-    plan = shapely.get_coordinates(points)
+    on_pavement = shapely.length(shapely.intersection(way, pavement))
+    faces: Boolean = (shapely.length(way) <= FARTHEST_EDGE) & (on_pavement <= 2 * KERB_DISTANCE)
+    return faces
+
+
+def _on_surface(plan: Float, geometry: SceneGeometry) -> Float:
+    """Return points in plan (k, 2) at the height of the ground, in a fixed order, without those that have no ground."""
     height = surface_height(plan, joined((*geometry.ground, *geometry.roads)))
-    there = np.isfinite(height)
+    has_ground = np.isfinite(height)
     # rounding to a micrometre removes the numerical noise of a distant map origin
-    edge: Float = np.round(np.column_stack([plan[there], height[there]]), 6)
-    ordered: Float = edge[np.lexsort(edge.T[::-1])]
+    points: Float = np.round(np.column_stack([plan[has_ground], height[has_ground]]), 6)
+    # sorted by x, then y, then z: shapely does not promise an order of the parts of a geometry
+    ordered: Float = points[np.lexsort(points.T[::-1])]
     return ordered
 
 

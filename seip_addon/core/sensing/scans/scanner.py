@@ -47,11 +47,11 @@ class ReflectiveSurface:
         self._reflectivity = reflectivity
         a, b, c = caster.triangles.transpose(1, 0, 2)
         normal = np.cross(b - a, c - a)
-        self._normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+        self.normals = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
 
     def reflected(self, directions: Float, triangle: Integer) -> Float:
         """Return reflectivity times cosine of incidence (n,) at hits, with directions in the triangles' axes."""
-        cos_incidence = np.einsum("ni,ni->n", self._normal[triangle], directions)
+        cos_incidence = np.einsum("ni,ni->n", self.normals[triangle], directions)
         reflected: Float = np.abs(cos_incidence) * self._reflectivity[triangle]
         return reflected
 

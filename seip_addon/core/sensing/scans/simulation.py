@@ -220,7 +220,7 @@ def prepare(
         There is no sensor, or the seed is negative.
     """
     if not sensors:
-        raise SeipError("there is no sensor to scan with: place some first, with seip place")
+        raise SeipError("there is no sensor to scan with: place some first")
     if settings.seed < 0:
         raise SeipError(f"the seed must be a whole number of at least 0, not {settings.seed}")
     shapes = body_surfaces(bodies, settings.engine)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ... import limits
-from ...arrays import Float, Integer
+from ...arrays import Boolean, Float, Integer
 from ...storage.array_file import ArrayFile, ArrayRule, ContentError
 from ...storage.files import digest
 
@@ -32,6 +32,9 @@ _ARRAYS = {
 FILE = ArrayFile(
     "seip.trajectories", 2, "file of trajectories", "import or simulate them again", _ARRAYS, undigested=True
 )
+
+SAMPLED = ("time", "position", "yaw", "pitch", "speed")
+"""Arrays of `Trajectories` with a row for each sample."""
 
 CATEGORIES = ("car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian")  # categories of road users
 
@@ -235,6 +238,18 @@ class LoadedTraffic:
 
     trajectories: Trajectories
     warnings: tuple[str, ...]
+
+
+def some_users(trajectories: Trajectories, kept: Boolean) -> Trajectories:
+    """Return the motion of the road users of a mask (u,)."""
+    counts = np.diff(trajectories.first)
+    samples = np.repeat(kept, counts)
+    return replace(
+        trajectories,
+        users=tuple(user for user, here in zip(trajectories.users, kept.tolist(), strict=True) if here),
+        first=np.concatenate([[0], np.cumsum(counts[kept])]).astype(np.int64),
+        **{name: getattr(trajectories, name)[samples] for name in SAMPLED},
+    )
 
 
 def _look(user: RoadUser) -> tuple[object, ...]:

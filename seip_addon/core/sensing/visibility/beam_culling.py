@@ -18,8 +18,8 @@ plane n·x = k at a distance r in plan where
 
     n_{xy} \cos(a - a_n) + n_z σ = k / r,
 
-Here a is the beam's azimuth, and n_xy and a_n are length and azimuth of the normal in plan. With r₁ ≤ r ≤ r₂ that
-leaves two arcs, one on each side of a_n.
+a is the beam's azimuth, and n_xy and a_n are length and azimuth of the normal in plan. With r₁ ≤ r ≤ r₂ that leaves
+two arcs, one on each side of a_n.
 """
 
 from __future__ import annotations
@@ -214,14 +214,14 @@ class NearRays:
         return NearRays(*(getattr(self, field.name)[which] for field in fields(self)))
 
     def likeliest(self, sensor: Integer) -> NearRays:
-        """Return for each target and sensor the bundle that should end nearest to the target.
+        """Return the bundle that should end nearest to the target, for each target and sensor.
 
         Parameters
         ----------
         sensor : (c,) int64
             Sensor of each channel.
         """
-        # grouped minimum: one number for each pair of sensor and target; of equal bundles the first is taken
+        # grouped minimum: one number for each pair of sensor and target; the first of equal bundles is taken
         number = sensor[self.channel] * (self.target.max(initial=0) + 1) + self.target
         least = np.full(number.max(initial=0) + 1, np.inf)
         np.minimum.at(least, number, self.miss)
@@ -242,9 +242,9 @@ class NearRays:
 
 
 def may_return(origin: Float, surfaces: NearSurfaces, beams: Beams) -> Boolean:
-    """Return the targets from which returns can be strong enough for each sensor, (models, t) bool.
+    """Return the mask of targets from which returns can be strong enough for each sensor, (models, t) bool.
 
-    It is true for all of these, and for few others.
+    It is true for all of these targets and for few others.
 
     Parameters
     ----------
@@ -263,9 +263,9 @@ def may_return(origin: Float, surfaces: NearSurfaces, beams: Beams) -> Boolean:
     return may
 
 
-def target_patches(origin: Float, surfaces: NearSurfaces, wanted: Boolean) -> Patches:
-    """Return the patches of the wanted targets as seen from a position; see `disc_patches`."""
-    target = np.flatnonzero(wanted)
+def target_patches(origin: Float, surfaces: NearSurfaces, selected: Boolean) -> Patches:
+    """Return the patches of selected targets as seen from a position; see `disc_patches`."""
+    target = np.flatnonzero(selected)
     azimuth, distance = _polar(surfaces.xyz[target] - origin)
     radius = np.full(len(distance), surfaces.radius)
     return Patches(
@@ -273,18 +273,18 @@ def target_patches(origin: Float, surfaces: NearSurfaces, wanted: Boolean) -> Pa
     )
 
 
-def disc_patches(origin: Float, surfaces: NearSurfaces, wanted: Boolean) -> tuple[Patches, Planes]:
-    """Return a patch for each surface near the wanted targets, as seen from a position.
+def disc_patches(origin: Float, surfaces: NearSurfaces, selected: Boolean) -> tuple[Patches, Planes]:
+    """Return a patch for each surface near selected targets, as seen from a position.
 
     Parameters
     ----------
     origin : (3,) float64, metres
         Position of the sensors.
-    wanted : (t,) bool
+    selected : (t,) bool
         Targets to return patches for.
     """
     discs = surfaces.discs
-    pick = np.flatnonzero(wanted[discs.target])
+    pick = np.flatnonzero(selected[discs.target])
     centre, normal = discs.centre[pick] - origin, discs.normal[pick]
     away = (centre * normal).sum(axis=1)
     normal = np.where(away[:, None] < 0, -normal, normal)

@@ -1,4 +1,4 @@
-"""Chunks of the visibility grid, which are computed in any order, on any machine."""
+"""Chunks of the visibility grid, which can be computed in any order and on any machine."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ class Rows:
 def compute_rows(
     model: VisibilityModel, candidates: Candidates, models: Mapping[str, LidarModel], poses: Integer
 ) -> Rows:
-    """Compute the targets that some candidate poses see.
+    """Compute the visibility of all targets from some candidate poses.
 
     Parameters
     ----------
     models : mapping of str to LidarModel
-        Sensor types by catalogue key, those of all candidates included.
+        Sensor types by catalogue key, including those of all candidates.
     poses : (k,) int64
         Indices of the poses.
     """
@@ -77,8 +77,10 @@ def sharing_rays(xyz: Float, yaw: Float, tilt: Float) -> list[Integer]:
     list of (k,) int64
         Indices of the poses of each group, in the order of their first poses.
     """
-    _, first, place = np.unique(np.column_stack([xyz, yaw, tilt]), axis=0, return_index=True, return_inverse=True)
-    rank = np.argsort(np.argsort(first))[place.ravel()]
+    _, first, group = np.unique(np.column_stack([xyz, yaw, tilt]), axis=0, return_index=True, return_inverse=True)
+    # np.unique numbers the groups by their coordinates; the rank of a group's first pose renumbers them in the order of
+    # the candidates. A stable sort by group then keeps that order within each group.
+    rank = np.argsort(np.argsort(first))[group.ravel()]
     order = np.argsort(rank, kind="stable")
     return np.split(order, np.cumsum(np.bincount(rank))[:-1])
 
@@ -120,7 +122,7 @@ def compute_chunks(
         Rows of each chunk.
     """
     loaded = {number: checkpoint.load(number) for number in range(len(chunks))} if checkpoint else {}
-    rows = {number: found for number, found in loaded.items() if found and len(found.packed) == len(chunks[number])}
+    rows = {number: chunk for number, chunk in loaded.items() if chunk and len(chunk.packed) == len(chunks[number])}
     keep = checkpoint.save if checkpoint else None
     yield from collect(chunks, submit, rows, "visibility", keep)
     return [rows[number] for number in range(len(chunks))]
@@ -130,7 +132,7 @@ def collect(
     chunks: Sequence[Integer],
     submit: Callable[[Integer], Future[Result]],
     results: dict[int, Result],
-    what: str,
+    work: str,
     keep: Callable[[int, Result], None] | None = None,
 ) -> Generator[Progress, None, None]:
     """Compute the chunks that have no result yet and add their results.
@@ -145,14 +147,14 @@ def collect(
         Function that starts the work on one chunk.
     results : dict of int to result
         Results by the number of the chunk; those of this call are added.
-    what : str
+    work : str
         Name of the work in progress messages.
     keep : callable, optional
         Function that is called with the number and the result of each chunk as soon as it is finished.
     """
     total = sum(map(len, chunks))
     done = sum(len(chunks[number]) for number in results)
-    yield Progress(done, total, what)
+    yield Progress(done, total, work)
     numbers = {submit(chunk): number for number, chunk in enumerate(chunks) if number not in results}
     pending = set(numbers)
     try:
@@ -164,7 +166,7 @@ def collect(
                 if keep:
                     keep(number, results[number])
                 done += len(chunks[number])
-            yield Progress(done, total, what)
+            yield Progress(done, total, work)
     finally:
         for future in pending:
             future.cancel()

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Boolean, Float, Integer
+from ...dask_client import connected
 from ...errors import SeipError
 from ...site.site import Site
 from ..lidar.model import LidarModel
@@ -24,7 +25,6 @@ Submit = Callable[[Integer], Future[Rows]]
 """Submits the pose indices of a chunk, (n,) int64; the future holds their rows of the grid."""
 
 _RAYS_BETWEEN_CHECKS = 1 << 15  # no more than a tenth of a second's work
-_CONNECT_TIMEOUT = 20  # seconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,32 +117,12 @@ def dask_executor(task: VisibilityTask, address: str) -> Iterator[Submit]:
     SeipError
         Dask is not installed, the scheduler does not answer or has no workers, or several workers died on one chunk.
     """
-    try:
-        import dask  # noqa: PLC0415 - an extra that need not be installed
-        from distributed import Client, KilledWorker  # noqa: PLC0415 - as above
-    except ImportError as error:
-        raise SeipError(
-            "a scheduler needs Dask, which is not installed; install the extra 'cluster' in the project's folder: "
-            "pip install '.[cluster]'"
-        ) from error
-    try:
-        client = Client(address, timeout=_CONNECT_TIMEOUT, set_as_default=False)
-    except TypeError as error:  # raised by distributed for a TLS address without certificates
-        raise SeipError(
-            f"{address} needs certificates: name them in Dask's settings distributed.comm.tls.ca-file, client.cert and "
-            "client.key"
-        ) from error
-    except (OSError, ValueError) as error:
-        raise SeipError(f"no Dask scheduler answers at {address}; start one, or check the address") from error
-    with client:
-        if not client.scheduler_info()["workers"]:
-            raise SeipError(
-                f"the Dask scheduler at {address} has no workers; start some where this package is installed"
-            )
+    with connected(address) as client:
+        from distributed import KilledWorker  # noqa: PLC0415 - an extra, which `connected` requires
+
         try:
-            with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1TB"}):
-                # submitted, not scattered: the scheduler recomputes it when the worker that holds it dies
-                shared_task = client.submit(_identity, task, pure=False)
+            # submitted, not scattered: the scheduler recomputes it when the worker that holds it dies
+            shared_task = client.submit(_identity, task, pure=False)
             with client.get_executor(pure=False) as executor:
                 yield lambda poses: executor.submit(_compute_on_worker, shared_task, poses)
         except KilledWorker as error:

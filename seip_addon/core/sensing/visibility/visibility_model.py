@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from ...arrays import Boolean, Float, Integer
 from ...geometry.orientation import orientation as orientation_of
 from ...geometry.orientation import rotated
 from ...site.site import Site
+from ...site.targets import Targets
 from ..lidar.model import LidarModel
 from .near_surfaces import NearSurfaces, near_surfaces, rotated_surfaces
 from .ray_casting import Engine, RayCaster, engine_name, make_ray_caster
@@ -24,6 +26,22 @@ from .settings import VisibilitySettings
 
 _MAX_LEVEL_ANGLE = 1e-6
 """Radians by which the axis of an upright sensor may deviate: Blender rotates objects in single precision."""
+
+
+class VisibleSite(Protocol):
+    """Targets, and the static surfaces that hide them: a `Site`, or less."""
+
+    @property
+    def targets(self) -> Targets:
+        """The targets."""
+
+    @property
+    def triangles(self) -> Float:
+        """Static surfaces, (n, 3, 3) float64, metres."""
+
+    @property
+    def reflectivity(self) -> Float:
+        """Reflectivity of each triangle, (n,) float64."""
 
 
 class VisibilityModel:
@@ -37,7 +55,7 @@ class VisibilityModel:
         Ray caster of the site's triangles.
     """
 
-    def __init__(self, site: Site, settings: VisibilitySettings, caster: RayCaster) -> None:
+    def __init__(self, site: VisibleSite, settings: VisibilitySettings, caster: RayCaster) -> None:
         self._caster, self._settings, self._reflectivity = caster, settings, site.reflectivity
         self._surfaces = near_surfaces(site.triangles, site.targets.xyz, settings.delta, site.reflectivity)
 

@@ -126,15 +126,15 @@ def with_city_model(
 
 def _to_map(model: CityModel, request: BuildingsRequest, reference: GeoReference) -> Transform:
     if request.origin is not None:
-        MAP_COORDINATE.require(request.origin[:2], "--buildings-origin", "X or Y", "give map coordinates")
-        ELEVATION.require(request.origin[2], "--buildings-origin", "Z", "give a height above the map's zero")
+        MAP_COORDINATE.require(request.origin[:2], "origin of the city model", "X or Y", "give map coordinates")
+        ELEVATION.require(request.origin[2], "origin of the city model", "Z", "give a height above the map's zero")
         shift = np.array(request.origin[:2])
         return lambda xy: xy + shift
     code = request.epsg or model.epsg
     if code is None:
         raise SeipError(
-            f"{model.name} names no reference system: give it by --buildings-epsg CODE, or the map coordinates of its "
-            "zero by --buildings-origin X Y Z"
+            f"{model.name} names no reference system: give the EPSG code of the city model, or its origin in "
+            "coordinates of the map, X Y Z"
         )
     return reprojection(code, reference, model.name).to_map
 

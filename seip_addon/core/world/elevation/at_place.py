@@ -129,7 +129,8 @@ def with_terrain(
     if not is_flat and not is_survey(path):
         low, high = around.lanes[:, 2].min(), around.lanes[:, 2].max()
         raise SeipError(
-            f"the map has its own heights there ({low:.1f} to {high:.1f} m), which its roads keep: leave out --terrain"
+            f"the map has its own heights there ({low:.1f} to {high:.1f} m), which its roads keep: leave out the "
+            "terrain"
         )
     if not is_survey(path):
         model = read_geotiff(path)
@@ -179,7 +180,7 @@ def _survey_points(
     named, middle = survey_system(path)
     code = request.epsg or named
     if code is None:
-        raise SeipError(f"{path.name} names no reference system: give it by --terrain-epsg CODE")
+        raise SeipError(f"{path.name} names no reference system: give the EPSG code of the terrain")
     system = reprojection(code, around.reference, path.name)
     raster = empty_raster(around.area)
     corners = system.from_map(raster.places)

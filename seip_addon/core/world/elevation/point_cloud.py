@@ -1,32 +1,23 @@
 """Laser surveys (LAS, LAZ), read with laspy if it is installed."""
 
-import importlib
-import struct
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
 from ...arrays import Float, Integer
 from ...errors import SeipError
 from ...geometry.reference_systems import epsg_code
-from ...limits import ELEVATION, MAP_COORDINATE, Limits
+from ...limits import ELEVATION, MAP_COORDINATE
 from ...progress import Progress
+from ...storage.las_file import damaged_las, opened_las
 
 SURVEY_SUFFIXES = (".las", ".laz")
 POINTS_PER_STEP = 2_000_000
 MAX_POINTS = 40_000_000  # points at a place
 _PROJECTED_KEY = 3072
-_HEADER_BYTES, _HEADER_BYTES_1_4 = 227, 375  # headers of LAS 1.0 to 1.2, and of 1.4
-_RECORD_BYTES, _EXTENDED_RECORD_BYTES = 54, 60  # before the content of a variable-length record
-_LASZIP_USER, _VARIABLE_CHUNKS = b"laszip encoded", 2**32 - 1
-_PACKED = 0x80  # bit of the point format that LAZ sets
-_MAX_PACKED_POINTS = 1_000  # per byte of LAZ: even flat ground measured evenly needs far more bytes
-_SCALE = Limits(1e-9, 1e3, "m")
-_OFFSET = MAP_COORDINATE
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +49,7 @@ def survey_system(path: Path) -> tuple[int | None, Float]:
     SeipError
         The file cannot be read, or laspy is missing.
     """
-    with _opened(path) as reader:
+    with opened_las(path) as reader:
         return _code(reader.header), (np.array(reader.header.mins) + np.array(reader.header.maxs))[None, :2] / 2
 
 
@@ -71,7 +62,7 @@ def read_points(path: Path, low: Float, high: Float) -> Generator[Progress, None
         The file is damaged, or has more than `MAX_POINTS` there.
     """
     points, classes, count, done = [], [], 0, 0
-    with _opened(path) as reader:
+    with opened_las(path) as reader:
         whole = int(reader.header.point_count)
         chunks = reader.chunk_iterator(POINTS_PER_STEP)
         while done < whole:
@@ -81,10 +72,10 @@ def read_points(path: Path, low: Float, high: Float) -> Generator[Progress, None
                 places = np.column_stack([np.asarray(chunk[axis], dtype=np.float64) for axis in ("x", "y", "z")])
                 kinds = np.asarray(chunk.classification, dtype=np.int64)
             except Exception as error:  # whatever a damaged file makes of laspy
-                raise _damaged(path, error) from error
+                raise damaged_las(path, error) from error
             done += len(places)
-            if fault := _OFFSET.fault(places):
-                raise _damaged(path, ValueError(f"a coordinate {fault}"))
+            if fault := MAP_COORDINATE.fault(places):
+                raise damaged_las(path, ValueError(f"a coordinate {fault}"))
             kept = ((places[:, :2] >= low) & (places[:, :2] <= high)).all(axis=1) & ELEVATION.each(places[:, 2])
             points.append(places[kept])
             classes.append(kinds[kept])
@@ -95,144 +86,6 @@ def read_points(path: Path, low: Float, high: Float) -> Generator[Progress, None
                     "(pdal translate in.laz out.laz sample --filters.sample.radius=0.2)"
                 )
     return PointCloud(np.concatenate([np.empty((0, 3)), *points]), np.concatenate([np.empty(0, np.int64), *classes]))
-
-
-def _opened(path: Path) -> Any:  # noqa: ANN401  # laspy has no types
-    laspy = _laspy(path)
-    if not path.is_file():
-        raise SeipError(f"no such file: {path}; check its path")
-    try:
-        _check_header(path)
-        return laspy.open(path)
-    except Exception as error:  # whatever a damaged file makes of laspy
-        raise _damaged(path, error) from error
-
-
-def _check_header(path: Path) -> None:
-    """Check the header of a survey against the size of the file, because laspy trusts it.
-
-    Fields and sizes are those of the ASPRS LAS specification 1.4 R15, sections 2.4 to 2.7.
-
-    Raises
-    ------
-    ValueError
-        The file is too short for its header, or a scale, offset or bound is not a plausible number.
-    """
-    size = path.stat().st_size
-    with path.open("rb") as file:
-        header = file.read(_HEADER_BYTES_1_4)
-        if len(header) < _HEADER_BYTES or not header.startswith(b"LASF"):
-            raise ValueError("it does not begin as a LAS file")
-        minor = header[25]
-        length, data, records = struct.unpack_from("<HII", header, 94)
-        kind, point_bytes, points = struct.unpack_from("<BHI", header, 104)
-        extended, extended_records = 0, 0
-        if minor >= 4 and len(header) == _HEADER_BYTES_1_4:
-            extended, extended_records, points_1_4 = struct.unpack_from("<QIQ", header, 235)
-            points = points_1_4 or points
-        if not _HEADER_BYTES <= length <= data <= size:
-            raise ValueError(f"its points begin at byte {data:,} of {size:,}")
-        packing = _check_records(file, records, length, data, _RECORD_BYTES)
-        if extended_records:
-            _check_records(file, extended_records, extended, size, _EXTENDED_RECORD_BYTES)
-        packed = bool(kind & _PACKED)
-        if packed:
-            _check_packing(file, packing, data, size, points, point_bytes)
-    if not packed and points * point_bytes > size - data:
-        raise ValueError(f"it announces {points:,} points of {point_bytes} bytes in {size - data:,} bytes")
-    if packed and points > _MAX_PACKED_POINTS * (size - data):
-        raise ValueError(f"it announces {points:,} points in {size - data:,} packed bytes")
-    scales, offsets, bounds = (
-        struct.unpack_from(f"<{count}d", header, at) for count, at in ((3, 131), (3, 155), (6, 179))
-    )
-    for what, limits, values in (("scale", _SCALE, scales), ("offset", _OFFSET, offsets), ("bound", _OFFSET, bounds)):
-        if fault := limits.fault(values):
-            raise ValueError(f"its {what} {fault}")
-
-
-def _check_records(file: BinaryIO, count: int, begin: int, end: int, header_bytes: int) -> list[bytes]:
-    """Check that variable-length records follow each other between two bytes of a file; return those of LASzip.
-
-    Raises
-    ------
-    ValueError
-        A record reaches beyond the end.
-    """
-    at, extended = begin, header_bytes == _EXTENDED_RECORD_BYTES
-    found: list[bytes] = []
-    if count * header_bytes > end - begin:
-        raise ValueError(f"it announces {count:,} variable-length records in {max(end - begin, 0):,} bytes")
-    for _ in range(count):
-        file.seek(at)
-        header = file.read(header_bytes)
-        if len(header) < header_bytes:
-            raise ValueError("a variable-length record ends beyond the file")
-        (length,) = struct.unpack_from("<Q" if extended else "<H", header, 20)
-        if at + header_bytes + length > end:
-            raise ValueError("a variable-length record reaches beyond its place")
-        if header[2:18].rstrip(b"\0") == _LASZIP_USER:
-            found.append(file.read(length))
-        at += header_bytes + length
-    return found
-
-
-def _check_packing(
-    file: BinaryIO, records: Sequence[bytes], data: int, size: int, points: int, point_bytes: int
-) -> None:
-    """Check the description of packed points in LAZ: LASzip 1.4, header and chunk table.
-
-    Parameters
-    ----------
-    records : sequence of bytes
-        LASzip records of the file.
-    data, size : int
-        Byte at which the packed points begin, and bytes of the file.
-
-    Raises
-    ------
-    ValueError
-        The items are not those of the points, or the chunk table does not fit into the file.
-    """
-    if len(records) != 1 or len(records[0]) < 34:
-        raise ValueError("it has no LASzip record, or several")
-    _, _, _, _, _, _, chunk, _, _, items = struct.unpack_from("<HHBBHIIqqH", records[0])
-    if len(records[0]) < 34 + 6 * items:
-        raise ValueError(f"its LASzip record announces {items} items and ends before them")
-    sizes = [struct.unpack_from("<HHH", records[0], 34 + 6 * number)[1] for number in range(items)]
-    if sum(sizes) != point_bytes:
-        raise ValueError(f"its packed items have {sum(sizes)} bytes and its points {point_bytes}")
-    file.seek(data)
-    (table,) = struct.unpack("<q", file.read(8).ljust(8, b"\xff"))
-    if table == -1:  # written by a program that could not go back
-        file.seek(max(size - 8, 0))
-        (table,) = struct.unpack("<q", file.read(8).ljust(8, b"\xff"))
-    if not data + 8 <= table <= size - 8:
-        raise ValueError(f"its chunk table begins at byte {table:,} of {size:,}")
-    file.seek(table)
-    _, chunks = struct.unpack("<II", file.read(8))
-    fixed = 0 < chunk < _VARIABLE_CHUNKS
-    if (
-        chunk == 0
-        or chunks > table - data
-        or (fixed and not chunk * (chunks - 1) < points + (points == 0) <= chunk * chunks + 1)
-    ):
-        raise ValueError(f"its chunk table announces {chunks:,} chunks of {chunk:,} points for {points:,} points")
-
-
-def _damaged(path: Path, error: Exception) -> SeipError:
-    first = (str(error).strip().splitlines() or ["no reason given"])[0]
-    return SeipError(f"{path.name} is not a readable LAS or LAZ file ({first[:100]}); download it again")
-
-
-def _laspy(path: Path) -> ModuleType:
-    try:
-        if path.suffix.lower() == ".laz":
-            importlib.import_module("lazrs")
-        return importlib.import_module("laspy")
-    except ModuleNotFoundError as error:
-        raise SeipError(
-            f"reading {path.name} needs {error.name}, which is not installed; pip install laspy lazrs"
-        ) from error
 
 
 def _code(header: Any) -> int | None:  # noqa: ANN401  # laspy has no types

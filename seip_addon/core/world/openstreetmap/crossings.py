@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..opendrive.junctions import STREETS
 from .extract import Extract, rings
-from .streets import is_roundabout, is_street
+from .streets import importance, is_roundabout, is_street
 
 ONE_CROSSING = 60.0  # metres: nodes of the same streets within this distance are one crossing (dual carriageways)
 EARTH_RADIUS = 6_371_000.0  # metres
@@ -22,11 +22,15 @@ class Crossing:
     streets : tuple of str
         Names of the streets, in alphabetical order.
     latitude, longitude : float, degrees
+    importance : int
+        Importance of the second most important of its named streets, see `streets.importance`: at a crossing of a
+        main street with a residential one it is that of the latter.
     """
 
     streets: tuple[str, ...]
     latitude: float
     longitude: float
+    importance: int = 0
 
     @property
     def name(self) -> str:
@@ -39,7 +43,7 @@ def named_crossings(extract: Extract) -> tuple[Crossing, ...]:
     streets = [way for way in extract.ways.values() if "highway" in way.tags and is_street(way.tags)]
     round_ways = [way for way in streets if is_roundabout(way.tags)]
     ring_of = {node: number for number, ring in enumerate(rings(round_ways)[0]) for node in ring}
-    names: defaultdict[tuple[str, int], set[str]] = defaultdict(set)
+    names: defaultdict[tuple[str, int], dict[str, int]] = defaultdict(dict)  # importance of each street of a place
     nodes: defaultdict[tuple[str, int], set[int]] = defaultdict(set)
     for way in streets:
         for node in way.nodes:
@@ -47,14 +51,18 @@ def named_crossings(extract: Extract) -> tuple[Crossing, ...]:
                 place = ("ring", ring_of[node]) if node in ring_of else ("node", node)
                 nodes[place].add(node)
                 if "name" in way.tags:
-                    names[place].add(way.tags["name"])
+                    name = way.tags["name"]
+                    names[place][name] = max(importance(way.tags), names[place].get(name, 0))
     places: defaultdict[tuple[str, ...], list[tuple[float, float]]] = defaultdict(list)
+    importances: defaultdict[tuple[str, ...], int] = defaultdict(int)
     for place, streets_there in names.items():
         if len(streets_there) > 1:
             there = [extract.nodes[node] for node in sorted(nodes[place])]
             middle = (sum(n.latitude for n in there) / len(there), sum(n.longitude for n in there) / len(there))
-            places[tuple(sorted(streets_there))].append(middle)
-    found = [Crossing(pair, *middle) for pair, there in places.items() for middle in _apart(there)]
+            pair = tuple(sorted(streets_there))
+            places[pair].append(middle)
+            importances[pair] = max(importances[pair], sorted(streets_there.values())[-2])
+    found = [Crossing(pair, *middle, importances[pair]) for pair, there in places.items() for middle in _apart(there)]
     return tuple(sorted(found, key=lambda one: (one.streets, one.latitude, one.longitude)))
 
 

@@ -72,7 +72,7 @@ def convert(
     if kept:
         options += ["--geometry.remove.keep-edges.explicit", ",".join(kept)]
     yield from run(programs, programs.netconvert, options, "streets of the extract")
-    text = _without_dates(target.read_text(encoding="utf-8"), streets)
+    text = _corrected(target.read_text(encoding="utf-8"), left_hand=streets.left_hand)
     sources = _sources(text)
     target.write_text(mended_text(_SOURCE.sub("", text)), encoding="utf-8")
     return sources
@@ -88,14 +88,16 @@ def _sources(text: str) -> dict[str, str]:
     return found
 
 
-def _without_dates(text: str, streets: StreetFile) -> str:
-    """Return the text of a map without dates, with a rule for left-hand traffic and with corrected names.
-
-    Without dates the same streets give the same bytes. netconvert escapes names twice, which is undone, and writes
-    internal ids (``:12_0``) as names of roads, which are removed.
-    """
+def _corrected(text: str, *, left_hand: bool) -> str:
+    """Return the text of a map of netconvert without dates, with corrected names and the side of traffic."""
+    # netconvert escapes the names of streets twice: "Smith & Sons" arrives as "Smith &amp;amp; Sons".
     text = re.sub(r"&amp;(amp|apos|gt|lt|quot);", r"&\1;", text)
+    # The first comment holds the time of the run and the paths of its files, and the header holds its date. With them
+    # the same streets would give different bytes each time, and results that carry a digest of the map would be stale.
     text = re.sub(r"<!--.*?-->\s*", "", text, count=1, flags=re.DOTALL)
     text = re.sub(r'(<header [^>]*?)date="[^"]*"', r'\1date=""', text, count=1)
+    # Roads within junctions have no street name; netconvert writes SUMO's internal id (":12_0") in its place, which
+    # would appear in results as the name of a street.
     text = re.sub(r'(<road [^>]*?)name=":[^"]*"', r'\1name=""', text)
-    return text.replace("<road ", '<road rule="LHT" ') if streets.left_hand else text
+    # netconvert writes no rule of traffic, and OpenDRIVE's default is right-hand traffic.
+    return text.replace("<road ", '<road rule="LHT" ') if left_hand else text

@@ -248,8 +248,8 @@ def site_of_extract(
     junction = nearest_junctions(road_map, lanes, float(middle[0]), float(middle[1]), 1)
     if (not junction or junction[0][1] > MAX_JUNCTION_DISTANCE) and place.radius is None:
         raise SeipError(
-            f"no junction within {MAX_JUNCTION_DISTANCE:g} m of {near[0]:.5f}, {near[1]:.5f}: give --radius for a "
-            "place between junctions, or --service-roads where driveways or aisles are streets too"
+            f"no junction within {MAX_JUNCTION_DISTANCE:g} m of {near[0]:.5f}, {near[1]:.5f}: give a radius "
+            "for a place between junctions, or count service roads where driveways or aisles are streets too"
         )
     roundabouts = _roundabouts(road_map, streets, extract)
     together = intersection(lanes, junction[0][0].id, roundabouts) if junction else frozenset[str]()
@@ -650,5 +650,5 @@ def _similar_names(extract: Extract, name: str) -> str:
 def _no_street(extract: Extract, near: tuple[float, float], reach: float) -> SeipError:
     return SeipError(
         f"{extract.name} has no street within {reach:,.0f} m of {near[0]:.5f}, {near[1]:.5f}: give a place on one of "
-        "its streets, latitude before longitude, or --service-roads where driveways or aisles are streets too"
+        "its streets, latitude before longitude, or count service roads where driveways or aisles are streets too"
     )

@@ -24,6 +24,7 @@ CLASSES = (
     *("unclassified", "residential", "living_street", "road", "busway"),
 )
 """Values of ``highway`` that are streets; ``service`` (driveways, aisles, alleys) is one on request."""
+MAIN_CLASSES = {"motorway", "trunk", "primary", "secondary"}
 TRACKS = {"tram", "light_rail"}
 """Values of ``railway`` whose tracks may lie in a street."""
 PAVED_CLASSES = {"primary", "secondary", "tertiary", "unclassified", "residential", "living_street", "road"}
@@ -93,6 +94,12 @@ def is_street(tags: Tags, *, service: bool = False) -> bool:
         return True
     highway = tags.get("highway")
     return highway in CLASSES or (service and highway == "service")
+
+
+def importance(tags: Tags) -> int:
+    """Return 2 for a main street (secondary and above, with its slip roads), 1 for a tertiary one, otherwise 0."""
+    highway = tags.get("highway", "").removesuffix("_link")
+    return 2 if highway in MAIN_CLASSES else int(highway == "tertiary")
 
 
 def is_tunnel(tags: Tags) -> bool:

@@ -353,6 +353,5 @@ def _metres_away(
 def _ambiguous(crossing: Crossing) -> UnclearLevelError:
     upper, lower = map(shlex.quote, crossing.levels)
     return UnclearLevelError(
-        f"{crossing}, and a scene has one level: choose it by a road that lies on it, --level {upper} or "
-        f"--level {lower}"
+        f"{crossing}, and a scene has one level: choose it by a road that lies on it (level {upper} or level {lower})"
     )

@@ -46,13 +46,13 @@ def mesh_place(model: SiteModel, given: Sequence[float], name: str) -> MeshPlace
         The numbers are not finite, there are too few or too many, or the place is not at the site.
     """
     if len(given) not in (2, 3) or not all(map(math.isfinite, given)):
-        raise SeipError(f"the place of {name} must be --mesh-origin LAT LON [HEADING], or X Y [HEADING] of the map")
+        raise SeipError(f"the origin of {name} must be LAT LON [HEADING], or X Y [HEADING] of the map")
     place = _local(model, given[:2])
     if place is None:
         x, y = model.origin[:2]
         raise SeipError(
             f"{given[0]:g}, {given[1]:g} is not within {REACH:,.0f} m of the site, in degrees or in metres of the map; "
-            f"the site's centre is at map ({x:.0f}, {y:.0f}): give the position of the zero of {name} by --mesh-origin"
+            f"the site's centre is at map ({x:.0f}, {y:.0f}): give the position of the origin of {name}"
         )
     heading = math.radians(given[2]) if len(given) == 3 else 0.0
     return MeshPlace((float(place[0]), float(place[1]), ground_height(model.parts, place)), heading)

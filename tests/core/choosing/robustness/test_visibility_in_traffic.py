@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seip_addon.core.choosing.robustness.traffic_instants import (
@@ -16,7 +16,11 @@ from seip_addon.core.choosing.robustness.traffic_instants import (
     obstacles_of,
     spread_instants,
 )
-from seip_addon.core.choosing.robustness.visibility_in_traffic import LAYER_HEIGHT, visibility_in_traffic
+from seip_addon.core.choosing.robustness.visibility_in_traffic import (
+    LAYER_HEIGHT,
+    poses_in_traffic,
+    visibility_in_traffic,
+)
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import rotated
 from seip_addon.core.progress import finish
@@ -93,6 +97,14 @@ crowds = st.lists(
 def views(instants, layer="road", around=AROUND):
     seen = finish(visibility_in_traffic(around, POSES, instants, layer))
     return np.array([seen.seen(instant) for instant in range(len(instants))])
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.lists(crowds, min_size=1, max_size=3))
+def test_one_instant_at_a_time_gives_what_all_together_give(instants):
+    poses = finish(poses_in_traffic(AROUND, POSES))
+    for instant, seen in zip(instants, views(instants), strict=True):
+        assert poses.seen_by(instant).tolist() == seen.sum(axis=0).tolist()
 
 
 def place_of(pose, caster, around, reflectivity):

@@ -9,6 +9,7 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from seip_addon.core.output.datasets import kitti, mmdetection3d, openpcdet, opv2v, pcd
 from seip_addon.core.output.datasets.label_files import read_labels
@@ -151,6 +152,21 @@ def test_pcd_header():
         "POINTS 3",
     ]
     assert len(data) == 3 * 16
+
+
+def test_the_viewpoint_of_a_sensors_cloud_is_its_pose():
+    sample = _sample(make_frame(), pcd.FORMAT)
+    for path, content in pcd.sample_files(sample).items():
+        (line,) = [line for line in content().split(b"\n") if line.startswith(b"VIEWPOINT")]
+        words = line.decode().split()[1:]
+        sensor = next((one for one in sample.run.sensors if f"/{one.label}/" in path), None)
+        if sensor is None:
+            assert words == ["0", "0", "0", "1", "0", "0", "0"]
+        else:
+            x, y, z, qw, qx, qy, qz = map(float, words)
+            assert np.abs(np.array([x, y, z]) - sensor.xyz).max() < 1e-9
+            turn = Rotation.from_quat([qx, qy, qz, qw]).as_matrix()
+            assert np.abs(turn - sensor.orientation).max() < 1e-8
 
 
 def test_opv2v_numbers_are_never_taken_for_text(tmp_path):

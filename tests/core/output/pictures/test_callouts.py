@@ -58,6 +58,20 @@ def test_boxes_are_stacked_upwards_without_overlap_and_no_farther_than_needed(se
             assert any(abs(low[i, 1] - high[j, 1] - 2.0) < 1e-9 for j in range(count))
 
 
+@cases(100)
+@given(st.integers(0, 10_000), st.integers(1, 12), st.integers(1, 3))
+def test_boxes_are_stacked_above_boxes_that_stay(seed, count, fixed):
+    random = np.random.default_rng(seed)
+    boxes = np.column_stack([random.uniform(0, 60, (count, 2)), random.uniform(20, 40, count), np.full(count, 18.0)])
+    taken = np.column_stack([random.uniform(0, 60, (fixed, 2)), random.uniform(5, 40, (fixed, 2))])
+    rise = stack_upwards(boxes, 2.0, taken)
+    low = np.concatenate((boxes[:, :2] + np.column_stack([np.zeros(count), rise]), taken[:, :2]))
+    high = low + np.concatenate((boxes, taken))[:, 2:]
+    assert (rise >= 0.0).all()
+    for i in range(count):
+        assert not any(overlap(low[i], high[i], low[j], high[j]) for j in range(len(low)) if j != i)
+
+
 def test_without_room_labels_stay_in_the_picture():
     anchors = np.full((40, 2), 50.0)
     sizes = np.full((40, 2), 60.0)

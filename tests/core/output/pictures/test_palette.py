@@ -19,6 +19,7 @@ from seip_addon.core.output.pictures.palette import (
     RETURNS_COLOURS,
     SEEN_COLOURS,
     SENSOR_COLOURS,
+    SHARE_COLOURS,
     WEIGHT_COLOURS,
     WEIGHTED,
     rgb,
@@ -93,7 +94,7 @@ def test_groups_share_no_hue(one, other):
     assert np.abs((differences + 180.0) % 360.0 - 180.0).min() >= APART
 
 
-@pytest.mark.parametrize("colours", [SEEN_COLOURS, WEIGHT_COLOURS])
+@pytest.mark.parametrize("colours", [SEEN_COLOURS, SHARE_COLOURS, WEIGHT_COLOURS])
 def test_classes_differ_in_lightness_too(colours):
     lightness = np.sort([oklch(colour)[0] for colour in colours])
     assert np.diff(lightness).min() > 0.07

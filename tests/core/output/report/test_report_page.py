@@ -15,7 +15,7 @@ from PIL import Image
 from seip_addon.core.choosing.placement.cheapest import cheapest_for_coverage
 from seip_addon.core.choosing.placement.objective import MOVED, SAME_PRICE, FrontPoint, Objective
 from seip_addon.core.choosing.placement.problem import PlacementProblem
-from seip_addon.core.choosing.placement.returns_summary import ReturnsSummary
+from seip_addon.core.choosing.placement.returns_summary import ReturnsPoint, ReturnsSummary
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
@@ -23,6 +23,7 @@ from seip_addon.core.output.pictures.close_up_sheet import TILE
 from seip_addon.core.output.report.blocks import Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Table
 from seip_addon.core.output.report.costs import costs_of
 from seip_addon.core.output.report.evidence import load_evidence
+from seip_addon.core.output.report.figures import returns_front_plot
 from seip_addon.core.output.report.html import as_html
 from seip_addon.core.output.report.sections import make_report
 from seip_addon.core.output.report.wording import certificate_sentence, date, geographic, plain_warning
@@ -330,6 +331,33 @@ def test_the_table_of_numbers_is_that_of_the_record(folder):
     text = text_of(folder, front=proven)
     assert "none sees more" in text
     assert "at most 1.4 percentage points more" in text
+
+
+def test_the_table_of_numbers_of_a_placement_for_returns_is_of_returns(folder):
+    front = (
+        ReturnsPoint(1, 8.24, 18_000.0, 0.0),
+        ReturnsPoint(3, 25.0, 54_000.0, 0.0312),
+        ReturnsPoint(4, 31.0, 72_000.0, None),
+    )
+    returns = ReturnsSummary(25.0, {"car": 80.0, "cyclist": 30.0, "pedestrian": 20.0}, (), front)
+    evidence = load_evidence(folder)
+    report = make_report(replace(evidence, record=replace(evidence.record, returns=returns)))
+    (table,) = (table for table in blocks_of(report, Table) if table.head[0] == "Sensors")
+    assert table.head == ("Sensors", "Sensors, $", "Points", "Other choices")
+    assert table.rows == (
+        ("1", "18,000", "8.2", "none has more"),
+        ("3", "54,000", "25", "at most 3.2% more"),
+        ("4", "72,000", "31", "may have more"),
+    )
+    plot = returns_front_plot(front, (3, 25.0))
+    assert plot.more == [0.0, pytest.approx(26.0 * 0.0312), 0.0]
+    assert plot.high == 31.0
+    text = text_of(folder, returns=returns)
+    assert "these numbers of points on a road user" in text
+    assert "none sees more" not in text
+    assert "none sees more" in text_of(
+        folder, returns=replace(returns, front=()), front=(FrontPoint(1, 0.5, 1.0, 0.0),)
+    )
 
 
 def test_a_note_on_equally_cheap_placements_gives_way_to_what_the_table_proves(tmp_path):

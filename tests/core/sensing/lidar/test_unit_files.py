@@ -57,7 +57,7 @@ def test_a_key_names_the_model_whose_beams_are_replaced(written, name, content):
     np.testing.assert_allclose(np.degrees(model.elevations), SIXTEEN)
     assert (np.abs(model.azimuth_offsets) <= math.pi).all()
     assert (model.rotation_rate, model.azimuth_count) == (base.rotation_rate, base.azimuth_count)
-    with pytest.raises(SeipError, match="does not say which LiDAR it is of: name one, as in --catalogue KEY=unit"):
+    with pytest.raises(SeipError, match="does not say which LiDAR it is of: name one, as in KEY=unit"):
         load_catalogue([path])
 
 

@@ -47,7 +47,7 @@ def test_a_missing_dask_has_its_sentence() -> None:
 @needs_dask
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://"])
 def test_a_scheduler_that_does_not_answer_has_its_sentence(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("seip_addon.core.sensing.visibility.executors._CONNECT_TIMEOUT", 0.5)
+    monkeypatch.setattr("seip_addon.core.dask_client._CONNECT_TIMEOUT", 0.5)
     with pytest.raises(SeipError, match="no Dask scheduler answers at"):
         finish(compute_visibility(SITE, MODELS, SETTINGS, ANY, scheduler=address))
 

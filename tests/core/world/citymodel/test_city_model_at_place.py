@@ -64,7 +64,7 @@ def test_an_origin_places_a_model_without_a_reference_system_and_keeps_its_heigh
     assert site.solids[0].outline.bounds == pytest.approx((-5, 15, 5, 23))
     assert site.solids[0].solid.vertices[:, 2].min() == 12
     assert not site.solids[0].on_ground
-    with pytest.raises(SeipError, match="names no reference system: give it by --buildings-epsg CODE"):
+    with pytest.raises(SeipError, match="names no reference system: give the EPSG code of the city model"):
         placed(model, tmp_path)
     with pytest.raises(SeipError, match="X or Y is nan, not"):
         placed(model, tmp_path, origin=(math.nan, 0.0, 0.0))

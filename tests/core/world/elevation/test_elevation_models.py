@@ -115,7 +115,7 @@ def test_smoothing_keeps_planes_and_stays_between_the_extremes(slope_x, slope_y,
 def test_a_map_with_heights_keeps_them(tmp_path):
     path = write_dem(tmp_path / "dem.tif", sampled(plane, X - 150, Y + 150, 300), X - 150, Y + 150)
     hill = np.column_stack([np.zeros((50, 2)), np.linspace(0, 5, 50)])
-    with pytest.raises(SeipError, match=r"own heights there \(0\.0 to 5\.0 m\).*--terrain"):
+    with pytest.raises(SeipError, match=r"own heights there \(0\.0 to 5\.0 m\).*leave out the terrain"):
         relief(path, lanes=hill)
     bridge = np.column_stack([np.zeros((100, 2)), np.repeat([34.0, 40.0], [80, 20])])
     assert relief(path, lanes=bridge).level == 34

@@ -183,7 +183,7 @@ def test_a_survey_without_ground_is_refused(tmp_path):
 
 def test_a_survey_without_a_system_asks_for_it(tmp_path):
     points = town(np.random.default_rng(3))
-    with pytest.raises(SeipError, match="--terrain-epsg CODE"):
+    with pytest.raises(SeipError, match="give the EPSG code of the terrain"):
         surveyed(tmp_path, points, wkt=None)
     assert surveyed(tmp_path, points, wkt=None, epsg=25833)[0].solids
 

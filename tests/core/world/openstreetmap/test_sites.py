@@ -190,7 +190,7 @@ def test_a_place_between_junctions_needs_a_radius(tmp_path):
     extract = Extract()
     extract.way([(-400, 0), (400, 0)], highway="residential", name="Long Street")
     extract.house(-20, 10, 20, 10)
-    with pytest.raises(SeipError, match="give --radius for a place between junctions"):
+    with pytest.raises(SeipError, match="give a radius for a place between junctions"):
         built(extract, tmp_path)
     assert built(extract, tmp_path, radius=60.0).model.region.area == pytest.approx(120 * 6.4, rel=0.05)
 

@@ -118,7 +118,7 @@ def test_no_post_stands_beside_the_bridge_over_the_street(tmp_path):
 
 
 def test_a_crossing_in_the_middle_of_the_place_is_refused_by_name(tmp_path):
-    with pytest.raises(SeipError, match=r"road 5 lies 6\.0 m above road 2 at \(0, 0\).*--level 5 or --level 2"):
+    with pytest.raises(SeipError, match=r"road 5 lies 6\.0 m above road 2 at \(0, 0\).*level 5 or level 2"):
         built(tmp_path, (0, 0))
     with pytest.raises(SeipError, match="no road '9' at this place"):
         built(tmp_path, (0, 0), ("9",))

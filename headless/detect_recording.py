@@ -1,0 +1,428 @@
+"""Detection in the recording of real sensors; a part of `seip detect`.
+
+seip detect sweeps/ --sensor os1_128 -o out/detected
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from headless import runtime
+from headless.charts.birds_eye import draw_birds_eye
+from headless.detection.average_precision import balanced_score, evaluate
+from headless.detection.detector import Detector
+from headless.detection.detector_evaluation import DetectorEvaluation
+from headless.detection.frame_results import Detections, FrameResult
+from headless.detection.matching import Rule
+from headless.detection.recorded_detection import (
+    RECOMMENDED_SCORE,
+    DetectedFrame,
+    area_of_recording,
+    detect_in_recording,
+)
+from headless.detection.rules import MAIN_RULE
+from headless.detection.settings import CLASS_CATEGORIES, CLASS_OF
+from headless.detection.suitability import suitability_warnings
+from headless.detection_results import DetectionSite, print_precision, save_charts, save_detections
+from headless.options import real_number
+from headless.video import save_video
+
+import bpy
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.plan import surface_height
+from seip_addon.core.limits import Limits
+from seip_addon.core.output.datasets.label_files import CLASSES, read_labels
+from seip_addon.core.output.results.detection_record import RECORDING_SCHEMA
+from seip_addon.core.output.results.versions import versions
+from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.recordings.box_labels import BoxLabels
+from seip_addon.core.sensing.recordings.box_labels import read_labels as read_box_labels
+from seip_addon.core.sensing.recordings.poses import read_poses
+from seip_addon.core.sensing.recordings.recorded_frames import RecordedFrames, RecordedScene, prepare_frames
+from seip_addon.core.sensing.recordings.recording import TIMES_FILE, Recording, open_recording, paired
+from seip_addon.core.sensing.scans.frame import Frame
+from seip_addon.core.sensing.scans.scanner import ReflectiveSurface
+from seip_addon.core.sensing.scans.static_scene import static_scene
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+from seip_addon.core.site.scene_geometry import SceneGeometry, joined
+from seip_addon.core.storage.files import digest, natural_order, save_json, whole_file
+from seip_addon.core.storage.json_dataclass import as_json
+from seip_addon.core.storage.source_digest import source_digest
+from seip_addon.scene.read import read_scene
+from seip_addon.scene.sensors import read_sensors
+
+RADIUS = 80.0
+"""Radius of the region around each sensor, metres: the detector was trained on regions of about this size."""
+
+RECORD = "detection.json"
+
+_LISTED_OVERLAP, _LISTED_RETURNS = 0.5, 10  # at which listed vehicles count as found
+
+_COLUMNS = (
+    *("frame", "time_s", "category", "score"),
+    *("x_m", "y_m", "z_m", "length_m", "width_m", "height_m", "yaw_deg"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sensors:
+    """Models and poses of a recording's sensors, and the scene that they are from, if any."""
+
+    models: Mapping[str, LidarModel]
+    poses: Mapping[str, Float]
+    geometry: SceneGeometry | None
+
+
+def add_recording_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of recordings to those of `seip detect`."""
+    group = parser.add_argument_group("recordings")
+    group.add_argument(
+        "--sensor",
+        nargs="+",
+        default=[],
+        metavar="KEY",
+        help="model of the sensors, or NAME=KEY for each; NAME is the folder of its sweeps",
+    )
+    group.add_argument("--poses", type=Path, metavar="FILE", help="poses of the sensors: JSON, or KITTI's calibration")
+    group.add_argument(
+        "--site", type=Path, metavar="BLEND", help="scene with the sensors: their poses, the road and the map"
+    )
+    group.add_argument("--labels", type=Path, metavar="DIR", help="labels of each sweep, for average precision")
+    group.add_argument(
+        "--radius",
+        type=real_number(Limits(10.0, 500.0)),
+        default=RADIUS,
+        metavar="M",
+        help="of the region around the sensors",
+    )
+    group.add_argument(
+        "--score",
+        type=real_number(Limits(0.05, 1.0)),
+        default=RECOMMENDED_SCORE,
+        metavar="S",
+        help="least score of drawn and listed detections",
+    )
+
+
+def is_recording(source: Path | None) -> bool:
+    """Return whether a path is a recording rather than a scene."""
+    return source is not None and source.suffix.lower() != ".blend"
+
+
+def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
+    """Detect road users in every frame of a recording, and write detections, pictures, video and figures."""
+    runtime.check_folder(options.output)
+    sensors, recording = _opened(options)
+    labels = _labels(options.labels, len(paired(recording)))
+    key = _key(options, recording, detector)
+    frames = runtime.finish_with_bar(
+        prepare_frames(
+            recording,
+            sensors.models,
+            sensors.poses,
+            radius=options.radius,
+            scene=None if sensors.geometry is None else _scene(sensors.geometry),
+        )
+    )
+    _require_vehicle(labels, frames.region, options.labels)
+    site = recording.name if sensors.geometry is None else sensors.geometry.name
+    area = area_of_recording(frames, detector, site)
+    backgrounds = [(sensor.mounted.label, sensor.background) for sensor in frames.sensors]
+    confidence = [background.confidence(name) for name, background in backgrounds]
+    for sentence in confidence:
+        runtime.LOG.info(sentence)
+    folder = options.output
+    _resume(folder, key)
+    results: list[FrameResult] = []
+    with runtime.incomplete_if_interrupted(folder, continues=True), runtime.progress_bar() as show:
+        steps = detect_in_recording(
+            frames,
+            detector,
+            area,
+            labels=labels,
+            known=lambda number: _stored(folder, number),
+            threads=os.cpu_count() or 1,
+        )
+        for step in steps:
+            if not isinstance(step, DetectedFrame):
+                show(step)
+                continue
+            results.append(step.result)
+            _save_frame(folder, step, frames, options.score, site)
+    fullest = max(range(len(results)), key=lambda number: len(results[number].detected))
+    scan = frames.frame(fullest)
+    doubts = [sentence for name, background in backgrounds for sentence in background.warnings(name)]
+    doubts += suitability_warnings(detector, [one.key for one in sensors.models.values()], area, scan)
+    if any(sensor.intensity_scale is None for sensor in frames.sensors):
+        doubts.append(
+            "the recording has no intensities: all points get the same one, and fewer road users may be found"
+        )
+    runtime.warn(doubts)
+    pictures = [folder / "frames" / f"{number:06d}.png" for number in range(len(frames))]
+    save_video(folder / "video.mp4", pictures, _rate(frames))
+    listed = _save_table(folder / "detections.csv", results, options.score, sensors.geometry)
+    outcome = _evaluated(results, fullest, scan) if labels is not None else None
+    record: dict[str, Any] = {
+        "schema": RECORDING_SCHEMA,
+        "key": key,
+        "complete": True,
+        "recording": recording.name,
+        "frames": len(frames),
+        "sensors": [
+            {
+                "id": one.mounted.label,
+                "sensor": one.mounted.model.key,
+                "local_m": one.mounted.xyz.tolist(),
+                "orientation": one.mounted.orientation.tolist(),
+                "intensity_scale": one.intensity_scale,
+                "background": {
+                    "sweeps": one.background.sweeps,
+                    "seconds": one.background.seconds,
+                    "uncertain": one.background.uncertain,
+                },
+            }
+            for one in frames.sensors
+        ],
+        "score": options.score,
+        "detector": detector.description() | {"digest": digest(options.detector.read_bytes())},
+        "warnings": doubts,
+        "versions": versions(blender=bpy.app.version_string),
+    }
+    if outcome is not None:
+        named = DetectionSite(site, frames.region, [one.mounted for one in frames.sensors])
+        save_charts(folder, outcome, named)
+        record["average_precision"] = {name: as_json(found) for name, found in outcome.precisions.items()}
+        record["recall"] = {"score": outcome.score, "categories": outcome.recall}
+        record["listed"] = _listed(results, options.score)
+        print_precision(outcome)
+        _print_listed(record["listed"])
+    save_json(folder / RECORD, record)
+    runtime.print_line(f"{listed:,} road users with a score of {options.score:g} or more in {len(frames):,} frames")
+    runtime.print_line(f"written to {folder}/: detections.csv, video.mp4, frames/, kitti/, openpcdet/")
+
+
+def _opened(options: argparse.Namespace) -> tuple[_Sensors, Recording]:
+    """Open the recording with the models and poses of its sensors."""
+    catalogue = load_catalogue(options.catalogue)
+    if options.site is not None:
+        if options.sensor or options.poses:
+            raise SeipError("--site names the sensors with their poses: leave out --sensor and --poses")
+        runtime.open_scene(options.site)
+        geometry = read_scene(bpy.context.scene).geometry
+        placed = {one.label: one for one in read_sensors(bpy.context.scene, catalogue)}
+        if not placed:
+            raise SeipError(f"{options.site} has no sensors: give a placed scene, or --sensor and --poses")
+        recording = open_recording(options.scene, min(one.model.rotation_rate for one in placed.values()))
+        if len(recording.sensors) == len(placed) == 1:
+            placed = {recording.sensors[0].name: next(iter(placed.values()))}
+        unknown = [record.name for record in recording.sensors if record.name not in placed]
+        if unknown:
+            raise SeipError(
+                f"{options.site} has the sensors {', '.join(placed)}, but the recording has {', '.join(unknown)}: "
+                "name the folders of sweeps after the sensors"
+            )
+        poses = {name: _pose(one.xyz, one.orientation) for name, one in placed.items()}
+        return _Sensors({name: one.model for name, one in placed.items()}, poses, geometry), recording
+    if not options.sensor:
+        raise SeipError("name the sensor that made the recording, as --sensor os1_128, or the scene with --site")
+    named = dict(_split(text) for text in options.sensor)
+    models = find_models(catalogue, list(named.values()))
+    recording = open_recording(options.scene, min(model.rotation_rate for model in models.values()))
+    for record in recording.sensors:
+        if record.name not in named and "" not in named:
+            raise SeipError(f"--sensor names no model for {record.name}: add {record.name}=KEY")
+    found = {record.name: models[named[record.name if record.name in named else ""]] for record in recording.sensors}
+    return _Sensors(found, {} if options.poses is None else _poses(options.poses, list(found)), None), recording
+
+
+def _poses(path: Path, names: Sequence[str]) -> dict[str, Float]:
+    """Read the poses of named sensors; the pose of one sensor may have any name."""
+    poses = read_poses(path)
+    if len(poses) == len(names) == 1:
+        return {names[0]: next(iter(poses.values()))}
+    missing = [name for name in names if name not in poses]
+    if missing:
+        raise SeipError(f"{path} has no pose of {', '.join(missing)}: it has those of {', '.join(poses)}")
+    return poses
+
+
+def _scene(geometry: SceneGeometry) -> RecordedScene:
+    """Return the surfaces, the road and the region of a scene."""
+    static, road = static_scene(geometry), joined(geometry.roads)
+    surface = ReflectiveSurface(make_ray_caster(static.triangles), static.reflectivity)
+    return RecordedScene(surface, lambda xy: surface_height(xy, road), geometry.region)
+
+
+def _split(text: str) -> tuple[str, str]:
+    name, equals, key = text.rpartition("=")
+    return (name, key) if equals else ("", text)
+
+
+def _pose(xyz: Float, orientation: Float) -> Float:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = orientation, xyz
+    return pose
+
+
+def _labels(folder: Path | None, frames: int) -> list[BoxLabels] | None:
+    """Read one file of labels for each frame, in the order of their names."""
+    if folder is None:
+        return None
+    named = (path for path in folder.glob("*") if path.suffix.lower() in {".txt", ".json"} and path.name != TIMES_FILE)
+    files = sorted(named, key=natural_order)
+    if len(files) != frames:
+        raise SeipError(
+            f"{folder} has {len(files)} files of labels, but the recording has {frames} frames: give one for each"
+        )
+    return [read_box_labels(path) for path in files]
+
+
+def _require_vehicle(labels: Sequence[BoxLabels] | None, region: BaseGeometry, folder: Path) -> None:
+    """Refuse labels without average precision before anything is written."""
+    for one in labels or ():
+        inside = shapely.contains_xy(region, one.boxes[:, 0], one.boxes[:, 1])
+        if np.isin(one.category[inside], MAIN_RULE.categories).any():
+            return
+    if labels is not None:
+        raise SeipError(
+            f"no file of {folder} has a {' or '.join(MAIN_RULE.categories)} in the region: give labels in the axes of "
+            "the site, or a larger --radius"
+        )
+
+
+def _key(options: argparse.Namespace, recording: Recording, detector: Detector) -> str:
+    """Return a digest of all that the detections follow from."""
+    files = [path for record in recording.sensors for path in record.paths]
+    sources = [path for path in (options.poses, options.site, *options.catalogue) if path is not None]
+    return digest(
+        source_digest(__name__),
+        detector.key,
+        repr((options.sensor, options.radius, options.score)),
+        *(f"{path.name} {path.stat().st_size} {path.stat().st_mtime_ns}" for path in files),
+        *(path.read_bytes() for path in sources),
+    )
+
+
+def _resume(folder: Path, key: str) -> None:
+    """Keep the frames of an interrupted run of the same inputs; remove others."""
+    record = folder / RECORD
+    known = record.exists() and f'"{key}"' in record.read_text(encoding="utf-8")
+    if not known:
+        for part in ("kitti", "openpcdet", "frames"):
+            for stale in (folder / part).glob("[0-9]*.*"):
+                stale.unlink()
+        save_json(record, {"schema": RECORDING_SCHEMA, "key": key, "complete": False})
+
+
+def _stored(folder: Path, number: int) -> Detections | None:
+    """Return the detections of a frame that an interrupted run has written."""
+    path = folder / "openpcdet" / f"{number:06d}.txt"
+    if not path.exists() or not (folder / "frames" / f"{number:06d}.png").exists():
+        return None
+    boxes, names = read_labels(path)
+    scores = [float(line.split()[8]) for line in path.read_text(encoding="utf-8").splitlines()]
+    category = {name: CLASS_OF[category] for category, name in CLASSES.items()}
+    return Detections(boxes, np.array(scores), np.array([category[name] for name in names], dtype=np.int64))
+
+
+def _save_frame(folder: Path, step: DetectedFrame, frames: RecordedFrames, score: float, site: str) -> None:
+    """Write the detections and the picture of a frame; the detections last, as they mark the frame as done."""
+    found, first = step.detections, [members[0] for members in CLASS_CATEGORIES.values()]
+    categories = [first[number] for number in found.category.tolist()]
+    shown = found.score >= score
+    west, south, east, north = frames.region.bounds
+    picture = draw_birds_eye(
+        step.frame.points,
+        step.frame.foreground,
+        (west, south, east, north),
+        boxes=found.boxes[shown],
+        categories=[name for name, chosen in zip(categories, shown, strict=True) if chosen],
+        sensors=np.array([sensor.mounted.xyz for sensor in frames.sensors]),
+        region=frames.region,
+        title=f"{site}, {step.frame.time:.1f} s",
+    )
+    with whole_file(folder / "frames" / f"{step.number:06d}.png") as temporary:
+        picture.save(temporary, "PNG")
+    save_detections(folder, step.number, found.boxes, categories, found.score)
+
+
+def _save_table(path: Path, results: Sequence[FrameResult], score: float, geometry: SceneGeometry | None) -> int:
+    """Write detections with some score as CSV and return their number.
+
+    Latitude and longitude are columns only if the map has them.
+    """
+    table = io.StringIO()
+    write = csv.writer(table, lineterminator="\n")
+    georeferenced = geometry is not None and geometry.geo_reference.mercator is not None
+    write.writerow((*_COLUMNS, "latitude", "longitude") if georeferenced else _COLUMNS)
+    count = 0
+    for number, result in enumerate(results):
+        found = result.detected
+        kept = np.flatnonzero(found.score >= score)
+        where = None
+        if georeferenced and geometry is not None and len(kept):
+            where = geometry.geo_reference.geographic(found.boxes[kept, :3] + geometry.origin)
+        for row, one in enumerate(kept.tolist()):
+            x, y, z, length, width, height, yaw = found.boxes[one].tolist()
+            sizes = [f"{value:.3f}" for value in (x, y, z, length, width, height)]
+            place = [] if where is None else [f"{where[row, 1]:.7f}", f"{where[row, 0]:.7f}"]
+            angle = f"{math.degrees(yaw):.1f}"
+            write.writerow(
+                [number, f"{result.time:.3f}", found.category[one], f"{found.score[one]:.3f}", *sizes, angle, *place]
+            )
+            count += 1
+    with whole_file(path) as temporary:
+        temporary.write_text(table.getvalue(), encoding="utf-8")
+    return count
+
+
+def _rate(frames: RecordedFrames) -> float:
+    """Return the usual rate of frames, hertz."""
+    times = np.array([frames.time(number) for number in range(len(frames))])
+    return float(min(max(1.0 / max(np.median(np.diff(times)), 1e-3), 0.5), 30.0)) if len(times) > 1 else 1.0
+
+
+def _listed(results: Sequence[FrameResult], score: float) -> dict[str, float | int | None]:
+    """Return the false vehicles per frame with some score, and the share found of the vehicles with enough returns."""
+    evaluation = evaluate(results, Rule(iou=_LISTED_OVERLAP))
+    false = ~evaluation.detections.hit & (evaluation.detections.score >= score)
+    wanted = evaluation.wanted.points >= _LISTED_RETURNS
+    found = evaluation.wanted.score[wanted] >= score
+    return {
+        "score": score,
+        "overlap": _LISTED_OVERLAP,
+        "false_per_frame": float(false.sum()) / len(results),
+        "fewest_returns": _LISTED_RETURNS,
+        "road_users": len(found),
+        "found": float(found.mean()) if len(found) else None,
+    }
+
+
+def _print_listed(listed: Mapping[str, float | int | None]) -> None:
+    runtime.print_line(
+        f"vehicles with a score of {listed['score']:g} or more: {listed['false_per_frame']:.2f} false ones per frame"
+    )
+    if listed["found"] is not None:
+        runtime.print_line(
+            f"{listed['found']:.0%} found of the {listed['road_users']:,} with {listed['fewest_returns']} returns or "
+            f"more, at an overlap of {listed['overlap']:g}"
+        )
+
+
+def _evaluated(results: Sequence[FrameResult], fullest: int, scan: Frame) -> DetectorEvaluation:
+    evaluation = evaluate(results, MAIN_RULE)
+    return DetectorEvaluation(tuple(results), evaluation, fullest, scan, balanced_score(evaluation))

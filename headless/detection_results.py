@@ -1,0 +1,91 @@
+"""Files and lines with the results of a detector: charts, detections of each frame, average precision."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from headless import runtime
+from headless.charts.detection import PrecisionRecallLine, save_parts_chart, save_precision_recall_chart
+from headless.charts.error_view import save_error_view
+from headless.detection.average_precision import precision_recall
+from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
+from headless.detection.chart_data import error_view, parts
+from headless.detection.detector_evaluation import DetectorEvaluation
+from headless.detection.rules import MAIN_RULE
+
+import numpy as np
+from shapely.geometry.base import BaseGeometry
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.output.datasets.detection_files import kitti_results, openpcdet_results
+from seip_addon.core.output.results.detection_record import FORMATS
+from seip_addon.core.sensing.scans.sensor import MountedSensor
+from seip_addon.core.storage.files import whole_file
+
+
+@dataclass(frozen=True, eq=False)
+class DetectionSite:
+    """Name, region of interest, sensors and credits of a site, for charts.
+
+    Parameters
+    ----------
+    region : shapely geometry, metres
+    sensors : sequence of MountedSensor
+    attribution : tuple of str
+        Credits that the sources of the scene require.
+    """
+
+    name: str
+    region: BaseGeometry
+    sensors: Sequence[MountedSensor]
+    attribution: tuple[str, ...] = ()
+
+
+def save_charts(folder: Path, outcome: DetectorEvaluation, site: DetectionSite) -> None:
+    """Write the charts of average precision and of the errors in the fullest frame."""
+    evaluation, score, name = outcome.evaluation, outcome.score, site.name
+    far = "distance to the nearest sensor (m)"
+    panels = [
+        parts(far, "average precision", {name: average_precision_by(evaluation, "distance", DISTANCE_EDGES)}),
+        parts(far, "recall", {name: recall_by(evaluation, "distance", DISTANCE_EDGES, score)}),
+        parts("returns from the road user", "recall", {name: recall_by(evaluation, "points", POINT_EDGES, score)}),
+    ]
+    save_parts_chart(folder / "where.png", panels, name)
+    found = precision_recall(evaluation)
+    types = " + ".join(sorted({sensor.model.key for sensor in site.sensors}))
+    count = len(site.sensors)
+    line = PrecisionRecallLine(types, count, found.recall, found.precision, evaluation.average_precision)
+    save_precision_recall_chart(folder / "precision_recall.png", [line], name)
+    frame = outcome.frames[outcome.fullest]
+    places = np.array([sensor.xyz for sensor in site.sensors])
+    title = f"{count} × {types}: AP {evaluation.average_precision:.2f} over all frames"
+    cloud = outcome.scan.points
+    view = error_view(title, frame, MAIN_RULE, score=score, cloud=cloud, region=site.region, sensors=places)
+    save_error_view(folder / "errors.png", [view], f"{name}, {frame.run} at {frame.time:.1f} s", site.attribution)
+
+
+def save_detections(folder: Path, number: int, boxes: Float, categories: Sequence[str], score: Float) -> None:
+    """Write the detections of a frame in each format; see `kitti_results`."""
+    for form, lines in zip(FORMATS, (kitti_results, openpcdet_results), strict=True):
+        with whole_file(folder / form / f"{number:06d}.txt") as temporary:
+            temporary.write_text(lines(boxes, categories, score), encoding="utf-8")
+
+
+def remove_detections(folder: Path) -> None:
+    """Remove the detections of an earlier run, which may have had more frames."""
+    for form in FORMATS:
+        for stale in (folder / form).glob("*.txt"):
+            stale.unlink()
+
+
+def print_precision(outcome: DetectorEvaluation) -> None:
+    """Print average precision by rule, and recall by category."""
+    for name, found in outcome.precisions.items():
+        between = "" if found.interval is None else " ({:.1%} to {:.1%})".format(*found.interval)
+        runtime.print_line(f"{name}: AP {found.average_precision:.1%}{between} of {found.road_users:,} road users")
+    recall = (f"{name} {one['recall']:.0%} of {one['road_users']:,}" for name, one in outcome.recall.items())
+    runtime.print_line(
+        f"found at an overlap of {MAIN_RULE.iou:g} with a score of {outcome.score:.2f} or more: {', '.join(recall)}"
+    )

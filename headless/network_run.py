@@ -1,0 +1,526 @@
+"""The run of a network: surveys of its sites, allocation of the budget, and the files of each site and of the whole."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from headless.network_tasks import (
+    SURVEY_FILES,
+    USAGE,
+    Failure,
+    Files,
+    PlaceJob,
+    SolveJob,
+    SurveyJob,
+    Workers,
+    solve_budget,
+    survey_site,
+    write_placement,
+)
+
+import numpy as np
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.choosing.network import network_search, site_problem
+from seip_addon.core.choosing.network.frontier import Frontier, SolvedBudget
+from seip_addon.core.choosing.network.network_search import NetworkAllocation, Request, search_allocation
+from seip_addon.core.choosing.network.site_problem import SiteProblem
+from seip_addon.core.choosing.placement.objective import Objective
+from seip_addon.core.errors import SeipError
+from seip_addon.core.output.network.network_record import (
+    NetworkPoint,
+    NetworkRecord,
+    NetworkSensor,
+    NetworkSite,
+    network_gap,
+)
+from seip_addon.core.progress import Progress
+from seip_addon.core.storage.files import digest, save_json, whole_file
+from seip_addon.core.storage.json_dataclass import as_json, from_json
+from seip_addon.core.storage.source_digest import source_digest
+from seip_addon.core.workflows.network_sites import NetworkPlace
+from seip_addon.core.workflows.network_survey import TakenPlacement
+from seip_addon.core.workflows.survey_settings import SurveySettings
+
+PROBLEM, SEARCHES = SURVEY_FILES[3], "searches.json"
+CURVE = (0.25, 0.5, 0.75, 1.5, 2.0)
+"""Shares of the money, besides the whole, at which the curve of value against money is computed."""
+OWN_SITE = "each sensor counts for its own site: what it sees of a neighbouring site is left out"
+SAME_HEIGHT = 0.01  # metres
+CURVE_TOLERANCE = 0.02
+"""Gap up to which the points of the curve are refined."""
+
+
+@dataclass(frozen=True)
+class NetworkRequest:
+    """Choices of a network besides its places.
+
+    Parameters
+    ----------
+    budgets : tuple of float, dollars
+        Money of each phase.
+    tolerance : float
+        Gap at which the search ends, as a share of the value.
+    minimum : float
+        Least value of the criterion at each site.
+    coverage : float, optional
+        Share of the road to be seen at each site at the least price, in place of budgets.
+    objective : Objective
+        Criterion and largest number of sensors at each site.
+    memory : int, bytes
+        Limit of the processes of a site; 0 for none.
+    installed : mapping of str to tuple of NetworkSensor
+        Sensors that stand at sites already, by the names of the sites; they remain and cost nothing.
+    """
+
+    budgets: tuple[float, ...]
+    tolerance: float
+    minimum: float
+    coverage: float | None
+    approaches: float
+    settings: SurveySettings
+    objective: Objective
+    memory: int = 0
+    installed: Mapping[str, tuple[NetworkSensor, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class StoredSearch:
+    """Search at a site that an earlier run has made: sensors installed before, and its result."""
+
+    installed: tuple[int, ...]
+    solved: SolvedBudget
+
+
+@dataclass(frozen=True)
+class StoredSearches:
+    """Content of ``searches.json``."""
+
+    key: str
+    searches: tuple[StoredSearch, ...] = ()
+
+
+@dataclass
+class _Site:
+    """A place with its files and the searches that were made there."""
+
+    place: NetworkPlace
+    folder: Path
+    key: str
+    message: str = ""
+    attribution: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    searches: StoredSearches = field(default_factory=lambda: StoredSearches(""))
+
+    def problem(self) -> SiteProblem:
+        """Read the placement problem."""
+        return SiteProblem.load(self.folder / PROBLEM)[0]
+
+    def found(self, installed: tuple[int, ...], budget: float, effort: float) -> SolvedBudget | None:
+        """Return a search of an earlier run, if it was made."""
+        return next(
+            (
+                one.solved
+                for one in self.searches.searches
+                if one.installed == installed and one.solved.budget == budget and one.solved.effort == effort
+            ),
+            None,
+        )
+
+    def store(self, installed: tuple[int, ...], solved: SolvedBudget) -> None:
+        """Add a search to those of the site, and write them in an order that does not depend on when they ended."""
+        searches = (*self.searches.searches, StoredSearch(installed, solved))
+        order = sorted(searches, key=lambda one: (one.installed, one.solved.budget, one.solved.effort))
+        self.searches = replace(self.searches, searches=tuple(order))
+        save_json(self.folder / SEARCHES, as_json(self.searches))
+
+
+def run_network(
+    name: str,
+    places: Sequence[NetworkPlace],
+    source: Callable[[NetworkPlace], tuple[str, bytes, str]],
+    request: NetworkRequest,
+    workers: Workers,
+    folder: Path,
+) -> Generator[Progress, None, NetworkRecord]:
+    """Survey the sites of a network, allocate the budget, and write the files of each site.
+
+    Finished work is stored in the folders of the sites, under keys of everything that it depends on: the same call goes
+    on after an interruption, and surveys only the sites that have changed.
+
+    Parameters
+    ----------
+    name : str
+        Name of the network.
+    source : callable
+        Returns suffix and content of the file that a site is built from, and the key of the site.
+    folder : path
+        Folder of the network, with one folder for each site.
+
+    Raises
+    ------
+    SeipError
+        Every site failed, the minimum cannot be reached, or a file cannot be written.
+    """
+    sites = yield from _surveyed(places, source, request, workers, folder)
+    good = [site for site in sites if not site.message]
+    if not good:
+        raise SeipError(f"all {len(sites)} sites failed; the first one: {sites[0].place.name}: {sites[0].message}")
+    network = _Network(good, request, workers)
+    if request.coverage is not None:
+        taken, allocation, phases = yield from network.cheapest()
+        curve: tuple[NetworkPoint, ...] = ()
+    else:
+        taken, allocation, phases, curve = yield from network.allocated()
+    yield from _placed(good, taken, request, workers)
+    rows = network.rows(taken, allocation, phases)
+    numbers = {id(site): row for site, row in zip(good, rows, strict=True)}
+    everything = tuple(numbers.get(id(site)) or _failed(site) for site in sites)
+    weight = float(network.weights.sum())
+    return NetworkRecord(
+        name=name,
+        criterion=network.criterion,
+        budgets_usd=request.budgets or (allocation.price,),
+        price_usd=sum(row.price_usd for row in rows),
+        value=allocation.value / weight,
+        bound=allocation.bound / weight,
+        sites=everything,
+        curve=curve,
+        sensor_types=request.settings.candidates.sensors,
+        attribution=tuple(sorted({credit for site in good for credit in site.attribution})),
+        notes=(OWN_SITE,),
+        goal=request.coverage,
+        least_usd=network.least,
+    )
+
+
+def _surveyed(
+    places: Sequence[NetworkPlace],
+    source: Callable[[NetworkPlace], tuple[str, bytes, str]],
+    request: NetworkRequest,
+    workers: Workers,
+    folder: Path,
+) -> Generator[Progress, None, list[_Site]]:
+    """Survey the sites whose inputs have changed; read the others."""
+    version = source_digest(site_problem.__name__)
+    sites: list[_Site] = []
+    open_numbers: list[int] = []
+    for number, place in enumerate(places):
+        yield Progress(number, len(places), "looking for finished sites")
+        _, _, key = source(place)
+        site = _Site(place, folder / place.folder, key)
+        sites.append(site)
+        if not _read_survey(site, version):
+            open_numbers.append(number)
+
+    def job(number: int) -> SurveyJob:
+        suffix, content, key = source(places[number])
+        return SurveyJob(
+            key,
+            places[number],
+            suffix,
+            content,
+            request.approaches,
+            request.settings,
+            request.objective,
+            request.memory,
+        )
+
+    jobs = [lambda number=number: job(number) for number in open_numbers]
+    done = len(sites) - len(jobs)
+    yield Progress(done, len(sites), "building and surveying sites")
+    for index, result in workers.run(survey_site, jobs):
+        site = sites[open_numbers[index]]
+        if isinstance(result, Failure):
+            site.message = result.message
+        else:
+            _write_survey(site, result)
+            if not _read_survey(site, version):
+                site.message = "its files could not be read again"
+        done += 1
+        yield Progress(done, len(sites), "building and surveying sites")
+    return sites
+
+
+def _read_survey(site: _Site, version: str) -> bool:
+    """Read what an earlier run has left of a site; return whether it is of the same inputs."""
+    if not (site.folder / PROBLEM).is_file():
+        return False
+    try:
+        _, header = SiteProblem.load(site.folder / PROBLEM)
+    except SeipError:
+        return False
+    if header.get("key") != site.key:
+        return False
+    site.attribution, site.warnings = tuple(header["attribution"]), tuple(header["warnings"])
+    key = digest(site.key, version)
+    try:
+        stored = from_json(StoredSearches, json.loads((site.folder / SEARCHES).read_text(encoding="utf-8")))
+    except (OSError, ValueError):
+        stored = StoredSearches(key)
+    site.searches = stored if stored.key == key else StoredSearches(key)
+    return True
+
+
+def _write_survey(site: _Site, files: Files) -> None:
+    """Replace the files of a site; the problem comes last, so that the others belong to it."""
+    shutil.rmtree(site.folder, ignore_errors=True)
+    _write_files(site.folder, files, last=PROBLEM)
+
+
+def _write_files(folder: Path, files: Files, last: str) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in sorted(files, key=lambda one: (one == last, one)):
+        with whole_file(folder / name) as temporary:
+            temporary.write_bytes(files[name])
+
+
+class _Network:
+    """Sites whose surveys succeeded, and the allocation of money to them."""
+
+    def __init__(self, sites: Sequence[_Site], request: NetworkRequest, workers: Workers) -> None:
+        self._sites, self._request, self._workers = sites, request, workers
+        self.weights: Float = np.array([site.place.weight for site in sites])
+        self.criterion = sites[0].problem().criterion
+        self.least = 0.0
+
+    def allocated(
+        self,
+    ) -> Generator[
+        Progress, None, tuple[list[SolvedBudget], NetworkAllocation, list[list[int]], tuple[NetworkPoint, ...]]
+    ]:
+        """Allocate the budget of each phase; sensors of earlier phases remain."""
+        request = self._request
+        installed = [_installed_poses(site, request.installed.get(site.place.name, ())) for site in self._sites]
+        phases = [[0] * len(standing) for standing in installed]
+        curve: tuple[NetworkPoint, ...] = ()
+        most = max(sum(request.budgets), CURVE[-1] * sum(request.budgets))
+        for number, budget in enumerate(request.budgets, start=1):
+            frontiers = [
+                site.problem().frontier(most, standing) for site, standing in zip(self._sites, installed, strict=True)
+            ]
+            last = number == len(request.budgets)
+            allocation = yield from search_allocation(
+                frontiers,
+                self.weights,
+                budget,
+                self._solver(installed),
+                request.tolerance,
+                gap=self._gap,
+                minimum=request.minimum if last else 0.0,
+            )
+            if number == 1:
+                curve, known = yield from self._curve(allocation, installed, sum(request.budgets))
+                if last:
+                    allocation = replace(allocation, frontiers=known)
+            for site, one in enumerate(allocation.taken):
+                phases[site] += [number] * (len(one.chosen) - len(installed[site]))
+            # New sensors follow those that were installed before, so that labels and phases keep their order.
+            installed = [
+                (*standing, *(pose for pose in one.chosen if pose not in standing))
+                for standing, one in zip(installed, allocation.taken, strict=True)
+            ]
+        taken = [replace(one, chosen=poses) for one, poses in zip(allocation.taken, installed, strict=True)]
+        return taken, allocation, phases, curve
+
+    def cheapest(
+        self,
+    ) -> Generator[Progress, None, tuple[list[SolvedBudget], NetworkAllocation, list[list[int]]]]:
+        """Find the cheapest placement of a coverage at each site."""
+        request = self._request
+        results: dict[int, tuple[SolvedBudget, float]] = {}
+        jobs = [
+            lambda site=site: SolveJob(
+                (site.folder / PROBLEM).read_bytes(), 0.0, network_search.LAST_EFFORT, (), request.coverage
+            )
+            for site in self._sites
+        ]
+        for number, result in self._workers.run(solve_budget, jobs):
+            if isinstance(result, Failure):
+                raise SeipError(f"{self._sites[number].place.name}: {result.message}")
+            results[number] = result
+            yield Progress(len(results), len(jobs), "cheapest placements")
+        taken = [results[number][0] for number in range(len(jobs))]
+        price = sum(one.price for one in taken)
+        self.least = sum(results[number][1] for number in range(len(jobs)))
+        value = float(self.weights @ [one.value for one in taken])
+        frontiers = tuple(
+            site.problem().frontier(price).with_solved(one) for site, one in zip(self._sites, taken, strict=True)
+        )
+        allocation = NetworkAllocation(price, tuple(taken), price, value, value, frontiers)
+        return taken, allocation, [[1] * len(one.chosen) for one in taken]
+
+    def rows(
+        self, taken: Sequence[SolvedBudget], allocation: NetworkAllocation, phases: Sequence[Sequence[int]]
+    ) -> list[NetworkSite]:
+        """Return the sites of the record."""
+        rows = []
+        for site, one, frontier, phase in zip(self._sites, taken, allocation.frontiers, phases, strict=True):
+            problem, place = site.problem(), site.place
+            sensors = tuple(
+                NetworkSensor(
+                    id=f"S{number}",
+                    sensor=str(problem.labels[pose]),
+                    latitude=float(problem.latlon[pose, 0]),
+                    longitude=float(problem.latlon[pose, 1]),
+                    height_m=round(float(problem.heights[pose]), 3),
+                    position=str(problem.names[pose]),
+                    price_usd=float(problem.prices[pose]),
+                    phase=of_phase,
+                )
+                for number, (pose, of_phase) in enumerate(zip(one.chosen, phase, strict=True), start=1)
+            )
+            rows.append(
+                NetworkSite(
+                    name=place.name,
+                    folder=place.folder,
+                    latitude=place.latitude,
+                    longitude=place.longitude,
+                    weight=place.weight,
+                    status="equipped" if sensors else "without sensor",
+                    price_usd=sum(sensor.price_usd for sensor in sensors if sensor.phase),
+                    value=one.value,
+                    bound=_bound_for(frontier, one),
+                    coverage=problem.coverage(one.chosen),
+                    sensors=sensors,
+                    frontier=_points(frontier),
+                )
+            )
+        return rows
+
+    def _curve(
+        self, allocation: NetworkAllocation, installed: Sequence[tuple[int, ...]], money: float
+    ) -> Generator[Progress, None, tuple[tuple[NetworkPoint, ...], tuple[Frontier, ...]]]:
+        """Return the value of the network for amounts of money in one phase, with bounds, and what is known then."""
+        request, weight = self._request, float(self.weights.sum())
+        frontiers = allocation.frontiers
+        least = float(self.weights @ [one.floor.value for one in frontiers]) / weight
+        points = [NetworkPoint(0.0, least, least)]
+        for share in sorted((*CURVE, 1.0)):
+            tolerance = max(CURVE_TOLERANCE, request.tolerance)
+            one = yield from search_allocation(
+                frontiers, self.weights, share * money, self._solver(installed), tolerance, gap=self._gap
+            )
+            frontiers = one.frontiers
+            points.append(NetworkPoint(share * money, one.value / weight, one.bound / weight))
+        return _monotone(points), frontiers
+
+    def _gap(self, value: float, bound: float) -> float:
+        """Return the gap of weighted sums of values, as `NetworkRecord.gap` states it."""
+        weight = float(self.weights.sum())
+        return network_gap(self.criterion, value / weight, bound / weight)
+
+    def _solver(
+        self, installed: Sequence[tuple[int, ...]]
+    ) -> Callable[[Sequence[Request]], Generator[Progress, None, list[SolvedBudget]]]:
+        """Return the function that solves budgets at the sites, on the workers or from earlier runs."""
+
+        def solve(requests: Sequence[Request]) -> Generator[Progress, None, list[SolvedBudget]]:
+            results = [self._sites[one.site].found(installed[one.site], one.budget, one.effort) for one in requests]
+            missing = [number for number, result in enumerate(results) if result is None]
+
+            def job(number: int) -> SolveJob:
+                one = requests[number]
+                content = (self._sites[one.site].folder / PROBLEM).read_bytes()
+                return SolveJob(content, one.budget, one.effort, installed[one.site])
+
+            jobs = [lambda number=number: job(number) for number in missing]
+            for done, (index, result) in enumerate(self._workers.run(solve_budget, jobs), start=1):
+                number = missing[index]
+                site = self._sites[requests[number].site]
+                if isinstance(result, Failure):
+                    raise SeipError(f"{site.place.name}: {result.message}")
+                results[number] = result[0]
+                site.store(installed[requests[number].site], result[0])
+                yield Progress(done, len(jobs), "searching placements for amounts of money", counted=False)
+            return [one for one in results if one is not None]
+
+        return solve
+
+
+def _placed(
+    sites: Sequence[_Site], taken: Sequence[SolvedBudget], request: NetworkRequest, workers: Workers
+) -> Generator[Progress, None, None]:
+    """Write the files of the placements that are taken, except those that an earlier run has written."""
+    wanted: list[tuple[_Site, SolvedBudget, str]] = []
+    for site, one in zip(sites, taken, strict=True):
+        key = digest(site.key, source_digest("headless.network_site"), json.dumps(as_json(one)))
+        mark = site.folder / "placed.key"
+        known = mark.read_text(encoding="ascii") if mark.is_file() else ""
+        if one.chosen and known == key:
+            continue
+        mark.unlink(missing_ok=True)
+        for path in site.folder.iterdir():
+            if path.name not in {*SURVEY_FILES, SEARCHES, USAGE}:
+                path.unlink()
+        if one.chosen:
+            wanted.append((site, one, key))
+
+    def job(site: _Site, one: SolvedBudget) -> PlaceJob:
+        files = {name: (site.folder / name).read_bytes() for name in SURVEY_FILES if (site.folder / name).exists()}
+        objective = replace(request.objective, budget=one.price)
+        return PlaceJob(files, request.settings, objective, TakenPlacement(one, one.bound), request.memory)
+
+    jobs = [lambda site=site, one=one: job(site, one) for site, one, _ in wanted]
+    for done, (number, result) in enumerate(workers.run(write_placement, jobs), start=1):
+        site, _, key = wanted[number]
+        if isinstance(result, Failure):
+            raise SeipError(f"{site.place.name}: {result.message}")
+        _write_files(site.folder, result, last="placement.json")
+        with whole_file(site.folder / "placed.key") as temporary:
+            temporary.write_text(key, encoding="ascii")
+        yield Progress(done, len(jobs), "writing placements")
+
+
+def _installed_poses(site: _Site, sensors: Sequence[NetworkSensor]) -> tuple[int, ...]:
+    """Return the poses of sensors that stand at a site already."""
+    problem = site.problem()
+    poses = []
+    for sensor in sensors:
+        same = (problem.labels == sensor.sensor) & (problem.names == sensor.position)
+        same &= np.abs(problem.heights - sensor.height_m) < SAME_HEIGHT
+        if not same.any():
+            raise SeipError(
+                f"{site.place.name}: {sensor.id}, {sensor.sensor} at {sensor.height_m:g} m on {sensor.position}, is no "
+                "candidate any more: name the same sensor types, heights and site as when it was installed"
+            )
+        poses.append(int(np.argmax(same)))
+    return tuple(poses)
+
+
+def _failed(site: _Site) -> NetworkSite:
+    place = site.place
+    return NetworkSite(
+        place.name, place.folder, place.latitude, place.longitude, place.weight, "failed", message=site.message
+    )
+
+
+def _bound_for(frontier: Frontier, one: SolvedBudget) -> float:
+    """Return the bound on the value for the money that a placement costs."""
+    within = frontier.amounts <= one.price * (1 + 1e-9)
+    return max(one.value, float(frontier.bounds()[within][-1]))
+
+
+def _points(frontier: Frontier) -> tuple[NetworkPoint, ...]:
+    """Return the best placements found at a site for rising prices, with their bounds."""
+    options = frontier.found_options()
+    bounds = frontier.bounds()
+    within = np.searchsorted(frontier.amounts, options.prices * (1 + 1e-9), side="right") - 1
+    return tuple(
+        NetworkPoint(float(price), float(value), max(float(value), float(bound)))
+        for price, value, bound in zip(options.prices, options.values, bounds[within], strict=True)
+    )
+
+
+def _monotone(points: Sequence[NetworkPoint]) -> tuple[NetworkPoint, ...]:
+    """Return points whose values never fall with more money, and whose bounds never rise with less."""
+    values = np.maximum.accumulate([one.value for one in points])
+    bounds = np.minimum.accumulate([one.bound for one in points][::-1])[::-1]
+    return tuple(
+        replace(one, value=float(value), bound=max(float(value), float(bound)))
+        for one, value, bound in zip(points, values, bounds, strict=True)
+    )

@@ -1,0 +1,246 @@
+"""Tasks of a network on the workers of a Dask cluster: surveys, searches, and the files of a site."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from seip_addon.core.choosing.network.frontier import SolvedBudget
+from seip_addon.core.choosing.network.site_problem import SiteProblem
+from seip_addon.core.choosing.placement.objective import Objective
+from seip_addon.core.dask_client import connected
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.storage.source_digest import source_digest
+from seip_addon.core.workflows.network_sites import NetworkPlace
+from seip_addon.core.workflows.network_survey import TakenPlacement
+from seip_addon.core.workflows.survey_settings import SurveySettings
+
+FORMAT = "seip-network-site/1"
+REQUEST = "request.pickle"
+SURVEY_FILES = ("site.blend", "visibility.npz", "visibility.returns.npz", "problem.npz", "site.xodr")
+"""Files of the survey of a site; the last two need not exist in all of them."""
+USAGE = "usage.json"
+"""Processor time and memory of the survey of a site, kept apart from results."""
+PLACED_FILES = "placed"
+"""Folder of the files of a placement, below that of the request."""
+IN_FLIGHT = 3  # tasks for each worker that are submitted and not finished: enough to keep it busy
+
+Files = dict[str, bytes]
+"""Content of files by their names."""
+
+
+@dataclass(frozen=True)
+class SurveyJob:
+    """A site to build and survey.
+
+    Parameters
+    ----------
+    key : str
+        Digest of everything that the result depends on.
+    suffix, content : str and bytes
+        Suffix and content of the file that the site is built from.
+    memory : int, bytes
+        Limit of the process; 0 for none.
+    """
+
+    key: str
+    place: NetworkPlace
+    suffix: str
+    content: bytes
+    approaches: float
+    settings: SurveySettings
+    objective: Objective
+    memory: int
+
+    @property
+    def file(self) -> str:
+        """Name of the file that the site is built from."""
+        return f"{self.place.source.name.split('.')[0]}{self.suffix}"
+
+
+@dataclass(frozen=True)
+class SolveJob:
+    """A budget to solve at a site; with ``coverage``, the least price of that coverage instead."""
+
+    problem: bytes
+    budget: float
+    effort: float
+    installed: tuple[int, ...]
+    coverage: float | None = None
+
+
+@dataclass(frozen=True)
+class PlaceJob:
+    """A placement to write with all its files."""
+
+    files: Files
+    settings: SurveySettings
+    objective: Objective
+    taken: TakenPlacement
+    memory: int
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Reason why a task failed, as a sentence for the user."""
+
+    message: str
+
+
+def survey_version() -> str:
+    """Return a digest of the code that surveys a site."""
+    return source_digest("headless.network_site")
+
+
+def survey_site(job: SurveyJob) -> Files | Failure:
+    """Build and survey a site in a process of its own, whose memory is limited and returned when it ends."""
+    return _in_process(job, {job.file: job.content}, SURVEY_FILES)
+
+
+def write_placement(job: PlaceJob) -> Files | Failure:
+    """Return the files of a placement, made in a process of its own."""
+    return _in_process(job, job.files, None)
+
+
+def solve_budget(job: SolveJob) -> tuple[SolvedBudget, float] | Failure:
+    """Return the best placement within a budget, or the cheapest of a coverage with the bound on its price."""
+    with tempfile.TemporaryDirectory(prefix="seip-") as folder:
+        path = Path(folder) / SURVEY_FILES[3]
+        path.write_bytes(job.problem)
+        problem, _ = SiteProblem.load(path)
+    try:
+        if job.coverage is not None:
+            return finish(problem.cheapest(job.coverage, job.effort, job.installed))
+        return finish(problem.solve(job.budget, job.effort, job.installed)), 0.0
+    except SeipError as error:
+        return Failure(str(error))
+
+
+def _in_process(job: SurveyJob | PlaceJob, files: Files, wanted: Sequence[str] | None) -> Files | Failure:
+    """Run `headless.network_site` on a job; return the wanted files, or those of the placement."""
+    with tempfile.TemporaryDirectory(prefix="seip-") as name:
+        folder = Path(name)
+        for file, content in files.items():
+            (folder / file).write_bytes(content)
+        (folder / REQUEST).write_bytes(pickle.dumps(job))
+        before = _usage()
+        done = subprocess.run(  # noqa: S603 -- this program itself
+            [sys.executable, "-m", "headless.network_site", name],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            cwd=Path(__file__).resolve().parents[1],
+            check=False,
+        )
+        if done.returncode:
+            reason = _reason(done.stderr.decode(errors="replace"), done.returncode)
+            return Failure(reason.replace(f"{name}{os.sep}", ""))
+        if wanted is None:
+            return {path.name: path.read_bytes() for path in sorted((folder / PLACED_FILES).iterdir())}
+        results = {file: (folder / file).read_bytes() for file in wanted if (folder / file).exists()}
+        after = _usage()
+        used = {"processor_s": round(after[0] - before[0], 2), "peak_memory_mb": round(after[1])}
+        return {**results, USAGE: json.dumps(used).encode()}
+
+
+def _usage() -> tuple[float, float]:
+    """Return processor seconds and peak memory (MB) of the processes that this one has started; 0 on Windows."""
+    try:
+        import resource  # noqa: PLC0415 -- not on Windows
+    except ImportError:
+        return 0.0, 0.0
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0
+
+
+def _reason(text: str, status: int) -> str:
+    """Return why a process failed, from what it wrote."""
+    lines = [line for line in text.strip().splitlines() if line.strip()]
+    if lines and lines[-1].startswith("error: "):
+        return lines[-1].removeprefix("error: ")
+    if status < 0:
+        return f"its process was ended by signal {-status}, as when memory runs out: use fewer workers or --memory"
+    return f"its process failed: {lines[-1] if lines else f'status {status}'}"
+
+
+class Workers:
+    """Workers of a cluster, on which functions run over many jobs.
+
+    Parameters
+    ----------
+    client : distributed.Client
+    """
+
+    def __init__(self, client: Any) -> None:  # noqa: ANN401 -- distributed has no types
+        self._client = client
+
+    def run(self, function: Callable[[Any], Any], jobs: Sequence[Callable[[], Any]]) -> Iterator[tuple[int, Any]]:
+        """Run a function on jobs; yield the number of each job with its result as they finish.
+
+        Only a few jobs for each worker are made and submitted at a time, so that many jobs need no more memory.
+
+        Parameters
+        ----------
+        jobs : sequence of callable
+            Each returns a job.
+
+        Raises
+        ------
+        SeipError
+            Several workers died on one job, or the scheduler is gone.
+        """
+        from distributed import CancelledError, KilledWorker, as_completed  # noqa: PLC0415 -- an extra
+
+        waiting = iter(range(len(jobs)))
+        numbers: dict[str, int] = {}
+        flying = as_completed(loop=self._client.loop)
+        threads = sum(self._client.nthreads().values())
+        try:
+            for _, number in zip(range(IN_FLIGHT * max(1, threads)), waiting, strict=False):
+                flying.add(self._submit(function, jobs[number], number, numbers))
+            while numbers:
+                future = next(flying)
+                number = numbers.pop(future.key)
+                result = future.result()
+                future.release()
+                following = next(waiting, None)
+                if following is not None:
+                    flying.add(self._submit(function, jobs[following], following, numbers))
+                yield number, result
+        except KilledWorker as error:
+            raise SeipError(
+                f"several workers died on one task ({error}): give them more memory, and run the command again to go on"
+            ) from error
+        except (CancelledError, OSError) as error:
+            raise SeipError("the Dask scheduler stopped: start it again, and run the same command to go on") from error
+        finally:
+            flying.clear()
+
+    def _submit(
+        self, function: Callable[[Any], Any], job: Callable[[], Any], number: int, numbers: dict[str, int]
+    ) -> Any:  # noqa: ANN401 -- as above
+        future = self._client.submit(function, job(), pure=False)
+        numbers[future.key] = number
+        return future
+
+
+@contextmanager
+def workers(address: str | None, number: int) -> Iterator[Workers]:
+    """Yield the workers of a scheduler, or of a cluster on this machine if no address is given.
+
+    Raises
+    ------
+    SeipError
+        Dask is not installed, or no scheduler answers.
+    """
+    with connected(address, number) as client:
+        yield Workers(client)

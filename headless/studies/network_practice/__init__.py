@@ -1,0 +1,1 @@
+"""Allocation of a budget over a network against common practice."""

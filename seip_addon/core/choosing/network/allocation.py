@@ -1,0 +1,120 @@
+r"""Allocation of a budget to sites: the multiple-choice knapsack problem, solved through PuLP.
+
+.. math::
+    \max \sum_s w_s \sum_k v_{sk} x_{sk} \quad\text{subject to}\quad
+    \sum_k x_{sk} = 1 \;\forall s, \quad \sum_s \sum_k p_{sk} x_{sk} \le C, \quad x_{sk} \in \{0, 1\},
+
+with the weight w of each site, and the price p and value v of each of its alternatives.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import pulp
+
+from ...arrays import Float
+from ...errors import SeipError
+from ..placement.problem import TIE_TOLERANCE
+from ..placement.solvers import solver_name
+from .frontier import Options
+
+_SCALE = 1e4  # of prices and values in the program: far above the solvers' absolute tolerances of 1e-6
+
+
+@dataclass(frozen=True)
+class Allocation:
+    """Alternative of each site, as an index into its options, with total price and weighted value."""
+
+    taken: tuple[int, ...]
+    price: float
+    value: float
+
+
+def allocate(options: Sequence[Options], weights: Float, budget: float) -> Allocation | None:
+    """Return the allocation of largest weighted value within a budget, the cheapest of those; None if there is none.
+
+    Parameters
+    ----------
+    options : sequence of Options
+        Alternatives of each site.
+    weights : (s,) float64
+        Importance of each site.
+    budget : float, dollars
+
+    Raises
+    ------
+    SeipError
+        The solver stopped with an error.
+    """
+    if any(len(each.prices) == 0 for each in options):
+        return None
+    program = _Program(options, weights, budget)
+    best = program.solve(program.value, pulp.LpMaximize)
+    if best is None:
+        return None
+    # Money that adds nothing is not spent: of all allocations of that value the cheapest one.
+    program.model += program.value >= best.value * program.value_scale * (1 - TIE_TOLERANCE)
+    cheapest = program.solve(program.price, pulp.LpMinimize)
+    return best if cheapest is None or cheapest.value < best.value * (1 - 2 * TIE_TOLERANCE) else cheapest
+
+
+def cheapest_allocation(options: Sequence[Options]) -> Allocation | None:
+    """Return the allocation of least price, whatever its value; None if a site has no alternative."""
+    if any(len(each.prices) == 0 for each in options):
+        return None
+    taken = tuple(int(each.prices.argmin()) for each in options)
+    return Allocation(taken, math.fsum(each.prices[one] for each, one in zip(options, taken, strict=True)), 0.0)
+
+
+class _Program:
+    """The integer program of an allocation."""
+
+    def __init__(self, options: Sequence[Options], weights: Float, budget: float) -> None:
+        self._options, self._weights, self._budget = options, weights, budget
+        self.model = pulp.LpProblem("allocation", pulp.LpMaximize)
+        most = math.fsum(weight * each.values.max() for each, weight in zip(options, weights, strict=True))
+        self.value_scale = _SCALE / most if most > 0 else 1.0
+        price_scale = _SCALE / budget if budget > 0 else 1.0
+        self._x = [
+            [self.model.add_variable(f"x{site}_{one}", cat=pulp.LpBinary) for one in range(len(each.prices))]
+            for site, each in enumerate(options)
+        ]
+        pairs = [
+            (x, weight * value * self.value_scale, price * price_scale)
+            for of_site, each, weight in zip(self._x, options, weights, strict=True)
+            for x, value, price in zip(of_site, each.values.tolist(), each.prices.tolist(), strict=True)
+        ]
+        self.value = pulp.LpAffineExpression([(x, float(value)) for x, value, _ in pairs])
+        self.price = pulp.LpAffineExpression([(x, float(price)) for x, _, price in pairs])
+        for of_site in self._x:
+            self.model += pulp.lpSum(of_site) == 1
+        self.model += self.price <= budget * price_scale * (1 + TIE_TOLERANCE)
+
+    def solve(self, objective: pulp.LpAffineExpression, sense: int) -> Allocation | None:
+        """Return the best allocation for an objective; None if there is none."""
+        self.model.sense = sense
+        self.model.setObjective(objective)
+        engine = (
+            pulp.HiGHS(msg=False, gapRel=0.0, threads=1, mip_abs_gap=1e-7)
+            if solver_name("auto") == "highs"
+            else pulp.PULP_CBC_CMD(msg=False, gapRel=0.0, threads=1)
+        )
+        try:
+            self.model.solve(engine)
+        except (pulp.PulpSolverError, OSError) as error:
+            raise SeipError(f"the solver stopped with an error ({error}); choose another solver") from error
+        if self.model.sol_status != pulp.LpSolutionOptimal:
+            return None
+        shares = ([x.value() or 0.0 for x in of_site] for of_site in self._x)
+        return self._allocation(tuple(one.index(max(one)) for one in shares))
+
+    def _allocation(self, taken: tuple[int, ...]) -> Allocation:
+        chosen = list(zip(self._options, self._weights, taken, strict=True))
+        return Allocation(
+            taken,
+            math.fsum(each.prices[one] for each, _, one in chosen),
+            math.fsum(weight * each.values[one] for each, weight, one in chosen),
+        )

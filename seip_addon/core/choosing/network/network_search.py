@@ -1,0 +1,223 @@
+"""Search for the best allocation of a budget to sites, which solves a site only where the decision depends on it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Float
+from ...errors import SeipError
+from ...progress import Progress
+from ..placement.problem import TIE_TOLERANCE, relative_gap
+from .allocation import Allocation, allocate, cheapest_allocation
+from .frontier import Frontier, Options, SolvedBudget
+
+FIRST_EFFORT, LAST_EFFORT, GROWTH = 1.0, 64.0, 4.0
+"""Counted work of the first and the last search of a budget at a site, and the factor from one to the next."""
+FIRST_SENSORS = (1, 2, 4)
+"""Numbers of sensors whose money is solved at every site before any allocation."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """Request to solve a budget at a site.
+
+    Parameters
+    ----------
+    site : int
+    budget : float, dollars
+    effort : float, units of counted work
+    """
+
+    site: int
+    budget: float
+    effort: float
+
+
+Solve = Callable[[Sequence[Request]], Generator[Progress, None, Sequence[SolvedBudget]]]
+"""Solves requests, in any order, and returns their results in the order of the requests."""
+
+Gap = Callable[[float, float], float]
+"""Gap of a value to its bound."""
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkAllocation:
+    """Allocation of a budget with its bound.
+
+    Parameters
+    ----------
+    budget : float, dollars
+    taken : tuple of SolvedBudget
+        Placement at each site.
+    price : float, dollars
+    value, bound : float
+        Sum over the sites of weight times value, and the largest such sum that is not excluded.
+    frontiers : tuple of Frontier
+        Frontiers of the sites as they are known after the search.
+    """
+
+    budget: float
+    taken: tuple[SolvedBudget, ...]
+    price: float
+    value: float
+    bound: float
+    frontiers: tuple[Frontier, ...]
+
+
+def search_allocation(  # noqa: PLR0913 -- the inputs of one search
+    frontiers: Sequence[Frontier],
+    weights: Float,
+    budget: float,
+    solve: Solve,
+    tolerance: float,
+    *,
+    gap: Gap = relative_gap,
+    minimum: float = 0.0,
+) -> Generator[Progress, None, NetworkAllocation]:
+    """Allocate a budget to sites until the bound is within a tolerance of the value.
+
+    Each round allocates the money twice: once among the placements found, which gives a value that is reached, and once
+    among the bounds of all amounts of money, which gives a value that no allocation exceeds. Where the second takes an
+    amount that has not been solved, it is solved; where all it takes have been solved, those whose own gaps are largest
+    are searched longer. No site is solved for money that neither allocation gives it.
+
+    Parameters
+    ----------
+    frontiers : sequence of Frontier
+    weights : (s,) float64
+        Importance of each site.
+    budget : float, dollars
+    solve : callable
+        Solves budgets at sites.
+    tolerance : float
+        Gap at which the search ends.
+    gap : callable
+        Gap between the value of an allocation and its bound.
+    minimum : float
+        Least value at each site.
+
+    Raises
+    ------
+    SeipError
+        The minimum cannot be reached at every site, or not within the budget.
+    """
+    known = list(frontiers)
+    known = yield from _solved(known, _first_requests(known, budget), solve)
+    while True:
+        bounding = [one.bounding_options(minimum) for one in known]
+        upper = allocate(bounding, weights, budget)
+        if upper is None:
+            raise _unreachable(known, bounding, budget, minimum)
+        found = [one.found_options(minimum) for one in known]
+        lower = allocate(found, weights, budget)
+        if lower is not None and gap(lower.value, max(lower.value, upper.value)) <= tolerance:
+            break
+        requests = _open_requests(known, bounding, upper, weights)
+        if not requests:
+            break
+        known = yield from _solved(known, requests, solve)
+    if lower is None:
+        raise SeipError(
+            f"no allocation of ${budget:,.0f} was found that reaches the minimum at every site, though none is "
+            "excluded: raise the budget, or lower the minimum"
+        )
+    taken = tuple(one.found[each.index[index]] for one, each, index in zip(known, found, lower.taken, strict=True))
+    bound = max(lower.value, upper.value)
+    return NetworkAllocation(budget, taken, lower.price, lower.value, bound, tuple(known))
+
+
+def value_range(
+    frontiers: Sequence[Frontier], weights: Float, budget: float, minimum: float = 0.0
+) -> tuple[Allocation | None, float]:
+    """Return the best allocation of a budget among the placements found, and the bound from what is known.
+
+    Returns
+    -------
+    allocation : Allocation or None
+    bound : float
+        Infinite if there is no allocation.
+    """
+    lower = allocate([one.found_options(minimum) for one in frontiers], weights, budget)
+    upper = allocate([one.bounding_options(minimum) for one in frontiers], weights, budget)
+    return lower, math.inf if upper is None else upper.value
+
+
+def _first_requests(frontiers: Sequence[Frontier], budget: float) -> list[Request]:
+    """Return the requests before any allocation: money for one sensor, two and four, whichever they are."""
+    requests = []
+    for site, one in enumerate(frontiers):
+        if len(one.amounts) == 1:
+            continue
+        cheapest = one.amounts[1]
+        wanted = {float(one.ends[-1])} | {
+            float(one.ends[np.flatnonzero(one.amounts <= number * cheapest * (1 + TIE_TOLERANCE))[-1]])
+            for number in FIRST_SENSORS
+        }
+        requests += [
+            Request(site, amount, FIRST_EFFORT)
+            for amount in sorted(wanted)
+            if amount <= budget * (1 + TIE_TOLERANCE) and not one.spent(amount)
+        ]
+    return requests
+
+
+def _open_requests(
+    frontiers: Sequence[Frontier], options: Sequence[Options], upper: Allocation, weights: Float
+) -> list[Request]:
+    """Return what to solve next: amounts that the bound takes without a search, otherwise those with a gap."""
+    amounts = [int(each.index[one]) for each, one in zip(options, upper.taken, strict=True)]
+    ends = [float(one.ends[amount]) for one, amount in zip(frontiers, amounts, strict=True)]
+    fresh = [
+        Request(site, end, FIRST_EFFORT)
+        for site, (one, amount, end) in enumerate(zip(frontiers, amounts, ends, strict=True))
+        if amount and not one.spent(end)
+    ]
+    if fresh:
+        return fresh
+    gaps = [
+        (weights[site] * (options[site].values[upper.taken[site]] - _reached(one, end)), site)
+        for site, (one, end) in enumerate(zip(frontiers, ends, strict=True))
+        if amounts[site] and one.spent(end) < LAST_EFFORT
+    ]
+    gaps = [(gap, site) for gap, site in gaps if gap > TIE_TOLERANCE]
+    largest = max((gap for gap, _ in gaps), default=0.0)
+    return [
+        Request(site, ends[site], min(LAST_EFFORT, frontiers[site].spent(ends[site]) * GROWTH))
+        for gap, site in gaps
+        if gap >= largest / 4  # smaller ones can wait until these are closed
+    ]
+
+
+def _reached(frontier: Frontier, budget: float) -> float:
+    """Return the best value found within a budget."""
+    return max(one.value for one in frontier.found if one.price <= budget * (1 + TIE_TOLERANCE))
+
+
+def _solved(
+    frontiers: list[Frontier], requests: Sequence[Request], solve: Solve
+) -> Generator[Progress, None, list[Frontier]]:
+    """Return the frontiers with the results of requests."""
+    results = yield from solve(requests)
+    known = list(frontiers)
+    for request, result in zip(requests, results, strict=True):
+        known[request.site] = known[request.site].with_solved(result)
+    return known
+
+
+def _unreachable(frontiers: Sequence[Frontier], options: Sequence[Options], budget: float, minimum: float) -> SeipError:
+    least = cheapest_allocation(options)
+    if least is None:
+        number = sum(len(each.prices) == 0 for each in options)
+        best = min(float(one.bounds()[-1]) for one in frontiers)
+        return SeipError(
+            f"the minimum of {minimum:.3g} cannot be reached at {number} of {len(frontiers)} sites, at one of them not "
+            f"more than {best:.3g}: lower the minimum, leave these sites out, or allow more sensors at a site"
+        )
+    return SeipError(
+        f"${budget:,.0f} do not reach the minimum of {minimum:.3g} at every site: at least ${least.price:,.0f} are "
+        "needed"
+    )

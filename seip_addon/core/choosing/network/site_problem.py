@@ -1,0 +1,224 @@
+"""Placement problem of one site of a network, which is solved for many budgets, and its file."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import limits
+from ...arrays import Boolean, Float, Integer, Text
+from ...errors import SeipError
+from ...progress import Progress
+from ...storage.array_file import ArrayFile, ArrayRule, ContentError
+from ..placement.cheapest import cheapest_for_coverage
+from ..placement.problem import Placement, PlacementProblem
+from ..placement.returns_solver import solve_returns
+from ..placement.search_limits import SolverLimits
+from ..placement.solver import solve
+from .frontier import Frontier, SolvedBudget, possible_amounts
+
+FILE = ArrayFile(
+    "seip.site-problem",
+    1,
+    "placement problem of a site",
+    "delete it and compute it again",
+    {
+        "packed": ArrayRule("u1", ("poses", "bytes")),
+        "returns": ArrayRule("f4", ("poses", "users"), limits.Limits(0.0, 1e12)),
+        "user_weights": ArrayRule("f8", ("users",), limits.Limits(0.0, 1e12)),
+        "prices": ArrayRule("f8", ("poses",), limits.PRICE),
+        "positions": ArrayRule("i8", ("poses",), limits.INDEX),
+        "xyz": ArrayRule("f8", ("poses", 3), limits.LOCAL_COORDINATE),
+        "heights": ArrayRule("f8", ("poses",), limits.DISTANCE),
+        "latlon": ArrayRule("f8", ("poses", 2), limits.Limits(-360.0, 360.0, "degrees")),
+        "labels": ArrayRule("U", ("poses",)),
+        "names": ArrayRule("U", ("poses",)),
+    },
+)
+
+
+@dataclass(frozen=True, eq=False)
+class SiteProblem:
+    """Placement problem of a site for any budget, with what results state about its poses.
+
+    Parameters
+    ----------
+    criterion : {"road", "returns"}
+        Criterion that is maximised: the share of the targets seen, or the mean of ln(1 + expected returns).
+    visible : (c, t) bool
+        Whether pose i sees target j.
+    returns : (c, m) float32
+        Expected returns of each pose from each road user; m is 0 for the criterion ``road``.
+    user_weights : (m,) float64
+        Importance of each road user.
+    prices : (c,) float64, dollars
+    positions : (c,) int64
+        Position of each pose.
+    xyz : (c, 3) float64, metres
+        Optical centre of each pose, local site axes.
+    heights : (c,) float64, metres
+        Height of each sensor above the ground.
+    latlon : (c, 2) float64, degrees
+        Latitude and longitude of each pose.
+    labels, names : (c,) str
+        Sensor type, and name of the position of each pose.
+    most_sensors : int
+        Largest number of sensors at the site.
+    """
+
+    criterion: Literal["road", "returns"]
+    visible: Boolean
+    returns: NDArray[np.float32]
+    user_weights: Float
+    prices: Float
+    positions: Integer
+    xyz: Float
+    heights: Float
+    latlon: Float
+    labels: Text
+    names: Text
+    most_sensors: int
+
+    def value(self, chosen: Sequence[int]) -> float:
+        """Return the value of the criterion for chosen poses."""
+        if not len(chosen):
+            return 0.0
+        rows = np.asarray(chosen, dtype=np.int64)
+        if self.criterion == "road":
+            return self.coverage(chosen)
+        together = self.returns[rows].sum(axis=0, dtype=np.float64)
+        return float(np.average(np.log1p(together), weights=self.user_weights))
+
+    def coverage(self, chosen: Sequence[int]) -> float:
+        """Return the share of the targets that chosen poses see, 0 to 1."""
+        return float(self.visible[np.asarray(chosen, dtype=np.int64)].any(axis=0).mean()) if len(chosen) else 0.0
+
+    def frontier(self, budget: float, installed: Sequence[int] = ()) -> Frontier:
+        """Return the frontier of the site before anything is solved.
+
+        Parameters
+        ----------
+        budget : float, dollars
+            Largest amount of money.
+        installed : sequence of int
+            Poses that were installed before; they remain and cost nothing.
+        """
+        free = self._free(installed)
+        more = max(0, self.most_sensors - len(installed))
+        amounts, ends = possible_amounts(self.prices[free], self.positions[free], more, budget)
+        value = self.value(installed)
+        floor = SolvedBudget(0.0, tuple(installed), 0.0, value, value, math.inf)
+        everything = np.flatnonzero(free).tolist() + list(installed)
+        return Frontier(amounts, ends, floor, max(value, self.value(everything)))
+
+    def solve(
+        self, budget: float, effort: float, installed: Sequence[int] = ()
+    ) -> Generator[Progress, None, SolvedBudget]:
+        """Find the best placement within a budget.
+
+        Parameters
+        ----------
+        budget : float, dollars
+        effort : float, units of counted work
+            Limit of the search.
+        installed : sequence of int
+            Poses that were installed before.
+        """
+        problem = self._problem(installed, budget)
+        search = SolverLimits("auto", effort=effort)
+        if self.criterion == "returns":
+            placement = yield from solve_returns(problem, self.returns, search)
+            whole = 1.0
+        else:
+            placement = yield from solve(problem, search)
+            whole = math.fsum(problem.weights)
+        return self._solved(placement, budget, effort, installed, placement.bound / whole)
+
+    def cheapest(
+        self, coverage: float, effort: float, installed: Sequence[int] = ()
+    ) -> Generator[Progress, None, tuple[SolvedBudget, float]]:
+        """Find the cheapest placement that sees a share of the targets; return it with a bound on the least price.
+
+        Raises
+        ------
+        SeipError
+            The coverage cannot be reached.
+        """
+        problem = self._problem(installed, None)
+        placement = yield from cheapest_for_coverage(problem, coverage, SolverLimits("auto", effort=effort))
+        found = self._solved(placement, placement.price, effort, installed, 1.0)
+        return replace(found, bound=found.value), max(0.0, placement.bound)
+
+    def _solved(
+        self, placement: Placement, budget: float, effort: float, installed: Sequence[int], bound: float
+    ) -> SolvedBudget:
+        chosen = tuple(placement.chosen.tolist())
+        value = self.value(chosen)
+        price = math.fsum(self.prices[[pose for pose in chosen if pose not in installed]])
+        # A search that ends early may have no bound of its own; all free poses together are one.
+        most = self.value((*np.flatnonzero(self._free(installed)).tolist(), *installed))
+        bound = value if placement.status == "optimal" else max(value, min(bound, most))
+        return SolvedBudget(budget, chosen, price, value, bound, effort)
+
+    def _free(self, installed: Sequence[int]) -> Boolean:
+        """Return the poses at positions without an installed sensor, (c,) bool."""
+        return ~np.isin(self.positions, self.positions[np.asarray(installed, dtype=np.int64)])
+
+    def _problem(self, installed: Sequence[int], budget: float | None) -> PlacementProblem:
+        """Return the problem in which installed poses must be chosen, and cost nothing."""
+        standing = np.asarray(installed, dtype=np.int64)
+        prices = self.prices.copy()
+        prices[standing] = 0.0
+        forbidden = ~self._free(installed)
+        forbidden[standing] = False
+        of_returns = self.criterion == "returns"
+        return PlacementProblem(
+            visible=self.returns > 0 if of_returns else self.visible,
+            weights=self.user_weights if of_returns else np.ones(self.visible.shape[1]),
+            prices=prices,
+            positions=self.positions,
+            xyz=self.xyz,
+            labels=self.labels,
+            mandatory=np.eye(len(prices), dtype=bool)[standing],
+            forbidden=forbidden,
+            count=min(max(self.most_sensors, len(standing)), len(np.unique(self.positions[~forbidden]))),
+            budget=budget,
+        )
+
+    def save(self, path: str | os.PathLike[str], header: dict[str, Any]) -> None:
+        """Write the problem with further entries of a header as npz."""
+        arrays = {name: getattr(self, name) for name in FILE.arrays if name != "packed"}
+        FILE.save(
+            path,
+            {**header, "criterion": self.criterion, "targets": self.visible.shape[1], "most": self.most_sensors},
+            {**arrays, "packed": np.packbits(self.visible, axis=1)},
+        )
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> tuple[SiteProblem, dict[str, Any]]:
+        """Read a problem and the header that `save` wrote.
+
+        Raises
+        ------
+        SeipError
+            The file is missing, damaged or not such a problem.
+        """
+        with FILE.reading(path) as (header, arrays):
+            targets, most, criterion = int(header["targets"]), int(header["most"]), header["criterion"]
+            packed = arrays.pop("packed")
+            if criterion not in ("road", "returns") or targets < 1 or packed.shape[1] != (targets + 7) // 8 or most < 1:
+                raise ContentError("its header contradicts its arrays")
+            visible = np.unpackbits(packed, axis=1, count=targets).astype(bool)
+            return cls(criterion=criterion, visible=visible, most_sensors=most, **arrays), header
+
+
+def check_problem(problem: SiteProblem) -> None:
+    """Raise SeipError if no pose adds anything to the value of a site."""
+    if problem.frontier(math.inf).ceiling <= 0.0:
+        raise SeipError("no candidate sees anything here: try other heights or sensor types, or remove obstacles")

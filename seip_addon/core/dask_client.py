@@ -1,0 +1,85 @@
+"""Connections to Dask schedulers, which distribute work to other processes and machines."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import ModuleType
+from typing import Any
+
+from .errors import SeipError
+
+_CONNECT_TIMEOUT = 20  # seconds
+
+
+@contextmanager
+def connected(address: str | None, workers: int = 1) -> Iterator[Any]:
+    """Yield a client of a Dask scheduler, and close it at the end.
+
+    Parameters
+    ----------
+    address : str or None
+        Address of the scheduler, such as ``tcp://10.0.0.1:8786``, or ``tls://10.0.0.1:8786`` with the certificates from
+        Dask's configuration. Its workers must be able to import this package. None starts a cluster on this machine.
+    workers : int
+        Number of processes of a cluster on this machine.
+
+    Raises
+    ------
+    SeipError
+        Dask is not installed, or the scheduler does not answer or has no workers.
+    """
+    try:
+        import dask  # noqa: PLC0415 - an extra that need not be installed
+        from distributed import Client, LocalCluster  # noqa: PLC0415 - as above
+    except ImportError as error:
+        raise SeipError(
+            "a scheduler needs Dask, which is not installed; install the extra 'cluster' in the project's folder: "
+            "pip install '.[cluster]'"
+        ) from error
+    with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1TB"}):
+        if address is None:
+            with (
+                _empty_main(),
+                LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    memory_limit=0,
+                    host="127.0.0.1",
+                    dashboard_address="127.0.0.1:0",
+                    silence_logs=50,
+                ) as cluster,
+                Client(cluster, set_as_default=False) as client,
+            ):
+                yield client
+            return
+        try:
+            client = Client(address, timeout=_CONNECT_TIMEOUT, set_as_default=False)
+        except TypeError as error:  # raised by distributed for a TLS address without certificates
+            raise SeipError(
+                f"{address} needs certificates: name them in Dask's settings distributed.comm.tls.ca-file, client.cert "
+                "and client.key"
+            ) from error
+        except (OSError, ValueError) as error:
+            raise SeipError(f"no Dask scheduler answers at {address}; start one, or check the address") from error
+        with client:
+            if not client.scheduler_info()["workers"]:
+                raise SeipError(
+                    f"the Dask scheduler at {address} has no workers; start some where this package is installed"
+                )
+            yield client
+
+
+@contextmanager
+def _empty_main() -> Iterator[None]:
+    """Keep new processes from importing the program that started them.
+
+    They would import it as their own main module, and with it bpy, which cannot be imported there.
+    """
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main

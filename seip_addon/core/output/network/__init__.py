@@ -1,0 +1,1 @@
+"""Results of a network of sites: record, map, table, chart and report."""

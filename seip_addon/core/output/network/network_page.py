@@ -1,0 +1,232 @@
+"""``network.html``: sites of a network on a map and in a table, in one file that loads nothing."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import math
+from collections.abc import Sequence
+from html import escape
+from urllib.parse import quote
+
+import numpy as np
+
+from ...arrays import Integer
+from ...counts import counted
+from ..pictures.drawing import percent
+from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK
+from ..report.html import STYLE
+from ..report.wording import dollars
+from .network_page_script import SCRIPT
+from .network_record import NetworkRecord, NetworkSite
+from .network_view import BARE_RADIUS, NetworkView, Street, legend_money, network_view, radius_of
+from .ranked_sites import (
+    RankedSite,
+    colour_title,
+    gain_text,
+    level,
+    level_words,
+    outcome,
+    ranked_sites,
+    sensors_text,
+)
+
+UNITS = 10_000  # of the map's width, so that whole numbers are fine enough
+USUAL_WIDTH = 900  # pixels of the map that its marks are sized for where no script runs
+SHAPES = (0.5, 1.0)  # how many times as high as wide the map is
+
+MAP_STYLE = f"""
+.map {{ position: relative; }}
+.map svg {{ display: block; width: 100%; border: 1px solid #c9d1d7; cursor: grab;
+  box-sizing: border-box; user-select: none; -webkit-user-select: none; }}
+.street {{ fill: none; stroke-linecap: round; vector-effect: non-scaling-stroke; }}
+.mark circle {{ stroke: {INK}; }}
+.mark .hit {{ fill: transparent; stroke: none; }}
+.mark .bare {{ fill: {PAPER}; stroke: {SOFT_INK}; }}
+.cross {{ fill: none; stroke: {SOFT_INK}; stroke-width: 2; }}
+.mark:hover circle, .mark:focus circle, .chosen circle {{ stroke-width: 3; }}
+.mark:focus {{ outline: none; }}
+.mark:focus-visible .hit, .chosen .hit {{ stroke: {INK}; stroke-width: 2; stroke-dasharray: 3 2; }}
+.chosen, tr:target {{ background: {PAPER_STREETS[0]}; }}
+.zoom {{ position: absolute; top: .5em; right: .5em; display: flex; gap: .3em; }}
+.zoom button {{ font: inherit; min-width: 2.4em; min-height: 2.4em; background: {PAPER}; border: 1px solid {SOFT_INK};
+  border-radius: 4px; color: {INK}; }}
+.under {{ display: flex; flex-wrap: wrap; justify-content: space-between; gap: .2em 1em; font-size: .85em;
+  color: {SOFT_INK}; }}
+.scale {{ border: 2px solid {INK}; border-top: 0; height: .35em; margin-top: .3em; }}
+.scale + span {{ display: block; }}
+.legend {{ display: flex; flex-wrap: wrap; gap: .2em 1.1em; align-items: center; padding: 0; margin: .4em 0;
+  list-style: none; font-size: .9em; }}
+.legend li {{ display: flex; align-items: center; gap: .35em; }}
+.wide {{ overflow-x: auto; }}
+th button {{ font: inherit; background: none; border: 0; padding: 0; color: inherit; text-align: inherit;
+  cursor: pointer; text-decoration: underline dotted; }}
+th[aria-sort=ascending] button::after {{ content: " ▲"; }}
+th[aria-sort=descending] button::after {{ content: " ▼"; }}
+tbody th {{ font-weight: 600; border-bottom-color: #dde3e7; min-width: 8em; overflow-wrap: anywhere; }}
+td:last-child {{ white-space: nowrap; }}
+a {{ color: inherit; }}
+@media (max-width: 30em) {{ td.number {{ white-space: normal; }} }}
+.skip:not(:focus) {{ position: absolute; left: -99em; }}
+"""
+
+
+def network_page(record: NetworkRecord, streets: Sequence[Street] | None = None) -> str:
+    """Return the page; its links lead to the folders of the sites beside it."""
+    view = network_view(record, streets, SHAPES)
+    ranked = ranked_sites(record)
+    digest = base64.b64encode(hashlib.sha256(SCRIPT.encode()).digest()).decode()
+    policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
+    equipped = sum(site.status == "equipped" for site in record.sites)
+    summary = (
+        f"{equipped:,} of {counted(len(record.sites), 'site has', 'sites have')} sensors for "
+        f"{dollars(record.price_usd)} of {dollars(math.fsum(record.budgets_usd))}. "
+        f"{colour_title(record)}, mean of the sites: {outcome(record, record.value)}."
+        if equipped
+        else "No site has sensors."
+    )
+    credits_ = "".join(f"<div>{escape(line)}</div>" for line in record.attribution)
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{escape(policy)}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{escape(record.name)}</title>
+<style>{STYLE}{MAP_STYLE}</style>
+</head>
+<body>
+<header>
+<h1><bdi>{escape(record.name)}</bdi></h1>
+<p class="subtitle">{escape(summary)}</p>
+</header>
+<main>
+<a class="skip" href="#sites">Skip the map</a>
+<div class="map">
+{_map(record, view, ranked)}
+<div class="zoom" hidden><button type="button" data-zoom="0.5" aria-label="Zoom in">+</button>
+<button type="button" data-zoom="2" aria-label="Zoom out">−</button>
+<button type="button" data-zoom="0">All</button></div>
+</div>
+<div class="under">{_scale(view)}<div>{credits_}</div></div>
+{_legend(record, view)}
+<h2 id="sites">Sites</h2>
+<div class="wide">
+{_table(record, ranked)}
+</div>
+</main>
+<script>{SCRIPT}</script>
+</body>
+</html>
+"""
+
+
+def _map(record: NetworkRecord, view: NetworkView, ranked: tuple[RankedSite, ...]) -> str:
+    left, _, _, top = view.window
+    unit = UNITS / view.width
+    parts = []
+    for rank, colour in enumerate(PAPER_STREETS):
+        lines = [np.rint((line - (left, top)) * (unit, -unit)).astype(int) for line, own in view.streets if own == rank]
+        path = "".join(f"M{_pairs(line[:1])}l{_pairs(np.diff(line, axis=0))}" for line in lines)
+        parts += [f'<path class="street" stroke="{colour}" stroke-width="{rank + 1}" d="{path}"/>'] if path else []
+    at = {id(site): number for number, site in enumerate(record.sites)}
+    for one in sorted(ranked, key=lambda one: -view.radii[at[id(one.site)]]):
+        number = at[id(one.site)]
+        x, y = np.rint((view.places[number] - (left, top)) * (unit, -unit)).astype(int).tolist()
+        parts.append(_mark(record, one, (x, y), float(view.radii[number])))
+    size = f"{UNITS} {UNITS * view.shape:.0f}"
+    scale = f'viewBox="0 0 {size}" data-metres="{1 / unit:.6g}"'
+    return f'<svg id="map" role="group" aria-label="Map of the sites" {scale}>\n' + "\n".join(parts) + "\n</svg>"
+
+
+def _pairs(points: Integer) -> str:
+    return " ".join(f"{x},{y}" for x, y in points.tolist()).replace(",-", "-")
+
+
+def _mark(record: NetworkRecord, one: RankedSite, place: tuple[int, int], radius: float) -> str:
+    site, (x, y) = one.site, place
+    shape = '<path class="cross" d="M-5-5 5 5M-5 5 5-5"/>'
+    if site.status == "equipped":
+        shape = f'<circle r="{radius:.1f}" fill="{SHARE_COLOURS[level(record, site)]}"/>'
+    elif site.status == "without sensor":
+        shape = f'<circle class="bare" r="{BARE_RADIUS}"/>'
+    words = escape(f"{site.name}: {_described(record, site)}")
+    start = f'<a class="mark" id="mark-{one.number}" href="#site-{one.number}" aria-label="{words}" data-at="{x} {y}"'
+    moved = f'transform="translate({x} {y}) scale({UNITS / USUAL_WIDTH:.1f})"'
+    return f'{start} {moved}><title>{words}</title>{shape}<circle class="hit" r="{max(10.0, radius + 4):.1f}"/></a>'
+
+
+def _described(record: NetworkRecord, site: NetworkSite) -> str:
+    if site.status == "failed":
+        return f"failed, {site.message}"
+    if site.status == "without sensor":
+        return site.status
+    seen = f"{percent(site.coverage)} of the road seen"
+    typical = "" if record.criterion == "road" else f"{outcome(record, site.value)} typical returns, "
+    return f"{sensors_text(site.sensors)}, {dollars(site.price_usd)}, {typical}{seen}"
+
+
+def _scale(view: NetworkView) -> str:
+    longest = view.width / 6
+    decade = 10.0 ** math.floor(math.log10(longest))
+    length = max(step * decade for step in (1, 2, 5) if step * decade <= longest)
+    words = f"{length:g} m" if length < 1000 else f"{length / 1000:g} km"
+    width = f"{100 * length / view.width:.3f}%"
+    return f'<div style="flex: 1 0 100%"><div class="scale" style="width: {width}"></div><span>{words}</span></div>'
+
+
+def _legend(record: NetworkRecord, view: NetworkView) -> str:
+    entries = [f"<li>{colour_title(record)}:</li>"]
+    for colour, words in zip(SHARE_COLOURS, level_words(record), strict=True):
+        entries.append(_entry(f'<circle r="7" fill="{colour}" stroke="{INK}"/>', 8.0, words))
+    money = legend_money(record)
+    entries += ["<li>Money spent:</li>"] if money else []
+    for amount in money:
+        radius = radius_of(record, view, amount)
+        entries.append(_entry(f'<circle r="{radius:.1f}" fill="none" stroke="{INK}"/>', radius + 1, dollars(amount)))
+    bare = f'<circle r="{BARE_RADIUS}" fill="{PAPER}" stroke="{SOFT_INK}"/>'
+    marks = {"without sensor": bare, "failed": '<path class="cross" d="M-5-5 5 5M-5 5 5-5"/>'}
+    found = {site.status for site in record.sites}
+    entries += [_entry(mark, 7.0, status) for status, mark in marks.items() if status in found]
+    return f'<ul class="legend" aria-label="Legend">{"".join(entries)}</ul>'
+
+
+def _entry(shape: str, half: float, words: str) -> str:
+    box = f'viewBox="{-half:.1f} {-half:.1f} {2 * half:.1f} {2 * half:.1f}" width="{2 * half:.0f}" aria-hidden="true"'
+    return f"<li><svg {box}>{shape}</svg>{escape(words)}</li>"
+
+
+def _table(record: NetworkRecord, ranked: tuple[RankedSite, ...]) -> str:
+    result = "Road seen" if record.criterion == "road" else "Returns"
+    names = ("Rank", "Site", result, "Gain per $1,000", "Money", "Sensors")
+    attributes = (' class="number" aria-sort="ascending"', "", *3 * (' class="number"',), "")
+    heads = "".join(
+        f'<th scope="col"{each}><button type="button">{name}</button></th>'
+        for each, name in zip(attributes, names, strict=True)
+    )
+    rows = "\n".join(_row(record, one) for one in ranked)
+    head = f'<thead><tr>{heads}<th scope="col">Files</th></tr></thead>'
+    return f"<table>\n{head}\n<tbody>\n{rows}\n</tbody>\n</table>"
+
+
+def _row(record: NetworkRecord, one: RankedSite) -> str:
+    site = one.site
+    equipped = site.status == "equipped"
+    sensors = sensors_text(site.sensors) if equipped else _described(record, site)
+    road = record.criterion == "road"
+    value = site.coverage if road else site.value
+    figures = (
+        (value if equipped else -1.0, (percent(value) if road else outcome(record, value)) if equipped else "–"),
+        (-math.inf if one.gain is None else one.gain, gain_text(record, one.gain)),
+        (site.price_usd, dollars(site.price_usd) if equipped else "–"),
+    )
+    cells = "".join(f'<td class="number" data-value="{key:.9g}">{words}</td>' for key, words in figures)
+    place = "./" + quote(site.folder, safe="/")
+    files = ", ".join(
+        f'<a href="{escape(f"{place}/{file}")}">{word}</a>'
+        for word, file in (("plan", "plan.png"), ("data", "placement.json"))
+    )
+    name = f'<th scope="row"><a href="#mark-{one.number}"><bdi>{escape(site.name)}</bdi></a></th>'
+    rank = f'<td class="number" data-value="{one.number}">{one.rank or "–"}</td>'
+    start = f'<tr id="site-{one.number}">{rank}{name}'
+    return f"{start}{cells}<td>{escape(sensors)}</td><td>{files if equipped else ''}</td></tr>"

@@ -1,0 +1,140 @@
+"""``map.png`` and ``curve.png``: sites of a network on a map, and its value for amounts of money."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ...arrays import Float
+from ..pictures.chart_style import add_legend, new_figure, set_title, style_axes
+from ..pictures.drawing import add_axes, as_png, credits_box, draw_attribution, draw_callouts
+from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK
+from ..pictures.plan_style import Style
+from ..pictures.scale_bar import draw_north, draw_scale, north_paper, scale_paper
+from ..report.wording import dollars
+from .network_record import NetworkRecord
+from .network_view import BARE_RADIUS, NetworkView, legend_money, radius_of
+from .ranked_sites import colour_title, level, level_words, outcome, ranked_sites
+
+DPI = 150
+MAP_SIZE, LEGEND_HEIGHT, CURVE_SIZE = (7.2, 3.9), 0.55, (7.2, 3.1)  # inches
+MAP_SHAPE = (MAP_SIZE[1] - LEGEND_HEIGHT) / MAP_SIZE[0]
+PIXEL = 0.45  # points for each pixel of `NetworkView.radii`
+STREET_WIDTHS = (0.4, 0.7, 1.2)  # points, by importance
+MOST_NUMBERED, MOST_MARKED = 12, 40  # sites with their rank on the map; points of a curve that are marked
+CRITERIA = {
+    "road": "road seen, mean of the sites",
+    "returns": "typical returns from a road user",
+}
+
+
+def draw_map(record: NetworkRecord, view: NetworkView) -> bytes:
+    """Return the sites on the streets as PNG, the first of them with their ranks; the view has the shape of the map."""
+    width, height = MAP_SIZE
+    figure = Figure(MAP_SIZE, dpi=DPI, facecolor=PAPER)
+    FigureCanvasAgg(figure)
+    axes = add_axes(figure, 0.0, LEGEND_HEIGHT, width, height - LEGEND_HEIGHT)
+    left, bottom, right, top = view.window
+    axes.set(xlim=(left, right), ylim=(bottom, top))
+    axes.spines[:].set(color=SOFT_INK, linewidth=0.6)
+    for rank, (colour, line) in enumerate(zip(PAPER_STREETS, STREET_WIDTHS, strict=True)):
+        own = [street for street, importance in view.streets if importance == rank]
+        axes.add_collection(LineCollection(own, colors=colour, linewidths=line, zorder=1.0), autolim=False)
+    for at in np.argsort(-view.radii, kind="stable").tolist():
+        axes.plot(*view.places[at], zorder=3.0, **_mark(record, view, at))
+    inch = view.width / width
+    draw_scale(axes, inch, 1.0)
+    draw_north(axes, inch)
+    draw_attribution(axes, record.attribution)
+    papers = (scale_paper(left, bottom, inch, 1.0), north_paper(right, top, inch))
+    taken = [(x, y, x + wide, y + high) for x, y, wide, high in papers]
+    taken += [credits_box(axes, record.attribution)] if record.attribution else []
+    first = [one.site for one in ranked_sites(record)[:MOST_NUMBERED] if one.gain is not None]
+    points = np.array([view.places[record.sites.index(site)] for site in first]).reshape(-1, 2)
+    draw_callouts(axes, points, [str(rank + 1) for rank in range(len(first))], view.places, 4.0, np.array(taken))
+    _draw_legend(figure, record, view)
+    return as_png(figure)
+
+
+def _mark(record: NetworkRecord, view: NetworkView, at: int) -> Style:
+    site = record.sites[at]
+    if site.status == "failed":
+        return {"marker": "x", "markersize": 6.5, "mec": SOFT_INK, "mew": 1.4}
+    if site.status == "without sensor":
+        return {"marker": "o", "markersize": 2 * BARE_RADIUS * PIXEL, "mfc": PAPER, "mec": SOFT_INK, "mew": 1.0}
+    size = 2 * PIXEL * float(view.radii[at])
+    return {"marker": "o", "markersize": size, "mfc": SHARE_COLOURS[level(record, site)], "mec": INK, "mew": 0.8}
+
+
+def _draw_legend(figure: Figure, record: NetworkRecord, view: NetworkView) -> None:
+    circle: Style = {"linestyle": "none", "marker": "o", "mec": INK, "mew": 0.8}
+    entries = [
+        Line2D([], [], mfc=colour, markersize=7.0, label=words, **circle)
+        for colour, words in zip(SHARE_COLOURS, level_words(record), strict=True)
+    ]
+    for money in legend_money(record):
+        size = 2 * PIXEL * radius_of(record, view, money)
+        entries.append(Line2D([], [], mfc="none", markersize=size, label=dollars(money), **circle))
+    for status, mark in (
+        ("without sensor", circle | {"mfc": PAPER, "mec": SOFT_INK, "markersize": 2 * BARE_RADIUS * PIXEL}),
+        ("failed", {"linestyle": "none", "marker": "x", "mec": SOFT_INK, "mew": 1.4, "markersize": 6.5}),
+    ):
+        if any(site.status == status for site in record.sites):
+            entries.append(Line2D([], [], label=status, **mark))
+    style: Style = {"ncols": len(entries), "frameon": False, "fontsize": 8, "borderaxespad": 0.0}
+    spacing: Style = {"handletextpad": 0.1, "columnspacing": 0.9, "title_fontsize": 8, "bbox_to_anchor": (0.5, 0.005)}
+    title = f"{colour_title(record)} (colour), money spent (area); numbers: ranks by gain per dollar"
+    legend = figure.legend(handles=entries, title=title, loc="lower center", **style, **spacing)
+    for text in legend.get_texts():
+        text.set_parse_math(False)
+
+
+def draw_curve(record: NetworkRecord) -> bytes:
+    """Return the value of the network against money, with its bound and the budgets, as PNG."""
+    figure, (axes,) = new_figure(*CURVE_SIZE, dpi=DPI)
+    money = np.array([point.price_usd for point in record.curve]) / 1000.0
+    values, bounds = (_shown(record, [getattr(point, name) for point in record.curve]) for name in ("value", "bound"))
+    if len(money):
+        style: Style = {"color": SHARE_COLOURS[1], "linewidth": 0.0}
+        # Between two points, the placement of less money is still possible, and the bound of more money still holds.
+        steps = np.repeat(money, 2)[1:]
+        lower = np.repeat(values, 2)[:-1]
+        upper = np.concatenate([bounds[:1], np.repeat(bounds[1:], 2)])[: len(steps)]
+        axes.fill_between(steps, lower, np.maximum(lower, upper), label="not ruled out by the bound", **style)
+        axes.plot(steps, lower, color=SHARE_COLOURS[3], label="best found")
+        if len(money) <= MOST_MARKED:
+            axes.plot(money, values, "o", color=SHARE_COLOURS[3], markersize=4)
+    placed = _shown(record, [record.value])
+    ring: Style = {"markersize": 12, "mfc": "none", "mec": INK, "mew": 1.6, "linestyle": "none"}
+    axes.plot(record.price_usd / 1000.0, placed, marker="o", label="this network", clip_on=False, **ring)
+    budgets = np.cumsum(record.budgets_usd) / 1000.0
+    for number, budget in enumerate(budgets.tolist(), start=1):
+        axes.axvline(budget, color=SOFT_INK, linewidth=1.0, linestyle=(0, (4, 2)), zorder=1.0)
+        words = f"phase {number}" if len(budgets) > 1 else "budget"
+        place: Style = {"transform": axes.get_xaxis_transform(), "ha": "center", "va": "bottom"}
+        axes.text(budget, 1.0, words, size=8.5, color=SOFT_INK, **place)
+    style_axes(axes, "money, $1,000", CRITERIA[record.criterion])
+    axes.xaxis.set_major_formatter("{x:,.0f}")
+    axes.yaxis.set_major_formatter("{x:.0f}%" if record.criterion == "road" else "{x:g}")
+    axes.set_xlim(left=0.0)
+    axes.set_ylim(0.0, max(1.0, axes.get_ylim()[1]))
+    add_legend(figure, [axes])
+    set_title(figure, record.name)
+    return as_png(figure)
+
+
+def _shown(record: NetworkRecord, values: list[float]) -> Float:
+    array = np.array(values, dtype=np.float64)
+    shown: Float = 100.0 * array if record.criterion == "road" else np.expm1(np.minimum(array, 50.0))
+    return shown
+
+
+def caption(record: NetworkRecord) -> str:
+    """Return the caption of the curve."""
+    what = CRITERIA[record.criterion]
+    what += ": geometric mean of 1 + returns, less 1" if record.criterion == "returns" else ""
+    result = f"{outcome(record, record.value)} for {dollars(record.price_usd)}"
+    return f"{what[:1].upper()}{what[1:]}, for amounts of money; the ring is this network: {result}."

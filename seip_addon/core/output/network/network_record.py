@@ -1,0 +1,209 @@
+"""``network.json``: sensors at the sites of a network within one budget."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from ... import limits
+from ...errors import SeipError
+from ...storage.files import read_small
+from ...storage.json_dataclass import as_json, from_json
+
+SCHEMA = "seip-network/1"
+
+PROVEN = 1e-9
+"""Gap up to which a network is proven optimal: smaller differences are rounding, as in `problem.TIE_TOLERANCE`."""
+_MOST_BYTES = 1 << 28
+
+Money = Annotated[float, limits.PRICE]
+Latitude = Annotated[float, limits.Limits(-90.0, 90.0, "degrees")]
+Longitude = Annotated[float, limits.Limits(-360.0, 360.0, "degrees")]
+Value = Annotated[float, limits.Limits(0.0, 1e6)]
+Length = Annotated[float, limits.DISTANCE]
+
+
+@dataclass(frozen=True)
+class NetworkPoint:
+    """Value of the criterion for at most an amount of money, and the proven bound on it.
+
+    Parameters
+    ----------
+    price_usd : float, dollars
+    value : float
+        Best value found.
+    bound : float
+        No placement within that money has a larger value.
+    """
+
+    price_usd: Money
+    value: Value
+    bound: Value
+
+
+@dataclass(frozen=True)
+class NetworkSensor:
+    """Sensor at a site of a network.
+
+    Parameters
+    ----------
+    id, sensor : str
+        Its label within the site, and its type's key in the catalogue.
+    latitude, longitude : float, degrees
+    height_m : float
+        Height above the ground.
+    position : str
+        Name of the pole or the area that carries it.
+    price_usd : float, dollars
+    phase : int
+        Number of the budget, from 1, that pays for it; 0 if it was installed before.
+    """
+
+    id: str
+    sensor: str
+    latitude: Latitude
+    longitude: Longitude
+    height_m: Length
+    position: str
+    price_usd: Money
+    phase: Annotated[int, limits.COUNT]
+
+
+@dataclass(frozen=True)
+class NetworkSite:
+    """Site of a network with its share of the budget.
+
+    Parameters
+    ----------
+    name, folder : str
+        Name, and folder of its own files below that of the network.
+    weight : float
+        Importance of the site, as given.
+    status : {"equipped", "without sensor", "failed"}
+    message : str
+        Reason if the site failed, otherwise "".
+    price_usd : float, dollars
+        Money spent at the site, without sensors that were installed before.
+    value, bound : float
+        Value of the criterion at the site with its sensors, and a bound on it for that money.
+    coverage : float, 0 to 1
+        Share of the road that its sensors see.
+    frontier : tuple of NetworkPoint
+        Best values for amounts of money, as far as the allocation needed them; prices rise.
+    """
+
+    name: str
+    folder: str
+    latitude: Latitude
+    longitude: Longitude
+    weight: Annotated[float, limits.WEIGHT]
+    status: Literal["equipped", "without sensor", "failed"]
+    message: str = ""
+    price_usd: Money = 0.0
+    value: Value = 0.0
+    bound: Value = 0.0
+    coverage: Annotated[float, limits.SHARE] = 0.0
+    sensors: tuple[NetworkSensor, ...] = ()
+    frontier: tuple[NetworkPoint, ...] = ()
+
+
+@dataclass(frozen=True)
+class NetworkRecord:
+    """Content of ``network.json``.
+
+    Parameters
+    ----------
+    name : str
+        Name of the network: that of its extract or table of sites.
+    criterion : {"road", "returns"}
+        ``road``: share of the targets on the road that are seen, 0 to 1. ``returns``: mean of ln(1 + expected returns)
+        of road users. The value of the network is the mean over its sites, by their weights; sites that failed are left
+        out.
+    budgets_usd : tuple of float, dollars
+        Money of each phase; the sensors of earlier phases remain.
+    curve : tuple of NetworkPoint
+        Value of the network for amounts of money in one phase; prices rise.
+    created : str
+        Time of the placement (ISO 8601), "" if it is not recorded.
+    goal : float, optional
+        Share of the road that is seen at every site at the least price, where that was asked for; the budget is then
+        the price.
+    least_usd : float, dollars
+        Proven bound: nothing cheaper reaches the goal.
+    """
+
+    name: str
+    criterion: Literal["road", "returns"]
+    budgets_usd: tuple[Money, ...]
+    price_usd: Money
+    value: Value
+    bound: Value
+    sites: tuple[NetworkSite, ...]
+    curve: tuple[NetworkPoint, ...]
+    sensor_types: tuple[str, ...]
+    attribution: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    created: str = ""
+    goal: Annotated[float, limits.SHARE] | None = None
+    least_usd: Money = 0.0
+
+    @property
+    def gap(self) -> float:
+        """Gap of the network; see `network_gap`."""
+        return network_gap(self.criterion, self.value, self.bound)
+
+    @property
+    def certificate(self) -> str:
+        """Certificate as a sentence."""
+        money = f"${sum(self.budgets_usd):,.0f}"
+        if self.goal is not None:
+            whole = f"{self.goal:.0%} of the road at every site"
+            if self.least_usd >= self.price_usd * (1.0 - PROVEN):
+                return f"Proven: nothing cheaper among these sites and candidates sees {whole}."
+            return f"Nothing for less than ${self.least_usd:,.0f} sees {whole}: at most {self.saving:.2%} can be saved."
+        what = "returns from road users" if self.criterion == "returns" else "road seen"
+        if self.gap <= PROVEN:
+            return f"Proven: no other use of {money} among these sites and candidates has more {what}."
+        return f"At most {self.gap:.2%} more {what} is possible for {money} among these sites and candidates."
+
+    @property
+    def saving(self) -> float:
+        """Largest possible share of the price that a cheaper network with the same goal saves."""
+        return max(0.0, 1.0 - self.least_usd / self.price_usd) if self.price_usd > 0 else 0.0
+
+
+def network_gap(criterion: Literal["road", "returns"], value: float, bound: float) -> float:
+    """Return the largest possible gain of another use of the same money, as a share.
+
+    For returns it is that of their geometric mean over road users and sites, as for a single site.
+    """
+    if criterion == "returns":
+        return math.expm1(max(0.0, bound - value))
+    return max(0.0, bound / value - 1.0) if value > 0 else math.inf if bound > 0 else 0.0
+
+
+def network_json(record: NetworkRecord) -> dict[str, Any]:
+    """Return a record as a JSON value with its schema."""
+    return {"schema": SCHEMA, **as_json(record)}
+
+
+def load_network(path: Path) -> NetworkRecord:
+    """Read ``network.json``.
+
+    Raises
+    ------
+    SeipError
+        It is damaged, or of a version that this program cannot read.
+    """
+    text = read_small(path, _MOST_BYTES, "run seip network again")
+    try:
+        content = json.loads(text)
+        schema = content.get("schema") if isinstance(content, dict) else None
+        if schema == SCHEMA:
+            return from_json(NetworkRecord, content)
+    except (ValueError, RecursionError) as error:
+        raise SeipError(f"{path} is damaged or not a network: {error}; run seip network again") from error
+    raise SeipError(f"{path} has the schema {schema!r}, not {SCHEMA!r}: run seip network again")

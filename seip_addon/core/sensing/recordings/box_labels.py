@@ -1,0 +1,142 @@
+"""Labelled boxes of a sweep, in the formats of KITTI, OpenPCDet, OpenLABEL and DAIR-V2X."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...arrays import Float, Text
+from ...errors import SeipError
+from ...geometry.orientation import quaternion_rotation
+from ...limits import ROAD_USER_SIZE, SENSOR_COORDINATE, UNWRAPPED_ANGLE, Limits
+from ...storage.array_file import READ_ERRORS
+from ...storage.files import content_fault, parse_json, read_small
+from ..traffic.trajectories import CATEGORIES
+
+_MAX_BYTES = 1 << 26
+_CURE = "give the labels of one sweep as KITTI, OpenPCDet, OpenLABEL or DAIR-V2X have them"
+
+_CATEGORY = {
+    **{category: category for category in CATEGORIES},
+    "cyclist": "bicycle",
+    "motorcyclist": "motorcycle",
+    "person": "pedestrian",
+    "personsitting": "pedestrian",
+}
+"""Category of each class name, in lower case and without punctuation."""
+
+_Box = tuple[str, list[Any]]
+"""Class name, and x y z (middle), length, width, height, yaw."""
+
+
+@dataclass(frozen=True, eq=False)
+class BoxLabels:
+    """Labelled boxes of one sweep.
+
+    Parameters
+    ----------
+    boxes : (k, 7) float64
+        x, y, z of the middle, length, width, height (metres), and yaw in [-π, π) counter-clockwise from +x (radians),
+        in the sensor's axes, or in those of the coordinate system of an OpenLABEL file.
+    category : (k,) str
+        One of `CATEGORIES` for each box.
+    ignored : dict of str to int
+        Number of boxes of each other class, which are left out.
+    """
+
+    boxes: Float
+    category: Text
+    ignored: dict[str, int]
+
+    def __len__(self) -> int:
+        return len(self.boxes)
+
+
+def read_labels(path: Path) -> BoxLabels:
+    """Read the labelled boxes of a sweep; the format is recognised by the content.
+
+    KITTI's labels are in the axes of a camera that stands in the sensor and looks along +x, as in datasets of this
+    program. A file without content has no labels.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be read, has another format or several frames, or a box is not one of a road user.
+    """
+    if path.is_file() and not path.stat().st_size:
+        return _labels([])
+    text = read_small(path, _MAX_BYTES, _CURE).decode("utf-8-sig", "replace")
+    try:
+        return _labels(_boxes(text))
+    except READ_ERRORS as error:
+        raise SeipError(f"{path.name} has no readable labels ({content_fault(error)}); {_CURE}") from error
+
+
+def _labels(boxes: Iterable[_Box]) -> BoxLabels:
+    ignored: Counter[str] = Counter()
+    rows, categories = [], []
+    for name, row in boxes:
+        category = _CATEGORY.get(re.sub(r"[\W_]", "", name.lower()))
+        if category is None:
+            ignored[name] += 1
+            continue
+        rows.append([float(number) for number in row])
+        categories.append(category)
+    table = np.array(rows, dtype=np.float64).reshape(-1, 7)
+    middle, size, yaw = (
+        (table[:, :3], SENSOR_COORDINATE),
+        (table[:, 3:6], ROAD_USER_SIZE),
+        (table[:, 6], UNWRAPPED_ANGLE),
+    )
+    if fault := Limits.first_fault({"the middle of a box": middle, "its size": size, "its yaw": yaw}):
+        raise ValueError(fault)
+    table[:, 6] = np.mod(table[:, 6] + np.pi, 2 * np.pi) - np.pi
+    return BoxLabels(table, np.array(categories, dtype=np.str_), dict(ignored))
+
+
+def _boxes(text: str) -> Iterator[_Box]:
+    if text.lstrip().startswith(("{", "[")):
+        content = parse_json(text)
+        return _of_openlabel(content["openlabel"]) if isinstance(content, dict) else map(_of_dair, content)
+    lines = [line.split() for line in text.splitlines() if line.strip()]
+    return map(_of_openpcdet if lines and len(lines[0]) < 15 else _of_kitti, lines)
+
+
+def _of_kitti(words: list[str]) -> _Box:
+    """Return a box of KITTI's ``label_2``: 15 columns, or 16 with a score."""
+    if not 15 <= len(words) <= 16:
+        raise ValueError(f"a line has {len(words)} columns, not 15")
+    height, width, length, x, y, z, rotation = (float(word) for word in words[8:15])
+    return words[0], [z, -x, height / 2 - y, length, width, height, -rotation - np.pi / 2]
+
+
+def _of_openpcdet(words: list[str]) -> _Box:
+    """Return a box of a line ``x y z dx dy dz heading class``, which a score may follow."""
+    if not 8 <= len(words) <= 9:
+        raise ValueError(f"a line has {len(words)} columns, not 8")
+    return words[7], list(words[:7])
+
+
+def _of_dair(box: dict[str, Any]) -> _Box:
+    size, place = box["3d_dimensions"], box["3d_location"]
+    return str(box["type"]), [*(place[axis] for axis in "xyz"), *(size[side] for side in "lwh"), box["rotation"]]
+
+
+def _of_openlabel(content: dict[str, Any]) -> Iterator[_Box]:
+    frames = content.get("frames", {})
+    if len(frames) != 1:
+        raise ValueError(f"it has {len(frames)} frames, not one")
+    for key, frame_object in next(iter(frames.values())).get("objects", {}).items():
+        data = frame_object["object_data"]
+        cuboids = data.get("cuboid", [])
+        kind = data.get("type") or content.get("objects", {})[key]["type"]
+        for cuboid in [cuboids] if isinstance(cuboids, dict) else cuboids:
+            x, y, z, *quaternion, length, width, height = (float(number) for number in cuboid["val"])
+            turn = quaternion_rotation(np.roll(quaternion, 1).reshape(4))
+            yield str(kind), [x, y, z, length, width, height, np.arctan2(turn[1, 0], turn[0, 0])]

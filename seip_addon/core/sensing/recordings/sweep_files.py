@@ -1,0 +1,157 @@
+"""Readers of sweeps: PCD, KITTI's and nuScenes' binary files, npz, LAS, LAZ and CSV."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Float
+from ...errors import SeipError
+from ...limits import SWEEP_POINTS
+from ...storage.array_file import read_npz
+from ...storage.files import read_small
+from ...storage.las_file import damaged_las, opened_las
+from .pcd_file import number_table, read_pcd
+from .sweep import Sweep, sweep_of
+
+MAX_BYTES = 1 << 30  # largest size of the file of a sweep
+
+Columns = dict[str, NDArray[Any]]
+
+_CURE = "export the sweep again"
+_NAMES = {
+    "intensity": ("intensity", "i", "reflectivity"),
+    "time": ("time",),
+}
+"""Names of each column in files, the preferred one first."""
+
+_POINTS_PER_STEP = 200_000
+
+
+def sweep_suffix(path: Path) -> str:
+    """Return the suffix by which a file is a sweep, such as ``.pcd`` or ``.pcd.bin``, or ""."""
+    name = path.name.lower()
+    return next((suffix for suffix in _READERS if name.endswith(suffix)), "")
+
+
+def read_sweep(path: Path) -> Sweep:
+    """Read a sweep in the format of the file's suffix.
+
+    ``.bin`` holds four float32 for each point (KITTI), ``.pcd.bin`` five (nuScenes). Point clouds with named columns
+    need ``x``, ``y`` and ``z``; the names of intensity are those of `_NAMES`.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be read, has another format, or is damaged.
+    """
+    suffix = sweep_suffix(path)
+    if not suffix:
+        raise SeipError(f"{path.name} is not a sweep: give a file that ends in {', '.join(_READERS)}")
+    try:
+        columns, viewpoint = _READERS[suffix](path)
+    except UnicodeDecodeError as error:
+        raise SeipError(f"{path.name} is not a text file; {_CURE}") from error
+    except ValueError as error:
+        raise SeipError(f"{path.name} is damaged or not a sweep ({str(error)[:200]}); {_CURE}") from error
+    return sweep_of(path.name, columns, viewpoint)
+
+
+def _pcd(path: Path) -> tuple[Columns, Float | None]:
+    fields, viewpoint = read_pcd(read_small(path, MAX_BYTES, _CURE))
+    return {name: fields[found] for name, found in _found(path, list(fields)).items()}, viewpoint
+
+
+def _found(path: Path, names: Sequence[str]) -> dict[str, str]:
+    """Return the name in the file of each column that it has.
+
+    Raises
+    ------
+    SeipError
+        A coordinate is missing.
+    """
+    missing = [axis for axis in "xyz" if axis not in names]
+    if missing:
+        raise SeipError(f"{path.name} has no {' and no '.join(missing)}: name the columns of the coordinates x, y, z")
+    found = {axis: axis for axis in "xyz"}
+    for column, known in _NAMES.items():
+        if name := next((name for name in known if name in names), None):
+            found[column] = name
+    return found
+
+
+def _binary(names: Sequence[str]) -> Callable[[Path], tuple[Columns, None]]:
+    """Return a reader of float32 files with the given columns and no header."""
+
+    def read(path: Path) -> tuple[Columns, None]:
+        content = read_small(path, MAX_BYTES, _CURE)
+        if len(content) % (4 * len(names)):
+            raise ValueError(
+                f"{len(content):,} bytes are not whole points of {len(names)} float32; files that end in .bin have "
+                "four, in .pcd.bin five"
+            )
+        points = np.frombuffer(content, "<f4").reshape(-1, len(names))
+        return dict(zip(names, points.T, strict=True)), None
+
+    return read
+
+
+def _npz(path: Path) -> tuple[Columns, None]:
+    arrays = read_npz(path, MAX_BYTES)
+    if "points" in arrays:
+        points = arrays.pop("points")
+        if points.ndim != 2 or not 3 <= points.shape[1] <= 6:
+            raise ValueError(f"points has the shape {points.shape}, not (n, 3 to 6)")
+        arrays |= dict(zip(("x", "y", "z", "intensity", "ring", "time"), points.T, strict=False))
+    columns = {name: arrays[found] for name, found in _found(path, list(arrays)).items()}
+    count = columns["x"].size
+    if columns.get("time", columns["x"]).shape == ():  # of the whole sweep
+        columns["time"] = np.repeat(columns["time"], count)
+    for name, column in columns.items():
+        if column.dtype.kind not in "fiu" or column.shape != (count,):
+            raise ValueError(f"{name} is not an array of numbers, one for each point")
+    return columns, None
+
+
+def _csv(path: Path) -> tuple[Columns, None]:
+    head, _, body = read_small(path, MAX_BYTES, _CURE).decode("utf-8-sig").partition("\n")
+    names = [name.strip().strip('"').lower() for name in head.split(",")]
+    found = _found(path, names)
+    table = number_table(body, ",", [names.index(name) for name in found.values()])
+    return dict(zip(found, table.T, strict=True)), None
+
+
+def _las(path: Path) -> tuple[Columns, None]:
+    with opened_las(path) as reader:
+        whole = int(reader.header.point_count)
+        SWEEP_POINTS.require(whole, path.name, "number of points", "export one revolution to a file")
+        try:
+            found = _found(path, ["x", "y", "z", *map(str, reader.header.point_format.dimension_names)])
+            chunks = [
+                np.column_stack([np.asarray(chunk[name], dtype=np.float64) for name in found.values()])
+                for chunk in reader.chunk_iterator(_POINTS_PER_STEP)
+            ]
+        except Exception as error:  # whatever a damaged file makes of laspy
+            raise damaged_las(path, error) from error
+    table = np.concatenate([np.empty((0, len(found))), *chunks])
+    if len(table) != whole:
+        raise damaged_las(path, ValueError(f"it announces {whole:,} points and has {len(table):,}"))
+    columns = dict(zip(found, table.T, strict=True))
+    if not columns["intensity"].any():  # a dimension that every file has
+        del columns["intensity"]
+    return columns, None
+
+
+_READERS: dict[str, Callable[[Path], tuple[Columns, Float | None]]] = {
+    ".pcd.bin": _binary(("x", "y", "z", "intensity", "ring")),
+    ".pcd": _pcd,
+    ".bin": _binary(("x", "y", "z", "intensity")),
+    ".npz": _npz,
+    ".las": _las,
+    ".laz": _las,
+    ".csv": _csv,
+}

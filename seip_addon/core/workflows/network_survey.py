@@ -1,0 +1,131 @@
+"""Survey of one site of a network: its placement problem, and the solution of the placement that is taken there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..choosing.network.frontier import SolvedBudget
+from ..choosing.network.site_problem import SiteProblem, check_problem
+from ..choosing.placement.deployment import deploy, pose_prices
+from ..choosing.placement.objective import Objective, Solution, criterion_of, placement_constraints
+from ..choosing.placement.problem import Placement, relative_gap
+from ..errors import SeipError
+from ..progress import Progress
+from ..sensing.returns.returns_grid import stored_returns
+from ..sensing.returns.road_users import road_users
+from .network_sites import NetworkPlace
+from .returns import returns_solution, user_weights
+from .survey import Survey
+
+
+@dataclass(frozen=True)
+class TakenPlacement:
+    """Placement of a site that the allocation takes.
+
+    Parameters
+    ----------
+    solved : SolvedBudget
+        Poses, those installed before included, with value and bound.
+    bound : float
+        Bound on the value for that money.
+    """
+
+    solved: SolvedBudget
+    bound: float
+
+
+def site_problem(survey: Survey, objective: Objective, place: NetworkPlace) -> Generator[Progress, None, SiteProblem]:
+    """Return the placement problem of a site of a network.
+
+    Parameters
+    ----------
+    objective : Objective
+        Criterion, and the largest number of sensors at the site.
+
+    Raises
+    ------
+    SeipError
+        The site demands a sensor somewhere, or no candidate sees anything.
+    """
+    site, candidates = survey.site, survey.site.candidates
+    constraints = placement_constraints(site, survey.models, _at_site(survey, objective))
+    if len(constraints.mandatory_groups):
+        raise SeipError(
+            f"{constraints.group_names[0]} must carry a sensor, which is not possible in a network: clear the "
+            "mandatory poles and areas of the site"
+        )
+    allowed = np.flatnonzero(constraints.allowed)
+    criterion = criterion_of(objective, survey.models)
+    returns, weights = np.zeros((len(candidates), 0), dtype=np.float32), np.zeros(0)
+    if criterion == "returns":
+        users = road_users(survey.geometry)
+        grid = yield from stored_returns(
+            survey.returns_path, site, users, survey.models, survey.settings.engine, threads=1
+        )
+        returns, weights = grid.returns, user_weights(users, objective)
+    geographic = site.geographic(candidates.xyz)
+    if geographic is None:  # a scene without a projection lies where the table says
+        latlon = np.tile((place.latitude, place.longitude), (len(candidates), 1))
+    else:
+        latlon = geographic[:, 1::-1]
+    if len(allowed) != len(candidates):  # forbidden poses keep their indices, and have no value
+        forbidden = ~constraints.allowed
+        returns = np.where(forbidden[:, None], np.float32(0.0), returns)
+    visible = survey.grid.visible & constraints.allowed[:, None]
+    problem = SiteProblem(
+        criterion="returns" if criterion == "returns" else "road",
+        visible=visible,
+        returns=returns,
+        user_weights=weights,
+        prices=pose_prices(candidates, survey.models),
+        positions=candidates.position_of,
+        xyz=candidates.xyz,
+        heights=candidates.height,
+        latlon=np.round(latlon, 8),
+        labels=candidates.sensor,
+        names=candidates.position_name[candidates.position_of],
+        most_sensors=_at_site(survey, objective).count or len(candidates.position),
+    )
+    check_problem(problem)
+    return problem
+
+
+def taken_solution(survey: Survey, objective: Objective, taken: TakenPlacement) -> Generator[Progress, None, Solution]:
+    """Return the solution of the placement that an allocation takes at a site, as `place` returns it."""
+    objective = _at_site(survey, objective)
+    solved = taken.solved
+    chosen = np.array(solved.chosen, dtype=np.int64)
+    optimal = taken.bound <= solved.value
+    rows = survey.grid.rows(chosen)
+    covered = float(rows.any(axis=0).sum())
+    of_returns = criterion_of(objective, survey.models) == "returns"
+    value, bound = (solved.value, taken.bound) if of_returns else (covered, taken.bound * rows.shape[1])
+    placement = Placement(
+        chosen=chosen,
+        objective=value,
+        bound=value if optimal else bound,
+        gap=0.0 if optimal else math.expm1(bound - value) if of_returns else relative_gap(value, bound),
+        status="optimal" if optimal else "feasible",
+        solver="network allocation",
+        seconds=0.0,
+        covered=covered,
+        price=solved.price,
+        notes=("the money at this site is its share of the budget of a network",),
+    )
+    if of_returns:
+        users = road_users(survey.geometry)
+        grid = yield from stored_returns(
+            survey.returns_path, survey.site, users, survey.models, survey.settings.engine, threads=1
+        )
+        return returns_solution(survey, grid, users, objective, (placement, None))
+    return Solution(objective, placement, None, deploy(survey.site, survey.models, rows, chosen))
+
+
+def _at_site(survey: Survey, objective: Objective) -> Objective:
+    """Return the objective with no more sensors than the site has positions."""
+    positions = len(survey.site.candidates.position)
+    return replace(objective, count=min(objective.count or positions, positions))

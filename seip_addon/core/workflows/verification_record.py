@@ -1,0 +1,106 @@
+"""Record of a verification, the table of its changes, and the catalogue of its units."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from ..output.results.verification_record import (
+    SCHEMA,
+    RecordedBackground,
+    RecordedChange,
+    RecordedGain,
+    RecordedPose,
+    RecordedReturns,
+    RecordedSteps,
+    VerificationRecord,
+)
+from ..sensing.recordings.verification import Verification, VerifiedSensor
+from ..storage.files import whole_file
+from ..storage.json_dataclass import as_json
+
+UNITS_FILE = "units.toml"
+"""Catalogue of the units of an installation."""
+CHANGES_FILE = "changes.csv"
+"""Table of what differs from the scene."""
+
+
+def record_of(site: str, recording: str, found: Verification) -> VerificationRecord:
+    """Return the record of a verification."""
+    changes = [
+        RecordedChange(
+            change.kind,  # type: ignore[arg-type]  # of three kinds
+            change.name,
+            tuple(change.box.tolist()),
+            change.rays,
+            None if math.isnan(cost) else cost,
+        )
+        for change, cost in zip(found.changes, found.costs, strict=True)
+    ]
+    steps = RecordedSteps(**asdict(found.coverage))
+    return VerificationRecord(site, recording, tuple(map(_pose, found.sensors)), tuple(changes), steps)
+
+
+def verification_record(site: str, recording: str, found: Verification) -> dict[str, Any]:
+    """Return the content of ``verification.json``."""
+    return {"schema": SCHEMA, **as_json(record_of(site, recording, found))}
+
+
+def _pose(one: VerifiedSensor) -> RecordedPose:
+    pose, background = one.registration, one.background
+    return RecordedPose(
+        id=pose.sensor.label,
+        sensor=pose.sensor.model.key,
+        local_m=tuple(pose.sensor.xyz.tolist()),
+        orientation=tuple(map(tuple, pose.sensor.orientation.tolist())),  # type: ignore[arg-type]  # three rows
+        shift_m=tuple(pose.shift[:3].tolist()),
+        shift_half_width_m=tuple(pose.half_width[:3].tolist()),
+        rotation_deg=tuple(math.degrees(angle) for angle in pose.shift[3:]),  # type: ignore[arg-type]  # three
+        rotation_half_width_deg=tuple(math.degrees(angle) for angle in pose.half_width[3:]),  # type: ignore[arg-type]
+        match=pose.match,
+        background=RecordedBackground(background.sweeps, background.seconds, background.uncertain),
+        gain=None if one.gain is None else RecordedGain(**asdict(one.gain)),
+        returns=tuple(RecordedReturns(**asdict(share)) for share in one.shares),
+    )
+
+
+def save_units(path: Path, recording: str, sensors: Sequence[VerifiedSensor]) -> bool:
+    """Write a catalogue with a model for each unit whose gain is known, and return whether there is one."""
+    tables = []
+    for one in sensors:
+        if one.gain is None:
+            continue
+        model, label = one.registration.sensor.model, one.registration.sensor.label
+        key = "".join(letter if letter.isalnum() else "_" for letter in f"{model.key}_{label}".lower())
+        tables.append(
+            f'[{key}]\nlike = "{model.key}"\nname = "{model.name}, unit {label}"\n'
+            f"gain = {one.gain.value:.4g}  # 95 % interval: {one.gain.low:.3g} to {one.gain.high:.3g}\n"
+            f'calibration = "recording {_plain(recording)}"\n'
+        )
+    if tables:
+        with whole_file(path) as temporary:
+            temporary.write_text("\n".join(tables), encoding="utf-8")
+    return bool(tables)
+
+
+def save_changes(path: Path, found: Verification) -> None:
+    """Write what differs from the scene as CSV, a row for each change."""
+    table = io.StringIO()
+    write = csv.writer(table, lineterminator="\n")
+    sizes = ["x_m", "y_m", "z_m", "length_m", "width_m", "height_m"]
+    write.writerow(["kind", "name", *sizes, "yaw_deg", "rays", "coverage_cost"])
+    for change, cost in zip(found.changes, found.costs, strict=True):
+        *numbers, yaw = change.box.tolist()
+        figures = [f"{value:.2f}" for value in (*numbers, math.degrees(yaw))]
+        write.writerow([change.kind, change.name, *figures, change.rays, "" if math.isnan(cost) else f"{cost:.5f}"])
+    with whole_file(path) as temporary:
+        temporary.write_text(table.getvalue(), encoding="utf-8")
+
+
+def _plain(text: str) -> str:
+    return "".join(letter for letter in text if letter.isprintable() and letter not in '"\\')

@@ -1,0 +1,251 @@
+"""Verification of an installation: what its recording shows, compared with what its plan promised."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ..arrays import Boolean, Float, Integer
+from ..errors import SeipError
+from ..geometry.plan import surface_height
+from ..progress import Progress
+from ..sensing.recordings.background import Background, learn_background
+from ..sensing.recordings.comparison import (
+    FARTHER,
+    VEHICLE,
+    Change,
+    RayComparison,
+    compare_rays,
+    gone_objects,
+    new_objects,
+)
+from ..sensing.recordings.recording import Recording
+from ..sensing.recordings.registration import Registration, register
+from ..sensing.recordings.sensor_recording import SensorRecording
+from ..sensing.recordings.unit_gain import fitted_gain, return_shares
+from ..sensing.recordings.verification import CoverageSteps, Verification, VerifiedSensor
+from ..sensing.scans.scanner import ReflectiveSurface
+from ..sensing.scans.sensor import MountedSensor
+from ..sensing.scans.static_scene import StaticScene, static_scene
+from ..sensing.visibility.ray_casting import Engine, make_ray_caster
+from ..sensing.visibility.settings import VisibilitySettings
+from ..sensing.visibility.visibility_model import VisibilityModel
+from ..site.scene_geometry import FROM_SURVEY, Mesh, SceneGeometry, joined
+from ..site.targets import Targets, generate_targets
+
+_FOUND = re.compile(r"Found (\d{1,9})\b")  # name of an object that a verification added
+_BOX_MARGIN = 1.0  # metres around a box that an earlier verification added
+_MOST_PRICED = 20  # changes whose cost in coverage is computed, those with most rays
+
+
+@dataclass(frozen=True, eq=False)
+class _Surroundings:
+    """Targets and static surfaces, for visibility."""
+
+    targets: Targets
+    triangles: Float
+    reflectivity: Float
+
+
+def verify(
+    geometry: SceneGeometry,
+    planned: Sequence[MountedSensor],
+    recording: Recording,
+    settings: VisibilitySettings,
+    *,
+    spacing: float,
+    engine: Engine = "auto",
+) -> Generator[Progress, None, Verification]:
+    """Compare a recording with the scene and the sensors that it was planned with.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+        The scene of the plan.
+    planned : sequence of MountedSensor
+        Sensors of the plan; the recording has a folder for each, or one sensor.
+    spacing : float, metres
+        Distance between neighbouring targets.
+
+    Raises
+    ------
+    SeipError
+        The recording has a sensor that is not planned, is of another site, or is too short.
+    """
+    pairs = _paired(planned, recording)
+    static = static_scene(geometry, planned)
+    surface = _surface(static, engine)
+    kinds = _kinds(geometry, static.triangles)
+    fitted: list[tuple[Registration, Background]] = []
+    for sensor, record in pairs:
+        background = yield from learn_background(record, sensor.model)
+        fitted.append((register(surface, sensor, background), background))
+    comparisons = [compare_rays(surface, pose.sensor, background) for pose, background in fitted]
+    road = joined(geometry.roads)
+    earlier = _earlier_boxes(geometry)
+    fresh = [one for one in new_objects(comparisons, lambda xy: surface_height(xy, road)) if not _is_at(one, earlier)]
+    found = _named(fresh, _first_number(geometry))
+    changes = (*found, *gone_objects(comparisons, geometry.occluders, static.triangles))
+    sensors = []
+    for (pose, background), comparison in zip(fitted, comparisons, strict=True):
+        one = _without_gone(comparison, changes)
+        gain = fitted_gain(one)
+        shares = return_shares(one, gain.value if gain else 1.0, kinds)
+        sensors.append(VerifiedSensor(pose, background, one, gain, tuple(shares)))
+    targets = generate_targets(geometry.region, road, spacing, geometry.weighted_regions)
+    corrected = _corrected(geometry, static, changes)
+
+    def coverage(scene: SceneGeometry, at: Sequence[MountedSensor]) -> float:
+        surfaces = static_scene(scene, planned)
+        around = _Surroundings(targets, surfaces.triangles, surfaces.reflectivity)
+        model = VisibilityModel(around, settings, make_ray_caster(surfaces.triangles, engine))
+        seen = np.any([model.see(one.model, one.xyz, one.orientation) for one in at], axis=0)
+        return float(np.mean(seen))
+
+    installed = [one.registration.sensor for one in sensors]
+    units = [
+        replace(
+            one.registration.sensor, model=one.registration.sensor.model.amplified(one.gain.value if one.gain else 1.0)
+        )
+        for one in sensors
+    ]
+    steps = (
+        (geometry, [sensor for sensor, _ in pairs]),
+        (geometry, installed),
+        (corrected, installed),
+        (corrected, units),
+    )
+    figures = []
+    for done, (scene, at) in enumerate(steps):
+        yield Progress(done, len(steps), "computing coverage", counted=False)
+        figures.append(coverage(scene, at))
+    seen = _seen_in_recording(targets, sensors, settings)
+    figures.append(float(np.mean(seen)))
+    objects = [change for change in changes if change.kind != VEHICLE][:_MOST_PRICED]
+    costs = dict.fromkeys(map(id, changes), float("nan"))
+    for done, change in enumerate(objects):
+        yield Progress(done, len(objects), "computing what each change costs")
+        others = [other for other in changes if other is not change]
+        costs[id(change)] = coverage(_corrected(geometry, static, others), installed) - figures[2]
+    yield Progress(len(objects), len(objects), "computing what each change costs")
+    return Verification(
+        tuple(sensors), changes, tuple(costs.values()), CoverageSteps(*figures), corrected, targets, seen
+    )
+
+
+def _paired(planned: Sequence[MountedSensor], recording: Recording) -> list[tuple[MountedSensor, SensorRecording]]:
+    """Return the planned sensor of each sensor of a recording."""
+    by_label = {one.label: one for one in planned}
+    if len(planned) == len(recording.sensors) == 1:
+        return [(planned[0], recording.sensors[0])]
+    unknown = [record.name for record in recording.sensors if record.name not in by_label]
+    if unknown:
+        raise SeipError(
+            f"the plan has the sensors {', '.join(by_label)}, but the recording has {', '.join(unknown)}: name the "
+            "folders of sweeps after the sensors"
+        )
+    return [(by_label[record.name], record) for record in recording.sensors]
+
+
+def _first_number(geometry: SceneGeometry) -> int:
+    """Return the first number after those of the objects that earlier verifications added to a scene."""
+    numbers = [int(found[1]) for mesh in geometry.occluders if (found := _FOUND.match(mesh.name))]
+    return 1 + max(numbers, default=0)
+
+
+def _named(changes: Sequence[Change], first: int) -> list[Change]:
+    """Return new objects and vehicles with names of their own, objects from a first number on."""
+    numbers = {"new": count(first), VEHICLE: count(1)}
+    words = {"new": "Found", VEHICLE: "Vehicle"}
+    return [replace(one, name=f"{words[one.kind]} {next(numbers[one.kind])}") for one in changes]
+
+
+def _earlier_boxes(geometry: SceneGeometry) -> BaseGeometry:
+    """Return the surroundings, in plan, of the boxes that earlier verifications added to a scene."""
+    boxes = [mesh for mesh in geometry.occluders if mesh.source == FROM_SURVEY and _FOUND.match(mesh.name)]
+    outlines = [shapely.MultiPoint(mesh.triangles.reshape(-1, 3)[:, :2]).convex_hull for mesh in boxes]
+    return shapely.union_all(shapely.buffer(outlines, _BOX_MARGIN))
+
+
+def _is_at(change: Change, earlier: BaseGeometry) -> bool:
+    """Return whether a new object is mostly within the surroundings of earlier boxes.
+
+    A box has the size of the sides that sensors measured, so that its object differs from it once more.
+    """
+    outline = shapely.MultiPoint(box_triangles(change.box).reshape(-1, 3)[:, :2]).convex_hull
+    return bool(outline.intersection(earlier).area > outline.area / 2)
+
+
+def _surface(static: StaticScene, engine: Engine) -> ReflectiveSurface:
+    return ReflectiveSurface(make_ray_caster(static.triangles, engine), static.reflectivity)
+
+
+def _kinds(geometry: SceneGeometry, triangles: Float) -> list[tuple[str, Integer]]:
+    """Return the triangles of roads, of other ground and of objects."""
+    rows = [row.tobytes() for row in triangles]
+    found = []
+    for name, meshes in (("road", geometry.roads), ("ground", geometry.ground), ("objects", geometry.occluders)):
+        own = {row.tobytes() for mesh in meshes for row in mesh.triangles}
+        found.append((name, np.array([number for number, row in enumerate(rows) if row in own], dtype=np.int64)))
+    return found
+
+
+def _without_gone(comparison: RayComparison, changes: Sequence[Change]) -> RayComparison:
+    """Return a comparison in which rays towards an object that is gone are farther, even if they do not return."""
+    gone = np.concatenate([np.zeros(0, dtype=np.int64), *(change.part for change in changes)])
+    result = np.where(np.isin(comparison.triangle, gone), FARTHER, comparison.result)
+    return replace(comparison, result=result)
+
+
+def _corrected(geometry: SceneGeometry, static: StaticScene, changes: Sequence[Change]) -> SceneGeometry:
+    """Return a scene with new objects as boxes and without those that are gone."""
+    gone = {row.tobytes() for change in changes for row in static.triangles[change.part]}
+    occluders = []
+    for mesh in geometry.occluders:
+        kept = np.array([row.tobytes() not in gone for row in mesh.triangles], dtype=bool)
+        if kept.all():
+            occluders.append(mesh)
+        elif kept.any():
+            reflectivity = None if mesh.reflectivity is None else mesh.reflectivity[kept]
+            occluders.append(replace(mesh, triangles=mesh.triangles[kept], reflectivity=reflectivity))
+    added = [Mesh(one.name, box_triangles(one.box), source=FROM_SURVEY) for one in changes if one.kind == "new"]
+    return replace(geometry, occluders=(*occluders, *added))
+
+
+def box_triangles(box: Float) -> Float:
+    """Return the triangles (12, 3, 3) of a box (7,)."""
+    x, y, z, length, width, height, yaw = box.tolist()
+    signs = np.array([(a, b, c) for c in (-1, 1) for b in (-1, 1) for a in (-1, 1)]) / 2
+    local = signs * (length, width, height)
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    corners = np.column_stack(
+        [local[:, 0] * cos - local[:, 1] * sin, local[:, 0] * sin + local[:, 1] * cos, local[:, 2]]
+    )
+    corners += (x, y, z)
+    faces = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
+    halves = [part for a, b, c, d in faces for part in ((a, b, c), (a, c, d))]
+    triangles: Float = corners[np.array(halves)]
+    return triangles
+
+
+def _seen_in_recording(targets: Targets, sensors: Sequence[VerifiedSensor], settings: VisibilitySettings) -> Boolean:
+    """Return the targets (t,) with a background return within δ, in the share of sweeps that detection demands."""
+    points = []
+    for one in sensors:
+        comparison = one.comparison
+        often = np.isfinite(comparison.measured) & (comparison.returned >= settings.detection)
+        points.append(comparison.sensor.xyz + comparison.directions[often] * comparison.measured[often, None])
+    xyz = np.concatenate(points)
+    seen = np.zeros(len(targets), dtype=bool)
+    target, point = shapely.STRtree(shapely.points(xyz[:, :2])).query(
+        shapely.points(targets.xyz[:, :2]), predicate="dwithin", distance=settings.delta
+    )
+    near = np.linalg.norm(targets.xyz[target] - xyz[point], axis=1) <= settings.delta
+    seen[target[near]] = True
+    return seen

@@ -1,0 +1,231 @@
+"""Traffic from SUMO (Simulation of Urban MObility, Eclipse) on an OpenDRIVE map; SUMO itself is an optional extra."""
+
+from collections.abc import Generator, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from ...arrays import Float
+from ...errors import SeipError
+from ...progress import Progress
+from ...sensing.traffic.source import TrafficFiles
+from ...settings import setting
+from ...storage.files import whole_file
+from ...sumo_programs import Sumo, find_sumo, run
+from ..opendrive.read import read_map
+from ..opendrive.road_map import RoadMap
+from ..streetscape.road_surface import GROUPS
+from .demand import Demand, write_routes
+from .street_network import PARKED_CLASS, StreetNetwork, read_network
+
+STEP_SECONDS = 0.1  # seconds between two steps of the simulation
+SAMPLING_SECONDS = 0.2  # seconds between two samples of the trajectories
+_LANE_CHANGE_SECONDS = 4.0  # seconds; without it SUMO's vehicles jump from lane to lane
+_MAX_SIGNAL_DISTANCE = 60.0  # metres, largest distance of a crosswalk from its traffic light
+_PAVEMENT_REACH = 6.0  # metres that pavements extend beyond the ends of a crosswalk
+
+_PERMISSIONS = {
+    "driving": 'disallow="pedestrian"',
+    "sidewalk": 'allow="pedestrian"',
+    "biking": 'allow="bicycle"',
+    "parking": f'allow="{PARKED_CLASS}"',
+}
+"""Permissions of groups of lane types; all others are closed explicitly: SUMO opens types without any to all."""
+_OWN_PERMISSIONS = {"bus": 'allow="bus"', "taxi": 'allow="taxi bus"'}
+_LANES = {lane: _PERMISSIONS.get(group, 'disallow="all"') for lane, group in GROUPS.items()} | _OWN_PERMISSIONS
+"""Permissions of all lane types of OpenDRIVE that have a surface."""
+
+
+@dataclass(frozen=True)
+class SignalPlan:
+    """Fixed plan of every traffic light, with green for opposite arms together; seconds of each state."""
+
+    green: int = setting(25, "green time of each signal phase", metavar="S")
+    amber: int = 3
+    all_red: int = 2
+
+    def __post_init__(self) -> None:
+        if min(self.green, self.amber) < 1 or self.all_red < 0:
+            raise SeipError("a signal plan needs green and amber of at least 1 s, and no negative times")
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Seed, duration, demand and signals of a simulation.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of all randomness, here and in SUMO.
+    duration : float, seconds
+    """
+
+    demand: Demand
+    signals: SignalPlan
+    seed: int
+    duration: float
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.seed < 2**31:
+            raise SeipError(f"--seed must be a whole number from 0 to {2**31 - 1}, not {self.seed}")
+        if not 0.0 < self.duration <= 86400.0:
+            raise SeipError(f"a simulation must last above 0 s and at most a day, not {self.duration:g} s")
+
+
+def simulate(
+    map_path: Path,
+    folder: Path,
+    scenario: Scenario,
+    bounds: tuple[float, float, float, float] | None = None,
+    sumo: Iterable[Path] = (),
+) -> Generator[Progress, None, TrafficFiles]:
+    """Simulate traffic on an OpenDRIVE map from 0 to the scenario's duration.
+
+    Parameters
+    ----------
+    bounds : (4,) float, metres, optional
+        Rectangle of the map (left, bottom, right, top); only roads that reach into it are used.
+    sumo : iterable of Path
+        Folders to search for SUMO first, as in `find_sumo`.
+
+    Returns
+    -------
+    TrafficFiles
+        Files, identical for the same arguments except for the dates in SUMO's comments.
+
+    Raises
+    ------
+    SeipError
+        SUMO is missing or rejects its input, or the map has no road that leads in.
+    """
+    programs = find_sumo(sumo)
+    recorded, routes, network = (folder / f"traffic.{kind}.xml" for kind in ("fcd", "rou", "net"))
+    yield from _network(programs, map_path, network, scenario.signals, bounds)
+    write_routes(routes, read_network(network), scenario.demand, scenario.seed, scenario.duration)
+    files = TrafficFiles(recorded, (routes,), network)
+    yield from run_sumo(programs, files, scenario.seed, scenario.duration)
+    return files
+
+
+def run_sumo(programs: Sumo, files: TrafficFiles, seed: int, duration: float) -> Generator[Progress, None, None]:
+    """Simulate the vehicles of route files on their network from 0 to ``duration`` seconds.
+
+    Parameters
+    ----------
+    files : TrafficFiles
+        The network, the routes, and the floating car data to be written.
+
+    Raises
+    ------
+    SeipError
+        SUMO rejects its input.
+    """
+    yield from run(
+        programs,
+        programs.sumo,
+        [
+            *("--net-file", files.net, "--route-files", ",".join(map(str, files.routes)), "--fcd-output", files.path),
+            *("--seed", seed, "--end", duration, "--step-length", STEP_SECONDS, "--precision", 3),
+            *("--device.fcd.period", SAMPLING_SECONDS, "--person-device.fcd.period", SAMPLING_SECONDS),
+            *("--lanechange.duration", _LANE_CHANGE_SECONDS, "--time-to-teleport", -1),
+            *("--collision.action", "warn", "--collision.check-junctions", "true", "--ignore-route-errors", "true"),
+            *("--no-step-log", "true", "--no-warnings", "true", "--xml-validation", "never"),
+        ],
+        "simulating traffic",
+    )
+
+
+def _network(
+    programs: Sumo, map_path: Path, network: Path, signals: SignalPlan, bounds: tuple[float, float, float, float] | None
+) -> Generator[Progress, None, None]:
+    """Write the network of a map: driving lanes, pavements, crossings where there are traffic lights, parking lanes."""
+    road_map = read_map(map_path)
+    types, plain, nodes = (network.with_name(name) for name in ("lanes.typ.xml", "plain.net.xml", "shapes.nod.xml"))
+    allowed = _LANES | {"none": 'disallow="all"'}
+    _write(types, "types", [f'<type id="{lane}" speed="13.89" {who}/>' for lane, who in allowed.items()])
+    common: list[object] = [
+        *("--offset.disable-normalization", "true", "--no-turnarounds", "true", "--xml-validation", "never"),
+        *("--junctions.internal-link-detail", 20, "--no-warnings", "true", "--tls.default-type", "static"),
+        *("--tls.green.time", signals.green, "--tls.yellow.time", signals.amber, "--tls.allred.time", signals.all_red),
+        *("--crossings.guess", "true", "--crossings.guess.speed-threshold", 0),
+    ]
+    lanes = ["--opendrive.import-all-lanes", "true", "--type-files", types, "--tls.guess", "true"]
+    source = ["--opendrive-files", map_path, *lanes, "--output-file", plain]
+    yield from run(programs, programs.netconvert, [*source, *common], "reading the map")
+    network_before = read_network(plain)
+    shapes = _junction_shapes(network_before, road_map)
+    if bounds is not None:
+        whole = _whole_nodes(network_before, _edges_within(network_before, bounds, map_path.name))
+        shapes = {node: shape for node, shape in shapes.items() if node in whole}
+    corners = {node: " ".join(f"{x:.2f},{y:.2f}" for x, y in shape) for node, shape in shapes.items()}
+    _write(nodes, "nodes", [f'<node id="{node}" shape="{shape}"/>' for node, shape in corners.items()])
+    clip = [] if bounds is None else ["--keep-edges.in-boundary=" + ",".join(f"{edge:.3f}" for edge in bounds)]
+    source = ["--sumo-net-file", plain, "--node-files", nodes, "--tls.rebuild", "true", "--output-file", network]
+    changes = [*source, *common, *clip, "--keep-edges.postload", "true"]
+    yield from run(programs, programs.netconvert, changes, "laying crosswalks")
+
+
+def _junction_shapes(network: StreetNetwork, road_map: RoadMap) -> dict[str, Float]:
+    """Return an outline (k, 2) around the crosswalks of each signalised junction.
+
+    SUMO places crossings along the inside of a junction and stops vehicles at its edge. With these outlines, both are
+    where the map has them.
+    """
+    if not network.signalised:
+        return {}
+    nodes = list(network.signalised)
+    places = np.array(list(network.signalised.values()))
+    corners: dict[str, list[Float]] = {}
+    for crosswalk in _crosswalks(road_map):
+        distance = np.hypot(*(places - crosswalk.mean(axis=0)).T)
+        if distance.min() < _MAX_SIGNAL_DISTANCE:
+            corners.setdefault(nodes[int(distance.argmin())], []).append(crosswalk)
+    hulls = {node: shapely.MultiPoint(np.concatenate(parts)).convex_hull for node, parts in corners.items()}
+    return {node: shapely.get_coordinates(hull)[:-1] for node, hull in hulls.items()}
+
+
+def _edges_within(network: StreetNetwork, bounds: tuple[float, float, float, float], map_name: str) -> set[str]:
+    """Return the edges that reach into a rectangle.
+
+    Raises
+    ------
+    SeipError
+        There is none.
+    """
+    kept = shapely.box(*bounds)
+    within = {
+        edge.id
+        for edge in network.edges.values()
+        if any(shapely.LineString(lane.line).intersects(kept) for lane in edge.lanes)
+    }
+    if not within:
+        raise SeipError(f"{map_name} has no road at this site: name the map that the site was built from")
+    return within
+
+
+def _whole_nodes(network: StreetNetwork, within: set[str]) -> set[str]:
+    """Return the nodes that keep all incoming edges if only some edges of the network are kept."""
+    nodes = {edge.to_node for edge in network.edges.values()}
+    return nodes - {edge.to_node for edge in network.edges.values() if edge.id not in within}
+
+
+def _crosswalks(road_map: RoadMap) -> list[Float]:
+    """Return the corners (4, 2) of the crosswalks of a map, in plan, with the pavements at their ends."""
+    outlines = []
+    for road in road_map.roads:
+        for item in road.objects:
+            if item.kind == "crosswalk" and item.length > 0.0 and item.width > 0.0:
+                s, t = np.array([item.s]), np.array([item.t])
+                heading = float(road.frame(s).heading[0]) + item.heading
+                ahead = np.array([np.cos(heading), np.sin(heading)]) * item.length / 2.0
+                aside = np.array([-np.sin(heading), np.cos(heading)]) * (item.width / 2.0 + _PAVEMENT_REACH)
+                signs = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+                outlines.append(road.place(s, t)[0, :2] + signs @ np.stack([ahead, aside]))
+    return outlines
+
+
+def _write(path: Path, root: str, elements: Sequence[str]) -> None:
+    with whole_file(path) as temporary:
+        temporary.write_text("\n".join([f"<{root}>", *elements, f"</{root}>", ""]), encoding="utf-8")

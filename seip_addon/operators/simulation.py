@@ -1,0 +1,88 @@
+"""The operator that simulates runs of traffic at the site with SUMO."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import bpy
+
+from .. import live_scan, preferences, scene_status
+from ..core.errors import SeipError
+from ..core.progress import Progress
+from ..core.sensing.traffic.source import TrafficFiles
+from ..core.workflows.traffic_simulation import SimulatedRuns, simulate_runs
+from ..properties.conversion import output_folder
+from ..scene.read import read_scene
+from ..session import SceneTraffic
+from .base import LongWork
+from .traffic import show_traffic
+
+NO_MAP = "There is no map to simulate traffic on: name the OpenDRIVE map (.xodr) that this site was built from."
+_TEXT_MAP = "streets.xodr"
+"""Name for the map of a text whose own name is no name of a file."""
+
+
+def why_no_simulation(scene: bpy.types.Scene) -> str:
+    """Return why no traffic can be simulated; nothing where it can."""
+    obstacle = scene_status.obstacle(scene)
+    if obstacle:
+        return obstacle
+    if preferences.sumo() is None:
+        return f"{preferences.NO_SUMO}."
+    return "" if scene.seip.simulation.street_map() is not None else NO_MAP
+
+
+class SEIP_OT_simulate_traffic(LongWork[SimulatedRuns], bpy.types.Operator):
+    """Simulate runs of traffic on the map of the site with SUMO, put the first on the road, and use all for Detection and for placements in traffic"""  # noqa: E501  # a tooltip is one line
+
+    bl_idname = "seip.simulate_traffic"
+    bl_label = "Simulate Traffic"
+    stopped_message = "stopped; no run was written"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether there are a road, a map of it, and SUMO."""
+        reason = why_no_simulation(context.scene)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SimulatedRuns]:
+        """Read the road and the map."""
+        request = scene.seip.simulation
+        found = request.street_map()
+        if found is None:
+            raise SeipError(NO_MAP)
+        self._named, self._key = request.folder, request.key()
+        geometry = read_scene(scene).geometry
+        more = (request.settings(), request.count, geometry, output_folder(request.folder, "the runs of traffic"))
+        if isinstance(found, Path):
+            return simulate_runs(found, *more, preferences.sumo_folders())
+        return _simulated_on_text(found.name, found.as_string(), *more, preferences.sumo_folders())
+
+    def conclude(self, scene: bpy.types.Scene, result: SimulatedRuns) -> None:
+        """Put the first run on the road, and name the folder where runs are asked for."""
+        seip = scene.seip
+        first = str(result.paths[0])
+        seip.traffic.file = bpy.path.relpath(first) if self._named.startswith("//") else first
+        seip.detection.runs = seip.goal.runs = self._named
+        seip.simulation.facts, seip.simulation.made_with = result.summary, self._key
+        files = TrafficFiles(result.paths[0])
+        show_traffic(scene, SceneTraffic(files, live_scan.changes(files), result.first), result.warnings[0])
+        for sentence in result.messages:
+            self.report({"WARNING"}, sentence)
+        self.report({"INFO"}, f"{result.summary}; press play")
+
+
+def _simulated_on_text(name: str, text: str, *more: Any) -> Generator[Progress, None, SimulatedRuns]:  # noqa: ANN401  # of `simulate_runs`
+    """Simulate traffic on a map that is a text in the open file."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / (Path(name).name or _TEXT_MAP)
+        path.write_text(text, encoding="utf-8")
+        return (yield from simulate_runs(path, *more))
+
+
+CLASSES = (SEIP_OT_simulate_traffic,)

@@ -1,0 +1,202 @@
+"""Operators that compare installed sensors with their plan, by a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import bpy
+
+from .. import live_coverage, preferences, scene_status
+from ..core.output.pictures.verification import save_changes_picture, save_returns_chart
+from ..core.output.results.file_names import VERIFICATION_FILE, VERIFICATION_FOLDER, VERIFICATION_PICTURES
+from ..core.output.results.verification_text import summary
+from ..core.output.results.versions import versions
+from ..core.progress import Progress
+from ..core.sensing.recordings.recording import Recording, open_recording
+from ..core.sensing.recordings.verification import Verification
+from ..core.sensing.scans.sensor import MountedSensor
+from ..core.site.scene_geometry import SceneGeometry
+from ..core.storage.files import check_folder, save_json, whole_file
+from ..core.workflows.survey_settings import SurveySettings
+from ..core.workflows.verification_record import (
+    CHANGES_FILE,
+    UNITS_FILE,
+    record_of,
+    save_changes,
+    save_units,
+    verification_record,
+)
+from ..core.workflows.verifying import verify
+from ..properties.conversion import absolute, output_folder
+from ..scene.changes import watch
+from ..scene.corrections import correct_scene
+from ..scene.read import read_scene
+from ..scene.sensors import labelled_sensors, read_sensors
+from ..session import LastVerification, session
+from .base import LongWork, Outcome, attempt
+from .detection import folder_of_result
+from .results import no_folder
+from .view import show_picture
+
+NO_SENSORS = "There is no sensor to verify: place sensors first."
+NO_RECORDING = "Name a recording of the installed sensors: a folder of sweeps, or a .pcap."
+NOT_VERIFIED = "Not verified since the file was opened: verify again to add the changes."
+CHANGED = "The scene has changed since: verify again."
+CHANGES = VERIFICATION_PICTURES[0]
+
+
+@dataclass(frozen=True, eq=False)
+class _Verified:
+    """A verification with the sentences of the panel and the content of its files."""
+
+    found: Verification
+    sentences: tuple[str, ...]
+    files: Mapping[str, bytes]
+
+
+def why_no_verification(scene: bpy.types.Scene) -> str:
+    """Return why the installation cannot be verified, or ""."""
+    if reason := scene_status.obstacle(scene):
+        return reason
+    if not labelled_sensors(scene):
+        return NO_SENSORS
+    return no_folder(scene) or ("" if scene.seip.verification.recording else NO_RECORDING)
+
+
+def why_no_correction(scene: bpy.types.Scene) -> str:
+    """Return why the scene cannot be corrected by the last verification, or ""."""
+    last = session.verification_of(scene)
+    if last is None:
+        return NOT_VERIFIED
+    return CHANGED if last.watch.changed else ""
+
+
+def sentences_of(scene: bpy.types.Scene) -> tuple[str, ...]:
+    """Return what the last verification of a scene found; the file keeps it."""
+    return tuple(scene.seip.verification.found.splitlines())
+
+
+def _folder_of(scene: bpy.types.Scene) -> Path:
+    return output_folder(scene.seip.result.folder, "the verification") / VERIFICATION_FOLDER
+
+
+class SEIP_OT_verify(LongWork[_Verified], bpy.types.Operator):
+    """Compare the installed sensors with the plan by a recording: their poses, what has changed, and the coverage"""
+
+    bl_idname = "seip.verify"
+    bl_label = "Verify Installation"
+    bl_options = {"REGISTER", "UNDO"}  # the scene keeps what was found, also when a correction is undone
+    stopped_message = "stopped; nothing was written"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether there are sensors and a recording."""
+        sentence = why_no_verification(context.scene)
+        if sentence:
+            cls.poll_message_set(sentence)
+        return not sentence
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, _Verified]:
+        """Read the scene and its sensors, and open the recording."""
+        settings = scene.seip.survey.settings()
+        self._folder = _folder_of(scene)
+        self._watch = watch(scene)
+        geometry = settings.weather.over(read_scene(scene).geometry)
+        sensors = tuple(
+            replace(one, model=settings.weather.through(one.model))
+            for one in read_sensors(scene, preferences.catalogue())
+        )
+        recording = open_recording(
+            absolute(scene.seip.verification.recording), min(one.model.rotation_rate for one in sensors)
+        )
+        return _verified(self._folder, geometry, sensors, recording, settings)
+
+    def conclude(self, scene: bpy.types.Scene, result: _Verified) -> None:
+        """Write the files, keep what was found, and report it."""
+        check_folder(self._folder)
+        for name, content in result.files.items():
+            with whole_file(self._folder / name) as temporary:
+                temporary.write_bytes(content)
+        scene.seip.verification.found = "\n".join(result.sentences)
+        session.verifications[scene.session_uid] = LastVerification(result.found, self._watch)
+        for one in result.found.sensors:
+            for sentence in one.background.warnings(one.registration.sensor.label):
+                self.report({"WARNING"}, sentence)
+        self.report({"INFO"}, f"verified; written to {self._folder}")
+
+
+def _verified(
+    folder: Path,
+    geometry: SceneGeometry,
+    sensors: tuple[MountedSensor, ...],
+    recording: Recording,
+    settings: SurveySettings,
+) -> Generator[Progress, None, _Verified]:
+    with folder_of_result(folder), TemporaryDirectory(prefix="seip-") as raw:
+        found = yield from verify(
+            geometry, sensors, recording, settings.visibility, spacing=settings.grid_spacing, engine=settings.engine
+        )
+        drawn = Path(raw)
+        changes, returns = VERIFICATION_PICTURES
+        yield Progress(0, 0, "drawing what differs")
+        save_changes_picture(drawn / changes, geometry, sensors, found)
+        yield Progress(0, 0, "drawing the returns")
+        save_returns_chart(drawn / returns, found)
+        save_changes(drawn / CHANGES_FILE, found)
+        save_units(drawn / UNITS_FILE, recording.name, found.sensors)
+        made = {"versions": versions(blender=bpy.app.version_string)}
+        save_json(drawn / VERIFICATION_FILE, verification_record(geometry.name, recording.name, found) | made)
+        sentences = summary(record_of(geometry.name, recording.name, found))
+        return _Verified(found, sentences, {path.name: path.read_bytes() for path in sorted(drawn.iterdir())})
+
+
+class SEIP_OT_correct_scene(bpy.types.Operator):
+    """Add the objects that were found as boxes, remove those that are gone, and move the sensors to where they are installed"""  # noqa: E501  # a tooltip is one line
+
+    bl_idname = "seip.correct_scene"
+    bl_label = "Add to Scene"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether the scene is as it was when it was verified."""
+        sentence = why_no_correction(context.scene)
+        if sentence:
+            cls.poll_message_set(sentence)
+        return not sentence
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Correct the scene."""
+        return attempt(self, lambda: self._correct(context.scene))
+
+    def _correct(self, scene: bpy.types.Scene) -> None:
+        last = session.verifications[scene.session_uid]
+        live_coverage.stop()
+        problems = correct_scene(scene, last.found)
+        last.watch.look(scene)  # so that nothing is added twice
+        for sentence in problems:
+            self.report({"WARNING"}, sentence)
+        self.report({"INFO"}, "the scene is as recorded; its placement is stale")
+
+
+class SEIP_OT_show_changes(bpy.types.Operator):
+    """Show the recording and what differs from the scene in the window in which Blender shows renderings"""
+
+    bl_idname = "seip.show_changes"
+    bl_label = "Show Picture"
+    bl_options = {"INTERNAL"}  # the panel offers it where there is a verification
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether there is a verification."""
+        return bool(sentences_of(context.scene))
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Open it."""
+        return attempt(self, lambda: show_picture(context, _folder_of(context.scene) / CHANGES))
+
+
+CLASSES = (SEIP_OT_verify, SEIP_OT_correct_scene, SEIP_OT_show_changes)

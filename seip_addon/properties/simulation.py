@@ -1,0 +1,80 @@
+"""Properties of the simulation of traffic: its demand, its map, and where its runs are written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+from bpy.props import IntProperty, StringProperty
+
+from ..core.workflows.traffic_simulation import DEFAULT_RUNS, SimulationSettings
+from ..core.world.openstreetmap.site import is_extract
+from ..core.world.traffic_simulation.demand import Demand
+from ..scene import contract
+from .conversion import absolute, as_typed, of_setting
+from .traffic import EXAMPLE, EXAMPLES
+
+EXAMPLE_MAP = EXAMPLES / "junction.xodr"
+_MOST_SECONDS = 3600.0
+
+
+class SEIP_PG_simulation(bpy.types.PropertyGroup):
+    """Settings of the simulation of traffic, and what was simulated last."""
+
+    map: StringProperty(
+        name="Map",
+        description="OpenDRIVE map of the site (.xodr), on which SUMO simulates traffic: a file, or a text in this "
+        f"file such as the streets of an extract; {EXAMPLE} for that of the example. Empty for the map beside the file",
+        subtype="FILE_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    flow: of_setting(Demand, "flow", "Vehicles/h", min=1.0, soft_max=1200.0, step=5000, precision=0)
+    pedestrians: of_setting(Demand, "pedestrians", "Pedestrians/h", soft_max=1200.0, step=5000, precision=0)
+    duration: of_setting(
+        SimulationSettings, "duration", "Duration (s)", min=1.0, max=_MOST_SECONDS, step=1000, precision=0
+    )
+    count: IntProperty(
+        name="Runs",
+        description="Number of runs, each with a seed of its own. An interval of the average precision needs four, a "
+        "placement in traffic two; more give closer figures",
+        default=DEFAULT_RUNS,
+        min=1,
+        soft_max=16,
+        max=1000,
+    )
+    folder: StringProperty(
+        name="Folder",
+        description="Where the runs are written; // is the folder of the .blend. It is a folder for them alone",
+        subtype="DIR_PATH",
+        default="//seip-traffic/",
+        options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    facts: StringProperty(name="Simulated", description="What was simulated last")
+    made_with: StringProperty(name="Made With", description="The settings of what was simulated last")
+
+    def street_map(self) -> Path | bpy.types.Text | None:
+        """Return the map that traffic is simulated on: a file, which may not exist, a text, or None."""
+        if self.map == EXAMPLE:
+            return EXAMPLE_MAP
+        if self.map:
+            return bpy.data.texts.get(self.map) or absolute(self.map)
+        name, file = str(self.id_data.get(contract.MAP, "")), Path(bpy.data.filepath)
+        if not name or not bpy.data.filepath:
+            return None
+        # `seip build-scene` writes the map of an extract's streets beside the scene, under the name of the scene
+        path = file.with_suffix(".xodr") if is_extract(Path(name)) else file.with_name(name)
+        return path if path.is_file() else None
+
+    def settings(self) -> SimulationSettings:
+        """Return the settings of the runs as the core takes them."""
+        demand = Demand(flow=as_typed(self.flow), pedestrians=as_typed(self.pedestrians))
+        return SimulationSettings(demand, duration=as_typed(self.duration))
+
+    def key(self) -> str:
+        """Return all that the runs follow from, as one text."""
+        return "|".join(
+            (self.map, *(f"{value:g}" for value in (self.flow, self.pedestrians, self.duration, self.count)))
+        )
+
+
+CLASSES = (SEIP_PG_simulation,)

@@ -1,0 +1,110 @@
+"""Legend, labels and the status of a section in the room that they have."""
+
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+import pytest
+
+from seip_addon.overlay import Block, Entry
+from seip_addon.panels import sections
+from seip_addon.viewport.free_frame import navigation_boxes
+from seip_addon.viewport.labels import label_boxes
+from seip_addon.viewport.legend import LEAST_SCALE, MARGIN, placed_legend
+
+FRAME = (120.0, 0.0, 460.0, 520.0)
+BLACK = (0.0, 0.0, 0.0, 1.0)
+
+
+@pytest.fixture
+def blocks(add_on):
+    words = ("seen by two or more  71.2%", "seen by one sensor  20.4%", "not seen  8.4%")
+    return [Block("Coverage of the road by sensors", tuple(Entry(one, (BLACK,)) for one in words))]
+
+
+def test_a_legend_with_room_has_the_scale_of_the_interface(blocks):
+    (left, bottom, right, top), scale = placed_legend(blocks, (0.0, 0.0, 2000.0, 1000.0), 1.5)
+    assert scale == 1.5
+    assert (right, bottom) == (2000.0 - MARGIN * 1.5, MARGIN * 1.5)
+    assert left < right
+    assert bottom < top
+
+
+def test_a_legend_without_room_shrinks_until_it_fits(blocks):
+    (left, bottom, right, top), scale = placed_legend(blocks, FRAME, 2.0)
+    assert LEAST_SCALE < scale < 2.0
+    assert FRAME[0] <= left < right < FRAME[2]
+    assert FRAME[1] < bottom < top < FRAME[3]
+
+
+def test_a_legend_in_a_low_viewport_fits_as_well(blocks):
+    (_, _, _, top), scale = placed_legend(blocks, (0.0, 0.0, 2000.0, 120.0), 2.0)
+    assert scale < 2.0
+    assert top < 120.0
+
+
+def boxes_apart(one, other):
+    return one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
+
+
+@pytest.mark.parametrize("size", [(2000.0, 1400.0), (2000.0, 520.0), (900.0, 520.0), (2000.0, 300.0), (460.0, 300.0)])
+def test_a_legend_keeps_off_the_gizmos_of_navigation(blocks, size):
+    frame = (0.0, 0.0, *size)
+    gizmos = [(size[0] - 208.0, size[1] - 208.0, *size), (size[0] - 92.0, size[1] - 468.0, *size)]
+    box, scale = placed_legend(blocks, frame, 2.0, gizmos)
+    assert all(boxes_apart(box, gizmo) for gizmo in gizmos)
+    assert scale >= LEAST_SCALE
+    assert box[0] >= 0.0
+    free, without = placed_legend(blocks, frame, 2.0)
+    if size[0] == 2000.0 and size[1] > 300.0:
+        assert scale == without == 2.0
+    if size[1] == 1400.0:
+        assert box == free
+
+
+def test_gizmos_that_are_switched_off_take_no_room(add_on):
+    space = SimpleNamespace(show_gizmo=True, show_gizmo_navigate=True)
+    (ball, buttons) = navigation_boxes(space, FRAME, 2.0)
+    assert ball[2:] == buttons[2:] == FRAME[2:]
+    assert ball[0] < buttons[0]
+    assert buttons[1] < ball[1]
+    assert navigation_boxes(SimpleNamespace(show_gizmo=True, show_gizmo_navigate=False), FRAME, 2.0) == []
+    assert navigation_boxes(SimpleNamespace(show_gizmo=False, show_gizmo_navigate=True), FRAME, 2.0) == []
+
+
+def test_a_legend_stays_readable(blocks):
+    assert placed_legend(blocks, (0.0, 0.0, 60.0, 60.0), 2.0)[1] == pytest.approx(LEAST_SCALE)
+
+
+def test_labels_are_in_the_frame_off_the_legend_and_off_each_other(add_on):
+    generator = np.random.default_rng(4)
+    anchors = generator.uniform((120.0, 0.0), (460.0, 400.0), (12, 2))
+    widths = generator.uniform(80.0, 140.0, 12)
+    legend = (250.0, 20.0, 440.0, 200.0)
+    boxes = label_boxes(anchors, widths, FRAME, [legend], 1.0)
+    assert np.all((boxes[:, 0] >= FRAME[0]) & (boxes[:, 2] <= FRAME[2]))
+    assert np.all(boxes[:, 1] > anchors[:, 1])
+    every = [*boxes.tolist(), list(legend)]
+    for number, one in enumerate(every):
+        for other in every[:number]:
+            beside = one[2] <= other[0] or other[2] <= one[0]
+            assert beside or one[3] <= other[1] or other[3] <= one[1]
+
+
+def test_a_label_of_what_is_outside_the_frame_stays_with_it(add_on):
+    boxes = label_boxes(np.array([(600.0, 100.0)]), np.array([80.0]), FRAME, [], 1.0)
+    assert boxes[0, [0, 2]].tolist() == [560.0, 640.0]
+
+
+def test_no_labels_give_no_boxes(add_on):
+    assert label_boxes(np.empty((0, 2)), np.empty(0), FRAME, [], 1.0).shape == (0, 4)
+
+
+@pytest.mark.parametrize(
+    ("width", "expected"), [(600, "111 returns · $32k · proven"), (283, "111 returns · $32k"), (60, "111 returns")]
+)
+def test_a_status_without_room_loses_its_last_parts(add_on, width, expected, monkeypatch):
+    scale = bpy.context.preferences.system.ui_scale or 1.0
+    context = SimpleNamespace(region=SimpleNamespace(width=width * scale), preferences=bpy.context.preferences)
+    monkeypatch.setattr(sections, "bpy", SimpleNamespace(context=context))
+    assert sections.fitting("111 returns · $32k · proven", sections.text_width("Placement")) == expected

@@ -1,0 +1,256 @@
+"""Verification from the panel: what it finds in a simulated recording, writes, and adds to the scene."""
+
+import json
+import re
+import shutil
+import time
+from concurrent.futures import CancelledError
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+
+from seip_addon.background import Background
+from seip_addon.core.output.results.verification_record import load_verification
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.site.scene_geometry import Mesh
+from seip_addon.operators import verification as operators
+from seip_addon.operators.verification import SEIP_OT_verify
+from seip_addon.panels import verification as panel
+from seip_addon.scene import contract
+from seip_addon.scene.read import read_scene
+from seip_addon.scene.sensors import read_sensors
+from seip_addon.session import session
+from tests.builders.drawn_layout import DrawnLayout
+from tests.builders.site_recording import changed, save_site_recording
+from tests.builders.small_junction import box_triangles
+from tests.builders.small_scene import make_run
+
+SHIFT = np.array([0.3, -0.2, 0.15])
+KIOSK = Mesh("kiosk", box_triangles((9.0, -13.0, 0.0), (11.0, -11.5, 3.0)))
+GONE = "hoarding"
+HOARDING = Mesh(GONE, box_triangles((16.0, 11.0, 0.0), (22.0, 11.3, 3.0)))
+
+
+def put_hoarding(scene):
+    mesh = bpy.data.meshes.new(GONE)
+    corners = HOARDING.triangles.reshape(-1, 3)
+    mesh.from_pydata(corners.tolist(), [], np.arange(len(corners)).reshape(-1, 3).tolist())
+    contract.find(scene, contract.OCCLUDERS).objects.link(bpy.data.objects.new(GONE, mesh))
+
+
+def put_sensors(scene):
+    sensors = contract.find_or_make(scene, contract.SENSORS)
+    for label, at in (("S1", (9.5, 9.5, 6.0)), ("S2", (-9.5, -9.5, 6.0))):
+        empty = bpy.data.objects.new(label, None)
+        empty["seip_sensor"], empty["seip_label"], empty.location = "os0_128", label, at
+        sensors.objects.link(empty)
+    bpy.context.view_layer.update()
+    return read_sensors(scene, load_catalogue())
+
+
+@pytest.fixture(scope="module")
+def recording(small_scene, tmp_path_factory):
+    """Sweeps of two sensors off their plan, at the junction with a kiosk more and a building less."""
+    bpy.ops.wm.open_mainfile(filepath=str(small_scene))
+    put_hoarding(bpy.context.scene)
+    geometry = read_scene(bpy.context.scene).geometry
+    planned = put_sensors(bpy.context.scene)
+    true = [replace(one, xyz=one.xyz + SHIFT) for one in planned]
+    traffic = make_run(7, 30.0).moved_to(geometry.origin)
+    folder = tmp_path_factory.mktemp("recorded") / "july"
+    return save_site_recording(folder, changed(geometry, GONE, [KIOSK]), true, traffic)
+
+
+@pytest.fixture
+def placed(junction, recording, tmp_path):
+    put_hoarding(junction)
+    put_sensors(junction)
+    junction.seip.result.folder = str(tmp_path / "out")
+    junction.seip.verification.recording = str(recording)
+    return junction
+
+
+@pytest.fixture
+def verified(placed):
+    assert bpy.ops.seip.verify() == {"FINISHED"}
+    return placed
+
+
+def drawn():
+    layout = DrawnLayout()
+    panel.draw(layout, bpy.context)
+    return layout
+
+
+def names(scene):
+    return {mesh.name for mesh in read_scene(scene).geometry.occluders}
+
+
+def test_the_panel_tells_poses_changes_and_coverage(verified, tmp_path):
+    folder = tmp_path / "out" / "verification"
+    written = {"changes.csv", "changes.png", "returns.png", "units.toml", "verification.json"}
+    assert {path.name for path in folder.iterdir()} == written
+    record = load_verification(folder / "verification.json")
+    for pose in record.sensors:
+        off = np.abs(np.array(pose.shift_m) - SHIFT)
+        assert (off < np.array(pose.shift_half_width_m) + 0.01).all()
+    kinds = {(change.kind, change.name) for change in record.changes if change.kind != "vehicle"}
+    assert kinds == {("new", "Found 1"), ("gone", GONE)}
+    text = drawn().text
+    off = np.linalg.norm(SHIFT)
+    assert re.search(rf"S1 by {off:.2f} m and 0\.\d°, S2 by {off:.2f} m", text)
+    assert f"1 object is not in the scene (Found 1); 1 object is no longer there ({GONE})." in text
+    assert f"{record.coverage.promised:.1%} were promised" in text
+    assert [name for name, _ in drawn().operators] == ["seip.verify", "seip.correct_scene", "seip.show_changes"]
+
+
+def test_the_scene_is_corrected_once_and_verified_again_without_changes(verified):
+    before = names(verified)
+    assert bpy.ops.seip.correct_scene() == {"FINISHED"}
+    assert names(verified) == before - {GONE} | {"Found 1"}
+    assert not bpy.ops.seip.correct_scene.poll()
+    assert operators.CHANGED in drawn().text
+    at = [one.xyz for one in read_sensors(verified, load_catalogue())]
+    assert np.allclose(at, [np.array((9.5, 9.5, 6.0)) + SHIFT, np.array((-9.5, -9.5, 6.0)) + SHIFT], atol=0.02)
+    assert bpy.ops.seip.verify() == {"FINISHED"}
+    assert "Nothing has changed that the sensors see." in drawn().text
+    assert bpy.ops.seip.correct_scene() == {"FINISHED"}
+    assert names(verified) == before - {GONE} | {"Found 1"}
+
+
+def test_the_correction_is_undone_in_one_step(verified):
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.ed.undo_push(message="verified")
+    before = names(verified)
+    bpy.ops.seip.correct_scene("EXEC_DEFAULT", True)  # with undo
+    assert names(bpy.context.scene) != before
+    bpy.ops.ed.undo()
+    assert names(bpy.context.scene) == before
+    assert [tuple(obj.location) for obj in bpy.data.collections["SEIP Sensors"].objects] == [
+        (9.5, 9.5, 6.0),
+        (-9.5, -9.5, 6.0),
+    ]
+
+
+def test_a_moved_object_makes_the_verification_old(verified):
+    assert operators.CHANGED not in drawn().text
+    bpy.data.objects["building 0"].location.x += 1.0
+    bpy.context.view_layer.update()
+    assert operators.CHANGED in drawn().text
+    with pytest.raises(RuntimeError, match="The scene has changed since"):
+        bpy.ops.seip.correct_scene()
+
+
+@pytest.mark.parametrize("reports", [1, 25, 45])
+def test_stopped_work_leaves_nothing(placed, tmp_path, reports):
+    operator = SEIP_OT_verify
+    steps = operator.prepare(_Stub(), placed)
+    for _ in range(reports):
+        next(steps)
+    steps.close()
+    assert not (tmp_path / "out").exists()
+    assert placed.session_uid not in session.verifications
+
+
+def test_work_in_a_thread_is_stopped_within_seconds(placed, tmp_path):
+    work = Background(SEIP_OT_verify.prepare(_Stub(), placed))
+    time.sleep(0.3)
+    work.stop()
+    assert work.join(20.0)
+    with pytest.raises(CancelledError):
+        work.result()
+    assert not (tmp_path / "out").exists()
+
+
+class _Stub:
+    """Stands in for an operator that Blender would make."""
+
+
+def no_sensors(scene, folder):
+    bpy.data.batch_remove(bpy.data.collections["SEIP Sensors"].objects)
+
+
+def no_recording(scene, folder):
+    scene.seip.verification.recording = ""
+
+
+def no_such_recording(scene, folder):
+    scene.seip.verification.recording = str(folder / "nowhere")
+
+
+def not_saved(scene, folder):
+    scene.seip.result.folder = ""
+
+
+def other_names(scene, folder):
+    shutil.copytree(scene.seip.verification.recording, folder / "other")
+    (folder / "other" / "S2").rename(folder / "other" / "north")
+    scene.seip.verification.recording = str(folder / "other")
+
+
+def another_site(scene, folder):
+    for obj in bpy.data.collections["SEIP Occluders"].objects:
+        obj.location.z = -100.0
+    for obj in bpy.data.collections["SEIP Sensors"].objects:
+        obj.location.z = 9.0
+    bpy.context.view_layer.update()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (no_sensors, "There is no sensor to verify: place sensors first"),
+        (no_recording, "Name a recording of the installed sensors"),
+        (no_such_recording, "no such file or folder: .*nowhere"),
+        (not_saved, "Name a folder to write the result to"),
+        (other_names, "the plan has the sensors S1, S2, but the recording has north"),
+        (another_site, "this is the recording of another site or sensor"),
+    ],
+)
+def test_each_mistake_has_its_sentence(placed, tmp_path, wrong, words):
+    wrong(placed, tmp_path)
+    with pytest.raises(RuntimeError, match=words):
+        bpy.ops.seip.verify()
+    assert not (tmp_path / "out").exists()
+    assert placed.session_uid not in session.verifications
+
+
+def test_an_empty_field_needs_no_sentence_and_there_are_no_buttons(placed):
+    placed.seip.verification.recording = ""
+    layout = drawn()
+    assert not layout.labels
+    assert [name for name, _ in layout.operators] == ["seip.verify"]
+
+
+def test_a_picture_that_is_gone_is_named(verified, tmp_path):
+    (tmp_path / "out" / "verification" / "changes.png").unlink()
+    with pytest.raises(RuntimeError, match=r"changes\.png is no longer there"):
+        bpy.ops.seip.show_changes()
+
+
+def test_another_file_knows_nothing_of_it(verified, small_scene):
+    bpy.ops.wm.open_mainfile(filepath=str(small_scene))
+    assert not session.verifications
+    assert not bpy.ops.seip.correct_scene.poll()
+
+
+def test_a_saved_file_keeps_what_was_found(verified, tmp_path):
+    found = operators.sentences_of(verified)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
+    assert operators.sentences_of(bpy.context.scene) == found
+    assert len(found) == 3
+    text = drawn().text
+    assert all(sentence in text for sentence in (*found, operators.NOT_VERIFIED))
+    assert bpy.ops.seip.show_changes.poll()
+    assert not bpy.ops.seip.correct_scene.poll()
+
+
+def test_the_units_are_in_a_catalogue(verified, tmp_path):
+    models = load_catalogue((tmp_path / "out" / "verification" / "units.toml",))
+    assert {"os0_128_s1", "os0_128_s2"} < set(models)
+    record = json.loads((tmp_path / "out" / "verification" / "verification.json").read_text(encoding="utf-8"))
+    assert record["recording"] == "july"
+    assert 0.8 < record["sensors"][0]["gain"]["value"] < 1.2

@@ -1,0 +1,116 @@
+"""Files of real sensors, written by hand: sweeps, poses and labels."""
+
+import json
+import struct
+
+import numpy as np
+
+PCD_TYPES = {"f": "F", "i": "I", "u": "U"}
+
+
+def make_points(seed=0, count=200):
+    """Columns x, y, z, intensity and ring of a sweep, of which x, y, z are float32."""
+    random = np.random.default_rng(seed)
+    xyz = random.uniform(-80, 80, (3, count)).astype("<f4")
+    intensity = random.integers(0, 256, count).astype("<f4")
+    return dict(zip(("x", "y", "z"), xyz, strict=True)) | {
+        "intensity": intensity,
+        "ring": np.sort(random.integers(0, 64, count)).astype("<u2"),
+    }
+
+
+def pcd_text(columns, data="binary", viewpoint="0 0 0 1 0 0 0", **changes):
+    """Return a PCD file of columns (n,) or (n, several), by PCL's description of the format."""
+    import lzf  # noqa: PLC0415  # a test's own library
+
+    count = len(next(iter(columns.values())))
+    parts = [np.asarray(column).reshape(count, *(column.shape[1:] or (1,))) for column in columns.values()]
+    head = {
+        "VERSION": "0.7",
+        "FIELDS": " ".join(columns),
+        "SIZE": " ".join(str(part.itemsize) for part in parts),
+        "TYPE": " ".join(PCD_TYPES[part.dtype.kind] for part in parts),
+        "COUNT": " ".join(str(part.shape[1]) for part in parts),
+        "WIDTH": count,
+        "HEIGHT": 1,
+        "VIEWPOINT": viewpoint,
+        "POINTS": count,
+        "DATA": data,
+    } | changes
+    if data == "ascii":
+        body = "".join(
+            " ".join(repr(value.item()) for part in parts for value in part[row]) + "\n" for row in range(count)
+        ).encode()
+    elif data == "binary":
+        body = b"".join(part[row].tobytes() for row in range(count) for part in parts)
+    else:
+        whole = b"".join(part.tobytes() for part in parts)
+        packed = lzf.compress(whole, 2 * len(whole) + 100) if whole else b""
+        body = struct.pack("<II", len(packed), len(whole)) + packed
+    return (
+        "# .PCD v0.7\n" + "".join(f"{key} {value}\n" for key, value in head.items() if value is not None)
+    ).encode() + body
+
+
+def csv_text(columns):
+    """Return a table with a header."""
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return ",".join(columns) + "\n" + "".join(",".join(map(repr, row)) + "\n" for row in rows)
+
+
+def write_sweep_file(path, columns):
+    """Write x, y, z, intensity and ring in the format of a path's suffix, as far as it holds them."""
+    table = np.column_stack([column.astype("<f4") for column in columns.values()])
+    name = path.name
+    if name.endswith(".pcd.bin"):
+        path.write_bytes(table.tobytes())
+    elif name.endswith(".bin"):
+        path.write_bytes(np.ascontiguousarray(table[:, :4]).tobytes())
+    elif name.endswith(".pcd"):
+        path.write_bytes(pcd_text(columns))
+    elif name.endswith(".csv"):
+        path.write_text(csv_text(columns))
+    elif name.endswith(".npz"):
+        np.savez_compressed(path, **columns)
+    else:
+        _write_las(path, columns)
+    return path
+
+
+def _write_las(path, columns):
+    import laspy  # noqa: PLC0415  # an optional extra
+
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.scales = np.full(3, 0.0001)
+    header.add_extra_dim(laspy.ExtraBytesParams("ring", np.uint16))
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = columns["x"], columns["y"], columns["z"]
+    cloud.intensity, cloud.ring = columns["intensity"].astype(np.uint16), columns["ring"]
+    cloud.write(path)
+
+
+def openlabel_text(boxes, kinds, frames=1):
+    """Return labels as TUMTraf has them; ``boxes`` are x, y, z, length, width, height, yaw."""
+    objects = {}
+    for number, ((x, y, z, length, width, height, yaw), kind) in enumerate(zip(boxes, kinds, strict=True)):
+        turn = [0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)]
+        cuboid = {"name": "shape3D", "val": [x, y, z, *turn, length, width, height], "attributes": {}}
+        objects[f"id-{number}"] = {"object_data": {"name": f"{kind}_{number}", "type": kind, "cuboid": cuboid}}
+    content = {"metadata": {"schema_version": "1.0.0"}, "coordinate_systems": {"s110_lidar_ouster_south": {}}}
+    content["frames"] = {str(frame): {"objects": objects, "frame_properties": {}} for frame in range(frames)}
+    return json.dumps({"openlabel": content})
+
+
+def dair_text(boxes, kinds):
+    """Return labels as DAIR-V2X has them, whose numbers are texts."""
+    return json.dumps(
+        [
+            {
+                "type": kind,
+                "3d_dimensions": {"h": repr(height), "w": repr(width), "l": repr(length)},
+                "3d_location": {"x": repr(x), "y": repr(y), "z": repr(z)},
+                "rotation": repr(yaw),
+            }
+            for (x, y, z, length, width, height, yaw), kind in zip(boxes, kinds, strict=True)
+        ]
+    )

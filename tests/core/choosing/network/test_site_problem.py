@@ -1,0 +1,89 @@
+"""Placement problem of a site: values, budgets, installed sensors and file."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seip_addon.core.choosing.network.site_problem import SiteProblem, check_problem
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from tests.builders.random_site import random_problem
+
+
+def best_by_enumeration(problem, budget, installed=()):
+    """Return the largest value over all placements within a budget that contain the installed poses."""
+    best = problem.value(installed)
+    for number in range(1, problem.most_sensors - len(installed) + 1):
+        for more in itertools.combinations(range(len(problem.prices)), number):
+            chosen = (*installed, *more)
+            if len(set(problem.positions[list(chosen)].tolist())) == len(chosen) and math.fsum(
+                problem.prices[list(more)]
+            ) <= budget * (1 + 1e-9):
+                best = max(best, problem.value(chosen))
+    return best
+
+
+@pytest.mark.parametrize("criterion", ["road", "returns"])
+@pytest.mark.parametrize("seed", range(12))
+def test_solved_budget_is_the_best_of_all_placements(criterion, seed):
+    problem = random_problem(seed, criterion)
+    for budget in (20_000.0, 34_000.0, 60_000.0):
+        found = finish(problem.solve(budget, 10.0))
+        assert found.value == pytest.approx(best_by_enumeration(problem, budget), rel=1e-6)
+        assert found.bound == pytest.approx(found.value)
+        assert found.price <= budget
+        assert found.value == pytest.approx(problem.value(found.chosen))
+
+
+@pytest.mark.parametrize("criterion", ["road", "returns"])
+@pytest.mark.parametrize("seed", range(8))
+def test_installed_sensors_remain_and_cost_nothing(criterion, seed):
+    problem = random_problem(100 + seed, criterion)
+    installed = (seed % 9,)
+    known = problem.frontier(60_000.0, installed)
+    assert known.floor.value == pytest.approx(problem.value(installed))
+    assert known.floor.price == 0.0
+    found = finish(problem.solve(20_000.0, 10.0, installed))
+    assert set(installed) <= set(found.chosen)
+    assert found.value == pytest.approx(best_by_enumeration(problem, 20_000.0, installed), rel=1e-6)
+    assert found.price == pytest.approx(sum(problem.prices[pose] for pose in found.chosen if pose not in installed))
+    assert known.ceiling >= found.value
+
+
+def test_cheapest_reaches_the_coverage_at_the_least_price():
+    problem = random_problem(4, "road")
+    found, least = finish(problem.cheapest(0.5, 10.0))
+    prices = [
+        problem.prices[list(chosen)].sum()
+        for number in range(1, 4)
+        for chosen in itertools.combinations(range(9), number)
+        if len(set(problem.positions[list(chosen)].tolist())) == number and problem.coverage(chosen) >= 0.5
+    ]
+    assert found.price == least == min(prices)
+    assert problem.coverage(found.chosen) >= 0.5
+
+
+def test_file_keeps_everything(tmp_path):
+    problem = random_problem(1, "returns")
+    problem.save(tmp_path / "problem.npz", {"key": "a key"})
+    again, header = SiteProblem.load(tmp_path / "problem.npz")
+    assert header["key"] == "a key"
+    for name, value in vars(problem).items():
+        np.testing.assert_array_equal(getattr(again, name), value)
+
+
+def test_damaged_file_is_refused(tmp_path):
+    path = tmp_path / "problem.npz"
+    random_problem(1, "road").save(path, {"key": "a key"})
+    path.write_bytes(path.read_bytes()[:-200])
+    with pytest.raises(SeipError, match="damaged"):
+        SiteProblem.load(path)
+
+
+def test_site_where_nothing_is_seen_is_refused():
+    problem = random_problem(1, "road")
+    with pytest.raises(SeipError, match="no candidate sees anything"):
+        check_problem(replace(problem, visible=np.zeros_like(problem.visible)))

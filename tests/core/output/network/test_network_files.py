@@ -1,0 +1,257 @@
+"""Files of a network: same bytes, names that stay text, and figures that agree between the files."""
+
+import csv
+import json
+import math
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+import shapely
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.output.network.network_page import network_page
+from seip_addon.core.output.network.network_pictures import draw_curve
+from seip_addon.core.output.network.network_record import NetworkPoint, load_network
+from seip_addon.core.output.network.network_report import make_network_report
+from seip_addon.core.output.network.network_view import MOST_CORNERS, network_view
+from seip_addon.core.output.network.ranked_sites import gain_text, level, ranked_sites
+from seip_addon.core.output.network.write import write_network
+from seip_addon.core.output.report.blocks import Facts, Table
+from tests.builders.invented_network import make_network, make_site, make_streets, network_of
+
+HOSTILE = ("<script>alert(1)</script>", "=cmd|' /C calc'!A0", "مفترق \u202eevil", "🚦 Ecke & “x” $a_b$", '" onload="x')
+VOID = {"meta", "br"}
+SHAPES = (0.5, 1.0)
+
+
+class Page(HTMLParser):
+    """Balanced tags with the text and links of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.links, self.cells, self.labels = [], [], [], [], []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.links += [value for name, value in attrs if name in {"src", "href"}]
+        self.labels += [value for name, value in attrs if name == "aria-label"]
+        assert not any(name.startswith("on") for name, _ in attrs)
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if "bdi" in self.open:
+            self.cells.append(data)
+
+
+def hostile_network():
+    draw = np.random.default_rng(3)
+    sites = [make_site(number, draw, name=name) for number, name in enumerate(HOSTILE)]
+    sites[0] = replace(sites[0], folder="javascript:alert(1)/<b>")
+    sites[1] = replace(sites[1], folder="//elsewhere.example/x")
+    failed = replace(make_site(9, draw, status="failed"), message="<i>no & road</i>")
+    return network_of((*sites, failed), name=HOSTILE[0])
+
+
+def facts(record):
+    return dict(next(block for block in make_network_report(record, b"", b"").first if isinstance(block, Facts)).rows)
+
+
+def rows_of(path):
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.parametrize("criterion", ["road", "returns"])
+def test_the_record_survives_its_file_and_the_same_record_gives_the_same_bytes(tmp_path, criterion):
+    record = make_network(criterion=criterion, budgets=(200_000.0, 900_000.0))
+    first, again = (write_network(tmp_path / name, record, make_streets()) for name in ("a", "b"))
+    assert load_network(tmp_path / "a" / "network.json") == record
+    assert len(first) == 8
+    for one, other in zip(first, again, strict=True):
+        assert one.read_bytes() == other.read_bytes(), one.name
+    assert b"(D:20260102030405Z)" in (tmp_path / "a" / "report.pdf").read_bytes()
+
+
+@pytest.mark.filterwarnings("ignore:Glyph")
+def test_names_stay_text(tmp_path):
+    record = hostile_network()
+    write_network(tmp_path, record)
+    page = Page((tmp_path / "network.html").read_text(encoding="utf-8"))
+    assert page.tags.count("script") == 1
+    assert not {"b", "i", "img", "iframe"} & set(page.tags)
+    assert set(HOSTILE) <= set(page.cells)
+    assert any(label.startswith(HOSTILE[4]) for label in page.labels)
+    report = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<script" not in report
+    assert "<i>" not in report
+    names = {row["name"] for row in rows_of(tmp_path / "sites.csv")}
+    assert f"'{HOSTILE[1]}" in names
+    assert not any(name.startswith("=") for name in names)
+    properties = [one["properties"] for one in json.loads((tmp_path / "network.geojson").read_text())["features"]]
+    assert set(HOSTILE) <= {one["name"] for one in properties if one["kind"] == "site"}
+
+
+@pytest.mark.filterwarnings("ignore:Glyph")
+def test_the_page_links_to_nothing_but_the_folders_of_its_sites():
+    page = network_page(hostile_network(), make_streets())
+    links = Page(page).links
+    assert links
+    assert all(
+        re.fullmatch(r"#(site|mark)-\d+|#sites|\./[\w./%-]+/(plan\.png|placement\.json)", link) for link in links
+    )
+    assert "./javascript%3Aalert%281%29/%3Cb%3E/plan.png" in links
+    assert ".///elsewhere.example/x/plan.png" in links
+    assert "://" not in page
+    assert "@import" not in page
+    assert "url(" not in page
+
+
+def test_the_geojson_holds_every_site_and_sensor_where_the_record_has_them(tmp_path):
+    record = make_network()
+    write_network(tmp_path, record)
+    text = (tmp_path / "network.geojson").read_text(encoding="utf-8")
+    content = json.loads(text)
+    assert content["attribution"] == list(record.attribution)
+    points = shapely.get_coordinates(shapely.from_geojson(text))
+    sites = [one for one in content["features"] if one["properties"]["kind"] == "site"]
+    sensors = [sensor for site in record.sites for sensor in site.sensors]
+    assert len(sites) == len(record.sites)
+    assert len(points) == len(sites) + len(sensors)
+    places = {one["properties"]["folder"]: one["geometry"]["coordinates"] for one in sites}
+    for site in record.sites:
+        assert places[site.folder] == pytest.approx((site.longitude, site.latitude), abs=1e-8)
+    expected = sorted((sensor.longitude, sensor.latitude) for sensor in sensors)
+    assert np.array(sorted(points[len(sites) :].tolist())) == pytest.approx(np.array(expected), abs=1e-8)
+
+
+def test_sites_are_ranked_by_gain_per_dollar_with_their_weight():
+    draw = np.random.default_rng(0)
+    twins = [replace(make_site(number, draw), price_usd=20_000.0, value=0.5, weight=1.0) for number in range(3)]
+    before = (NetworkPoint(0.0, 0.3, 0.3), NetworkPoint(20_000.0, 0.5, 0.5))
+    twins = [replace(twins[0], frontier=before), replace(twins[1], weight=4.0), twins[2]]
+    free = replace(make_site(3, draw), price_usd=0.0, weight=2.0)
+    failed, bare = (make_site(4 + at, draw, status=status) for at, status in enumerate(("failed", "without sensor")))
+    record = network_of((failed, free, bare, *twins))
+    ranked = ranked_sites(record)
+    assert [one.site for one in ranked] == [twins[1], twins[2], twins[0], free, bare, failed]
+    mean = (2.0 + bare.weight + 1.0 + 4.0 + 1.0) / 5
+    assert [one.gain for one in ranked[:3]] == pytest.approx([0.1 / mean, 0.025 / mean, 0.01 / mean])
+    assert [one.rank for one in ranked] == [1, 2, 3, None, None, None]
+    assert gain_text(record, 0.0251) == "2.51 points"
+    assert gain_text(replace(record, criterion="returns"), math.log(1.25)) == "25.0%"
+
+
+def test_colours_begin_at_round_coverages_and_returns():
+    site = make_site(0, np.random.default_rng(0))
+    record = network_of((site,))
+    assert [level(record, replace(site, coverage=share)) for share in (0.0, 0.199, 0.2, 0.8, 1.0)] == [0, 0, 1, 4, 4]
+    of_returns = replace(record, criterion="returns")
+    values = [math.log1p(number) for number in (0.9, 1.01, 5.01, 20.1, 101.0)]
+    assert [level(of_returns, replace(site, value=value)) for value in values] == [0, 1, 2, 3, 4]
+
+
+def test_tables_agree_for_300_sites(tmp_path):
+    record = make_network(300, budgets=(2e6, 9e6))
+    write_network(tmp_path, record, make_streets())
+    rows = rows_of(tmp_path / "sites.csv")
+    assert len(rows) == 300
+    assert math.fsum(float(row["price_usd"]) for row in rows) == pytest.approx(record.price_usd)
+    gains = [float(row["gain_per_1000_usd"]) for row in rows if row["rank"]]
+    assert gains == sorted(gains, reverse=True)
+    assert (tmp_path / "network.html").stat().st_size < 600_000
+    report = make_network_report(record, b"", b"")
+    tables = {section.title: [b for b in section.blocks if isinstance(b, Table)] for section in report.sections}
+    assert len(tables["Sites with sensors"][0].rows) == sum(row["status"] == "equipped" for row in rows)
+    assert len(tables["Sites that failed"][0].rows) == sum(row["status"] == "failed" for row in rows)
+    spent = [float(row[2].strip("$").replace(",", "")) for row in tables["Phases"][0].rows]
+    assert sum(spent) == pytest.approx(record.price_usd)
+
+
+@pytest.mark.parametrize(("status", "sites"), [("without sensor", 5), ("failed", 5), ("failed", 1), ("failed", 0)])
+def test_networks_without_sensors_are_written(tmp_path, status, sites):
+    record = make_network(sites, statuses=(status,))
+    assert all(path.stat().st_size for path in write_network(tmp_path, record))
+    assert "No site has sensors." in (tmp_path / "network.html").read_text(encoding="utf-8")
+    assert facts(record)["Sensors"] == "none"
+    assert ("Proof" in facts(record)) == (status != "failed")
+
+
+def test_sites_on_both_sides_of_the_date_line_are_near_each_other(tmp_path):
+    draw = np.random.default_rng(1)
+    east, west = (make_site(number, draw) for number in range(2))
+    east = replace(east, latitude=-16.8, longitude=179.99, sensors=())
+    west = replace(west, latitude=-16.8, longitude=-179.99, sensors=())
+    record = network_of((west, east, replace(east, name="beyond", longitude=180.01)))
+    line = (np.array([(-16.8, 179.98), (-16.8, -179.98)]), 2)
+    view = network_view(record, [line], SHAPES)
+    degree = 111_320.0 * math.cos(math.radians(16.8))
+    assert view.places[:, 0] == pytest.approx(np.array((1, -1, 1)) * 0.01 * degree, rel=2e-3)
+    assert view.width < 0.03 * degree
+    write_network(tmp_path, record)
+    places = [
+        one["geometry"]["coordinates"][0] for one in json.loads((tmp_path / "network.geojson").read_text())["features"]
+    ]
+    assert sorted(places) == [-179.99, -179.99, 179.99]
+
+
+def test_the_map_keeps_proportions_and_its_window_holds_all_sites():
+    record = make_network()
+    view = network_view(record, make_streets(), SHAPES)
+    left, bottom, right, top = view.window
+    assert ((view.places > (left, bottom)) & (view.places < (right, top))).all()
+    assert SHAPES[0] <= view.shape <= SHAPES[1]
+    north = math.radians(record.sites[1].latitude - record.sites[0].latitude) * 6.37e6
+    assert view.places[1, 1] - view.places[0, 1] == pytest.approx(north, rel=5e-3)
+    for street, _ in view.streets:
+        assert (street >= np.array((left, bottom)) - 1e-6).all()
+        assert (street <= np.array((right, top)) + 1e-6).all()
+
+
+def test_streets_of_a_city_are_thinned():
+    draw = np.random.default_rng(2)
+    places = np.cumsum(draw.normal(scale=2e-4, size=(9_000, 30, 2)), axis=1)
+    starts = np.array((52.47, 13.44)) + draw.uniform(-0.05, 0.05, (9_000, 1, 2))
+    streets = [(line, number % 3) for number, line in enumerate(places + starts)]
+    view = network_view(make_network(), streets, SHAPES)
+    assert 1_000 < sum(len(line) for line, _ in view.streets) <= MOST_CORNERS
+
+
+def test_a_bound_above_the_value_is_stated_in_the_unit_of_the_criterion():
+    record = make_network(3, statuses=("equipped",), value=0.6, bound=0.6123)
+    assert "sees more than 61.3%: this is proven" in facts(record)["Proof"]
+    returns = replace(record, criterion="returns", value=math.log(11.0), bound=math.log(12.1))
+    assert returns.gap == pytest.approx(0.1)
+    assert "gives more than 11 points: this is proven" in facts(returns)["Proof"]
+    assert "does better: this is proven" in facts(replace(record, bound=0.6))["Proof"]
+
+
+def test_the_curve_is_drawn_from_the_points_of_the_record():
+    record = make_network(budgets=(100_000.0, 300_000.0))
+    higher = tuple(replace(point, bound=point.bound + 0.2) for point in record.curve)
+    assert draw_curve(record) != draw_curve(replace(record, curve=higher))
+    assert draw_curve(record) != draw_curve(replace(record, budgets_usd=(400_000.0,)))
+    assert draw_curve(replace(record, curve=())).startswith(b"\x89PNG")
+
+
+def test_damaged_and_foreign_files_are_refused(tmp_path):
+    path = tmp_path / "network.json"
+    write_network(tmp_path, make_network(2))
+    whole = path.read_text(encoding="utf-8")
+    for damaged, says in (
+        (whole.replace("seip-network/1", "seip-network/9"), "has the schema"),
+        (whole[:-20], "is damaged"),
+        (whole.replace('"weight"', '"wait"'), "weight is missing"),
+        (re.sub(r'"latitude": [\d.]+', '"latitude": 91', whole), "latitude"),
+    ):
+        path.write_text(damaged, encoding="utf-8")
+        with pytest.raises(SeipError, match=says):
+            load_network(path)

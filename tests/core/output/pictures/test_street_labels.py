@@ -1,0 +1,105 @@
+"""Names of streets on a map that a user pans and zooms."""
+
+import math
+
+import numpy as np
+import pytest
+
+from seip_addon.core.geometry.map_view import MapView
+from seip_addon.core.output.pictures.street_labels import REPEATED, start_of, street_labels
+from seip_addon.core.world.openstreetmap.street_plan import NamePlaces
+
+FRAME = (0.0, 0.0, 1000.0, 800.0)
+HEIGHT = 12.0
+NO_DOTS = np.empty((0, 3))
+
+
+@pytest.fixture
+def places():
+    """Two hundred places along thirty streets, in all directions."""
+    generator = np.random.default_rng(5)
+    street = generator.integers(0, 30, 200)
+    return NamePlaces(
+        tuple(f"Street {number:02d}" for number in range(30)),
+        street,
+        generator.uniform(-600.0, 600.0, (200, 2)),
+        generator.uniform(-math.pi / 2, math.pi / 2, 200),
+        generator.uniform(20.0, 500.0, 200),
+        generator.integers(0, 3, 30)[street],
+    )
+
+
+@pytest.fixture
+def widths():
+    return np.random.default_rng(6).uniform(40.0, 120.0, 30)
+
+
+def corners(label, width):
+    """Corners of a label's turned box, (4, 2)."""
+    turn = np.array([(math.cos(label.angle), math.sin(label.angle)), (-math.sin(label.angle), math.cos(label.angle))])
+    box = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (width / 2, HEIGHT / 2)
+    return np.array(label.middle) + box @ turn
+
+
+def overlap(one, other):
+    """Return whether two turned boxes overlap: no side of either separates them."""
+    for box in (one, other):
+        for axis in np.diff(box[:3], axis=0):
+            a, b = one @ axis, other @ axis
+            if a.max() <= b.min() or b.max() <= a.min():
+                return False
+    return True
+
+
+@pytest.mark.parametrize("scale", [0.3, 0.8, 3.0])
+def test_labels_are_in_the_frame_and_neither_overlap_nor_cover_dots(places, widths, scale):
+    view = MapView((0.0, 0.0), scale, FRAME, 0.1)
+    generator = np.random.default_rng(7)
+    dots = np.column_stack((generator.uniform(0, 1000, 40), generator.uniform(0, 800, 40), np.full(40, 6.0)))
+    labels = street_labels(places, widths, HEIGHT, view, dots)
+    assert labels
+    numbers = [places.names.index(one.name) for one in labels]
+    boxes = [corners(one, widths[number]) for one, number in zip(labels, numbers, strict=True)]
+    assert np.all((np.array(boxes) >= 0) & (np.array(boxes) <= FRAME[2:]))
+    for number, (one, box) in enumerate(zip(labels, boxes, strict=True)):
+        for other, other_box in zip(labels[:number], boxes[:number], strict=True):
+            assert not overlap(box, other_box)
+            if one.name == other.name:
+                assert math.dist(one.middle, other.middle) >= REPEATED
+        for x, y, radius in dots.tolist():
+            square = np.array([(x, y)]) + np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * radius / 1.5
+            assert not overlap(box, square)
+
+
+def test_a_name_is_written_only_where_its_street_is_longer(places, widths):
+    view = MapView((0.0, 0.0), 0.3, FRAME, 0.1)
+    for label in street_labels(places, widths, HEIGHT, view, NO_DOTS):
+        number = places.names.index(label.name)
+        at = np.linalg.norm(view.to_pixels(places.positions) - label.middle, axis=1).argmin()
+        assert places.street[at] == number
+        assert places.lengths[at] * view.scale >= widths[number]
+
+
+def test_main_streets_are_named_first(widths):
+    places = NamePlaces(
+        ("Main", "Side"),
+        np.array([1, 0]),
+        np.array([(0.0, 0.0), (5.0, 0.0)]),
+        np.zeros(2),
+        np.array([900.0, 300.0]),
+        np.array([0, 2]),
+    )
+    view = MapView((0.0, 0.0), 1.0, FRAME, 0.1)
+    assert [one.name for one in street_labels(places, widths, HEIGHT, view, NO_DOTS)] == ["Main"]
+
+
+def test_letters_start_at_the_lower_left_corner_of_the_turned_box(places, widths):
+    view = MapView((0.0, 0.0), 0.8, FRAME, 0.1)
+    for label in street_labels(places, widths, HEIGHT, view, NO_DOTS):
+        width = widths[places.names.index(label.name)]
+        assert start_of(label, width, HEIGHT) == pytest.approx(corners(label, width)[0])
+
+
+def test_no_places_give_no_labels():
+    nothing = NamePlaces((), np.empty(0, int), np.empty((0, 2)), np.empty(0), np.empty(0), np.empty(0, int))
+    assert street_labels(nothing, np.empty(0), HEIGHT, MapView((0.0, 0.0), 1.0, FRAME, 0.1), NO_DOTS) == []

@@ -1,0 +1,93 @@
+"""The section of a report on the verification of the installation."""
+
+import json
+from html import unescape
+
+import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.output.report.blocks import Paragraph, Picture, Table
+from seip_addon.core.output.report.evidence import load_evidence
+from seip_addon.core.output.report.html import as_html
+from seip_addon.core.output.report.pdf import as_pdf
+from seip_addon.core.output.report.sections import make_report
+from tests.builders.report_folder import make_folder
+from tests.builders.verification_folder import STEPS, make_verification
+
+TITLE = "Verification of the installation"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    make_folder(tmp_path / "out")
+    return tmp_path / "out"
+
+
+def section(folder):
+    return next((one for one in make_report(load_evidence(folder)).sections if one.title == TITLE), None)
+
+
+def of_kind(folder, kind):
+    return [block for block in section(folder).blocks if isinstance(block, kind)]
+
+
+def test_a_placement_that_was_not_verified_has_no_such_section(folder):
+    assert section(folder) is None
+
+
+def test_the_section_tells_poses_changes_coverage_and_gain(folder):
+    record = make_verification(folder)
+    page = unescape(as_html(make_report(load_evidence(folder))))
+    assert as_pdf(make_report(load_evidence(folder))).startswith(b"%PDF")
+    for one in record.sensors:
+        assert f"{one.id} is 0.36 m from its planned position" in page
+        assert f"{one.id} has a gain of 0.64" in page
+    steps, changes = of_kind(folder, Table)
+    assert steps.rows == (
+        ("As promised", "62.0%", ""),
+        ("Sensors where they are", "60.0%", "−2.0"),
+        ("Objects as they are", "60.5%", "+0.5"),
+        ("Gains as they are", "51.0%", "−9.5"),
+    )
+    assert [(row[0], row[1], row[3]) for row in changes.rows] == [
+        ("Found 1: not in the plan", "3.0 × 1.5 × 4.0", "costs 1.2 points"),
+        ("Kiosk <b>: no longer there", "4.0 × 4.0 × 3.0", "adds 0.4 points"),
+        ("Found 3: not in the plan", "1.0 × 1.0 × 2.0", "no effect"),
+    ]
+    assert all("° N, " in row[2] for row in changes.rows)  # the map's projection is known
+    assert len(of_kind(folder, Picture)) == 2
+    assert "1 standing vehicle is not counted as changes." in page
+    assert "Kiosk <b>" not in as_html(make_report(load_evidence(folder)))
+
+
+def test_sensors_without_a_recording_are_named(folder):
+    make_verification(folder, without=1)
+    missing = load_evidence(folder).sensors[-1].id
+    assert any(f"does not contain {missing}" in block.text for block in of_kind(folder, Paragraph))
+
+
+def test_other_settings_are_stated(folder):
+    make_verification(folder)
+    planned = load_evidence(folder).record.coverage.whole
+    assert abs(planned - STEPS.promised) > 0.0005
+    assert any("Settings other than those of the placement" in block.text for block in of_kind(folder, Paragraph))
+
+
+def test_pictures_may_be_missing_but_not_damaged(folder):
+    make_verification(folder)
+    (folder / "verification" / "returns.png").unlink()
+    assert len(of_kind(folder, Picture)) == 1
+    (folder / "verification" / "changes.png").write_bytes(b"none")
+    with pytest.raises(SeipError, match=r"changes\.png is damaged .* verify the installation again"):
+        load_evidence(folder)
+
+
+@pytest.mark.parametrize("changed", [{"id": "S99"}, {"sensor": "os0_128"}, {"local_m": [0.0, 0.0, 9.0]}])
+def test_the_verification_of_another_placement_is_refused(folder, changed):
+    make_verification(folder)
+    path = folder / "verification" / "verification.json"
+    content = json.loads(path.read_text(encoding="utf-8"))
+    content["sensors"][0] |= changed
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(SeipError, match="of another placement"):
+        load_evidence(folder)

@@ -1,0 +1,151 @@
+"""Poses of sensors in all formats, and files that hold none."""
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.output.datasets.kitti import CALIBRATION
+from seip_addon.core.sensing.recordings.poses import read_poses
+from tests.builders.scan_frames import rotation
+
+
+def make_pose(seed=0):
+    random = np.random.default_rng(seed)
+    pose = np.eye(4)
+    pose[:3, :3] = rotation(*random.uniform(-1.5, 1.5, 3))
+    pose[:3, 3] = random.uniform(-100, 100, 3)
+    return pose
+
+
+def read(folder, name, text):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return read_poses(path)
+
+
+def refused(words, folder, text, name="p.json"):
+    with pytest.raises(SeipError, match=words) as caught:
+        read(folder, name, text)
+    assert name in str(caught.value)
+
+
+def same(found, expected):
+    assert found.keys() == expected.keys()
+    for name, pose in found.items():
+        assert pose.dtype == np.float64
+        np.testing.assert_allclose(pose, expected[name], rtol=0.0, atol=1e-9)
+
+
+POSES = {"S1": make_pose(1), "s110_lidar.south": make_pose(2), "Pole 3": make_pose(3)}
+LISTS = {name: pose.tolist() for name, pose in POSES.items()}
+
+
+@pytest.mark.parametrize("flow", [False, None])
+@pytest.mark.parametrize("flat", [True, False])
+def test_yaml_as_pyyaml_writes_it(flow, flat, tmp_path):
+    lists = {name: np.ravel(pose).tolist() if flat else pose for name, pose in LISTS.items()}
+    text = "# measured in May\n---\n" + yaml.safe_dump(lists, default_flow_style=flow)
+    same(read(tmp_path, "p.yaml", text.replace("\nS1:\n", "\nS1:  # south\n")), POSES)
+
+
+@given(st.floats(-1e6, 1e6), st.sampled_from([repr, "{:e}".format, "{:+.3f}".format, "{:.0f}.".format]))
+def test_numbers_of_yaml(tmp_path_factory, x, form):
+    text = f"S1:\n- [1, 0.0, 0, {form(x)}]\n- [0, +1.0, -0., 0]\n- - 0\n  - 0\n  - 1\n  - -2\n- [0, 0, 0, 1]\n"
+    pose = read(tmp_path_factory.mktemp("yaml"), "p.yml", text)["S1"]
+    assert pose[:, 3].tolist() == [float(form(x)), 0.0, -2.0, 1.0]
+
+
+def test_json(tmp_path):
+    same(read(tmp_path, "p.json", json.dumps(LISTS)), POSES)
+    for key in ("name", "id"):
+        listed = {"sensors": [{key: name, "pose": pose, "model": "os1_128"} for name, pose in LISTS.items()]}
+        same(read(tmp_path, "p.json", json.dumps(listed)), POSES)
+
+
+def test_dair(tmp_path):
+    pose = make_pose()
+    for shape in ((3,), (3, 1)):
+        content = {"rotation": pose[:3, :3].tolist(), "translation": pose[:3, 3].reshape(shape).tolist()}
+        content["relative_error"] = {"delta_x": "", "delta_y": ""}
+        same(read(tmp_path, "000009.json", json.dumps(content)), {"000009": pose})
+
+
+def test_kitti(tmp_path):
+    pose = make_pose()
+    numbers = " ".join(repr(number) for number in pose[:3].ravel().tolist())
+    same(read(tmp_path, "calib.txt", f"{CALIBRATION}Tr_velo_to_world: {numbers}\n"), {"calib": pose})
+    same(read(tmp_path, "calib.txt", CALIBRATION), {"calib": np.eye(4)})
+    right, down, forward = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]])  # x right, y down, z forward of a camera
+    camera = np.eye(4)
+    camera[:3, :3] = [right, down, forward]
+    numbers = " ".join(repr(number) for number in (camera @ pose)[:3].ravel().tolist())
+    same(read(tmp_path, "calib.txt", f"P0: 1 0 0 0\nTr: {numbers}\n"), {"calib": pose})
+
+
+def test_rotations_that_are_rounded_are_made_exact(tmp_path):
+    pose = make_pose()
+    found = read(tmp_path, "p.json", json.dumps({"S1": pose.round(4).tolist()}))["S1"]
+    np.testing.assert_allclose(found[:3, :3].T @ found[:3, :3], np.eye(3), rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(found, pose, rtol=0.0, atol=2e-4)
+
+
+def changed(at, value):
+    pose = make_pose()
+    pose[at] = value
+    return json.dumps({"S1": pose.tolist()})
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        ("mirrored", json.dumps({"S1": np.diag([1, -1, 1, 1]).tolist()})),
+        ("scaled or skewed", json.dumps({"S1": np.diag([1.002, 1, 1, 1]).tolist()})),
+        ("scaled or skewed", json.dumps({"S1": np.diag([0, 0, 0, 1]).tolist()})),
+        ("scaled or skewed", changed((0, 0), 1e6)),
+        ("last row", changed((3, 0), 1.0)),
+        ("16 numbers", changed((0, 3), 1e8)),
+        ("16 numbers", json.dumps({"S1": np.eye(3).tolist()})),
+        ("number NaN", changed((0, 3), np.nan)),
+        ("no readable poses", json.dumps({"S1": [[1, 2], [3]]})),
+        ("no readable poses", json.dumps({"S1": {"x": 1}})),
+        ("no readable poses", json.dumps({"sensors": [{"name": "S1"}]})),
+        ("no readable poses", json.dumps({"sensors": 3})),
+        ("two sensors have one name", json.dumps({"sensors": [{"id": 1, "pose": 0}, {"id": "1", "pose": 0}]})),
+        ("no readable poses", json.dumps({"rotation": 1, "translation": 2})),
+        ("its structure is another one", "[1, 2]"),
+        ("names no sensor", "{}"),
+        ("no readable poses", "[" * 100_000),
+        ("no readable poses", '{"S1": '),
+        ("as JSON", yaml.safe_dump(LISTS, default_flow_style=True)),
+        ("convert it to JSON", "sensors:\n- name: S1\n  pose: [1, 2]\n"),
+        ("convert it to JSON", "S1: *anchor\n"),
+        ("convert it to JSON", "S1: [.nan, 0]\n"),
+        ("convert it to JSON", "S1: [1]\nS1: [1]\n"),
+        ("16 numbers", "S1: [1, 2, 3]\n"),
+        ("none of Tr_velo_to_world", "Tr_imu_to_velo: 1 0 0 0\n"),
+        ("no readable poses", "Tr: 1 0 0\n"),
+        ("no readable poses", "Tr_velo_to_world: 1 0 0 0 0 1 0 0 0 0 far 0\n"),
+        ("is empty", ""),
+    ],
+)
+def test_refusals(words, text, tmp_path):
+    refused(words, tmp_path, text)
+
+
+def test_cut_files(tmp_path):
+    for text in (json.dumps(LISTS), json.dumps({"rotation": np.eye(3).tolist(), "translation": [0, 0, 0]})):
+        for part in range(50):
+            refused(r"p\.json", tmp_path, text[: len(text) * part // 50])
+
+
+@given(st.text(max_size=80) | st.binary(max_size=80))
+def test_any_text(tmp_path_factory, content):
+    path = tmp_path_factory.mktemp("any") / "p.yaml"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass"))
+    with pytest.raises(SeipError):
+        read_poses(path)

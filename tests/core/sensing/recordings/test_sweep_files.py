@@ -1,0 +1,300 @@
+"""Sweeps in all formats against writers by hand, and files that are damaged."""
+
+import struct
+import zipfile
+
+import lzf
+import numpy as np
+import pypcd4
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.orientation import quaternion_of
+from seip_addon.core.sensing.recordings.pcd_file import lzf_decompressed
+from seip_addon.core.sensing.recordings.sweep_files import read_sweep
+from tests.builders.recording_files import csv_text, make_points, pcd_text, write_sweep_file
+from tests.builders.scan_frames import rotation
+
+FORMATS = (".pcd", ".bin", ".pcd.bin", ".npz", ".csv", ".las", ".laz")
+LASPY = {".las", ".laz"}
+
+
+def read(folder, name, content):
+    path = folder / name
+    path.write_bytes(content)
+    return read_sweep(path)
+
+
+def refused(words, folder, name, content):
+    with pytest.raises(SeipError, match=words) as caught:
+        read(folder, name, content)
+    assert name in str(caught.value)
+
+
+def same(sweep, columns, atol=0.0):
+    xyz = np.column_stack([columns[axis] for axis in "xyz"])
+    np.testing.assert_allclose(sweep.points, xyz, rtol=0.0, atol=atol)
+    assert (sweep.points.dtype, sweep.intensity.dtype) == (np.float32, np.float32)
+    assert (sweep.intensity == columns["intensity"]).all()
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_formats_hold_the_same(suffix, tmp_path):
+    if suffix in LASPY:
+        pytest.importorskip("laspy")
+    columns = make_points()
+    sweep = read_sweep(write_sweep_file(tmp_path / f"a{suffix}", columns))
+    same(sweep, columns, atol=0.00006 if suffix in LASPY else 0.0)
+    assert (sweep.viewpoint, sweep.time) == (None, None)
+
+
+@pytest.mark.parametrize("data", ["ascii", "binary", "binary_compressed"])
+@given(
+    seed=st.integers(0, 1000),
+    count=st.integers(0, 40),
+    kind=st.sampled_from(["<f4", "<f8"]),
+    ring=st.sampled_from(["<u1", "<u2", "<u4", "<u8", "<i2", "<i4", "<i8"]),
+    names=st.sampled_from([("intensity", "ring"), ("i", "channel"), ("reflectivity", "laser_id")]),
+    padding=st.integers(1, 3),
+    data_order=st.permutations(range(6)),
+)
+def test_pcd(tmp_path_factory, data, seed, count, kind, ring, names, padding, data_order):
+    points = make_points(seed, count)
+    columns = [(axis, points[axis].astype(kind)) for axis in "xyz"]
+    columns += [(names[0], points["intensity"]), (names[1], points["ring"].astype(ring))]
+    columns += [("_", np.ones((count, padding), dtype="<u1"))]
+    content = pcd_text(dict(columns[at] for at in data_order), data)
+    same(read(tmp_path_factory.mktemp("pcd"), "a.pcd", content), points)
+
+
+@pytest.mark.parametrize("data", ["ASCII", "BINARY", "BINARY_COMPRESSED"])
+def test_pcd_of_pypcd4(data, tmp_path):
+    columns = make_points()
+    types = [column.dtype.type for column in columns.values()]
+    cloud = pypcd4.PointCloud.from_points(list(columns.values()), list(columns), types)
+    cloud.save(tmp_path / "a.pcd", encoding=pypcd4.Encoding[data])
+    same(read_sweep(tmp_path / "a.pcd"), columns)
+
+
+def test_pcd_fields_may_repeat_and_lack_a_count(tmp_path):
+    columns = make_points(count=4)
+    content = pcd_text({**columns, "p": np.zeros((4, 1), "<u1"), "q": np.zeros((4, 1), "<u1")}, COUNT=None)
+    same(read(tmp_path, "a.pcd", content.replace(b"p q\n", b"_ _\n")), columns)
+
+
+@given(st.floats(-3, 3), st.floats(-1.5, 1.5), st.floats(-3, 3), st.integers(0, 99))
+def test_a_viewpoint_is_the_pose_of_the_sensor(tmp_path_factory, yaw, pitch, roll, seed):
+    columns = make_points(seed)
+    turn, at = rotation(yaw, pitch, roll), np.array([10.0, -20.0, 6.0])
+    own = np.column_stack([columns[axis] for axis in "xyz"]).astype(float)
+    site = (own @ turn.T + at).T
+    words = " ".join(repr(number) for number in [*at.tolist(), *quaternion_of(turn).tolist()])
+    content = pcd_text({**columns, **dict(zip("xyz", site, strict=True))}, viewpoint=words)
+    sweep = read(tmp_path_factory.mktemp("pcd"), "a.pcd", content)
+    same(sweep, columns, atol=1e-5)
+    expected = np.eye(4)
+    expected[:3, :3], expected[:3, 3] = turn, at
+    np.testing.assert_allclose(sweep.viewpoint, expected, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("suffix", [".pcd", ".bin", ".pcd.bin", ".npz", ".csv"])
+def test_missing_returns_are_dropped(suffix, tmp_path):
+    columns = make_points(count=9)
+    for row, value in ((1, np.nan), (3, np.inf), (5, -np.inf)):
+        columns["y"][row] = value
+    for axis in "xyz":
+        columns[axis][7] = 0.0
+    content = write_sweep_file(tmp_path / f"a{suffix}", columns)
+    kept = [0, 2, 4, 6, 8]
+    same(read_sweep(content), {name: column[kept] for name, column in columns.items()})
+
+
+def test_npz_of_points(tmp_path):
+    columns = make_points()
+    table = np.column_stack(list(columns.values()))
+    for width in (3, 4, 5):
+        np.savez(tmp_path / "a.npz", points=table[:, :width], time=12.5, note=np.array("of a test"))
+        sweep = read_sweep(tmp_path / "a.npz")
+        assert (sweep.points == table[:, :3].astype(np.float32)).all()
+        assert sweep.time == 12.5
+        assert (sweep.intensity is None) == (width < 4)
+
+
+def test_csv_has_columns_in_any_order_and_case(tmp_path):
+    text = '"Z", label,X,y,time,Channel\r\n3,"a b",1,2,7.5,4\r\n3,c,1,2,7.25,4\r\n'
+    sweep = read(tmp_path, "a.csv", text.encode())
+    assert sweep.points.tolist() == [[1, 2, 3]] * 2
+    assert (sweep.time, sweep.intensity) == (7.25, None)
+
+
+def test_las_without_intensity(tmp_path):
+    pytest.importorskip("laspy")
+    columns = make_points()
+    columns["intensity"][:] = 0.0
+    assert read_sweep(write_sweep_file(tmp_path / "a.laz", columns)).intensity is None
+
+
+@given(st.lists(st.binary(max_size=40) | st.tuples(st.binary(min_size=1, max_size=9), st.integers(2, 400))))
+def test_lzf_against_another_compressor(parts):
+    whole = b"".join(part if isinstance(part, bytes) else part[0] * part[1] for part in parts)
+    if whole:
+        packed = lzf.compress(whole, 2 * len(whole) + 100)
+        assert lzf_decompressed(packed, len(whole)) == whole
+        for size in (len(whole) - 1, len(whole) + 1):
+            with pytest.raises(ValueError, match="do not stand for"):
+                lzf_decompressed(packed, size)
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_cut_files(suffix, tmp_path):
+    """A cut between two points of a format without a header or end gives the points before."""
+    if suffix in LASPY:
+        pytest.importorskip("laspy")
+    columns = make_points(count=203)
+    xyz = np.column_stack([columns[axis] for axis in "xyz"])
+    content = write_sweep_file(tmp_path / f"whole{suffix}", columns).read_bytes()
+    path, whole = tmp_path / f"a{suffix}", []
+    for part in range(50):
+        path.write_bytes(content[: len(content) * part // 50])
+        try:
+            sweep = read_sweep(path)
+        except SeipError as error:
+            message = str(error)
+            assert path.name in message
+        else:
+            last = len(sweep) - (suffix == ".csv")  # the last number may be cut
+            assert (sweep.points[:last] == xyz[:last]).all()
+            whole.append(part)
+    size = {".bin": 16, ".pcd.bin": 20}.get(suffix)
+    if size:
+        assert whole == [part for part in range(1, 50) if len(content) * part // 50 % size == 0]
+    else:
+        assert not whole or suffix == ".csv"
+
+
+@pytest.mark.parametrize("data", ["ascii", "binary_compressed"])
+def test_cut_pcd(data, tmp_path):
+    content = pcd_text(make_points(), data)
+    for part in range(50):
+        if data == "ascii" and part == 49:
+            continue
+        refused("a.pcd", tmp_path, "a.pcd", content[: len(content) * part // 50])
+
+
+@pytest.mark.parametrize(
+    ("words", "changes"),
+    [
+        ("POINTS differ", {"POINTS": 3}),
+        ("announces", {"WIDTH": 3, "POINTS": 3}),
+        ("WIDTH is not a whole number up to", {"WIDTH": 10**11, "POINTS": 10**11}),
+        ("announces", {"WIDTH": 10_000_000, "POINTS": 10_000_000}),
+        ("HEIGHT is not", {"HEIGHT": "-1"}),
+        ("WIDTH is not", {"WIDTH": None}),
+        ("differ in length", {"FIELDS": "x y z"}),
+        ("differ in length", {"FIELDS": None}),
+        ("unknown type", {"TYPE": "F F F F Q"}),
+        ("unknown type", {"SIZE": "4 4 4 4 3"}),
+        ("more than", {"COUNT": "1 1 1 1 9999"}),
+        ("no x", {"FIELDS": "a y z intensity ring"}),
+        ("no x and no z", {"FIELDS": "a y b intensity ring"}),
+        ("seven numbers", {"VIEWPOINT": "0 0 0 1"}),
+        ("seven numbers", {"VIEWPOINT": "0 0 nan 1 0 0 0"}),
+        ("length 1", {"VIEWPOINT": "0 0 0 0 0 0 0"}),
+        ("no PCD header", {"DATA": "binary_packed"}),
+        ("no PCD header", {"FIELDS": "x " * 40_000}),
+    ],
+)
+@pytest.mark.parametrize("data", ["ascii", "binary", "binary_compressed"])
+def test_contradicting_headers_of_pcd(data, words, changes, tmp_path):
+    refused(words, tmp_path, "a.pcd", pcd_text(make_points(count=6), data, **changes))
+
+
+def test_a_compressed_pcd_of_too_many_bytes(tmp_path):
+    head = pcd_text(make_points(count=1), WIDTH=10**7, POINTS=10**7, DATA="binary_compressed").split(b"compressed\n")[0]
+    refused("announces", tmp_path, "a.pcd", head + b"compressed\n" + struct.pack("<II", 9, 18 * 10**7) + bytes(9))
+
+
+@pytest.mark.parametrize(
+    ("words", "name", "content"),
+    [
+        ("is empty", "a.bin", b""),
+        ("is empty", "a.pcd", b""),
+        ("is empty", "a.csv", b""),
+        ("not whole points of 4", "a.bin", bytes(20)),
+        ("not whole points of 5", "a.pcd.bin", bytes(16)),
+        ("intensity is nan", "a.bin", np.array([1, 2, 3, np.nan], "<f4").tobytes()),
+        ("map coordinates", "a.bin", np.array([1, 2e4, 3, 0], "<f4").tobytes()),
+        ("map coordinates", "a.csv", b"x,y,z\n389123.0,5712345.0,80\n"),
+        ("no x and no y and no z", "a.csv", b"1,2,3\n4,5,6\n"),
+        ("is damaged", "a.csv", b"x,y,z\n1,2\n"),
+        ("is damaged", "a.csv", b"x,y,z\n1,2,far\n"),
+        ("not a text file", "a.csv", b"x,y,z\n1,2,\xff\n"),
+        ("not a text file", "a.pcd", b"\xff\nDATA ascii\n"),
+        ("damaged or not an npz file", "a.npz", b"PK\x03\x04 and so on"),
+        ("not a sweep: give a file", "a.txt", b"1 2 3"),
+    ],
+)
+def test_refusals(words, name, content, tmp_path):
+    refused(words, tmp_path, name, content)
+
+
+@pytest.mark.parametrize(
+    ("words", "arrays"),
+    [
+        ("no x", {"a": np.zeros(3)}),
+        ("has the shape", {"points": np.zeros((3, 2))}),
+        ("has the shape", {"points": np.zeros(3)}),
+        ("intensity is not an array", {"points": np.ones((3, 3)), "intensity": np.ones(2)}),
+        ("x is not an array", {"x": np.ones((3, 1)), "y": np.ones(3), "z": np.ones(3)}),
+        ("time is not an array", {"points": np.ones((3, 3)), "time": np.array("noon")}),
+        ("x is not an array", {"points": np.full((3, 3), 1j)}),
+    ],
+)
+def test_wrong_arrays(words, arrays, tmp_path):
+    np.savez(tmp_path / "a.npz", **arrays)
+    with pytest.raises(SeipError, match=words):
+        read_sweep(tmp_path / "a.npz")
+
+
+def test_an_npz_that_unpacks_to_more_than_any_sweep(tmp_path):
+    with zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as archive, archive.open("x.npy", "w") as file:
+        header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (150000000,), }".ljust(117) + b"\n"
+        file.write(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header)
+        for _ in range(1200):
+            file.write(bytes(10**6))
+    assert (tmp_path / "a.npz").stat().st_size < 2e6
+    with pytest.raises(SeipError, match="more than 1,074 MB"):
+        read_sweep(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize("data", ["ascii", "binary", "binary_compressed"])
+def test_numbers_that_overflow(data, tmp_path):
+    columns = {axis: np.array([1.7e308, 2.0]) for axis in "xyz"}
+    refused("map coordinates", tmp_path, "a.pcd", pcd_text(columns, data, "1 2 3 0 0 0 1"))
+    refused("map coordinates", tmp_path, "a.pcd", pcd_text(columns, data, "1 2 3 0.5 0.5 0.5 0.5"))
+
+
+def test_missing_files(tmp_path):
+    for name in ("a.pcd", "a.bin", "a.npz", "a.csv"):
+        with pytest.raises(SeipError, match="no such file"):
+            read_sweep(tmp_path / name)
+    (tmp_path / "b.csv").mkdir()
+    with pytest.raises(SeipError, match="cannot read"):
+        read_sweep(tmp_path / "b.csv")
+
+
+@given(content=st.binary(max_size=300), suffix=st.sampled_from(FORMATS[:5]))
+def test_random_bytes(tmp_path_factory, content, suffix):
+    try:
+        sweep = read(tmp_path_factory.mktemp("any"), f"a{suffix}", content)
+    except SeipError:
+        return
+    assert suffix in {".bin", ".pcd.bin"}
+    assert np.isfinite(sweep.points).all()
+
+
+def test_a_table_is_read_as_it_was_written(tmp_path):
+    columns = make_points(seed=3, count=1000)
+    same(read(tmp_path, "a.csv", csv_text(columns).encode()), columns)

@@ -1,0 +1,293 @@
+"""Corrections of a scene: what is added, removed, trimmed and moved, and what is left alone with a sentence."""
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.recordings.comparison import Change
+from seip_addon.core.sensing.recordings.registration import Registration
+from seip_addon.core.sensing.recordings.verification import CoverageSteps, Verification, VerifiedSensor
+from seip_addon.core.sensing.scans.sensor import MountedSensor
+from seip_addon.core.site.scene_geometry import SceneGeometry, joined
+from seip_addon.core.site.targets import generate_targets
+from seip_addon.core.workflows.verifying import box_triangles
+from seip_addon.scene import contract
+from seip_addon.scene.corrections import correct_scene
+from seip_addon.scene.pieces import attach_piece
+from seip_addon.scene.read import read_scene
+from seip_addon.scene.sensors import read_sensors
+
+BOX = np.array([3.0, -20.0, 1.5, 2.0, 1.0, 3.0, 0.4])
+NONE = np.zeros(0, dtype=np.int64)
+
+
+def cube(name, at, size=1.0, collection=contract.OCCLUDERS):
+    """Add a cube by its middle."""
+    mesh = bpy.data.meshes.new(name)
+    corners = box_triangles(np.array([0.0, 0.0, 0.0, size, size, size, 0.0])).reshape(-1, 3)
+    mesh.from_pydata(corners.tolist(), [], np.arange(len(corners)).reshape(-1, 3).tolist())
+    obj = bpy.data.objects.new(name, mesh)
+    obj.location = at
+    if collection:
+        contract.find_or_make(bpy.context.scene, collection).objects.link(obj)
+    return obj
+
+
+@pytest.fixture
+def scene():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    for name in (contract.REGION, contract.ROADS):
+        mesh = bpy.data.meshes.new(name)
+        mesh.from_pydata([(-10, -10, 0), (10, -10, 0), (10, 10, 0), (-10, 10, 0)], [], [(0, 1, 2, 3)])
+        obj = bpy.data.objects.new(name, mesh)
+        contract.find_or_make(bpy.context.scene, name).objects.link(obj)
+    cube("Wall", (20, 0, 0.5))
+    return bpy.context.scene
+
+
+def verified(scene, gone=(), new=(), sensors=(), keep=None):
+    """Return a verification in which meshes are gone, except triangles that ``keep`` (of their middles) selects."""
+    geometry: SceneGeometry = read_scene(scene).geometry
+    occluders, changes = [], []
+    for mesh in geometry.occluders:
+        stays = np.full(len(mesh.triangles), mesh.name not in gone)
+        if mesh.name in gone:
+            changes.append(Change("gone", mesh.name, BOX, 50, np.arange(len(mesh.triangles))))
+            stays |= keep(mesh.triangles.mean(axis=1)) if keep else False
+        if stays.any():
+            occluders.append(replace(mesh, triangles=mesh.triangles[stays], reflectivity=None))
+    changes += [Change("new", name, box, 50, NONE) for name, box in new]
+    targets = generate_targets(geometry.region, joined(geometry.roads), 4.0, ())
+    return Verification(
+        sensors=tuple(sensors),
+        changes=tuple(changes),
+        costs=(0.0,) * len(changes),
+        coverage=CoverageSteps(0.5, 0.5, 0.5, 0.5, 0.5),
+        corrected=replace(geometry, occluders=tuple(occluders)),
+        targets=targets,
+        measured_seen=np.zeros(len(targets), dtype=bool),
+    )
+
+
+def solids(scene):
+    """Return the occluders of a scene, by name: rounded corners in order."""
+    return {
+        mesh.name: sorted(map(tuple, np.round(mesh.triangles, 4).reshape(-1, 9).tolist()))
+        for mesh in read_scene(scene).geometry.occluders
+    }
+
+
+def test_new_objects_become_boxes(scene):
+    assert not correct_scene(scene, verified(scene, new=[("Found 1", BOX)]))
+    (mesh,) = [mesh for mesh in read_scene(scene).geometry.occluders if mesh.name == "Found 1"]
+    assert mesh.source == "survey"
+    assert np.allclose(mesh.triangles, box_triangles(BOX), atol=1e-5)
+
+
+def test_a_second_correction_changes_nothing(scene):
+    tower = cube("Tower", (0, 20, 0.5))
+    _join(tower, (0, 24, 0.5))
+    found = verified(scene, gone={"Tower"}, new=[("Found 1", BOX)], keep=lambda middle: middle[:, 1] < 22)
+    correct_scene(scene, found)
+    once = solids(scene)
+    assert set(once) == {"Wall", "Tower", "Found 1"}
+    assert len(once["Tower"]) == 12
+    assert not correct_scene(scene, found)
+    assert solids(scene) == once
+    assert len([obj for obj in bpy.data.objects if obj.name.startswith("Found")]) == 1
+
+
+def test_a_name_that_is_taken_gets_a_number_and_the_box_still_replaces_its_own(scene):
+    other = bpy.data.objects.new("Found 1", None)
+    scene.collection.objects.link(other)
+    found = verified(scene, new=[("Found 1", BOX)])
+    correct_scene(scene, found)
+    correct_scene(scene, found)
+    assert set(solids(scene)) == {"Wall", "Found 1.001"}
+    assert other.name == "Found 1"
+
+
+def test_an_object_of_several_collections_is_removed_from_all_of_the_scene(scene):
+    kiosk = cube("Kiosk", (0, 20, 0.5))
+    mine = bpy.data.collections.new("Mine")
+    scene.collection.children.link(mine)
+    mine.objects.link(kiosk)
+    contract.find_or_make(scene, contract.POLES).objects.link(kiosk)
+    assert not correct_scene(scene, verified(scene, gone={"Kiosk"}))
+    assert "Kiosk" not in bpy.data.objects
+    assert set(solids(scene)) == {"Wall"}
+
+
+def test_another_scene_keeps_its_object(scene):
+    kiosk = cube("Kiosk", (0, 20, 0.5))
+    other = bpy.data.scenes.new("Other")
+    other.collection.objects.link(kiosk)
+    correct_scene(scene, verified(scene, gone={"Kiosk"}))
+    assert "Kiosk" not in scene.objects
+    assert "Kiosk" in other.objects
+
+
+def test_a_gone_pole_is_removed(scene):
+    cube("Post", (0, 20, 2.0), 0.3, contract.POLES)
+    assert len(read_scene(scene).geometry.poles) == 1
+    correct_scene(scene, verified(scene, gone={"Post"}))
+    assert not read_scene(scene).geometry.poles
+
+
+def test_children_stay_where_they_are_and_pieces_go(scene):
+    house, child = cube("House", (5, 20, 0.5)), cube("Child", (1, 2, 3))
+    house.rotation_euler.z = 0.7
+    child.parent = house
+    attach_piece(cube("Window", (0, 0.5, 0)), house)
+    bpy.context.view_layer.update()
+    before = solids(scene)["Child"]
+    correct_scene(scene, verified(scene, gone={"House"}))
+    assert set(solids(scene)) == {"Wall", "Child"}
+    assert np.allclose(solids(scene)["Child"], before, atol=1e-4)
+    assert "Window" not in bpy.data.objects
+
+
+def test_what_stays_of_an_object_keeps_place_materials_and_modifiers_effect(scene):
+    row = cube("Row", (0, 20, 0.5))
+    row.data.materials.append(bpy.data.materials.new("brick"))
+    row["seip_source"] = "extract"
+    modifier = row.modifiers.new("Array", "ARRAY")
+    modifier.count, modifier.use_relative_offset, modifier.use_constant_offset = 3, False, True
+    modifier.constant_offset_displace = (3, 0, 0)
+    shared = row.data
+    twin = bpy.data.objects.new("Twin", shared)
+    twin.location = (0, 30, 0.5)
+    contract.find_or_make(scene, contract.OCCLUDERS).objects.link(twin)
+    before = solids(scene)
+    correct_scene(scene, verified(scene, gone={"Row"}, keep=lambda middle: middle[:, 0] > 2))
+    after = solids(scene)
+    assert set(after["Row"]) < set(before["Row"])
+    assert len(after["Row"]) == 24
+    assert after["Twin"] == before["Twin"]
+    assert not row.modifiers
+    assert [slot.material.name for slot in row.material_slots] == ["brick"]
+    assert (tuple(row.location), row["seip_source"]) == ((0, 20, 0.5), "extract")
+
+
+def _instance(scene, *objects):
+    content = bpy.data.collections.new("Content")
+    for obj in objects:
+        content.objects.link(obj)
+    instance = bpy.data.objects.new("Instance", None)
+    instance.instance_type, instance.instance_collection = "COLLECTION", content
+    instance.location = (0, 20, 0.5)
+    contract.find_or_make(scene, contract.OCCLUDERS).objects.link(instance)
+    return instance
+
+
+def test_a_whole_instance_is_removed_and_its_collection_stays(scene):
+    _instance(scene, cube("Inner", (0, 0, 0), collection=""))
+    assert "Instance 1" in solids(scene)
+    assert not correct_scene(scene, verified(scene, gone={"Instance 1"}))
+    assert set(solids(scene)) == {"Wall"}
+    assert "Inner" in bpy.data.collections["Content"].objects
+
+
+def test_a_part_of_an_instance_stays_with_a_sentence(scene):
+    _instance(scene, cube("A", (0, 0, 0), collection=""), cube("B", (5, 0, 0), collection=""))
+    before = solids(scene)
+    (sentence,) = correct_scene(scene, verified(scene, gone={"Instance 1"}))
+    assert "Make Instances Real" in sentence
+    assert solids(scene) == before
+
+
+def test_a_part_of_a_curve_stays_with_a_sentence(scene):
+    curve = bpy.data.curves.new("Fence", "CURVE")
+    curve.dimensions, curve.bevel_depth = "3D", 0.2
+    for x in (0.0, 5.0):
+        spline = curve.splines.new("POLY")
+        spline.points.add(1)
+        spline.points[0].co, spline.points[1].co = (x, 20, 0, 1), (x, 22, 0, 1)
+    fence = bpy.data.objects.new("Fence", curve)
+    contract.find_or_make(scene, contract.OCCLUDERS).objects.link(fence)
+    before = solids(scene)
+    (sentence,) = correct_scene(scene, verified(scene, gone={"Fence"}, keep=lambda middle: middle[:, 0] > 2))
+    assert "convert it to a mesh" in sentence
+    assert solids(scene) == before
+
+
+@pytest.fixture
+def with_library(scene, tmp_path):
+    """The scene with a collection of occluders from another file, which holds two cubes in one object."""
+    library = bpy.data.collections.new("Block")
+    block = cube("House", (0, 20, 0.5), collection="")
+    _join(block, (0, 24, 0.5))
+    library.objects.link(block)
+    path = tmp_path / "city.blend"
+    bpy.data.libraries.write(str(path), {library})
+    bpy.data.collections.remove(library)
+    bpy.data.objects.remove(block)
+    with bpy.data.libraries.load(str(path), link=True) as (_, wanted):
+        wanted.collections = ["Block"]
+    return wanted.collections[0]
+
+
+def test_an_object_of_a_linked_collection_stays_with_a_sentence(scene, with_library):
+    contract.find_or_make(scene, contract.OCCLUDERS).children.link(with_library)
+    before = solids(scene)
+    for keep in (None, lambda middle: middle[:, 1] < 22):
+        (sentence,) = correct_scene(scene, verified(scene, gone={"House"}, keep=keep))
+        assert "'House' has changed, but is linked from" in sentence
+        assert "city.blend" in sentence
+        assert solids(scene) == before
+
+
+def test_a_linked_object_is_unlinked_from_a_collection_of_the_file(scene, with_library):
+    house = with_library.objects[0]
+    contract.find_or_make(scene, contract.OCCLUDERS).objects.link(house)
+    (sentence,) = correct_scene(scene, verified(scene, gone={"House"}, keep=lambda middle: middle[:, 1] < 22))
+    assert "is linked from" in sentence
+    assert not correct_scene(scene, verified(scene, gone={"House"}))
+    assert set(solids(scene)) == {"Wall"}
+
+
+def test_a_street_in_the_same_instance_stays_with_a_sentence(scene):
+    instance = _instance(scene, cube("Inner", (0, 0, 0), collection=""))
+    roads = bpy.data.collections.new("SEIP Roads.001")
+    roads.objects.link(cube("Lane", (9, 0, 0), collection=""))
+    instance.instance_collection.children.link(roads)
+    before = solids(scene)
+    name = next(name for name in before if name.startswith("Instance"))
+    (sentence,) = correct_scene(scene, verified(scene, gone={name}))
+    assert "Make Instances Real" in sentence
+    assert solids(scene) == before
+
+
+@pytest.mark.parametrize("mode", ["XYZ", "ZYX", "QUATERNION"])
+def test_sensors_are_moved_whatever_their_parents_and_rotation_modes(scene, mode):
+    model = load_catalogue()["type1"]
+    mast = bpy.data.objects.new("Mast", None)
+    mast.location, mast.rotation_euler = (1, 2, 3), (0.1, 0.2, 0.3)
+    empty = bpy.data.objects.new("S1", None)
+    empty["seip_sensor"], empty["seip_label"] = "type1", "S1"
+    empty.rotation_mode, empty.parent = mode, mast
+    scene.collection.objects.link(mast)
+    contract.find_or_make(scene, contract.SENSORS).objects.link(empty)
+    turn, _ = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))
+    turn *= np.linalg.det(turn)
+    sensor = MountedSensor("S1", model, np.array([4.0, 5.0, 6.0]), turn)
+    pose = Registration(sensor, np.zeros(6), np.zeros(6), 1.0)
+    verified_sensor = VerifiedSensor(pose, None, None, None, ())
+    assert not correct_scene(scene, verified(scene, sensors=[verified_sensor]))
+    (read,) = read_sensors(scene, load_catalogue())
+    assert np.allclose(read.xyz, sensor.xyz, atol=1e-5)
+    assert np.allclose(read.orientation, turn, atol=1e-5)
+    other = replace(verified_sensor, registration=replace(pose, sensor=replace(sensor, label="S7")))
+    assert "S7 is no longer in the scene" in correct_scene(scene, verified(scene, sensors=[other]))[0]
+
+
+def _join(obj, at):
+    """Give an object a second cube."""
+    mesh = obj.data
+    first = np.array([vertex.co for vertex in mesh.vertices])
+    both = np.concatenate([first, first + np.subtract(at, obj.location)])
+    mesh.clear_geometry()
+    mesh.from_pydata(both.tolist(), [], np.arange(len(both)).reshape(-1, 3).tolist())
