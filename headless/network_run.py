@@ -27,7 +27,7 @@ import numpy as np
 from seip_addon.core.arrays import Float
 from seip_addon.core.choosing.network import network_search, site_problem
 from seip_addon.core.choosing.network.frontier import Frontier, SolvedBudget
-from seip_addon.core.choosing.network.network_search import NetworkAllocation, Request, search_allocation
+from seip_addon.core.choosing.network.network_search import Goal, NetworkAllocation, Request, search_allocations
 from seip_addon.core.choosing.network.site_problem import SiteProblem
 from seip_addon.core.choosing.placement.objective import Objective
 from seip_addon.core.errors import SeipError
@@ -303,20 +303,16 @@ class _Network:
             frontiers = [
                 site.problem().frontier(most, standing) for site, standing in zip(self._sites, installed, strict=True)
             ]
-            last = number == len(request.budgets)
-            allocation = yield from search_allocation(
-                frontiers,
-                self.weights,
-                budget,
-                self._solver(installed),
-                request.tolerance,
-                gap=self._gap,
-                minimum=request.minimum if last else 0.0,
+            goals = [
+                Goal(budget, request.tolerance, request.minimum if number == len(request.budgets) else 0.0),
+                *(self._curve_goals() if number == 1 else ()),
+            ]
+            found = yield from search_allocations(
+                frontiers, self.weights, goals, self._solver(installed), gap=self._gap
             )
+            allocation = found[0]
             if number == 1:
-                curve, known = yield from self._curve(allocation, installed, sum(request.budgets))
-                if last:
-                    allocation = replace(allocation, frontiers=known)
+                curve = self._curve(found[1:])
             for site, one in enumerate(allocation.taken):
                 phases[site] += [number] * (len(one.chosen) - len(installed[site]))
             # New sensors follow those that were installed before, so that labels and phases keep their order.
@@ -392,22 +388,17 @@ class _Network:
             )
         return rows
 
-    def _curve(
-        self, allocation: NetworkAllocation, installed: Sequence[tuple[int, ...]], money: float
-    ) -> Generator[Progress, None, tuple[tuple[NetworkPoint, ...], tuple[Frontier, ...]]]:
-        """Return the value of the network for amounts of money in one phase, with bounds, and what is known then."""
-        request, weight = self._request, float(self.weights.sum())
-        frontiers = allocation.frontiers
-        least = float(self.weights @ [one.floor.value for one in frontiers]) / weight
-        points = [NetworkPoint(0.0, least, least)]
-        for share in sorted((*CURVE, 1.0)):
-            tolerance = max(CURVE_TOLERANCE, request.tolerance)
-            one = yield from search_allocation(
-                frontiers, self.weights, share * money, self._solver(installed), tolerance, gap=self._gap
-            )
-            frontiers = one.frontiers
-            points.append(NetworkPoint(share * money, one.value / weight, one.bound / weight))
-        return _monotone(points), frontiers
+    def _curve_goals(self) -> list[Goal]:
+        """Return the amounts of money, in one phase, at which the value of the network is computed."""
+        tolerance = max(CURVE_TOLERANCE, self._request.tolerance)
+        return [Goal(share * sum(self._request.budgets), tolerance) for share in sorted((*CURVE, 1.0))]
+
+    def _curve(self, allocations: Sequence[NetworkAllocation]) -> tuple[NetworkPoint, ...]:
+        """Return the value of the network for amounts of money, with bounds."""
+        weight = float(self.weights.sum())
+        least = float(self.weights @ [one.floor.value for one in allocations[0].frontiers]) / weight
+        points = [NetworkPoint(one.budget, one.value / weight, one.bound / weight) for one in allocations]
+        return _monotone([NetworkPoint(0.0, least, least), *points])
 
     def _gap(self, value: float, bound: float) -> float:
         """Return the gap of weighted sums of values, as `NetworkRecord.gap` states it."""

@@ -7,7 +7,7 @@ from headless.studies.network_practice.practices import PRACTICES, four_corners,
 import numpy as np
 import pytest
 
-from seip_addon.core.choosing.network.network_search import search_allocation
+from seip_addon.core.choosing.network.network_search import Goal, search_allocations
 from seip_addon.core.progress import Progress, finish
 from tests.builders.random_site import random_problem
 
@@ -23,7 +23,7 @@ def test_no_practice_beats_the_allocation_or_spends_more(seed, criterion):
         return [finish(sites[one.site].solve(one.budget, 10.0)) for one in requests]
 
     known = [site.frontier(money) for site in sites]
-    best = finish(search_allocation(known, weights, money, solve, 0.0))
+    (best,) = finish(search_allocations(known, weights, [Goal(money, 0.0)], solve))
     for practice in PRACTICES.values():
         chosen = practice(sites, weights, money)
         price = math.fsum(site.prices[list(poses)].sum() for site, poses in zip(sites, chosen, strict=True))

@@ -1,4 +1,4 @@
-"""Search for the best allocation of a budget to sites, which solves a site only where the decision depends on it."""
+"""Search for the best allocations of budgets to sites, which solves a site only where a decision depends on it."""
 
 from __future__ import annotations
 
@@ -37,6 +37,29 @@ class Request:
     effort: float
 
 
+@dataclass(frozen=True)
+class Goal:
+    """Budget to allocate.
+
+    Parameters
+    ----------
+    budget : float, dollars
+    tolerance : float
+        Gap at which the search ends.
+    minimum : float
+        Least value at each site.
+    """
+
+    budget: float
+    tolerance: float
+    minimum: float = 0.0
+
+    @property
+    def money(self) -> tuple[float, float]:
+        """Budget and minimum, which alone decide what is the best allocation."""
+        return self.budget, self.minimum
+
+
 Solve = Callable[[Sequence[Request]], Generator[Progress, None, Sequence[SolvedBudget]]]
 """Solves requests, in any order, and returns their results in the order of the requests."""
 
@@ -68,82 +91,94 @@ class NetworkAllocation:
     frontiers: tuple[Frontier, ...]
 
 
-def search_allocation(  # noqa: PLR0913 -- the inputs of one search
+def search_allocations(
     frontiers: Sequence[Frontier],
     weights: Float,
-    budget: float,
+    goals: Sequence[Goal],
     solve: Solve,
-    tolerance: float,
     *,
     gap: Gap = relative_gap,
-    minimum: float = 0.0,
-) -> Generator[Progress, None, NetworkAllocation]:
-    """Allocate a budget to sites until the bound is within a tolerance of the value.
+) -> Generator[Progress, None, tuple[NetworkAllocation, ...]]:
+    """Allocate each of several budgets to sites until its bound is within its tolerance of its value.
 
-    Each round allocates the money twice: once among the placements found, which gives a value that is reached, and once
-    among the bounds of all amounts of money, which gives a value that no allocation exceeds. Where the second takes an
-    amount that has not been solved, it is solved; where all it takes have been solved, those whose own gaps are largest
-    are searched longer. No site is solved for money that neither allocation gives it.
+    Each round allocates each budget twice: once among the placements found, which gives a value that is reached, and
+    once among the bounds of all amounts of money, which gives a value that no allocation exceeds. Where the second
+    takes an amount that has not been solved, it is solved; where all it takes have been solved, those whose own gaps
+    are largest are searched longer. No site is solved for money that no allocation gives it. The requests of all
+    budgets are solved together, so that many workers are busy.
 
     Parameters
     ----------
     frontiers : sequence of Frontier
     weights : (s,) float64
         Importance of each site.
-    budget : float, dollars
+    goals : sequence of Goal
     solve : callable
         Solves budgets at sites.
-    tolerance : float
-        Gap at which the search ends.
     gap : callable
         Gap between the value of an allocation and its bound.
-    minimum : float
-        Least value at each site.
+
+    Returns
+    -------
+    tuple of NetworkAllocation
+        One for each goal.
 
     Raises
     ------
     SeipError
-        The minimum cannot be reached at every site, or not within the budget.
+        A minimum cannot be reached at every site, or not within the budget.
     """
     known = list(frontiers)
-    known = yield from _solved(known, _first_requests(known, budget), solve)
-    while True:
-        bounding = [one.bounding_options(minimum) for one in known]
-        upper = allocate(bounding, weights, budget)
-        if upper is None:
-            raise _unreachable(known, bounding, budget, minimum)
-        found = [one.found_options(minimum) for one in known]
-        lower = allocate(found, weights, budget)
-        if lower is not None and gap(lower.value, max(lower.value, upper.value)) <= tolerance:
-            break
-        requests = _open_requests(known, bounding, upper, weights)
-        if not requests:
-            break
+    first = {one for goal in goals for one in _first_requests(known, goal.budget)}
+    known = yield from _solved(known, first, solve)
+    open_goals = list(goals)
+    while open_goals:
+        # Goals that differ by their tolerance alone share the work.
+        rounds = {key: _Round(known, weights, *key) for key in dict.fromkeys(goal.money for goal in open_goals)}
+        wanted = {key: one.requests() for key, one in rounds.items()}
+        open_goals = [
+            goal for goal in open_goals if wanted[goal.money] and rounds[goal.money].gap(gap) > goal.tolerance
+        ]
+        requests = {request for goal in open_goals for request in wanted[goal.money]}
         known = yield from _solved(known, requests, solve)
-    if lower is None:
-        raise SeipError(
-            f"no allocation of ${budget:,.0f} was found that reaches the minimum at every site, though none is "
-            "excluded: raise the budget, or lower the minimum"
-        )
-    taken = tuple(one.found[each.index[index]] for one, each, index in zip(known, found, lower.taken, strict=True))
-    bound = max(lower.value, upper.value)
-    return NetworkAllocation(budget, taken, lower.price, lower.value, bound, tuple(known))
+    return tuple(_Round(known, weights, *goal.money).allocation() for goal in goals)
 
 
-def value_range(
-    frontiers: Sequence[Frontier], weights: Float, budget: float, minimum: float = 0.0
-) -> tuple[Allocation | None, float]:
-    """Return the best allocation of a budget among the placements found, and the bound from what is known.
+class _Round:
+    """Allocations of a budget from what is known of the sites: among placements found, and among bounds."""
 
-    Returns
-    -------
-    allocation : Allocation or None
-    bound : float
-        Infinite if there is no allocation.
-    """
-    lower = allocate([one.found_options(minimum) for one in frontiers], weights, budget)
-    upper = allocate([one.bounding_options(minimum) for one in frontiers], weights, budget)
-    return lower, math.inf if upper is None else upper.value
+    def __init__(self, known: Sequence[Frontier], weights: Float, budget: float, minimum: float) -> None:
+        self._known, self._weights, self._budget = known, weights, budget
+        self._bounding = [one.bounding_options(minimum) for one in known]
+        upper = allocate(self._bounding, weights, budget)
+        if upper is None:
+            raise _unreachable(known, self._bounding, budget, minimum)
+        self._upper = upper
+        self._found = [one.found_options(minimum) for one in known]
+        self._lower = allocate(self._found, weights, budget)
+
+    def gap(self, gap: Gap) -> float:
+        """Return the gap between the two; infinite if no placement was found."""
+        if self._lower is None:
+            return math.inf
+        return gap(self._lower.value, max(self._lower.value, self._upper.value))
+
+    def requests(self) -> list[Request]:
+        """Return what to solve next."""
+        return _open_requests(self._known, self._bounding, self._upper, self._weights)
+
+    def allocation(self) -> NetworkAllocation:
+        """Return the allocation among placements found, with its bound."""
+        lower = self._lower
+        if lower is None:
+            raise SeipError(
+                f"no allocation of ${self._budget:,.0f} was found that reaches the minimum at every site, though none "
+                "is excluded: raise the budget, or lower the minimum"
+            )
+        chosen = zip(self._known, self._found, lower.taken, strict=True)
+        taken = tuple(one.found[each.index[index]] for one, each, index in chosen)
+        bound = max(lower.value, self._upper.value)
+        return NetworkAllocation(self._budget, taken, lower.price, lower.value, bound, tuple(self._known))
 
 
 def _first_requests(frontiers: Sequence[Frontier], budget: float) -> list[Request]:
@@ -198,12 +233,13 @@ def _reached(frontier: Frontier, budget: float) -> float:
 
 
 def _solved(
-    frontiers: list[Frontier], requests: Sequence[Request], solve: Solve
+    frontiers: list[Frontier], requests: set[Request], solve: Solve
 ) -> Generator[Progress, None, list[Frontier]]:
     """Return the frontiers with the results of requests."""
-    results = yield from solve(requests)
+    ordered = sorted(requests, key=lambda one: (one.site, one.budget, one.effort))
+    results = yield from solve(ordered)
     known = list(frontiers)
-    for request, result in zip(requests, results, strict=True):
+    for request, result in zip(ordered, results, strict=True):
         known[request.site] = known[request.site].with_solved(result)
     return known
 

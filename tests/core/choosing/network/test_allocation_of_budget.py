@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from seip_addon.core.choosing.network import frontier as frontiers
 from seip_addon.core.choosing.network.allocation import allocate
 from seip_addon.core.choosing.network.frontier import Frontier, Options, SolvedBudget, possible_amounts
-from seip_addon.core.choosing.network.network_search import search_allocation
+from seip_addon.core.choosing.network.network_search import Goal, search_allocations
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, finish
 
@@ -86,7 +86,7 @@ def test_search_finds_the_best_of_all_allocations(seed, looseness):
     weights = rng.choice([0.5, 1.0, 3.0], size=len(sites))
     budget = float(rng.integers(1, 90) * 1000)
     known = [site.frontier(budget) for site in sites]
-    found = finish(search_allocation(known, weights, budget, solver(sites, looseness), tolerance=0.0))
+    (found,) = finish(search_allocations(known, weights, [Goal(budget, 0.0)], solver(sites, looseness)))
     best = best_of_all(sites, weights, budget)
     assert found.value == pytest.approx(best, rel=1e-9)
     assert found.bound >= best * (1 - 1e-9)
@@ -95,13 +95,29 @@ def test_search_finds_the_best_of_all_allocations(seed, looseness):
     assert found.price == pytest.approx(math.fsum(one.price for one in found.taken))
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_budgets_that_are_searched_together_each_have_their_best_allocation(seed):
+    rng = np.random.default_rng(3000 + seed)
+    sites = [EnumeratedSite(rng) for _ in range(3)]
+    weights, budgets = rng.choice([0.5, 1.0, 3.0], size=3), (rng.integers(1, 90, size=5) * 1000.0).tolist()
+    known = [site.frontier(max(budgets)) for site in sites]
+    goals = [Goal(budget, 0.0) for budget in budgets]
+    for budget, found in zip(
+        budgets, finish(search_allocations(known, weights, goals, solver(sites, 0.05))), strict=True
+    ):
+        best = best_of_all(sites, weights, budget)
+        assert found.value == pytest.approx(best, rel=1e-9)
+        assert found.bound == pytest.approx(best, rel=1e-6)
+        assert found.price <= budget * (1 + 1e-9)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_a_search_that_ends_early_has_a_bound_that_holds(seed):
     rng = np.random.default_rng(1000 + seed)
     sites = [EnumeratedSite(rng) for _ in range(4)]
     weights, budget = np.ones(4), float(rng.integers(20, 90) * 1000)
     known = [site.frontier(budget) for site in sites]
-    found = finish(search_allocation(known, weights, budget, solver(sites, 0.1), tolerance=0.2))
+    (found,) = finish(search_allocations(known, weights, [Goal(budget, 0.2)], solver(sites, 0.1)))
     best = best_of_all(sites, weights, budget)
     assert found.value <= best * (1 + 1e-9)
     assert found.bound >= best * (1 - 1e-9)
@@ -117,9 +133,9 @@ def test_minimum_at_every_site_is_reached_or_proven_impossible(seed):
     best = best_of_all(sites, weights, budget, minimum)
     if best == -math.inf:
         with pytest.raises(SeipError, match="minimum"):
-            finish(search_allocation(known, weights, budget, solver(sites), 0.0, minimum=minimum))
+            finish(search_allocations(known, weights, [Goal(budget, 0.0, minimum)], solver(sites)))
     else:
-        found = finish(search_allocation(known, weights, budget, solver(sites), 0.0, minimum=minimum))
+        (found,) = finish(search_allocations(known, weights, [Goal(budget, 0.0, minimum)], solver(sites)))
         assert found.value == pytest.approx(best, rel=1e-9)
         assert min(one.value for one in found.taken) >= minimum
 
@@ -135,7 +151,7 @@ def test_no_site_is_solved_twice_for_the_same_money_and_effort():
         return (yield from plain(requests))
 
     known = [site.frontier(60_000.0) for site in sites]
-    finish(search_allocation(known, np.ones(4), 60_000.0, solve, 0.0))
+    finish(search_allocations(known, np.ones(4), [Goal(60_000.0, 0.0), Goal(30_000.0, 0.0)], solve))
     assert len(asked) == len(set(asked))
 
 
