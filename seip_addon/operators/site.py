@@ -42,10 +42,12 @@ from .base import LongWork, Outcome, attempt
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "scenes" / f"junction{DESCRIPTION_SUFFIX}"
 """The site that comes with SEIP: beside the package, in a checkout as in the extension."""
+EXTRACTS = "*.osm;*.osm.gz;*.osm.pbf"
+"""Files of OpenStreetMap, as the file browser filters them."""
 NO_PLACE = "Choose a junction, or give latitude and longitude"
 COPIED = (
     *("source", "position", "region_shape", "radius", "osm", "buildings", "buildings_epsg", "buildings_origin"),
-    *("terrain", "terrain_epsg", "meshes", "mesh_origin", "mesh_up"),
+    *("terrain", "terrain_epsg", "meshes", "mesh_origin", "mesh_up", "network"),
 )
 """Properties of a choice that a site in a new scene takes over."""
 SHARE_OF_VIEW = 0.6
@@ -53,11 +55,8 @@ SHARE_OF_VIEW = 0.6
 AREA_ITEMS = tuple(item for item in ROLE_ITEMS if Role[item[0]] in roles.AREAS)
 
 
-class SEIP_OT_choose_map(LongWork[SitePlaces], bpy.types.Operator):
-    """Choose an OpenDRIVE map (.xodr), an extract of OpenStreetMap (.osm, .osm.gz, .osm.pbf) or a site description (.toml), and choose among its junctions"""  # noqa: E501  # a tooltip is one line
-
-    bl_idname = "seip.choose_map"
-    bl_label = "Choose Map"
+class ReadsMap(LongWork[SitePlaces]):
+    """A mixin for operators that read the junctions of a file."""
 
     filepath: bpy.props.StringProperty(
         name="File",
@@ -65,19 +64,16 @@ class SEIP_OT_choose_map(LongWork[SitePlaces], bpy.types.Operator):
         subtype="FILE_PATH",
         options={"SKIP_SAVE", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
-    filter_glob: bpy.props.StringProperty(
-        default=f"*.xodr;*{DESCRIPTION_SUFFIX};*.osm;*.osm.gz;*.osm.pbf", options={"HIDDEN", "SKIP_SAVE"}
-    )
-    _by_hand = False
+    by_hand = False
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the scene can be written into."""
-        return _is_own(cls, context.scene)
+        return is_own(cls, context.scene)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event | None) -> Outcome:
         """Open the file browser, unless a file was dropped."""
-        self._by_hand = True
+        self.by_hand = True
         if self.filepath:
             return super().invoke(context, event)
         context.window_manager.fileselect_add(self)
@@ -85,11 +81,22 @@ class SEIP_OT_choose_map(LongWork[SitePlaces], bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """List the file's junctions: in a thread where the file browser asks, at once where a script does."""
-        return super().invoke(context, None) if self._by_hand and not bpy.app.background else super().execute(context)
+        return super().invoke(context, None) if self.by_hand and not bpy.app.background else super().execute(context)
 
     def prepare(self, _scene: bpy.types.Scene) -> Generator[Progress, None, SitePlaces]:
         """Return the reading of the file."""
         return site_places(Path(bpy.path.abspath(self.filepath)))
+
+
+class SEIP_OT_choose_map(ReadsMap, bpy.types.Operator):
+    """Choose an OpenDRIVE map (.xodr), an extract of OpenStreetMap (.osm, .osm.gz, .osm.pbf) or a site description (.toml), and choose among its junctions"""  # noqa: E501  # a tooltip is one line
+
+    bl_idname = "seip.choose_map"
+    bl_label = "Choose Map"
+
+    filter_glob: bpy.props.StringProperty(
+        default=f"*.xodr;*{DESCRIPTION_SUFFIX};{EXTRACTS}", options={"HIDDEN", "SKIP_SAVE"}
+    )
 
     def conclude(self, scene: bpy.types.Scene, result: SitePlaces) -> None:
         """List the junctions in place of those of another file, and ask for the place."""
@@ -98,15 +105,11 @@ class SEIP_OT_choose_map(LongWork[SitePlaces], bpy.types.Operator):
             before = site.junction  # it stays until another one is chosen
         else:
             site.radius, site.position = result.radius, ""
-        site.source, site.junction = self.filepath, ""
-        site.junctions.clear()
-        for place in result.places:
-            one = site.junctions.add()
-            one.name, one.id = place.name, place.key
+        list_junctions(site, self.filepath, result)
         site.junction = before if before in site.junctions else ""
         self.report({"INFO"}, counted(len(site.junctions), "junction"))
         session.places = result
-        if self._by_hand and not bpy.app.background:
+        if self.by_hand and not bpy.app.background:
             self._ask(site, result)
 
     def _ask(self, site: SEIP_PG_site, found: SitePlaces) -> None:
@@ -119,9 +122,19 @@ class SEIP_OT_choose_map(LongWork[SitePlaces], bpy.types.Operator):
         bpy.ops.seip.choose_place("INVOKE_DEFAULT")
 
 
-def _is_own(operator: type[bpy.types.Operator], scene: bpy.types.Scene) -> bool:
+def list_junctions(site: SEIP_PG_site, source: str, found: SitePlaces) -> None:
+    """List the junctions of a file, of which none is chosen yet."""
+    site.source, site.junction = source, ""
+    site.junctions.clear()
+    for place in found.places:
+        one = site.junctions.add()
+        one.name, one.id = place.name, place.key
+
+
+def is_own(operator: type, scene: bpy.types.Scene) -> bool:
+    """Return whether a scene belongs to the open file; otherwise the tooltip of an operator says why not."""
     if scene_status.is_linked(scene):
-        operator.poll_message_set(scene_status.LINKED)
+        operator.poll_message_set(scene_status.LINKED)  # type: ignore[attr-defined]  # of Blender's operators
     return not scene_status.is_linked(scene)
 
 
@@ -163,7 +176,7 @@ class _BuildsSite(LongWork[BuiltSite]):
         if has_site(scene):
             new = bpy.data.scenes.new(name)
             if self.is_chosen:
-                _copy_choice(scene.seip.site, new.seip.site)
+                copy_choice(scene.seip.site, new.seip.site)
             sensor_types.list_types(new)
             return new
         if remove_startup_objects(scene):
@@ -194,7 +207,7 @@ class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
         missing = missing_for_build(context.scene)
         if missing:
             cls.poll_message_set(missing)
-        return not missing and _is_own(cls, context.scene)
+        return not missing and is_own(cls, context.scene)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
         """Take what was chosen."""
@@ -213,14 +226,15 @@ class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the scene can be written into."""
-        return _is_own(cls, context.scene)
+        return is_own(cls, context.scene)
 
     def prepare(self, _scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
         """Take the example's description, which says all."""
         return build_site(EXAMPLE, SiteRequest())
 
 
-def _copy_choice(chosen: SEIP_PG_site, site: SEIP_PG_site) -> None:
+def copy_choice(chosen: SEIP_PG_site, site: SEIP_PG_site) -> None:
+    """Have a site take over the choice of its file and place from another one."""
     for name in COPIED:
         setattr(site, name, getattr(chosen, name))
     for junction in chosen.junctions:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from . import export, placement, results, sensors, site, traffic
+from ..scene.network import is_network
+from . import export, network, placement, results, sensors, site, traffic
 from .sections import draw_sections
 from .sidebar import Sidebar
 
@@ -17,7 +18,11 @@ class SEIP_PT_steps(Sidebar, bpy.types.Panel):
     bl_options = {"HIDE_HEADER"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the sections."""
+        """Draw the sections; of a network, its junctions."""
+        if is_network(context.scene):
+            network.draw(self.layout, context)
+            return
+        network.draw_back(self.layout, context.scene)
         steps = {"site": site, "sensors": sensors, "placement": placement}
         status = {name: step.status(context.scene) for name, step in steps.items()}
         draw_sections(self.layout, {name: step.draw for name, step in steps.items()}, context, status)

@@ -6,7 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    PointerProperty,
+    StringProperty,
+)
 
 from ..core.errors import SeipError
 from ..core.site.scene_geometry import DEFAULT_WEIGHT
@@ -108,6 +115,9 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
             ("auto", "Automatic", "y for OBJ, z for the others"),
             *((axis, axis.upper(), f"The {axis} axis points up") for axis in UP_AXES),
         ),
+    )
+    network: PointerProperty(
+        name="Network", description="Scene of the network that this site is a junction of", type=bpy.types.Scene
     )
     role: EnumProperty(name="Role", description="What objects mean to the placement", items=ROLE_ITEMS)
     checked: BoolProperty(name="Checked", description="Whether the check has looked at this scene")

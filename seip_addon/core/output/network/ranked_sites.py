@@ -82,8 +82,13 @@ def gain_text(record: NetworkRecord, gain: float | None) -> str:
 def level(record: NetworkRecord, site: NetworkSite) -> int:
     """Return the index of a site's colour among `SHARE_COLOURS`."""
     if record.criterion == "road":
-        return bisect_right(COVERAGE_STEPS, site.coverage)
+        return coverage_level(site.coverage)
     return bisect_right(RETURNS_STEPS, math.expm1(site.value))
+
+
+def coverage_level(coverage: float) -> int:
+    """Return the index of a coverage's colour among `SHARE_COLOURS`."""
+    return bisect_right(COVERAGE_STEPS, coverage)
 
 
 def level_words(record: NetworkRecord) -> tuple[str, ...]:
