@@ -1,7 +1,7 @@
 # make demo        set up, and place sensors at the shipped junction
 # make site        build a site from an OpenStreetMap extract, with sensors and a report (installs SUMO: 230 MB)
 # make network     spread one budget over the junctions of an invented town (installs SUMO)
-# make test        set up, and run the tests (the slow ones: make test-slow; those of the studies: make test-studies)
+# make test        set up, and run the tests (the slow ones: make test-slow; those of the studies: make test-studies; searches of an hour: make test-long)
 # make lint        set up, and check style and types
 # make scenes      rebuild the shipped scenes from their sources
 # make detection   install PyTorch, for the detector; make test-detection tests it
@@ -27,7 +27,7 @@ SPREAD := -n auto --maxprocesses 4
 DEMO := scenes/junction.blend --sensor type1 type2 type3 -o out/junction
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo site network test test-slow test-studies lint scenes sumo test-traffic traffic detection test-detection study coverage-study detection-study recording detector ingredients settings stability benchmark extension lock clean distclean
+.PHONY: help environment demo site network test test-slow test-long test-studies lint scenes sumo test-traffic traffic detection test-detection study coverage-study detection-study recording detector ingredients settings stability benchmark extension lock clean distclean
 
 help:
 	@sed -n '/^#/!q; s/^#\( \|$$\)//p' Makefile
@@ -50,10 +50,14 @@ network: sumo
 	@echo "map: out/town/network.html, report: out/town/report.html, report.pdf"
 
 test: environment
-	$(PY) -m pytest $(SPREAD) --ignore tests/studies -m "not slow"
+	$(PY) -m pytest $(SPREAD) --ignore tests/studies -m "not slow and not long"
 
 test-slow: environment
-	$(PY) -m pytest $(SPREAD) --ignore tests/studies -m "slow or hypothesis"
+	$(PY) -m pytest $(SPREAD) --ignore tests/studies -m "(slow or hypothesis) and not long"
+
+# Random cases in numbers that CI has no time for.
+test-long: environment
+	$(PY) -m pytest $(SPREAD) --ignore tests/studies -m long
 
 test-studies: detection sumo
 	$(PY) -m pytest $(SPREAD) tests/studies

@@ -14,9 +14,6 @@ from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.progress import finish
 from tests.oracles.placement_search import DUST, UNDECIDED, WEIGHTS, faults, search, sentence
 
-QUICK = 40
-MANY = 3000
-
 
 @pytest.mark.parametrize("seed", [249, 1_000_194, 100_277])
 def test_problems_that_were_answered_wrongly(seed: int) -> None:
@@ -25,7 +22,12 @@ def test_problems_that_were_answered_wrongly(seed: int) -> None:
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize(
-    ("first", "number"), [(520, QUICK), pytest.param(100_000, MANY, marks=pytest.mark.slow)], ids=["quick", "many"]
+    ("first", "number"),
+    [
+        pytest.param(520, 40, id="quick"),
+        pytest.param(100_000, 300, marks=pytest.mark.slow, id="many"),
+        pytest.param(100_300, 2700, marks=pytest.mark.long, id="most"),
+    ],
 )
 def test_placements_of_random_problems(first: int, number: int) -> None:
     total = search(number, first)

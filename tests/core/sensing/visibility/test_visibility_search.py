@@ -14,7 +14,7 @@ from tests.oracles.visibility_search import FAULTS, assess, draw_case, search, s
 
 QUICK = 12
 FIRST = 42  # faults that there were showed in scenes 42, 43, 51 and 52
-MANY = 400
+MANY, MOST = 80, 320
 
 
 def no_fault(total: Counter[str]) -> None:
@@ -28,10 +28,16 @@ def test_grids_of_random_scenes(engine: Engine) -> None:
     no_fault(search([engine], QUICK, first_seed=FIRST))
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("first", "number"),
+    [
+        pytest.param(100_000, MANY, marks=pytest.mark.slow, id="many"),
+        pytest.param(100_000 + MANY, MOST, marks=pytest.mark.long, id="most"),
+    ],
+)
 @each_engine
-def test_grids_of_many_random_scenes(engine: Engine) -> None:
-    no_fault(search([engine], MANY, first_seed=100_000))
+def test_grids_of_many_random_scenes(engine: Engine, first: int, number: int) -> None:
+    no_fault(search([engine], number, first_seed=first))
 
 
 @pytest.mark.slow

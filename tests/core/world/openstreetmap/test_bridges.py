@@ -332,14 +332,15 @@ def check_exit(seed, tmp_path):
     assert not any("steeper" in warning or "differ in height" in warning for warning in site.model.warnings)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(
+    "seed",
+    [
+        *range(6),
+        *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(6, 18)),
+        *(pytest.param(seed, marks=pytest.mark.long) for seed in range(18, 66)),
+    ],
+)
 def test_random_exits_have_gentle_grades_and_no_steps(tmp_path, seed):
-    check_exit(seed, tmp_path)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(6, 66))
-def test_many_random_exits_have_gentle_grades_and_no_steps(tmp_path, seed):
     check_exit(seed, tmp_path)
 
 
