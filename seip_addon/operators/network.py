@@ -10,7 +10,7 @@ from .. import scene_status, sensor_types
 from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.output.network.ranked_sites import coverage_level
-from ..core.output.pictures.palette import MAP_JUNCTION, SHARE_COLOURS
+from ..core.output.pictures.palette import NO_SITE_COLOUR, SHARE_COLOURS
 from ..core.output.results.placement_file import parsed_record
 from ..core.workflows.site_places import SitePlaces
 from ..scene import contract, network
@@ -133,9 +133,9 @@ def _show(whole: bpy.types.Scene) -> None:
 
 
 def _colour(scene: bpy.types.Scene | None) -> str:
-    """Return the colour of a junction: white without a site, otherwise that of the coverage."""
+    """Return the colour of a junction: grey without a site, otherwise that of the coverage."""
     if scene is None or scene_status.has_nothing(scene):
-        return MAP_JUNCTION
+        return NO_SITE_COLOUR
     record = scene.seip.result.record
     return SHARE_COLOURS[coverage_level(parsed_record(record).coverage.whole if record else 0.0)]
 

@@ -9,13 +9,14 @@ import numpy as np
 import shapely
 
 from ..core.arrays import Float
-from ..core.output.pictures.palette import MAP_STREETS, rgb
+from ..core.output.pictures.palette import MAP_STREETS
 from ..core.world.openstreetmap.street_plan import StreetPlan
 from . import contract
+from .materials import linear
 
 STREET_WIDTHS, DOT_SIZES = (3.0, 6.0, 10.0), (1.0, 1.3, 1.6)
 """Metres, and factors of `_dot_radius`, by importance of the street or junction."""
-SMALLEST_DOT, LARGEST_DOT = 8.0, 60.0
+SMALLEST_DOT, LARGEST_DOT = 8.0, 30.0
 """Radii, metres."""
 RISE = 0.2
 """Metres between streets of one importance and the next, so that the more important ones are drawn above."""
@@ -69,16 +70,16 @@ def extent(scene: bpy.types.Scene) -> shapely.Geometry:
 
 def paint_junction(obj: bpy.types.Object, colour: str) -> None:
     """Give a junction a colour of the palette."""
-    obj.color = (*rgb(colour), 1.0)
+    obj.color = linear(colour)
 
 
 def _dot_radius(places: Float) -> float:
-    """Return a radius at which most dots do not touch: a third of the median distance to the nearest neighbour."""
+    """Return a radius at which most dots do not touch: a sixth of the median distance to the nearest neighbour."""
     if len(places) < 2:
         return SMALLEST_DOT
     tree = shapely.STRtree(shapely.points(places))
     _, distances = tree.query_nearest(shapely.points(places), exclusive=True, return_distance=True, all_matches=False)
-    return float(np.clip(np.median(distances) / 3.0, SMALLEST_DOT, LARGEST_DOT))
+    return float(np.clip(np.median(distances) / 6.0, SMALLEST_DOT, LARGEST_DOT))
 
 
 def _streets(lines: Sequence[Float], width: float, importance: int) -> bpy.types.Object:
@@ -92,7 +93,7 @@ def _streets(lines: Sequence[Float], width: float, importance: int) -> bpy.types
     mesh = bpy.data.meshes.new("Streets")
     mesh.from_pydata(points.tolist(), [], np.arange(len(points)).reshape(-1, 4).tolist())
     obj = bpy.data.objects.new("Streets", mesh)
-    obj.color = (*rgb(MAP_STREETS[importance]), 1.0)
+    obj.color = linear(MAP_STREETS[importance])
     obj.hide_select = True  # a click between junctions selects none
     return obj
 

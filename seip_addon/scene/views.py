@@ -13,6 +13,8 @@ CLIP_START, CLIP_END = 0.5, 5000.0
 """Metres before the eye between which a 3D view shows objects: a site, without flicker of what lies close together."""
 VIEW_SENSOR = 72.0
 """Millimetres of the longer side of a 3D view's sensor; a camera's is 36 unless it is set."""
+PLAN_MARGIN = 1.5
+"""Of the distance from which a plan fills a view: no junction is to lie under the sidebar."""
 LEAST_PLAN = 200.0
 """Metres of a plan that a view shows at least."""
 MARGIN = 1.15
@@ -49,7 +51,7 @@ def frame_plan(area: bpy.types.Area, plan: BaseGeometry) -> None:
     look.view_perspective = "ORTHO"
     look.view_rotation = (1.0, 0.0, 0.0, 0.0)
     look.view_location = ((left + right) / 2, (bottom + top) / 2, 0.0)
-    look.view_distance = MARGIN * side * view.lens / VIEW_SENSOR
+    look.view_distance = PLAN_MARGIN * side * view.lens / (VIEW_SENSOR / 2)  # without perspective half of it counts
     view.clip_start, view.clip_end = CLIP_START, max(CLIP_END, 4.0 * look.view_distance)
 
 

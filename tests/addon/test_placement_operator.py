@@ -350,8 +350,14 @@ def test_a_folder_that_cannot_be_written_has_its_sentence(junction, tmp_path):
         bpy.ops.seip.export_result()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("risk", ["mean", "worst-quarter", "worst"])
+@pytest.mark.parametrize(
+    "risk",
+    [
+        pytest.param("mean", marks=pytest.mark.long),
+        pytest.param("worst-quarter", marks=pytest.mark.slow),
+        pytest.param("worst", marks=pytest.mark.long),
+    ],
+)
 def test_panel_and_batch_place_alike_over_pose_errors(junction, tmp_path, risk, small_scene):
     goal = junction.seip.goal
     goal.scenarios, goal.risk, goal.failures = "pose-errors", risk, "mean"

@@ -9,13 +9,19 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tests.fuzz import FORMATS, case_of, fuzz, is_fault
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("seed", "cases"),
+    [
+        pytest.param(1, 100, marks=pytest.mark.slow, id="many"),
+        pytest.param(2, 300, marks=pytest.mark.long, id="most"),
+    ],
+)
 @pytest.mark.parametrize("key", FORMATS)
-def test_hostile_files_give_a_result_or_a_sentence(key):
+def test_hostile_files_give_a_result_or_a_sentence(key, seed, cases):
     if key == "pt":
         pytest.importorskip("torch", reason="make detection installs it")
-    count = round(300 * FORMATS[key].share)
-    went = fuzz(key, seed=1, count=count)
+    count = round(cases * FORMATS[key].share)
+    went = fuzz(key, seed=seed, count=count)
     assert len(went) == count
     assert [line for line in went if is_fault(key, line)] == []
 

@@ -121,7 +121,7 @@ def test_the_same_run_gives_the_same_bytes(folder, tmp_path, run):
         assert (tmp_path / "again" / name).read_bytes() == (folder / name).read_bytes()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_eight_sensors_at_the_shipped_junction_are_proven_the_best(tmp_path):
     """A change of the branch and bound that cuts less than this one does ends at the limit without a proof."""
     options = ["--sensor", "type1", "--count", "8", "--effort", "120", "--no-render"]

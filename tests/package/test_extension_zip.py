@@ -112,9 +112,13 @@ def test_the_root_package_is_lazy():
     subprocess.run(command, check=True, timeout=120, stdin=subprocess.DEVNULL)  # noqa: S603  # our own script
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "platform"), [(name, at) for name, build in build_extension.BUILDS.items() for at in build.platforms]
+    ("name", "platform"),
+    [
+        pytest.param(name, at, marks=pytest.mark.slow if at == "linux-x64" else pytest.mark.long)
+        for name, build in build_extension.BUILDS.items()
+        for at in build.platforms
+    ],
 )
 def test_every_pin_has_one_wheel(name, platform, tmp_path, monkeypatch):
     build = build_extension.BUILDS[name]

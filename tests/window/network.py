@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import bpy
 import numpy as np
 from bl_ext.user_default.seip.seip_addon import preferences
-from bl_ext.user_default.seip.seip_addon.core.output.pictures.palette import MAP_JUNCTION, SHARE_COLOURS, rgb
+from bl_ext.user_default.seip.seip_addon.core.output.pictures.palette import NO_SITE_COLOUR, SHARE_COLOURS, rgb
 from bl_ext.user_default.seip.seip_addon.operators.site import has_site
 from bl_ext.user_default.seip.seip_addon.scene.network import is_network, junctions
 from bl_ext.user_default.seip.seip_addon.session import session
@@ -24,8 +24,8 @@ from driver import Steps, Window, play
 OUT = Path(sys.argv[sys.argv.index("--") + 1])
 EXTRACT = (Path("scenes") / "town.osm").resolve()
 ENVIRONMENT = Path(".venv").resolve()
-NEARLY = 30
-"""Largest difference of a drawn colour, of 255: the view is colour-managed."""
+NEARLY, BESIDE = 30, 12
+"""Largest difference of a drawn colour, of 255; and pixels left of the origin, where the colour is looked at."""
 
 
 def scenario(window: Window) -> Steps:
@@ -43,7 +43,7 @@ def scenario(window: Window) -> Steps:
     yield 1.0
     whole = _scene()
     yield from window.picture("1-network")
-    _assert_colours(window, dict.fromkeys(junctions(whole), MAP_JUNCTION))
+    _assert_colours(window, dict.fromkeys(junctions(whole), NO_SITE_COLOUR))
     one = junctions(whole)[2]
     yield from window.press("LEFTMOUSE", _pixel(window, one))
     yield 0.5
@@ -59,7 +59,7 @@ def scenario(window: Window) -> Steps:
     assert _scene() == whole
     bpy.ops.object.select_all(action="DESELECT")
     yield from window.picture("4-back")
-    _assert_colours(window, {obj: SHARE_COLOURS[0] if obj == one else MAP_JUNCTION for obj in junctions(whole)})
+    _assert_colours(window, {obj: SHARE_COLOURS[0] if obj == one else NO_SITE_COLOUR for obj in junctions(whole)})
 
 
 def _pixel(window: Window, obj: bpy.types.Object) -> tuple[int, int]:
@@ -74,6 +74,7 @@ def _assert_colours(window: Window, colours: dict[bpy.types.Object, str]) -> Non
     pixels = window.pixels().astype(int)
     for obj, colour in colours.items():
         x, y = _pixel(window, obj)
+        x -= BESIDE
         drawn = pixels[len(pixels) - 1 - y, x]
         wanted = np.array([255 * part for part in rgb(colour)])
         assert np.abs(drawn - wanted).max() < NEARLY, f"{obj.name} at {x}, {y} is {drawn}, not {wanted}"

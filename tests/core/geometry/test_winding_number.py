@@ -105,7 +105,7 @@ def test_a_post_is_blocked_by_what_comes_too_near_in_plan_at_its_height(seed, cl
     assert post_blocked(foot, height, clearance, halves).tolist() == (near & meets).any(axis=1).tolist()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_million_triangles_may_be_one_object_or_many():
     """Posts among 250 solids of 4096 triangles each that stand apart, so that each is inside of one or of none."""
     places = np.stack(np.meshgrid(np.arange(25.0) * 12, np.arange(10.0) * 12, [2.0], indexing="ij"), axis=-1)

@@ -80,9 +80,16 @@ def most_covered(problem: PlacementProblem) -> float:
     return best
 
 
-@pytest.mark.parametrize("number", [20, pytest.param(200, marks=pytest.mark.slow)])
-def test_local_search_finds_the_best_of_small_budget_problems(number: int) -> None:
-    for seed in range(number):
+@pytest.mark.parametrize(
+    "seeds",
+    [
+        pytest.param(range(20), id="few"),
+        pytest.param(range(20, 80), marks=pytest.mark.slow, id="many"),
+        pytest.param(range(80, 200), marks=pytest.mark.long, id="most"),
+    ],
+)
+def test_local_search_finds_the_best_of_small_budget_problems(seeds: range) -> None:
+    for seed in seeds:
         problem = budget_of_few(seed)
         assert (seed, searched(problem)[0]) == (seed, most_covered(problem))
 
@@ -90,9 +97,9 @@ def test_local_search_finds_the_best_of_small_budget_problems(number: int) -> No
 @pytest.mark.parametrize(
     "seeds",
     [
-        pytest.param(range(1, 3), id="few"),
-        pytest.param(range(3, 12), marks=pytest.mark.slow, id="many"),
-        pytest.param(range(12, 41), marks=pytest.mark.long, id="most"),
+        pytest.param(range(1, 2), id="few"),
+        pytest.param(range(2, 6), marks=pytest.mark.slow, id="many"),
+        pytest.param(range(6, 41), marks=pytest.mark.long, id="most"),
     ],
 )
 def test_a_plain_tabu_search_of_each_composition_finds_nothing_better(seeds: range) -> None:

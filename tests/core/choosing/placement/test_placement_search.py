@@ -24,9 +24,9 @@ def test_problems_that_were_answered_wrongly(seed: int) -> None:
 @pytest.mark.parametrize(
     ("first", "number"),
     [
-        pytest.param(520, 40, id="quick"),
-        pytest.param(100_000, 300, marks=pytest.mark.slow, id="many"),
-        pytest.param(100_300, 2700, marks=pytest.mark.long, id="most"),
+        pytest.param(520, 20, id="quick"),
+        pytest.param(100_000, 150, marks=pytest.mark.slow, id="many"),
+        pytest.param(100_150, 2850, marks=pytest.mark.long, id="most"),
     ],
 )
 def test_placements_of_random_problems(first: int, number: int) -> None:

@@ -101,7 +101,6 @@ def best_by_brute_force(problem, returns):
     return best
 
 
-@settings(max_examples=150, deadline=None)
 @given(st.integers(0, 10**9))
 def test_the_placement_is_the_best_of_all(seed):
     problem, returns = problem_of(seed)
@@ -114,7 +113,6 @@ def test_the_placement_is_the_best_of_all(seed):
     assert found.objective >= best - 2e-9
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10**9))
 def test_at_the_limit_the_bound_still_holds(seed):
     problem, returns = problem_of(seed, count=3, budget=None, mandatory=None)
@@ -124,7 +122,6 @@ def test_at_the_limit_the_bound_still_holds(seed):
     assert found.bound >= best - 2e-9
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.integers(0, 10**9))
 def test_the_order_of_poses_does_not_matter(seed):
     problem, returns = problem_of(seed, mandatory=None)

@@ -101,7 +101,6 @@ def test_the_program_finds_the_best_of_all(seed):
 
 
 @pytest.mark.slow
-@settings(max_examples=400, deadline=None)
 @given(st.integers(0, 10**9))
 def test_the_program_finds_the_best_of_all_of_many(seed):
     check_best_of_all(seed)

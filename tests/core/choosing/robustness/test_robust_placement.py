@@ -145,7 +145,7 @@ def test_a_bound_that_is_lowered_goal_by_goal_still_holds(risk, monkeypatch):
     monkeypatch.setattr(f"{module}.MIN_CLOSED_SHARE", 2.0)  # goals even where branching closes the gap
     for name in ("BRANCHING_SHARE", "WEAK_BRANCHING_SHARE"):
         monkeypatch.setattr(f"{module}.{name}", 1e-9)
-    for seed in range(6):
+    for seed in range(3):
         problem, views = crowd(seed, 4)
         answer = finish(solve_robust(problem, pack(views), risk, SolverLimits(effort=0.05)))
         best = reached_at_most(problem, views, risk)

@@ -14,7 +14,7 @@ from tests.oracles.visibility_search import FAULTS, assess, draw_case, search, s
 
 QUICK = 12
 FIRST = 42  # faults that there were showed in scenes 42, 43, 51 and 52
-MANY, MOST = 80, 320
+MANY, MOST = 25, 375
 
 
 def no_fault(total: Counter[str]) -> None:

@@ -242,8 +242,14 @@ def test_a_value_gone_wrong_is_read_or_refused_in_words(tmp_path_factory, span, 
     is_read_or_refused_in_words(tmp_path_factory.getbasetemp(), span, value)
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(
+    "spans",
+    [
+        pytest.param(VALUES[::5], marks=pytest.mark.slow, id="every-fifth"),
+        pytest.param(VALUES, marks=pytest.mark.long, id="all"),
+    ],
+)
 @pytest.mark.parametrize("value", WRONG)
-def test_every_value_gone_wrong_is_read_or_refused_in_words(tmp_path, value):
-    for span in VALUES:
+def test_every_value_gone_wrong_is_read_or_refused_in_words(tmp_path, value, spans):
+    for span in spans:
         is_read_or_refused_in_words(tmp_path, span, value)
