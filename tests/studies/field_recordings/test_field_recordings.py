@@ -50,7 +50,8 @@ def test_the_shipped_recording_is_that_of_the_study(tmp_path):
     assert own[-1].read_text(encoding="utf-8") == shipped[-1].read_text(encoding="utf-8")
     for one, other in zip(own[:-1], shipped[:-1], strict=True):
         with np.load(one) as ours, np.load(other) as theirs:
-            # made on another machine, where some coordinates were rounded to the next step; why is not known
+            # Embree computes in single precision with code for the processor at hand: on another one, some coordinates
+            # are rounded to the next step.
             moved = np.abs(ours["points"] - theirs["points"])
             assert moved[:, :3].max() <= RESOLUTION
             assert np.mean(moved > 0) < 1e-3
