@@ -60,7 +60,7 @@ test-long: environment
 	$(PY) -m pytest $(SPREAD) --ignore tests/studies -m long
 
 test-studies: detection sumo
-	$(PY) -m pytest $(SPREAD) tests/studies
+	$(PY) -m pytest $(SPREAD) -m "not long" tests/studies
 
 lint: environment
 	$(PY) -m ruff check
@@ -75,8 +75,9 @@ sumo: environment
 	@$(PYTHON) -m headless.set_up "$(VENV)" traffic
 
 test-traffic: sumo
-	$(PY) -m pytest tests/core/world/opendrive/test_shipped_maps.py tests/core/world/traffic_simulation tests/headless/test_traffic.py \
-	  tests/core/world/openstreetmap/test_sites.py
+	$(PY) -m pytest $(SPREAD) -m "not long" tests/core/world/opendrive/test_shipped_maps.py tests/core/world/traffic_simulation \
+	  tests/headless/test_traffic.py tests/core/world/openstreetmap/test_sites.py tests/core/world/openstreetmap/test_bridges.py \
+	  tests/addon/test_network_scene.py
 
 # Runs of one scene differ by their seed, and by the second of the signals' cycle of 60 s at which they begin; dense ones
 # have twice the vehicles. They are many and short, as whole runs alone are independent of each other.
