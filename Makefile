@@ -1,7 +1,8 @@
 # make demo        set up, and place sensors at the shipped junction
 # make site        build a site from an OpenStreetMap extract, with sensors and a report (installs SUMO: 230 MB)
 # make network     spread one budget over the junctions of an invented town (installs SUMO)
-# make test        set up, and run the tests (the slow ones: make test-slow; those of the studies: make test-studies; searches of an hour: make test-long)
+# make test        set up, and run the tests (the slow ones: make test-slow, the longest: make test-long; of the studies: make
+#                  test-studies)
 # make lint        set up, and check style and types
 # make scenes      rebuild the shipped scenes from their sources
 # make detection   install PyTorch, for the detector; make test-detection tests it

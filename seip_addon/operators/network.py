@@ -15,10 +15,10 @@ from ..core.output.results.placement_file import parsed_record
 from ..core.workflows.site_places import SitePlaces
 from ..scene import contract, network
 from ..scene.startup import remove_startup_objects
-from ..scene.views import frame_plan
-from ..viewport import overlays
+from ..scene.views import frame_plan, frame_site
+from ..session import session
 from .base import Outcome, attempt
-from .site import EXTRACTS, ReadsMap, copy_choice, has_site, is_own, list_junctions, missing_for_build
+from .site import EXTRACTS, ReadsMap, bring_to_front, is_own, list_junctions, missing_for_build
 
 NO_JUNCTION = "Click a junction first"
 
@@ -57,11 +57,13 @@ class SEIP_OT_open_junction(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a junction is selected."""
-        selected = selected_junction(context) is not None
-        if not selected:
-            cls.poll_message_set(NO_JUNCTION)
-        return selected and is_own(cls, context.scene)
+        """Return whether a junction is selected and no other work is under way."""
+        reason = "" if selected_junction(context) is not None else NO_JUNCTION
+        if session.running is not None:
+            reason = "Other work is under way"
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason and is_own(cls, context.scene)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Bring the scene of the site to the front."""
@@ -72,18 +74,14 @@ class SEIP_OT_open_junction(bpy.types.Operator):
         if obj is None:
             raise SeipError(NO_JUNCTION)
         scene = site_of(whole, obj)
-        if scene is None:
-            whole.seip.site.junction = obj[contract.JUNCTION]
-            missing = missing_for_build(whole)
-            if missing:
-                raise SeipError(missing)
-            scene = bpy.data.scenes.new(obj.name)
-            copy_choice(whole.seip.site, scene.seip.site)
-            scene.seip.site.network = whole
-            sensor_types.list_types(scene)
-        context.window.scene = scene
-        if not has_site(scene):
-            bpy.ops.seip.build_site("INVOKE_DEFAULT")
+        if scene is not None:
+            bring_to_front(scene, lambda area: frame_site(area, scene))
+            return
+        whole.seip.site.junction = obj[contract.JUNCTION]
+        missing = missing_for_build(whole)
+        if missing:
+            raise SeipError(missing)
+        bpy.ops.seip.build_site("INVOKE_DEFAULT")
 
 
 class SEIP_OT_show_network(bpy.types.Operator):
@@ -112,24 +110,17 @@ def selected_junction(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def site_of(whole: bpy.types.Scene, obj: bpy.types.Object) -> bpy.types.Scene | None:
-    """Return the scene of the site of a junction, if it has one."""
-    name = obj[contract.JUNCTION]
+    """Return the scene in which the site of a junction was built, if any."""
+    place = whole.seip.site.place(obj[contract.JUNCTION])
     scenes = (one for one in bpy.data.scenes if one.seip.site.network == whole)
-    return next((one for one in scenes if one.seip.site.junction == name), None)
+    return next((one for one in scenes if one.get(contract.BUILT) == place), None)
 
 
 def _show(whole: bpy.types.Scene) -> None:
     """Bring the scene of a network to the front, its junctions coloured by what their sites have."""
     for obj in network.junctions(whole):
         network.paint_junction(obj, _colour(site_of(whole, obj)))
-    window = bpy.context.window
-    if window is None:
-        return
-    window.scene = whole
-    for area in window.screen.areas:
-        if area.type == "VIEW_3D":
-            frame_plan(area, network.extent(whole))
-    overlays.open_sidebar(window)
+    bring_to_front(whole, lambda area: frame_plan(area, network.extent(whole)))
 
 
 def _colour(scene: bpy.types.Scene | None) -> str:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable
+from collections.abc import Callable, Generator, Iterable
 from pathlib import Path
 
 import bpy
-from shapely.geometry.base import BaseGeometry
 
 from .. import preferences, scene_status, sensor_types
 from ..core.counts import counted
@@ -34,8 +33,9 @@ from ..scene.build import build_scene, remove_site
 from ..scene.changes import watch
 from ..scene.check import contents_of
 from ..scene.imported import MeshFiles, import_mesh
+from ..scene.network import is_network
 from ..scene.startup import remove_startup_objects
-from ..scene.views import frame_site, set_up_view
+from ..scene.views import frame_site
 from ..session import CheckedScene, session
 from ..viewport import overlays
 from .base import LongWork, Outcome, attempt
@@ -98,6 +98,14 @@ class SEIP_OT_choose_map(ReadsMap, bpy.types.Operator):
         default=f"*.xodr;*{DESCRIPTION_SUFFIX};{EXTRACTS}", options={"HIDDEN", "SKIP_SAVE"}
     )
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether the scene can be written into, and is of one site."""
+        if is_network(context.scene):
+            cls.poll_message_set("This scene shows a network: open the site of a junction, or go to another scene")
+            return False
+        return super().poll(context)
+
     def conclude(self, scene: bpy.types.Scene, result: SitePlaces) -> None:
         """List the junctions in place of those of another file, and ask for the place."""
         site, before = scene.seip.site, ""
@@ -158,7 +166,7 @@ class _BuildsSite(LongWork[BuiltSite]):
         added = self._add_meshes(built, dict(zip(paths, places, strict=True)))
         if not self.is_chosen:
             built.seip.traffic.file = built.seip.simulation.map = traffic.EXAMPLE
-        show_site(built, result.model.region)
+        bring_to_front(built, lambda area: frame_site(area, built))
         for note in result.model.notes:
             report({"INFO"}, note)
         for warning in result.model.warnings:
@@ -173,10 +181,12 @@ class _BuildsSite(LongWork[BuiltSite]):
         if self.is_chosen and is_of_choice(scene):
             remove_site(scene)
             return scene
-        if has_site(scene):
+        if has_site(scene) or is_network(scene):
             new = bpy.data.scenes.new(name)
             if self.is_chosen:
-                copy_choice(scene.seip.site, new.seip.site)
+                _copy_choice(scene.seip.site, new.seip.site)
+                if is_network(scene):
+                    new.seip.site.network = scene
             sensor_types.list_types(new)
             return new
         if remove_startup_objects(scene):
@@ -233,8 +243,7 @@ class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
         return build_site(EXAMPLE, SiteRequest())
 
 
-def copy_choice(chosen: SEIP_PG_site, site: SEIP_PG_site) -> None:
-    """Have a site take over the choice of its file and place from another one."""
+def _copy_choice(chosen: SEIP_PG_site, site: SEIP_PG_site) -> None:
     for name in COPIED:
         setattr(site, name, getattr(chosen, name))
     for junction in chosen.junctions:
@@ -258,16 +267,21 @@ def _keep_map(scene: bpy.types.Scene, built: BuiltSite) -> None:
         simulation.map = text.name
 
 
-def show_site(scene: bpy.types.Scene, region: BaseGeometry) -> None:
-    """Bring a scene to the front, with its site in all 3D views of the window and the sidebar beside them."""
+def bring_to_front(scene: bpy.types.Scene, frame: Callable[[bpy.types.Area], None]) -> None:
+    """Show a scene in the window, with the sidebar beside it.
+
+    Parameters
+    ----------
+    frame : callable
+        Has a 3D view look at the scene.
+    """
     window = bpy.context.window
     if window is None:
         return
     window.scene = scene
     for area in window.screen.areas:
         if area.type == "VIEW_3D":
-            set_up_view(area.spaces.active)
-            frame_site(area, scene, region)
+            frame(area)
     overlays.open_sidebar(window)
 
 

@@ -6,8 +6,11 @@ import bpy
 
 from ..core.counts import counted
 from ..operators.network import SEIP_OT_open_junction, SEIP_OT_show_network, selected_junction, site_of
+from ..operators.site import SEIP_OT_build_site
+from ..scene import contract
 from ..scene.network import junctions
 from . import placement, site
+from .run_button import draw_run, is_running
 from .wrapped_text import draw_sentence
 
 
@@ -18,13 +21,16 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     text = f"{whole.name}: {counted(len(junctions(whole)), 'junction')}, {counted(sites, 'site')}"
     draw_sentence(layout, text, icon="WORLD")
     obj = selected_junction(context)
-    row = layout.row()
-    row.active_default = obj is not None
-    row.operator(SEIP_OT_open_junction.bl_idname, icon="ZOOM_SELECTED")
+    if is_running(SEIP_OT_build_site.bl_idname):
+        draw_run(layout, SEIP_OT_build_site.bl_idname)
+    else:
+        row = layout.row()
+        row.active_default = obj is not None
+        row.operator(SEIP_OT_open_junction.bl_idname, icon="ZOOM_SELECTED")
     if obj is None:
         draw_sentence(layout, "Click a junction in the view, then open its site.", icon="INFO")
         return
-    draw_sentence(layout, obj.name, icon="DECORATE_DRIVER")
+    draw_sentence(layout, obj[contract.JUNCTION], icon="DECORATE_DRIVER")
     scene = site_of(whole, obj)
     if scene is None:
         draw_sentence(layout, "It has no site yet: opening it builds one.")

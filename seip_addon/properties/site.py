@@ -144,9 +144,9 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
         """Return whether enough is chosen to build a site: a map has a middle, an extract none."""
         return bool(self.source and (self.junction or self.position or not self.is_extract()))
 
-    def place(self) -> str:
-        """Return the chosen place on the chosen map, as one text."""
-        return "|".join((self.source, self.junction or self.position))
+    def place(self, junction: str = "") -> str:
+        """Return a junction of the chosen map, or the chosen place on it, as one text."""
+        return "|".join((self.source, junction or self.junction or self.position))
 
     def follows_approaches(self) -> bool:
         """Return whether the region follows the approaches of a junction."""

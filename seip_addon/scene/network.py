@@ -54,7 +54,7 @@ def build_network(scene: bpy.types.Scene, names: Sequence[str], plan: StreetPlan
 
 def is_network(scene: bpy.types.Scene) -> bool:
     """Return whether a scene shows a network."""
-    return contract.has_members(scene, contract.NETWORK)
+    return len(junctions(scene)) > 0
 
 
 def junctions(scene: bpy.types.Scene) -> list[bpy.types.Object]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 
 import bpy
-import shapely
+import numpy as np
 from mathutils import Vector
 from shapely.geometry.base import BaseGeometry
+
+from . import contract
 
 CLIP_START, CLIP_END = 0.5, 5000.0
 """Metres before the eye between which a 3D view shows objects: a site, without flicker of what lies close together."""
@@ -55,20 +57,21 @@ def frame_plan(area: bpy.types.Area, plan: BaseGeometry) -> None:
     view.clip_start, view.clip_end = CLIP_START, max(CLIP_END, 4.0 * look.view_distance)
 
 
-def frame_site(area: bpy.types.Area, scene: bpy.types.Scene, site: BaseGeometry) -> None:
-    """Look at a site as the scene's camera does, free to be turned.
+def frame_site(area: bpy.types.Area, scene: bpy.types.Scene) -> None:
+    """Look at a site as the scene's camera does, free to be turned; without camera or region from where the view is.
 
     Parameters
     ----------
     area : bpy.types.Area
         With a 3D view.
-    site : BaseGeometry
-        What is to be seen, in site axes.
     """
     view, camera = area.spaces.active, scene.camera
+    set_up_view(view)
+    if camera is None or camera.type != "CAMERA" or not contract.has_members(scene, contract.REGION):
+        return
     region = next(region for region in area.regions if region.type == "WINDOW")
     scene.view_layers[0].update()
-    middle = Vector((*shapely.box(*site.bounds).centroid.coords[0], 0.0))
+    middle = _middle_of_region(scene)
     ahead = camera.matrix_world.to_quaternion() @ Vector((0.0, 0.0, -1.0))
     camera_width = math.tan(camera.data.angle_x / 2)
     view_width = VIEW_SENSOR / 2 / view.lens
@@ -82,3 +85,10 @@ def frame_site(area: bpy.types.Area, scene: bpy.types.Scene, site: BaseGeometry)
     look.view_location = middle
     distance = (middle - camera.matrix_world.translation).dot(ahead)
     look.view_distance = MARGIN * distance * camera_width / view_width * tall * narrow
+
+
+def _middle_of_region(scene: bpy.types.Scene) -> Vector:
+    """Return the middle of the box around the region, at the height 0."""
+    region = contract.members(scene)[contract.REGION]
+    corners = np.array([(obj.matrix_world @ Vector(corner))[:2] for obj in region for corner in obj.bound_box])
+    return Vector((*(corners.min(axis=0) + corners.max(axis=0)) / 2, 0.0))

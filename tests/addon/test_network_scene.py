@@ -50,7 +50,7 @@ def drawn():
         getattr(layout, part).return_value = layout
     layout.panel_prop.return_value = layout.panel.return_value = (layout, None)
     SEIP_PT_steps.draw(SimpleNamespace(layout=layout), bpy.context)
-    texts = " ".join(call.kwargs["text"] for call in layout.label.call_args_list)
+    texts = "\n".join(call.kwargs["text"] for call in layout.label.call_args_list)
     return texts, [call.args[0] for call in layout.operator.call_args_list]
 
 
@@ -123,6 +123,59 @@ def test_a_junction_is_opened_in_a_scene_of_its_own_and_found_again(town):
     bpy.ops.seip.open_junction()
     assert bpy.context.scene not in {town, site}
     assert has_site(site)
+
+
+@needs_sumo
+def test_a_site_that_is_there_is_opened_again_as_a_site_is_shown(town):
+    one = junctions(town)[0]
+    town.seip.site.radius = 30.0
+    select(one)
+    bpy.ops.seip.open_junction()
+    site = bpy.context.scene
+    spaces = [area.spaces.active for area in bpy.context.window.screen.areas if area.type == "VIEW_3D"]
+    looks = [(space.region_3d.view_location.copy(), space.region_3d.view_distance) for space in spaces]
+    site.seip.site.junction = junctions(town)[1][contract.JUNCTION]  # chosen, and not built
+    bpy.ops.seip.show_network()
+    select(one)
+    bpy.ops.seip.open_junction()
+    assert bpy.context.scene == site
+    assert len(bpy.data.scenes) == 2
+    for space, (location, distance) in zip(spaces, looks, strict=True):
+        assert space.shading.color_type == "MATERIAL"
+        assert space.region_3d.view_perspective == "PERSP"
+        assert np.allclose(space.region_3d.view_location, location, atol=1e-3)
+        assert space.region_3d.view_distance == pytest.approx(distance, rel=1e-4)
+
+
+@needs_sumo
+def test_a_site_that_cannot_be_built_leaves_no_scene(town):
+    one = junctions(town)[0]
+    select(one)
+    town.seip.site.buildings = str(TOWN.parent / "missing.json")
+    with pytest.raises(RuntimeError, match=r"missing\.json"):
+        bpy.ops.seip.open_junction()
+    assert [scene.name for scene in bpy.data.scenes] == [town.name]
+    assert bpy.context.scene == town
+
+
+def test_no_site_is_built_on_the_network_and_its_extract_stays(town):
+    bpy.ops.seip.load_example()
+    assert bpy.context.scene != town
+    assert not has_site(town)
+    assert bpy.context.scene.seip.site.network is None
+    bpy.context.window.scene = town
+    with pytest.raises(RuntimeError, match="This scene shows a network"):
+        bpy.ops.seip.choose_map(filepath=str(TOWN.parent / "junction.xodr"))
+    assert town.seip.site.source == str(TOWN)
+
+
+def test_junctions_keep_their_names_beside_objects_of_the_same_name(add_on):
+    names = [place.name for place in finish(site_places(TOWN)).places]
+    for name in names:
+        bpy.data.objects.new(name, None)
+    bpy.ops.seip.import_network(filepath=str(TOWN))
+    select(junctions(bpy.context.scene)[0])
+    assert names[0] in drawn()[0].splitlines()
 
 
 def test_work_that_is_in_the_scene_stays(add_on, tmp_path):

@@ -46,7 +46,9 @@ def run(folder, *options):
         patch.multiple(criterion, DELTAS=(4.0, 6.0), **spacings),
         patch.multiple("headless.convergence", COARSE_CANDIDATE_SPACING=25.0, EVALUATION_SPACING=4.0, **spacings),
     ):
-        stability.main([str(SCENE), "-o", str(folder / "docs"), "--work", str(folder / "work"), *COARSE, *options], LITTLE)
+        stability.main(
+            [str(SCENE), "-o", str(folder / "docs"), "--work", str(folder / "work"), *COARSE, *options], LITTLE
+        )
     return (folder / "docs" / "stability.md").read_text(encoding="utf-8")
 
 

@@ -101,11 +101,11 @@ def search_allocations(
 ) -> Generator[Progress, None, tuple[NetworkAllocation, ...]]:
     """Allocate each of several budgets to sites until its bound is within its tolerance of its value.
 
-    Each round allocates each budget twice: once among the placements found, which gives a value that is reached, and
-    once among the bounds of all amounts of money, which gives a value that no allocation exceeds. Where the second
-    takes an amount that has not been solved, it is solved; where all it takes have been solved, those whose own gaps
-    are largest are searched longer. No site is solved for money that no allocation gives it. The requests of all
-    budgets are solved together, so that many workers are busy.
+    Before the first round each site is solved for the money of one sensor, two, four and all. Each round allocates each
+    budget twice: once among the placements found, which gives a value that is reached, and once among the bounds of all
+    amounts of money, which gives a value that no allocation exceeds. Where the second takes an amount that has not been
+    solved, it is solved; where all it takes have been solved, those whose own gaps are largest are searched longer. The
+    requests of all budgets are solved together, so that many workers are busy.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ class _Round:
 
 
 def _first_requests(frontiers: Sequence[Frontier], budget: float) -> list[Request]:
-    """Return the requests before any allocation: money for one sensor, two and four, whichever they are."""
+    """Return the requests before any allocation: money for one sensor, two, four and all, as far as the budget goes."""
     requests = []
     for site, one in enumerate(frontiers):
         if len(one.amounts) == 1:
