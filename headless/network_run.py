@@ -295,7 +295,11 @@ class _Network:
     ]:
         """Allocate the budget of each phase; sensors of earlier phases remain."""
         request = self._request
-        installed = [_installed_poses(site, request.installed.get(site.place.name, ())) for site in self._sites]
+        names = [site.place.name for site in self._sites]
+        installed = [
+            poses_of(name, site.problem(), request.installed.get(name, ()))
+            for name, site in zip(names, self._sites, strict=True)
+        ]
         phases = [[0] * len(standing) for standing in installed]
         curve: tuple[NetworkPoint, ...] = ()
         most = max(sum(request.budgets), CURVE[-1] * sum(request.budgets))
@@ -467,16 +471,26 @@ def _placed(
         yield Progress(done, len(jobs), "writing placements")
 
 
-def _installed_poses(site: _Site, sensors: Sequence[NetworkSensor]) -> tuple[int, ...]:
-    """Return the poses of sensors that stand at a site already."""
-    problem = site.problem()
+def poses_of(name: str, problem: SiteProblem, sensors: Sequence[NetworkSensor]) -> tuple[int, ...]:
+    """Return the poses of the sensors that an earlier network placed at a site.
+
+    Parameters
+    ----------
+    name : str
+        Name of the site, for messages.
+
+    Raises
+    ------
+    SeipError
+        A sensor is no candidate of the problem.
+    """
     poses = []
     for sensor in sensors:
         same = (problem.labels == sensor.sensor) & (problem.names == sensor.position)
         same &= np.abs(problem.heights - sensor.height_m) < SAME_HEIGHT
         if not same.any():
             raise SeipError(
-                f"{site.place.name}: {sensor.id}, {sensor.sensor} at {sensor.height_m:g} m on {sensor.position}, is no "
+                f"{name}: {sensor.id}, {sensor.sensor} at {sensor.height_m:g} m on {sensor.position}, is no "
                 "candidate any more: name the same sensor types, heights and site as when it was installed"
             )
         poses.append(int(np.argmax(same)))

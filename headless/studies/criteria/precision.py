@@ -14,26 +14,23 @@ from headless.detection.average_precision import (
     part,
 )
 from headless.detection.detector import Detector
-from headless.detection.frame_results import FrameResult
-from headless.detection.recordings import SampledRun, Simulator
+from headless.detection.recordings import Simulator
 from headless.detection.rules import MAIN_RULE, RULES, precision_by
-from headless.detection.run_detection import AT_ONCE, detect_in_runs
+from headless.detection.run_detection import AT_ONCE
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import deterministic
 from headless.side_by_side import side_by_side
 from headless.studies.detection.case_study import ModelConfiguration, Traffic, TrainingSet, simulate_training_set
 from headless.studies.detection.sensor_configuration import SensorConfiguration
+from headless.studies.stored_detections import stored_detections
 
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Text
 from seip_addon.core.estimates import RESAMPLES, Interval, percentiles
 from seip_addon.core.progress import Progress
-from seip_addon.core.storage.files import digest
-from seip_addon.core.storage.source_digest import source_digest
 
 from .drawing import DrawnPlacements, PlacementsStudySettings
-from .kept_frames import load_frames, save_frames
 
 TRAFFIC_SEED, TRAINING_SEED, PLACEMENT_SEED = 0, 1, 2  # of resamples: draws of one must not follow from another's
 RESAMPLES_AT_ONCE = 100  # the number that needs a few hundred megabytes
@@ -182,7 +179,9 @@ def precisions(
     folder : path
         Of results: what was detected is kept in it, under a digest of all that it follows from.
     """
-    works = [_evaluated(simulator, placement, detectors, traffic.test, folder / FOLDER) for placement in placements]
+    works = [
+        stored_detections(simulator, placement, detectors, traffic.test, folder / FOLDER) for placement in placements
+    ]
     with deterministic(1):  # all the time, as torch keeps one such setting for all threads
         results = yield from side_by_side(works, AT_ONCE)
     runs: Text = np.repeat([run.name for run in traffic.test], [len(run.times) for run in traffic.test])
@@ -193,20 +192,3 @@ def precisions(
         for name, rule in CLASSES.items()
     }
     return Precisions(runs, tuple(tuple(evaluate(frames, MAIN_RULE) for frames in own) for own in results), of_classes)
-
-
-def _evaluated(
-    simulator: Simulator,
-    placement: SensorConfiguration,
-    detectors: Sequence[Detector],
-    runs: Sequence[SampledRun],
-    store: Path,
-) -> Generator[Progress, None, tuple[list[FrameResult], ...]]:
-    scene = digest(source_digest(detect_in_runs.__module__), simulator.key(placement, runs))
-    paths = [store / f"{digest(scene, detector.key)[:32]}.npz" for detector in detectors]
-    missing = [number for number, path in enumerate(paths) if not path.exists()]
-    if missing:
-        found = yield from detect_in_runs(simulator, placement, runs, [detectors[number] for number in missing], 1)
-        for number, frames in zip(missing, found, strict=True):
-            save_frames(paths[number], frames)
-    return tuple(load_frames(path) for path in paths)

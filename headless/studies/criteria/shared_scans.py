@@ -11,6 +11,7 @@ from headless.detection.recordings import MountedSensors, SampledRun, Simulator
 from headless.detection.settings import CLASS_CATEGORIES
 from headless.detection.training import deterministic
 from headless.studies.detection.sensor_configuration import SensorConfiguration
+from headless.studies.stored_detections import load_frames, save_frames
 
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.scans.frame import Frame
@@ -20,8 +21,6 @@ from seip_addon.core.sensing.scans.simulation import Simulation, body_surfaces, 
 from seip_addon.core.sensing.traffic.bodies import fitted_body
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
-
-from .kept_frames import load_frames, save_frames
 
 FOLDER = "detections"
 

@@ -212,10 +212,11 @@ def _numbered(places: Sequence[tuple[str, float, float, float, Path]], approache
 
 
 def _folder_name(name: str) -> str:
-    """Return a name in small letters, digits and hyphens; names in other scripts are replaced by a digest."""
-    plain = unicodedata.normalize("NFKD", name.casefold().translate(_FOREIGN)).encode("ascii", "ignore").decode()
-    stem = re.sub(r"[^a-z0-9]+", "-", plain).strip("-")[:60]
-    return stem if len(stem) > 1 else f"site-{digest(name)[:8]}"
+    """Return a name in small letters, digits and hyphens; names with letters of other scripts become a digest."""
+    parts = unicodedata.normalize("NFKD", name.casefold().translate(_FOREIGN))
+    foreign = any(letter.isalpha() and not letter.isascii() for letter in parts)
+    stem = re.sub(r"[^a-z0-9]+", "-", parts.encode("ascii", "ignore").decode()).strip("-")[:60]
+    return f"site-{digest(name)[:8]}" if foreign or not stem else stem
 
 
 def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:

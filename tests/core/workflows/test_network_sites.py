@@ -45,10 +45,12 @@ def test_table_with_names_weights_and_any_usual_delimiter(tmp_path):
 
 
 def test_names_in_other_scripts_have_folders_of_their_own(tmp_path):
-    text = "source,latitude,longitude,name\nmap.osm,54.1,7.1,忠孝東路\nmap.osm,54.2,7.1,信義路\n"
-    first, second = table_places(write(tmp_path, text), 40.0)
-    assert first.folder.startswith("site-")
-    assert first.folder != second.folder
+    names = ("忠孝東路", "信義路", "信義路12巷")
+    rows = "".join(f"map.osm,54.{number},7.1,{name}\n" for number, name in enumerate(names))
+    text = f"source,latitude,longitude,name\n{rows}"
+    folders = {place.folder for place in table_places(write(tmp_path, text), 40.0)}
+    assert len(folders) == 3
+    assert all(folder.startswith("site-") for folder in folders)
 
 
 @pytest.mark.parametrize(

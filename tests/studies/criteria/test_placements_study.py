@@ -20,12 +20,12 @@ from headless.studies.criteria.drawing import (
     PlacementsStudySettings,
     draw_placements,
 )
-from headless.studies.criteria.kept_frames import load_frames, save_frames
 from headless.studies.criteria.occupancy import require_vehicles, vehicle_occupancy
 from headless.studies.criteria.pose_criteria import SeenShare
 from headless.studies.criteria.precision import Precisions
 from headless.studies.criteria.site_criteria import best_of, problem_of
 from headless.studies.detection.sensor_configuration import SensorConfiguration
+from headless.studies.stored_detections import load_frames, save_frames
 
 import numpy as np
 import shapely

@@ -1,17 +1,23 @@
-"""Results of frames on disk, so that a study that was stopped goes on."""
+"""Detections with placements, kept on disk, so that a study that was stopped goes on."""
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from headless.detection.detector import Detector
 from headless.detection.frame_results import EvaluatedBoxes, FrameResult, GroundTruth
+from headless.detection.recordings import MountedSensors, SampledRun, Simulator
+from headless.detection.run_detection import detect_in_runs
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seip_addon.core import limits
+from seip_addon.core.progress import Progress
 from seip_addon.core.storage.array_file import ArrayFile, ArrayRule, ContentError
+from seip_addon.core.storage.files import digest
+from seip_addon.core.storage.source_digest import source_digest
 
 TABLES = {"truth": GroundTruth, "detected": EvaluatedBoxes}
 TYPES = {"category": "U", "points": "i8", "inside": "b1", "parked": "b1"}  # of columns; of others float64
@@ -36,6 +42,30 @@ def _rules() -> dict[str, ArrayRule]:
 
 
 FILE = ArrayFile("seip.detections", 1, "file of detections", "delete it, and it is made again", _rules())
+
+
+def stored_detections(
+    simulator: Simulator,
+    placement: MountedSensors,
+    detectors: Sequence[Detector],
+    runs: Sequence[SampledRun],
+    folder: Path,
+) -> Generator[Progress, None, tuple[list[FrameResult], ...]]:
+    """Return the results of frames with a placement for each detector, from their files if these exist.
+
+    Parameters
+    ----------
+    folder : path
+        Folder of the files, each named by a digest of everything that the results depend on.
+    """
+    scene = digest(source_digest(detect_in_runs.__module__), simulator.key(placement, runs))
+    paths = [folder / f"{digest(scene, detector.key)[:32]}.npz" for detector in detectors]
+    missing = [number for number, path in enumerate(paths) if not path.exists()]
+    if missing:
+        found = yield from detect_in_runs(simulator, placement, runs, [detectors[number] for number in missing], 1)
+        for number, frames in zip(missing, found, strict=True):
+            save_frames(paths[number], frames)
+    return tuple(load_frames(path) for path in paths)
 
 
 def save_frames(path: Path, frames: Sequence[FrameResult]) -> None:
