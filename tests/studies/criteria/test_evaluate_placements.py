@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless import place, survey
-from headless.studies.criteria import precision
+from headless.studies import stored_detections
 from headless.studies.detection import command as evaluate
 
 from matplotlib.image import imread
@@ -110,14 +110,14 @@ def test_a_study_that_was_stopped_goes_on_where_it_was(run, study, tmp_path, mon
     for path in sorted((study / "detections").iterdir())[1:]:
         (tmp_path / "detections" / path.name).write_bytes(path.read_bytes())
     evaluated = []
-    detect_in_runs = precision.detect_in_runs
+    detect_in_runs = stored_detections.detect_in_runs
 
     def counted(simulator, placement, runs, detectors, threads):
         evaluated.append((placement.name, len(detectors)))
         return detect_in_runs(simulator, placement, runs, detectors, threads)
 
     counted.__module__ = detect_in_runs.__module__
-    monkeypatch.setattr(precision, "detect_in_runs", counted)
+    monkeypatch.setattr(stored_detections, "detect_in_runs", counted)
     run(tmp_path, *DRAWN)
     assert [detectors for _, detectors in evaluated] == [1]
     for name in ("placements.csv", "placements.json", "criteria.png", "coverage_and_ap.png"):
