@@ -154,17 +154,26 @@ def _network(
     lanes = ["--opendrive.import-all-lanes", "true", "--type-files", types, "--tls.guess", "true"]
     source = ["--opendrive-files", map_path, *lanes, "--output-file", plain]
     yield from run(programs, programs.netconvert, [*source, *common], "reading the map")
-    network_before = read_network(plain)
-    shapes = _junction_shapes(network_before, road_map)
+    whole = read_network(plain)
+    shapes = _junction_shapes(whole, road_map)
     if bounds is not None:
-        whole = _whole_nodes(network_before, _edges_within(network_before, bounds, map_path.name))
-        shapes = {node: shape for node, shape in shapes.items() if node in whole}
+        if not _reaches_into(whole, bounds):
+            raise SeipError(f"{map_path.name} has no road at this site: name the map that the site was built from")
+        cut = network.with_name("cut.net.xml")
+        clip = [
+            "--keep-edges.in-boundary=" + ",".join(f"{edge:.3f}" for edge in bounds),
+            "--keep-edges.postload",
+            "true",
+        ]
+        source = ["--sumo-net-file", plain, "--tls.rebuild", "true", "--output-file", cut]
+        yield from run(programs, programs.netconvert, [*source, *common, *clip], "cutting the map")
+        complete = _complete_junctions(whole, read_network(cut))
+        shapes = {node: shape for node, shape in shapes.items() if node in complete}
+        plain = cut
     corners = {node: " ".join(f"{x:.2f},{y:.2f}" for x, y in shape) for node, shape in shapes.items()}
     _write(nodes, "nodes", [f'<node id="{node}" shape="{shape}"/>' for node, shape in corners.items()])
-    clip = [] if bounds is None else ["--keep-edges.in-boundary=" + ",".join(f"{edge:.3f}" for edge in bounds)]
     source = ["--sumo-net-file", plain, "--node-files", nodes, "--tls.rebuild", "true", "--output-file", network]
-    changes = [*source, *common, *clip, "--keep-edges.postload", "true"]
-    yield from run(programs, programs.netconvert, changes, "laying crosswalks")
+    yield from run(programs, programs.netconvert, [*source, *common], "laying crosswalks")
 
 
 def _junction_shapes(network: StreetNetwork, road_map: RoadMap) -> dict[str, Float]:
@@ -186,29 +195,16 @@ def _junction_shapes(network: StreetNetwork, road_map: RoadMap) -> dict[str, Flo
     return {node: shapely.get_coordinates(hull)[:-1] for node, hull in hulls.items()}
 
 
-def _edges_within(network: StreetNetwork, bounds: tuple[float, float, float, float], map_name: str) -> set[str]:
-    """Return the edges that reach into a rectangle.
-
-    Raises
-    ------
-    SeipError
-        There is none.
-    """
+def _reaches_into(network: StreetNetwork, bounds: tuple[float, float, float, float]) -> bool:
+    """Return whether a lane of a network reaches into a rectangle."""
     kept = shapely.box(*bounds)
-    within = {
-        edge.id
-        for edge in network.edges.values()
-        if any(shapely.LineString(lane.line).intersects(kept) for lane in edge.lanes)
-    }
-    if not within:
-        raise SeipError(f"{map_name} has no road at this site: name the map that the site was built from")
-    return within
+    lanes = (lane for edge in network.edges.values() for lane in edge.lanes)
+    return any(shapely.LineString(lane.line).intersects(kept) for lane in lanes)
 
 
-def _whole_nodes(network: StreetNetwork, within: set[str]) -> set[str]:
-    """Return the nodes that keep all incoming edges if only some edges of the network are kept."""
-    nodes = {edge.to_node for edge in network.edges.values()}
-    return nodes - {edge.to_node for edge in network.edges.values() if edge.id not in within}
+def _complete_junctions(whole: StreetNetwork, cut: StreetNetwork) -> set[str]:
+    """Return the signalised nodes of a network that was cut to which all edges of the whole network still lead."""
+    return set(cut.signalised) - {edge.to_node for edge in whole.edges.values() if edge.id not in cut.edges}
 
 
 def _crosswalks(road_map: RoadMap) -> list[Float]:

@@ -16,6 +16,7 @@ from seip_addon.core.sensing.traffic.floating_car_data import Extent, read_float
 from seip_addon.core.sensing.traffic.trajectories import CATEGORIES
 from seip_addon.core.sensing.traffic.vehicle_types import read_vehicle_types
 from seip_addon.core.sumo_programs import find_sumo
+from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
 from seip_addon.core.world.traffic_simulation import simulation as sumo
 from seip_addon.core.world.traffic_simulation.demand import MODELS, VEHICLE_SHARES, Demand, KerbParking, write_routes
 from seip_addon.core.world.traffic_simulation.street_network import DRIVING, PARKING, WALKING, read_network
@@ -360,6 +361,19 @@ def test_town05_is_cut_to_the_scene(tmp_path):
     trajectories, warnings = read_trajectories(data, types, np.zeros(3), "Town05")
     assert len(trajectories) > 20
     assert not warnings
+
+
+@pytest.mark.slow
+@needs_sumo
+def test_cut_behind_traffic_lights_of_a_one_way_carriageway(tmp_path):
+    """The site ends a metre behind a node with traffic lights, all of whose ways on are cut off."""
+    extract = MAPS.parent / "osm" / "northgate_dual_carriageway.osm"
+    if not extract.is_file():
+        pytest.skip(f"no {extract}")
+    built = finish(build_site(extract, SiteRequest(near_latlon=(47.7086575, -122.3273312), approaches=40.0)))
+    save_map(built, tmp_path / "site.xodr")
+    files = simulated(tmp_path / "run", tmp_path / "site.xodr", duration=10.0, bounds=(13.4, 153.5, 187.5, 257.4))
+    assert len(read_network(files.net).arms) >= 3
 
 
 @needs_sumo
