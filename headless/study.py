@@ -29,6 +29,7 @@ STUDIES = {
     "field-recordings": "verification of installations that differ from their plans",
     "network-practice": "allocation of a network against common practice",
     "network-scale": "processor time of networks, and of larger ones",
+    "open-benchmark": "criteria and placements scored on ten junctions",
     "paper": "the paper's case study on its map and traffic",
     "stability": "limits of every method",
     "benchmark": "speed and error of every method",

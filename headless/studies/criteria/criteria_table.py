@@ -212,6 +212,7 @@ class StudiedType:
                     "count": placed.count,
                     "kind": kind,
                     "poses": poses.tolist(),
+                    "sensors": [sensor.xyz.tolist() for sensor in placed.configurations[number].sensors],
                     "criteria": {one.key: one.value(poses) for one in self.criteria},
                     "average_precision": {
                         name: evaluations[number].average_precision for name, evaluations in evaluated.items()

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,7 @@ from seip_addon.scene.check import contents_of
 
 from .demand_draw import draw_demand, draw_signals
 from .extract_text import LATITUDE, LONGITUDE, write_extract, write_terrain
-from .street_plan import StreetPlan, draw_plan
+from .street_plan import StreetPlan, draw_plan, with_tram
 
 SCHEMA, VERSION = "seip.training_site", 1
 MAX_ATTEMPTS = 8  # plans that are drawn for a site until one passes the check
@@ -56,6 +56,10 @@ class SiteSettings:
         Duration of each run, and of the simulation before it.
     approaches : float, metres
         Length of the streets in the region of interest.
+    tram : bool
+        Whether tracks of a tram lie in the main street.
+    pedestrians : float, per hour and arm
+        Number of pedestrians; 0 to draw it.
     """
 
     seed: int = 0
@@ -63,6 +67,8 @@ class SiteSettings:
     duration: float = 40.0
     warm_up: float = 80.0
     approaches: float = 60.0
+    tram: bool = False
+    pedestrians: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0 <= self.seed < 2**31:
@@ -160,6 +166,7 @@ def _built(
     problems = ""
     for attempt in range(MAX_ATTEMPTS):
         plan = draw_plan(np.random.default_rng([settings.seed, number, attempt, _PLAN]))
+        plan = with_tram(plan) if settings.tram else plan
         try:
             geometry = yield from within(whole, _build(folder, plan, settings))
         except _UnusableError as error:
@@ -208,6 +215,8 @@ def _run_of_traffic(
     """Simulate and save a run; return its entry in the record."""
     random = np.random.default_rng([settings.seed, *streams, _RUN])
     demand, signals = draw_demand(plan, random), draw_signals(random)
+    if settings.pedestrians:
+        demand = replace(demand, pedestrians=settings.pedestrians)
     seed = int(random.integers(2**31))
     scenario = Scenario(demand, signals, seed, settings.warm_up + settings.duration)
     simulated = yield from simulate_run(folder / "site.xodr", scenario, settings.warm_up, geometry)

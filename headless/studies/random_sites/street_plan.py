@@ -150,6 +150,13 @@ def draw_plan(random: Random) -> StreetPlan:
     return StreetPlan(arms, roundabout, signals, bare.left_hand, things)
 
 
+def with_tram(plan: StreetPlan) -> StreetPlan:
+    """Return a plan with tracks of a tram along the main street."""
+    first, second = (arm.line for arm in plan.arms if arm.name == "Main Street")
+    tracks = Thing(np.concatenate([first[:0:-1], second]), {"railway": "tram"})
+    return replace(plan, things=(*plan.things, tracks))
+
+
 def _draw_arms(random: Random) -> tuple[Arm, ...]:
     count = int(random.choice(list(ARM_SHARES), p=list(ARM_SHARES.values())))
     gaps = MIN_ANGLES[count] + (360.0 - count * MIN_ANGLES[count]) * random.dirichlet(np.full(count, 4.0))

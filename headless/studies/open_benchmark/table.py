@@ -1,0 +1,175 @@
+"""Table of the open benchmark: placements with average precision and criteria, and scores of criteria on it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from headless.studies.rank_correlation import rank_agreements
+
+import numpy as np
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.errors import SeipError
+from seip_addon.core.estimates import IntervalEstimate, student_reach
+from seip_addon.core.storage.csv_table import save_csv
+from seip_addon.core.storage.files import read_small
+
+AP = {name: f"ap_{name.replace('-', '_')}" for name in ("vehicles", "two-wheelers", "pedestrians")}
+"""Columns of average precision by class of road users."""
+CRITERIA = ("coverage", "returns", "occupancy_entropy", "egvs", "inspe", "pe_vgop")
+"""Columns of criteria, as in `criteria.site_criteria`, which needs torch."""
+COLUMNS = ("site", "placement", "kind", "sensors", *AP.values(), *CRITERIA)
+FEWEST = 4
+"""Placements of a site below which a criterion is not scored there."""
+_MOST_BYTES = 1 << 26
+
+Placements = dict[str, list[dict[str, str]]]
+"""Rows of the table by site."""
+
+
+@dataclass(frozen=True)
+class CriterionScore:
+    """Score of a criterion for a class of road users.
+
+    Parameters
+    ----------
+    sites : int
+        Number of sites.
+    spearman : IntervalEstimate
+        Rank correlation of the criterion with average precision over a site's placements, mean over sites.
+    loss : IntervalEstimate
+        Average precision of a site's best placement less that of the placement with the largest value of the
+        criterion, mean over sites.
+    """
+
+    road_users: str
+    sites: int
+    spearman: IntervalEstimate
+    loss: IntervalEstimate
+
+
+def table_rows(site: str, placements: Sequence[Mapping[str, Any]]) -> Iterator[tuple[object, ...]]:
+    """Yield the rows of a site, from the placements in the record of the criteria study."""
+    for number, one in enumerate(placements, start=1):
+        sensors = "; ".join(" ".join(f"{value:.3f}" for value in xyz) for xyz in one["sensors"])
+        precision = [one["average_precision"].get(name) for name in AP]
+        values = [one["criteria"].get(key) for key in CRITERIA]
+        figures = ["" if value is None or math.isnan(value) else f"{value:.6f}" for value in (*precision, *values)]
+        yield (site, number, one["kind"], sensors, *figures)
+
+
+def save_table(path: Path, rows: Sequence[Sequence[object]]) -> None:
+    """Write the table."""
+    save_csv(path, COLUMNS, rows)
+
+
+def read_table(path: Path) -> Placements:
+    """Read the table.
+
+    Raises
+    ------
+    SeipError
+        It is no table of the benchmark.
+    """
+    by_site: Placements = {}
+    for row in _read_csv(path, ("site", "placement", *AP.values())):
+        by_site.setdefault(row["site"], []).append(row)
+    return by_site
+
+
+def read_criterion(path: Path, table: Placements) -> dict[str, Float]:
+    """Read values of a criterion, a column ``value`` by ``site`` and ``placement``, for all placements of some sites.
+
+    Raises
+    ------
+    SeipError
+        A placement is unknown, missing or there twice, or a value is no number.
+    """
+    found: dict[str, dict[str, float]] = {}
+    for row in _read_csv(path, ("site", "placement", "value")):
+        site, placement = row["site"], row["placement"]
+        if placement not in {one["placement"] for one in table.get(site, ())}:
+            raise SeipError(f"{path}: the benchmark has no placement {placement} at {site or 'a site without name'}")
+        if placement in found.setdefault(site, {}):
+            raise SeipError(f"{path}: placement {placement} at {site} is there twice")
+        found[site][placement] = _number(path, row, "value")
+    for site, values in found.items():
+        missing = [one["placement"] for one in table[site] if one["placement"] not in values]
+        if missing:
+            raise SeipError(
+                f"{path}: placement {missing[0]} at {site} is missing: give a value to each of its placements"
+            )
+    if not found:
+        raise SeipError(f"{path} has no values")
+    return {site: np.array([values[one["placement"]] for one in table[site]]) for site, values in found.items()}
+
+
+def criterion_column(path: Path, table: Placements, key: str) -> dict[str, Float]:
+    """Return the values of a criterion that is a column of the table, at the sites that have it."""
+    return {
+        site: np.array([_number(path, row, key) for row in rows])
+        for site, rows in table.items()
+        if all(row.get(key) for row in rows)
+    }
+
+
+def score(path: Path, table: Placements, values: Mapping[str, Float]) -> list[CriterionScore]:
+    """Score a criterion on the sites for which it has values, for each class of road users.
+
+    Parameters
+    ----------
+    path : path
+        File of the table, for messages.
+    values : mapping of str to (n,) float64
+        Values for the placements of each site, in the order of the table; more is better.
+    """
+    scores = []
+    for road_users, column in AP.items():
+        correlations, losses = [], []
+        for site, own in values.items():
+            rows = table[site]
+            if len(rows) < FEWEST or not all(row[column] for row in rows):
+                continue
+            precision = np.array([_number(path, row, column) for row in rows])
+            # A criterion without any differences says nothing: its correlation is undefined, and counts as zero.
+            correlations.append(float(np.nan_to_num(rank_agreements(own, precision)[0])))
+            losses.append(float(precision.max() - precision[int(np.argmax(own))]))
+        if correlations:
+            figures = (_mean(np.array(each)) for each in (correlations, losses))
+            scores.append(CriterionScore(road_users, len(correlations), *figures))
+    return scores
+
+
+def _mean(values: Float) -> IntervalEstimate:
+    mean = float(values.mean())
+    reach = student_reach(values) if len(values) > 1 else math.inf
+    return IntervalEstimate(mean, mean - reach, mean + reach)
+
+
+def _read_csv(path: Path, needed: Sequence[str]) -> list[dict[str, str]]:
+    text = read_small(path, _MOST_BYTES, "give a table of the benchmark")
+    try:
+        rows = list(csv.DictReader(io.StringIO(text.decode("utf-8-sig"))))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise SeipError(f"{path} is not a table: {error}; save it as CSV in UTF-8") from error
+    missing = [name for name in needed if not rows or name not in rows[0]]
+    if missing:
+        raise SeipError(f"{path} has no column {missing[0]!r}: it needs {', '.join(needed)}")
+    return [{name: value or "" for name, value in row.items() if isinstance(name, str)} for row in rows]
+
+
+def _number(path: Path, row: Mapping[str, str], column: str) -> float:
+    try:
+        value = float(row[column])
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        where = f"placement {row['placement']} at {row['site']}"
+        raise SeipError(f"{path}: {column} of {where} is {row[column]!r}, not a number")
+    return value
