@@ -54,8 +54,10 @@ def has_nothing(scene: bpy.types.Scene) -> bool:
 def next_step(scene: bpy.types.Scene) -> str:
     """Return the operator, by its ``bl_idname``, that comes next on the way to placed sensors; empty at its end."""
     site = scene.seip.site
-    if is_linked(scene) or is_newer(scene) or scene.seip.result.record:
+    if is_linked(scene) or is_newer(scene):
         return ""
+    if scene.seip.result.record:
+        return "seip.solve_placement" if other_goal(scene) else ""
     if obstacle(scene):
         return "seip.build_site" if site.has_place() else "seip.choose_map"
     if not site.checked:
@@ -129,6 +131,15 @@ def stale_placement(scene: bpy.types.Scene) -> str:
         return NOT_COMPARED
     record = parsed_record(scene.seip.result.record)
     return stale_survey(scene) or ("" if record.is_of(state.inputs) else ANOTHER_SITE)
+
+
+def other_goal(scene: bpy.types.Scene) -> str:
+    """Return whether the goal is another than that of the scene's placement, in a sentence; empty if it is the same."""
+    try:
+        same = scene.seip.goal.objective() == parsed_record(scene.seip.result.record).request.goal
+    except SeipError as error:
+        return str(error)
+    return "" if same else "The goal has changed: place again for it."
 
 
 def stale_check(scene: bpy.types.Scene) -> str:

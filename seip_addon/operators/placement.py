@@ -15,6 +15,7 @@ from .. import scene_survey, selection
 from ..core.acceptance import Acceptance
 from ..core.choosing.placement.objective import Objective, check_objective
 from ..core.errors import SeipError
+from ..core.output.results.answer import answer
 from ..core.output.results.placement_record import Provenance
 from ..core.output.results.versions import versions
 from ..core.progress import Progress
@@ -46,13 +47,12 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneState], bpy.types.Ope
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Put the sensors into the scene, and all that is needed to go on later into the file."""
         survey, solution = result.placed()
-        deployment = solution.deployment
         provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
         record = record_of(survey, solution, provenance)
-        write_result(scene, survey.site, deployment)
+        write_result(scene, survey.site, solution.deployment)
         keep_result(scene, result, record)
         coverage.show_colours(scene)
-        self.report({"INFO"}, f"coverage {deployment.coverage:.2%}, price {record.price_text}")
+        self.report({"INFO"}, " ".join(answer(record)[:2]))
 
 
 def _placed(

@@ -81,13 +81,13 @@ def no_placement(scene: bpy.types.Scene) -> str:
 
 
 def no_folder(scene: bpy.types.Scene) -> str:
-    """Say where the result would be written if the file were saved; empty if it can be."""
+    """Say why there is no folder yet to write the result to, and the cure; empty if there is one."""
     folder = scene.seip.result.folder
     if not folder:
         return "Name a folder to write the result to."
     if bpy.data.filepath or not folder.startswith("//"):
         return ""
-    return f"Save the file first: the result is written to {folder[2:] or 'the folder'} beside it."
+    return f"Save the file, or choose another folder: {folder[2:] or 'this one'} is beside the file."
 
 
 class SEIP_OT_look_from_sensor(ForPlacement, bpy.types.Operator):

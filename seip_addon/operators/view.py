@@ -48,9 +48,9 @@ class SEIP_OT_colour_coverage(bpy.types.Operator):
         description="What the colours of the road mean",
         items=(
             ("returns", "Returns", "Expected returns from a pedestrian there, where sensors were placed for returns"),
-            ("seen", "Seen", "Whether some sensor sees the target"),
-            ("times", "Sensors", "How many sensors see the target"),
-            ("weights", "Weights", "How much the target counts"),
+            ("seen", "Seen", "Whether any sensor measures the surface of the road"),
+            ("times", "Sensors", "How many sensors measure the surface of the road"),
+            ("weights", "Weights", "Weight of each part of the road, where regions are weighted"),
         ),
         default="times",
     )

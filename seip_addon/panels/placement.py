@@ -11,7 +11,7 @@ from .. import scene_status
 from ..core.choosing.placement.objective import certificate, purpose
 from ..core.choosing.placement.returns_summary import returns_text
 from ..core.counts import counted, duration_text
-from ..core.output.results.answer import answer, status_text
+from ..core.output.results.answer import answer, sentence, status_text
 from ..core.output.results.placement_file import parsed_record
 from ..core.output.results.placement_record import PlacementRecord, relevant_warnings
 from ..core.workflows.traffic_runs import traffic_folder
@@ -33,6 +33,8 @@ _SHOWN = {
 """Properties of the objective that are shown for each kind of scenarios."""
 
 
+NAME_SHARE = 0.68
+"""Share of a row that the name of a figure takes."""
 NUMBER_SHARE = 0.3
 """Share of a row that a number of sensors takes, beside the bar of its coverage."""
 
@@ -54,12 +56,12 @@ def status(scene: bpy.types.Scene) -> str:
     if no_placement(scene):
         return "none yet"
     text = status_text(parsed_record(scene.seip.result.record))
-    return f"{text} · changed" if _doubts(scene) else text
+    return f"{text} · changed" if _doubts(scene) or scene_status.other_goal(scene) else text
 
 
 def _doubts(scene: bpy.types.Scene) -> list[str]:
     """Return why the placement is not of the scene as it is now."""
-    return [sentence for sentence in (scene_status.stale_placement(scene), sensor_edits(scene).describe()) if sentence]
+    return [text for text in (scene_status.stale_placement(scene), sensor_edits(scene).describe()) if text]
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -185,19 +187,22 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     record = parsed_record(scene.seip.result.record)
     box = layout.box()
     doubts = _doubts(scene)
-    for sentence in doubts:
-        draw_sentence(box, sentence, icon="ERROR", reserved=BOX)
+    for text in doubts:
+        draw_sentence(box, text, icon="ERROR", reserved=BOX)
     stale = scene_status.stale_placement(scene)
     if stale and stale != scene_status.ANOTHER_SITE:
         draw_run(box, SEIP_OT_compare_scene.bl_idname)
     if sensor_edits(scene).describe():
         draw_run(box, SEIP_OT_evaluate_sensors.bl_idname)
+    other_goal = "" if doubts else scene_status.other_goal(scene)
+    if other_goal:
+        draw_sentence(box, other_goal, icon="INFO", reserved=BOX)
     column = box.column()
     column.active = not doubts
     if scene.seip.result.change:
         draw_sentence(column, scene.seip.result.change, icon="INFO", reserved=BOX)
-    for sentence in answer(record):
-        draw_sentence(column, sentence, reserved=BOX)
+    for text in answer(record):
+        draw_sentence(column, text, reserved=BOX)
     others = {"numbers": partial(_draw_numbers, goal=scene.seip.goal, certain=not doubts)} if numbers(record) else {}
     draw_sections(box, {**others, "details": partial(_draw_details, certain=not doubts)}, record)
 
@@ -228,8 +233,7 @@ def numbers(record: PlacementRecord) -> list[tuple[int, float, str]]:
     front = record.returns.front
     most = max((point.returns for point in front), default=0.0) or 1.0
     return [
-        (point.count, point.returns / most, f"{returns_text(point.returns)} returns · ${point.price:,.0f}")
-        for point in front
+        (point.count, point.returns / most, f"{returns_text(point.returns)} · ${point.price:,.0f}") for point in front
     ]
 
 
@@ -238,11 +242,12 @@ def front_text(record: PlacementRecord) -> str:
     if record.returns is not None:
         gaps = [point.gap for point in record.returns.front]
         if None in gaps:
-            limit = "Others may have more."
+            limit = "Not every number is proven."
         else:
             most = max(gap for gap in gaps if gap is not None)
             limit = f"Others have at most {most:.1%} more." if most else "No other has more."
-        return f"Returns and price of the best placement found for each number, without a budget. {limit}"
+        what = "Returns from a road user in each turn, and price, of the best placement found for each number"
+        return f"{what}, without a budget. {limit}"
     what = "Coverage by weight" if record.objective.kind == "weighted" else "Coverage"
     missed = max(point.missed for point in record.front)
     limit = f"Others see at most {missed:.1%} of the road more." if missed else "No other sees more."
@@ -258,42 +263,40 @@ def _draw_details(layout: bpy.types.UILayout, record: PlacementRecord, *, certai
         layout.label(text=topic)
         column = layout.column(align=True)
         for name, value in lines:
-            row = column.split(factor=0.5)
+            row = column.split(factor=NAME_SHARE)
             row.label(text=f"  {name}", translate=False)
             row.label(text=value, translate=False)
     if certain:
         objective, notes = record.objective, record.notes
         proven = objective.status == "optimal" and not purpose(notes)  # of the coverage that is shown above
-        sentence = certificate(objective.status, objective.gap, cheapest=objective.cheapest, notes=notes)
-        draw_sentence(layout, sentence, icon="CHECKMARK" if proven else "INFO", reserved=BOX)
+        proof = certificate(objective.status, objective.gap, cheapest=objective.cheapest, notes=notes)
+        draw_sentence(layout, proof, icon="CHECKMARK" if proven else "INFO", reserved=BOX)
     for note in (*record.notes, *_warnings(record)):
-        draw_sentence(layout, note, icon="INFO", reserved=BOX)
+        draw_sentence(layout, sentence(note), icon="INFO", reserved=BOX)
 
 
 def figures(record: PlacementRecord) -> dict[str, list[tuple[str, str]]]:
     """Return the figures of a placement as text, by topic."""
     coverage, objective = record.coverage, record.objective
-    seen = [("Whole road", f"{coverage.whole:.2%}")]
+    seen = [("Road", f"{coverage.whole:.2%}")]
     if coverage.central is not None:
-        seen.append(("Weighted regions", f"{coverage.central:.2%}"))
+        seen.append(("In weighted regions", f"{coverage.central:.2%}"))
     if objective.kind == "weighted":
         seen.append(("By weight", f"{coverage.weighted:.2%}"))
     if coverage.gain_band is not None and coverage.gain_band.sheets:
         seen.append(("Plausible gains", f"{coverage.gain_band.low:.0%} to {coverage.gain_band.high:.0%}"))
     returns: list[tuple[str, str]] = []
+    crossings: list[tuple[str, str]] = []
     if record.returns is not None:
         returns = [(name.capitalize(), returns_text(number)) for name, number in record.returns.of_each.items()]
-        returns += [(crossing.name, returns_text(crossing.least)) for crossing in record.returns.crossings]
-    proof: list[tuple[str, str]] = []
-    if objective.bound is not None and objective.gap is not None:
-        unit = "${:,.0f}" if objective.cheapest else "{:,.6g}"
-        proof = [
-            ("Objective", unit.format(objective.value)),
-            ("Bound", unit.format(objective.bound)),
-            ("Gap", f"{objective.gap:.2%}"),
-        ]
+        crossings = [(crossing.name, returns_text(crossing.least)) for crossing in record.returns.crossings]
     price = [(sensor.id, f"${sensor.price_usd:,.0f}") for sensor in record.sensors]
-    return {"Coverage": seen, "Returns": returns, "Price": [*price, ("Total", record.price_text)], "Proof": proof}
+    return {
+        "Seen": seen,
+        "Returns from a Road User in Each Turn": returns,
+        "Returns at Worst Point of Crossing": crossings,
+        "Price": [*price, ("Total", record.price_text)],
+    }
 
 
 def _warnings(record: PlacementRecord) -> list[str]:

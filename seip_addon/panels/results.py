@@ -8,6 +8,7 @@ from ..core.errors import SeipError
 from ..core.output.results.comparison import BOTH, CLASS_WORDS, KEPT_ONLY, NEITHER, PRESENT_ONLY, compared_shares
 from ..core.output.results.placement_file import parsed_record
 from ..core.output.results.placement_record import PlacementRecord
+from ..core.sensing.lidar.model import short_name
 from ..operators import results
 from ..session import FollowedSensors, session
 from . import view
@@ -16,6 +17,9 @@ from .sections import draw_sections
 from .sidebar import RowList, is_narrow
 from .wrapped_text import draw_sentence
 
+SENSOR_SHARE = 0.72
+"""Share of a row of the list that a sensor takes, beside what it sees."""
+
 
 class SEIP_UL_chosen(RowList, bpy.types.UIList):
     """The sensors of the placement."""
@@ -23,16 +27,15 @@ class SEIP_UL_chosen(RowList, bpy.types.UIList):
     bl_idname = "SEIP_UL_chosen"
 
     def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
-        """Draw a sensor: label, type, height, place and what it sees."""
+        """Draw a sensor: label, height, product and what it sees; its position where there is room."""
         record = parsed_record(bpy.context.scene.seip.result.record)
         sensor = next((one for one in record.sensors if one.id == item.name), None)
         if sensor is None:
             layout.label(text=item.name)
             return
-        narrow = is_narrow(bpy.context)
-        row = layout.split(factor=0.55 if narrow else 0.75)
-        where = "" if narrow else f" {sensor.height_m:g} m {sensor.position}"
-        row.label(text=f"{item.name}  {sensor.sensor_name}{where}")
+        row = layout.split(factor=SENSOR_SHARE)
+        words = [item.name, f"{sensor.height_m:g} m", short_name(sensor.sensor_name)]
+        row.label(text="  ".join(words if is_narrow(bpy.context) else [*words, sensor.position]), translate=False)
         row.label(text=f"{sensor.coverage_alone:.1%}")
 
 
@@ -66,6 +69,9 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         draw_sentence(layout, sentence, icon="INFO")
         return
     result = scene.seip.result
+    heading = layout.split(factor=SENSOR_SHARE)
+    heading.label(text="Sensor")
+    heading.label(text="Sees Alone")
     _draw_list(layout, SEIP_UL_chosen, result, "sensors", "active_sensor")
     label = result.sensors[result.active_sensor].name if 0 <= result.active_sensor < len(result.sensors) else ""
     layout.operator("seip.look_from_sensor", icon="HIDE_OFF", text=f"View from {label or 'Sensor'}")

@@ -9,6 +9,10 @@ import bpy
 from .. import scene_status
 from ..core.counts import duration_text
 from ..session import session
+from .sections import BETWEEN, fitting
+
+TWO_BUTTONS = 40.0
+"""Width of the buttons beside the progress, pixels at the usual scale of the interface."""
 
 
 def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE", text: str | None = None) -> None:
@@ -24,7 +28,8 @@ def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE", text
         return
     progress = running.work.progress
     times = times_text(time.monotonic() - running.began, running.work.seconds_left)
-    row.progress(factor=progress.done / progress.total if progress.total else 0.0, text=f"{times} · {progress.what}")
+    text = fitting(f"{times}{BETWEEN}{progress.what}", TWO_BUTTONS)
+    row.progress(factor=progress.done / progress.total if progress.total else 0.0, text=text)
     if running.acceptance is not None and running.acceptance.searching:
         row.operator("seip.accept", text="", icon="CHECKMARK")
     row.operator("seip.stop", text="", icon="X")

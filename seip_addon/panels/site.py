@@ -46,9 +46,9 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the choice of a map while there is no site, otherwise the check and its problems."""
     scene = context.scene
     if scene_status.has_nothing(scene):
-        draw_sentence(layout, "Begin with the example, with a map, or with roles of your own objects.", icon="INFO")
-        draw_run(layout, SEIP_OT_load_example.bl_idname, icon="MOD_BUILD")
+        draw_sentence(layout, "Choose a map, load the example, or give roles to your own objects.", icon="INFO")
         _draw_map(layout, scene)
+        draw_run(layout, SEIP_OT_load_example.bl_idname, icon="MOD_BUILD")
     else:
         _draw_check(layout, scene)
         draw_sections(layout, {"contents": _draw_contents, "change_site": _draw_map}, scene)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..core.choosing.placement.returns_summary import SURFACE_SEEN
 from ..core.output.pictures.coverage_colours import Aspect
 from ..operators.results import no_placement
 from ..operators.view import (
@@ -52,6 +53,8 @@ def _draw_coverage(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
         now = obj is not None and obj.get(ASPECT) == aspect
         button = row.operator(SEIP_OT_colour_coverage.bl_idname, text=words, depress=now)
         button.aspect = aspect
+    if obj is not None and "returns" in possible and obj.get(ASPECT) in {"seen", "times"}:
+        draw_sentence(column, SURFACE_SEEN, icon="INFO")
     why_not = why_no_coverage(context.scene)
     if why_not:
         draw_sentence(column, why_not, icon="INFO")

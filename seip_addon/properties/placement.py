@@ -66,7 +66,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         "criterion",
         "Criterion",
         items=(
-            ("auto", "By Sensor", "Returns if a sensor has a range law, as real ones have; otherwise road seen"),
+            ("auto", "By Sensor", "Returns from road users for products, the road seen for the paper's sensor types"),
             ("road", "Road Seen", "The share of the road that sensors see"),
             ("returns", "Returns", "The expected returns from cars, cyclists and pedestrians"),
             ("height", "Vehicles' Height", f"The {LAYER_NAMES['height']}, in traffic"),

@@ -59,7 +59,9 @@ class SEIP_PG_result(SEIP_PG_placement):
         options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     render: BoolProperty(
-        name="Rendered View", description="Render a view of the scene as well, which takes a minute", default=False
+        name="Include Rendered View",
+        description="Add a rendered view of the scene to the files and the report, which takes a minute",
+        default=False,
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.choosing.placement.deployment import Deployment, Sensor
 from ..core.geometry.solids import Solid, join, prism, tube
-from ..core.output.pictures.coverage_colours import Aspect, Colouring, Legend, of_placement
+from ..core.output.pictures.coverage_colours import Aspect, Colouring, Legend, colouring
 from ..core.site.roles import AREA_OVERLAYS
 from ..core.site.site import Site, Targets
 from ..core.site.target_squares import target_squares
@@ -48,9 +48,10 @@ def write_result(scene: bpy.types.Scene, site: Site, deployment: Deployment) -> 
     """
     for name in (contract.SENSORS, contract.COVERAGE):
         contract.leave_shared(scene, name)
+    aspect = _shown_aspect(scene)
     clear_result(scene)
     _write_sensors(contract.find_or_make(scene, contract.SENSORS), deployment.sensors)
-    _write_coverage(contract.find_or_make(scene, contract.COVERAGE), site.targets, deployment)
+    _write_coverage(contract.find_or_make(scene, contract.COVERAGE), site.targets, deployment, aspect)
 
 
 def take_over(
@@ -68,6 +69,7 @@ def take_over(
         Theirs, by their labels.
     """
     contract.leave_shared(scene, contract.COVERAGE)
+    aspect = _shown_aspect(scene)
     old = coverage_of(scene)
     if old is not None:
         _remove(old)
@@ -75,7 +77,7 @@ def take_over(
         if sensor.label in empties:  # nobody has deleted it meanwhile
             rename_whole(empties[sensor.label], _name(sensor))
             _describe(empties[sensor.label], sensor)
-    _write_coverage(contract.find_or_make(scene, contract.COVERAGE), site.targets, deployment)
+    _write_coverage(contract.find_or_make(scene, contract.COVERAGE), site.targets, deployment, aspect)
 
 
 def clear_result(scene: bpy.types.Scene) -> None:
@@ -180,7 +182,7 @@ def shown_legend(scene: bpy.types.Scene) -> Legend | None:
     if obj is None or CLASS_WORDS not in obj:
         return None
     shares = np.array(obj[SHARES], dtype=np.float64)
-    return Legend(obj.get(TITLE, "Coverage"), tuple(obj[CLASS_WORDS]), tuple(obj[CLASS_COLOURS]), shares)
+    return Legend(obj.get(TITLE, "Road surface"), tuple(obj[CLASS_WORDS]), tuple(obj[CLASS_COLOURS]), shares)
 
 
 def paint(obj: bpy.types.Object, colours: Colouring) -> None:
@@ -203,11 +205,20 @@ def paint(obj: bpy.types.Object, colours: Colouring) -> None:
     obj[ASPECT] = ""
 
 
-def _write_coverage(collection: bpy.types.Collection, targets: Targets, deployment: Deployment) -> None:
+def _shown_aspect(scene: bpy.types.Scene) -> str:
+    """Return the aspect that a user has chosen for the coverage, or "" while it is that of a new placement."""
+    obj = coverage_of(scene)
+    aspect = "" if obj is None else str(obj.get(ASPECT, ""))
+    return "" if obj is None or aspect == aspects_of(obj)[0] else aspect
+
+
+def _write_coverage(collection: bpy.types.Collection, targets: Targets, deployment: Deployment, aspect: str) -> None:
     obj = bpy.data.objects.new("Coverage", _coverage_mesh(targets, deployment))
     obj[contract.WRITTEN] = True
-    paint(obj, of_placement(deployment))
-    obj[ASPECT] = aspects_of(obj)[0]
+    possible = aspects_of(obj)
+    shown = next((one for one in possible if one == aspect), possible[0])
+    paint(obj, colouring(shown, deployment.seen_by, targets.weight, deployment.pedestrian_returns))
+    obj[ASPECT] = shown
     obj["seip_coverage"] = deployment.coverage
     obj["seip_seen_twice"] = deployment.seen_twice
     obj["seip_coverage_weighted"] = deployment.weighted

@@ -1,14 +1,23 @@
 """The coverage on the road: its legend, and whether a view shows its colours."""
 
+from collections.abc import Iterator
+
 import bpy
 
-from ..core.output.pictures.palette import rgb
+from ..core.output.pictures.palette import FORBIDDEN_VEIL, MANDATORY_VEIL, WEIGHTED_VEIL, rgb
 from ..overlay import Block, Entry, Overlay
+from ..scene import contract
 from ..scene.write import coverage_of, shown_legend
 from . import overlays
 from .labels import labels_of_sensors
 
 NAME = "coverage"
+AREAS = (
+    (contract.WEIGHTED_REGIONS, "weighted region", WEIGHTED_VEIL),
+    (contract.FORBIDDEN_AREAS, "no sensor", FORBIDDEN_VEIL),
+    (contract.MANDATORY_AREAS, "sensor required", MANDATORY_VEIL),
+)
+"""Collections of areas with their words and colours in the legend."""
 SHOWN_BY = {"MATERIAL", "VERTEX"}  # ways to colour Solid shading that show the coverage
 
 
@@ -45,7 +54,17 @@ def legend_of_coverage(scene: bpy.types.Scene) -> Block | None:
         return None
     rows = zip(legend.words, legend.colours, legend.shares, strict=True)
     entries = tuple(Entry(f"{words}  {share:.1%}", ((*rgb(colour), 1.0),)) for words, colour, share in rows)
-    return Block(legend.title, entries)
+    return Block(legend.title, (*entries, *_areas(scene)))
+
+
+def _areas(scene: bpy.types.Scene) -> Iterator[Entry]:
+    """Yield an entry for each kind of area that the scene shows on the road or beside it."""
+    layer = scene.view_layers[0]
+    for name, words, colour in AREAS:
+        collection = contract.find(scene, name)
+        objects = () if collection is None else collection.all_objects
+        if any(obj.visible_get(view_layer=layer) for obj in objects if obj.name in layer.objects):
+            yield Entry(words, ((*rgb(colour), 1.0),))
 
 
 def shows_coverage(space: bpy.types.SpaceView3D) -> bool:

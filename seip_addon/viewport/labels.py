@@ -10,6 +10,7 @@ from ..core.output.pictures.callouts import stack_upwards
 from ..overlay import Label
 from ..scene import contract
 from ..scene.sensors import placed_sensors
+from ..session import session
 from .free_frame import Box
 from .legend import FONT, PAPER, TEXT_SIZE, fill, write
 
@@ -18,12 +19,18 @@ RISE, PAD, TALL, GAP = 16.0, 5.0, 18.0, 2.0
 
 
 def labels_of_sensors(scene: bpy.types.Scene) -> list[Label]:
-    """Return the label and type of each sensor that the scene shows, at its optical centre."""
+    """Return the label and product of each sensor that the scene shows, at its optical centre."""
     return [
-        (f"{label}  {obj.get(contract.SENSOR, '')}".strip(), tuple(obj.matrix_world.translation))
+        (f"{label}  {_product(obj)}".strip(), tuple(obj.matrix_world.translation))
         for label, obj in placed_sensors(scene).items()
         if obj.name in scene.view_layers[0].objects and obj.visible_get(view_layer=scene.view_layers[0])
     ]
+
+
+def _product(obj: bpy.types.Object) -> str:
+    key = str(obj.get(contract.SENSOR, ""))
+    model = session.sensor_types.get(key)
+    return key if model is None else model.short_name
 
 
 def draw_labels(  # what a label must keep off is of several kinds

@@ -130,15 +130,60 @@ def test_a_click_on_a_number_of_sensors_makes_it_the_goal(junction):
     assert placed.price_usd == record.front[2].price
 
 
+def sentences(scene: bpy.types.Scene, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Return the sentences of the step as it is drawn."""
+    said: list[str] = []
+    monkeypatch.setattr(placement_panel, "draw_sentence", lambda _, text, **__: said.append(text))
+    placement_panel.draw(DrawnLayout(), bpy.context)
+    return said
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"count": 3},
+        {"limit": "BUDGET"},
+        {"min_distance": 7.3},
+        {"weighting": "VALUE"},
+        {"scenarios": "pose-errors"},
+    ],
+)
+def test_another_goal_makes_placing_the_next_step(junction, monkeypatch, change):
+    bpy.ops.seip.solve_placement()
+    goal = junction.seip.goal
+    before = {name: getattr(goal, name) for name in change}
+    assert scene_status.next_step(junction) == scene_status.other_goal(junction) == ""
+    for name, value in change.items():
+        setattr(goal, name, value)
+    assert scene_status.next_step(junction) == "seip.solve_placement"
+    assert placement_panel.status(junction).endswith("changed")
+    assert any("goal has changed" in text for text in sentences(junction, monkeypatch))
+    for name, value in before.items():
+        setattr(goal, name, value)
+    assert scene_status.next_step(junction) == scene_status.other_goal(junction) == ""
+
+
+def test_a_placement_of_any_goal_is_of_that_goal(junction):
+    goal = junction.seip.goal
+    goal.limit, goal.budget, goal.min_distance = "BUDGET", 12_345.67, 3.3
+    goal.weighting, goal.central_weight = "VALUE", 2.7
+    bpy.ops.seip.solve_placement()
+    assert scene_status.other_goal(junction) == ""
+    goal.limit, goal.coverage = "COVERAGE", 12.3
+    bpy.ops.seip.solve_placement()
+    assert scene_status.other_goal(junction) == ""
+
+
 def test_numbers_of_sensors_placed_by_returns_show_returns(junction):
     front = (ReturnsPoint(1, 4.0, 1000.0, 0.0), ReturnsPoint(2, 16.0, 2000.0, 0.0))
     bpy.ops.seip.solve_placement()
     record = parsed_record(junction.seip.result.record)
     by_returns = replace(record, front=(), returns=ReturnsSummary(16.0, {"car": 16.0}, (), front))
-    assert placement_panel.numbers(by_returns) == [(1, 0.25, "4 returns · $1,000"), (2, 1.0, "16 returns · $2,000")]
-    text = "Returns and price of the best placement found for each number, without a budget. "
+    assert placement_panel.numbers(by_returns) == [(1, 0.25, "4 · $1,000"), (2, 1.0, "16 · $2,000")]
+    what = "Returns from a road user in each turn, and price, of the best placement found for each number"
+    text = f"{what}, without a budget. "
     assert placement_panel.front_text(by_returns) == f"{text}No other has more."
-    for gap, limit in ((0.031, "Others have at most 3.1% more."), (None, "Others may have more.")):
+    for gap, limit in ((0.031, "Others have at most 3.1% more."), (None, "Not every number is proven.")):
         open_ended = replace(by_returns.returns, front=(front[0], replace(front[1], gap=gap)))
         assert placement_panel.front_text(replace(by_returns, returns=open_ended)) == f"{text}{limit}"
     stored = json.loads(junction.seip.result.record) | {"front": [], "returns": as_json(by_returns.returns)}
@@ -146,7 +191,7 @@ def test_numbers_of_sensors_placed_by_returns_show_returns(junction):
     junction.seip.sections.numbers = True
     layout, numbers = choices(junction)
     assert [number[0] for number in numbers] == [1, 2]
-    assert [bar[1] for bar in layout.bars] == ["4 returns · $1,000", "16 returns · $2,000"]
+    assert [bar[1] for bar in layout.bars] == ["4 · $1,000", "16 · $2,000"]
 
 
 def test_numbers_of_sensors_are_not_offered_where_the_record_has_none(junction):
@@ -339,7 +384,7 @@ def test_an_unsaved_file_says_where_it_would_write(junction, monkeypatch):
     scene = bpy.context.scene
     from seip_addon.operators.results import no_folder  # noqa: PLC0415  # registered with the add-on
 
-    assert "Save the file first: the result is written to seip-result/ beside it." in no_folder(scene)
+    assert no_folder(scene) == "Save the file, or choose another folder: seip-result/ is beside the file."
 
 
 def test_a_folder_that_cannot_be_written_has_its_sentence(junction, tmp_path):

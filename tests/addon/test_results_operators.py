@@ -69,7 +69,7 @@ def test_two_placements_are_compared_target_by_target(placed):
     assert (words[index] == "seen only by the kept").sum() == (before & ~after).sum() > 0
     assert (words[index] == "seen only by the present").sum() == (after & ~before).sum()
     legend = legend_of_coverage(placed)
-    assert [entry.words for entry in legend.entries] == [
+    assert [entry.words for entry in legend.entries[:4]] == [
         f"seen by neither  {np.mean(~before & ~after):.1%}",
         f"seen by both  {np.mean(before & after):.1%}",
         f"seen only by the present  {np.mean(after & ~before):.1%}",

@@ -14,6 +14,7 @@ from seip_addon.core.output.pictures.sheet import GAP
 from seip_addon.panels import view as view_section
 from seip_addon.scene import render
 from seip_addon.scene.sensors import placed_sensors
+from seip_addon.scene.write import ASPECT, coverage_of
 from seip_addon.session import session
 from seip_addon.viewport import overlays
 from seip_addon.viewport.coverage import legend_of_coverage, shows_coverage
@@ -38,8 +39,10 @@ def test_nothing_can_be_shown_before_a_placement(junction):
 def test_coverage_is_coloured_with_a_legend(placed, aspect):
     assert bpy.ops.seip.colour_coverage(aspect=aspect) == {"FINISHED"}
     block = legend_of_coverage(placed)
-    shares = [float(entry.words.split()[-1].rstrip("%")) for entry in block.entries]
+    words = [entry.words for entry in block.entries]
+    shares = [float(one.split()[-1].rstrip("%")) for one in words if one.endswith("%")]
     assert sum(shares) == pytest.approx(100.0, abs=0.3)
+    assert words[len(shares) :] == ["weighted region", "no sensor"]
     assert overlays.handler_count() == 2
 
 
@@ -92,7 +95,7 @@ def test_undo_takes_colours_and_legend_back(placed):
     bpy.ops.seip.colour_coverage(aspect="seen")
     bpy.ops.ed.undo_push(message="coloured")
     bpy.ops.ed.undo()
-    assert [entry.words.split("  ")[0] for entry in legend_of_coverage(bpy.context.scene).entries][-1].endswith("more")
+    assert legend_of_coverage(bpy.context.scene).entries[2].words.startswith("seen by two or more")
 
 
 @pytest.mark.parametrize("ending", ["toggle", "another file", "unregister", "delete the scene"])
@@ -157,8 +160,8 @@ def test_a_view_that_hides_the_colours_is_set_in_one_click(placed):
 
 def test_a_placement_shows_its_coverage_with_legend_and_labels_and_so_does_the_file_when_it_is_opened(placed, tmp_path):
     blocks, labels = overlays.legend_blocks(placed), overlays.labels_of(placed)
-    assert [block.title for block in blocks] == ["Coverage"]
-    assert [words for words, _ in labels] == ["S1  type1", "S2  type1"]
+    assert [block.title for block in blocks] == ["Road surface"]
+    assert [words for words, _ in labels] == ["S1  Type 1", "S2  Type 1"]
     path = tmp_path / "placed.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
@@ -171,11 +174,29 @@ def test_a_placement_shows_its_coverage_with_legend_and_labels_and_so_does_the_f
     assert overlays.handler_count() == 0
 
 
+def test_the_legend_names_the_areas_that_are_shown(placed):
+    regions = bpy.data.collections["SEIP Weighted Regions"].objects
+    for obj in regions:
+        obj.hide_set(True)
+    assert [entry.words for entry in legend_of_coverage(placed).entries][3:] == ["no sensor"]
+    for obj in bpy.data.collections["SEIP Forbidden Areas"].objects:
+        obj.hide_set(True)
+    assert len(legend_of_coverage(placed).entries) == 3
+
+
+def test_the_aspect_that_was_chosen_is_shown_after_placing_again(placed):
+    bpy.ops.seip.colour_coverage(aspect="weights")
+    placed.seip.goal.count = 1
+    bpy.ops.seip.solve_placement()
+    assert coverage_of(placed)[ASPECT] == "weights"
+    assert legend_of_coverage(placed).title == "Weight"
+
+
 def test_labels_are_of_sensors_that_are_shown_where_they_are(placed):
     sensors = placed_sensors(placed)
     sensors["S1"].hide_set(True)
     sensors["S2"].location.x += 5.0
     bpy.context.view_layer.update()
     ((words, place),) = overlays.labels_of(placed)
-    assert words == "S2  type1"
+    assert words == "S2  Type 1"
     assert place == pytest.approx(tuple(sensors["S2"].location))

@@ -137,7 +137,7 @@ def test_a_new_placement_takes_the_report_on_the_old_one_away(folder, small_scen
     assert not (tmp_path / "report.html").exists()
     assert not (tmp_path / "placement.kml").exists()
     notes = load_placement(tmp_path / "placement.json").notes
-    assert "placement.geojson and placement.kml are not written: the scene's map names no projection" in notes
+    assert "placement.geojson and placement.kml cannot be written: the scene's map names no projection" in notes
 
 
 def test_a_folder_that_is_none_is_not_made(tmp_path):

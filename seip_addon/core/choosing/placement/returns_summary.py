@@ -11,6 +11,12 @@ RETURNS = Limits(0.0, COUNT.most)
 FEW_RETURNS = 5.0
 """Number of returns from a pedestrian below which a warning names the crossing."""
 
+SURFACE_SEEN = (
+    "Seen means that the surface of the road itself is measured. People and vehicles reflect more light and are "
+    "detected farther away."
+)
+"""Why the share of the road that is seen is lower than that on which road users are detected."""
+
 
 def share_reached(value: float, best: float, *, of_returns: bool) -> float:
     """Return the share of the best placement's outcome that another placement reaches, from their objective values.
@@ -87,10 +93,13 @@ class ReturnsSummary:
     front: tuple[ReturnsPoint, ...] = ()
 
     def describe(self) -> str:
-        """Return the number of returns from each kind of road user as text."""
+        """Return the number of returns from each kind of road user as text, with its unit."""
+        return self.describe_each().replace(" from", " returns from", 1)
+
+    def describe_each(self) -> str:
+        """Return the numbers alone as text, such as "494 from a car and 36 from a pedestrian"."""
         parts = [f"{returns_text(number)} from a {name}" for name, number in self.of_each.items()]
-        parts[0] = parts[0].replace(" from", " returns from", 1)
-        return f"{', '.join(parts[:-1])} and {parts[-1]}"
+        return " and ".join(filter(None, (", ".join(parts[:-1]), parts[-1])))
 
     def warnings(self) -> tuple[str, ...]:
         """Return a warning that names the crossings where a pedestrian may have few returns."""

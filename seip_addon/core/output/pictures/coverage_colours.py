@@ -57,7 +57,7 @@ class Colouring:
     words: tuple[str, ...]
     colours: tuple[str, ...]
     of: Integer
-    title: str = "Coverage"
+    title: str = "Road surface"
 
     @property
     def shares(self) -> Float:
@@ -131,4 +131,5 @@ def _by_weight(weight: Float) -> Colouring:
     ends = [(levels[group[0]], levels[group[-1]]) for group in groups]
     words = tuple(f"weight {low:g}" if low == high else f"weight {low:g} to {high:g}" for low, high in ends)
     spread = np.linspace(0, len(WEIGHT_COLOURS) - 1, max(len(groups), 2)).round().astype(int)
-    return Colouring(words, tuple(WEIGHT_COLOURS[place] for place in spread[: len(groups)]), group_of[of.ravel()])
+    colours = tuple(WEIGHT_COLOURS[place] for place in spread[: len(groups)])
+    return Colouring(words, colours, group_of[of.ravel()], "Weight")

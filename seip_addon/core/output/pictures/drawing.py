@@ -117,7 +117,7 @@ def draw_sensors(  # noqa: PLR0913  # what labels need to keep off
     """
     sensors = deployment.sensors
     in_full = len(sensors) <= MAX_LABELLED_IN_FULL
-    words = [f"{s.label}  {s.model.key} · {s.height:.3g} m{s.turned}" if in_full else s.label for s in sensors]
+    words = [f"{s.label}  {s.model.short_name} · {s.height:.3g} m{s.turned}" if in_full else s.label for s in sensors]
     draw_callouts(axes, points, words, road, zorder - 0.5, taken)
     markers = markers_of(deployment)
     hidden = np.zeros(len(points), dtype=bool) if hidden is None else hidden

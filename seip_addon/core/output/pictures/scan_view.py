@@ -118,7 +118,7 @@ def _write_around(figure: Figure, frame: Frame, sensors: Sequence[MountedSensor]
     figure.text(y=1 - 0.58 / height, s=counts, size=11, color=SOFT_INK, **style)
     shown = range(len(sensors))
     marks = [Line2D([], [], color=sensor_colour(number), marker="o", linestyle="none") for number in shown]
-    types = [f"{sensor.label}  {sensor.model.key}" for sensor in sensors]
+    types = [f"{sensor.label}  {sensor.model.short_name}" for sensor in sensors]
     legend = figure.legend(
         marks, types, loc="lower left", bbox_to_anchor=(MARGIN / width, 0.0), frameon=False, ncols=8, fontsize=9
     )

@@ -11,11 +11,13 @@ import numpy as np
 from ...arrays import Float
 from ...choosing.placement.deployment import BAND, UNRANKED
 from ...choosing.placement.objective import CHOSEN_FOR, MOVED, SAME_PRICE, purpose
-from ...choosing.placement.returns_summary import FEW_RETURNS, ReturnsSummary, returns_text
+from ...choosing.placement.returns_summary import FEW_RETURNS, SURFACE_SEEN, ReturnsSummary, returns_text
 from ...counts import counted
 from ...sensing.visibility.settings import VisibilitySettings
 from ...site.candidates import PAPER_TYPES
 from ..pictures.drawing import percent
+from ..results.answer import sentence
+from ..results.costs import Costs, costs_of
 from ..results.file_names import POSE_ERROR_PICTURES, TRAFFIC_PICTURES
 from ..results.located import LOCATED_FILES
 from ..results.placement_record import PlacementRecord, RecordedSensor, relevant_warnings
@@ -35,7 +37,6 @@ from ..results.verification_text import (
 )
 from .blind_spots import BlindSpot, blind_spots, centres, seen_places
 from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Report, Section, Table
-from .costs import Costs, costs_of
 from .evidence import Evidence
 from .figures import blind_spot_map, coverage_front, front_chart, returns_front_plot
 from .losses import failures
@@ -50,7 +51,6 @@ from .wording import (
     plain_warning,
     points,
     proof,
-    sentence,
 )
 
 MOST_SPOTS = 8
@@ -74,12 +74,6 @@ PAPER_MODELS = (
     "are the sensor models of the SEIP study on roadside perception, not products: they stand for LiDARs with 16, 32 "
     "and 128 channels, and count every return within range. Choose a product and place the sensors again before "
     "inviting tenders."
-)
-
-
-SURFACE = (
-    "Seen means here that the surface of the road itself is measured. People and vehicles reflect more light and are "
-    "detected farther away: the plan shows where."
 )
 
 
@@ -384,7 +378,7 @@ def _blind_spots(evidence: Evidence) -> Iterator[Block]:
     parts = counted(len(spots), "connected part")
     yield Paragraph(f"{area:,.0f} m² of road is not seen, in {parts}.{largest} {_counted_from(evidence)}")
     if evidence.record.returns is not None:
-        yield Paragraph(SURFACE)
+        yield Paragraph(SURFACE_SEEN)
     yield Picture(
         blind_spot_map(evidence, shown),
         "Orange is not seen, light blue seen by one sensor, dark blue by two or more. Triangles are sensors, numbers "

@@ -9,18 +9,12 @@ from datetime import datetime
 
 from ...choosing.placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE, Objective, certificate
 from ...counts import counted
+from ..results.answer import sentence
 from ..results.placement_record import RecordedObjective, RecordedSensor
 from .evidence import Evidence
 
 _RINGS = re.compile(r"beyond (.*?) neighbouring rings on a level road are more than 2δ = ([\d.]+) m apart.*")
 _RANGE = re.compile(r"detects this road \((.*?) reflectivity\) with (.*?) probability up to (.*?)(?:;.*)?$")
-
-
-def sentence(text: str) -> str:
-    """Return a note with a capital and a full stop; names of types and files at its beginning stay as they are."""
-    first = text.split(maxsplit=1)[0] if text.strip() else ""
-    begun = text[:1].upper() + text[1:] if first.isalpha() else text
-    return begun if begun.endswith((".", "!", "?")) else f"{begun}."
 
 
 def dollars(amount: float) -> str:

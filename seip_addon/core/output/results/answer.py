@@ -7,6 +7,7 @@ import math
 from ...choosing.placement.objective import MOVED, purpose
 from ...choosing.placement.returns_summary import FEW_RETURNS, returns_text, share_reached
 from ...counts import counted
+from .costs import costs_of
 from .placement_record import PlacementRecord
 
 LARGE_GAP = 0.05
@@ -15,6 +16,13 @@ WHOLE_THOUSANDS = 10_000.0
 """Price in dollars from which a header rounds to thousands."""
 NEEDLESS = 0.01
 """Share of the road, lost without a sensor, below which leaving that sensor out is recommended."""
+
+
+def sentence(text: str) -> str:
+    """Return a note with a capital and a full stop; names of types and files at its beginning stay as they are."""
+    first = text.split(maxsplit=1)[0] if text.strip() else ""
+    begun = text[:1].upper() + text[1:] if first.isalpha() else text
+    return begun if begun.endswith((".", "!", "?")) else f"{begun}."
 
 
 def status_text(record: PlacementRecord) -> str:
@@ -55,7 +63,7 @@ def change_text(record: PlacementRecord, previous: PlacementRecord) -> str:
     """Return whether a placement is better or worse than the previous one, or "" if they cannot be compared.
 
     Placements are compared by what both were chosen for, on the same number of targets: returns from road users, or
-    coverage.
+    coverage. The difference in price is added, as a smaller number of sensors is worse and cheaper.
     """
     comparable = record.counts.targets == previous.counts.targets and record.site.name == previous.site.name
     if not comparable or (record.returns is None) != (previous.returns is None):
@@ -65,7 +73,9 @@ def change_text(record: PlacementRecord, previous: PlacementRecord) -> str:
         return ""
     word = "Better" if now > before else "Worse"
     figures = f"{_quality(record, exact=True)} instead of {_quality(previous, exact=True)}"
-    return f"{word} than the previous placement: {figures}."
+    saved = previous.price_usd - record.price_usd
+    price = f", for ${abs(saved):,.0f} {'less' if saved > 0 else 'more'}" if round(saved) else ""
+    return f"{word} than the previous placement: {figures}{price}."
 
 
 def possible_improvement(record: PlacementRecord) -> float | None:
@@ -102,7 +112,7 @@ def _certificate(record: PlacementRecord) -> str:
 def _achievement(record: PlacementRecord) -> str:
     if record.returns is None:
         return f"{record.coverage.whole:.1%} of the road is seen."
-    return f"{record.returns.describe()}."
+    return f"{_quality(record)} from a road user in each turn: {record.returns.describe_each()}."
 
 
 def _outlook(record: PlacementRecord) -> str:
@@ -123,5 +133,7 @@ def _outlook(record: PlacementRecord) -> str:
 
 
 def _price(record: PlacementRecord) -> str:
-    scope = "with installation" if record.installed else "without installation"
-    return f"${record.price_usd:,.0f} for {counted(len(record.sensors), 'sensor')}, {scope}."
+    paid = f"${record.price_usd:,.0f} for {counted(len(record.sensors), 'sensor')}"
+    if record.installed:
+        return f"{paid} with installation."
+    return f"{paid}, about ${costs_of(record).total:,.0f} installed."

@@ -91,8 +91,7 @@ def rings(polygon: shapely.Polygon) -> list[list[list[float]]]:
 def missing_sentence(site: Site, files: Sequence[str]) -> str:
     """Say why files that need longitude and latitude are missing; empty where they are not."""
     obstacle = site.geo_reference.obstacle
-    verb = "are" if len(files) > 1 else "is"
-    return f"{' and '.join(files)} {verb} not written: {obstacle}" if obstacle else ""
+    return f"{' and '.join(files)} cannot be written: {obstacle}" if obstacle else ""
 
 
 def _geographic(site: Site, points: Float) -> Float:

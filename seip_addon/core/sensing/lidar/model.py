@@ -20,6 +20,11 @@ DetectionLaw = RangeEquation | CarlaDropoff
 """Law by which returns are detected: physical, or the one of CARLA."""
 
 
+def short_name(name: str) -> str:
+    """Return the name of a product without the remark in brackets: ``VLP-16`` for ``VLP-16 (Puck)``."""
+    return name.partition(" (")[0]
+
+
 @dataclass(frozen=True, eq=False)
 class LidarModel:
     """A LiDAR that rotates, scans a limited horizontal field of view in columns, or draws a rosette.
@@ -113,6 +118,11 @@ class LidarModel:
         object.__setattr__(self, "elevations", np.arctan2(z, np.hypot(x, y)))
         object.__setattr__(self, "azimuth_offsets", np.arctan2(y, x))
         object.__setattr__(self, "field_of_view", 2 * rosette.reach)
+
+    @property
+    def short_name(self) -> str:
+        """Name without the remark in brackets, for labels."""
+        return short_name(self.name)
 
     @property
     def channels(self) -> int:

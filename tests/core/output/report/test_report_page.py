@@ -21,13 +21,13 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.output.pictures.close_up_sheet import TILE
 from seip_addon.core.output.report.blocks import Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Table
-from seip_addon.core.output.report.costs import costs_of
 from seip_addon.core.output.report.evidence import load_evidence
 from seip_addon.core.output.report.figures import returns_front_plot
 from seip_addon.core.output.report.html import as_html
 from seip_addon.core.output.report.sections import make_report
 from seip_addon.core.output.report.wording import certificate_sentence, date, geographic, plain_warning
 from seip_addon.core.output.report.write import write_report
+from seip_addon.core.output.results.costs import costs_of
 from seip_addon.core.output.results.file_names import REPORT_FILES
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.visibility.grid import VisibilityGrid

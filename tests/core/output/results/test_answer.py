@@ -17,6 +17,7 @@ from seip_addon.core.output.results.answer import (
     recommendation,
     status_text,
 )
+from seip_addon.core.output.results.costs import costs_of
 from seip_addon.core.output.results.placement_record import Provenance, placement_record
 from tests.builders.small_junction import make_example
 
@@ -66,8 +67,13 @@ def test_a_proven_placement_has_two_sentences(record):
     assert status_text(record) == "94% · $48k · proven"
     assert answer(record) == (
         "94.4% of the road is seen. No placement of these candidates is better.",
-        "$48,000 for 3 sensors, without installation.",
+        f"$48,000 for 3 sensors, about ${costs_of(record).total:,.0f} installed.",
     )
+
+
+def test_a_price_with_installation_is_stated_as_such(record):
+    paid = tuple(replace(one, installation_usd=2_000.0) for one in record.sensors)
+    assert answer(replace(record, sensors=paid))[1] == "$48,000 for 3 sensors with installation."
 
 
 def test_the_possible_improvement_is_that_of_the_bound(record):
@@ -89,7 +95,9 @@ def test_the_possible_improvement_is_that_of_the_bound(record):
 def test_returns_are_compared_as_a_share_of_returns(record):
     one = with_returns(record)
     assert status_text(one) == "150 returns · $48k · proven"
-    assert answer(one)[0].startswith("494 returns from a car, 71 from a cyclist and 36 from a pedestrian.")
+    assert answer(one)[0].startswith(
+        "150 returns from a road user in each turn: 494 from a car, 71 from a cyclist and 36 from a pedestrian."
+    )
     value = one.objective.value
     better = replace(one, objective=replace(one.objective, bound=value + math.log(1.07), gap=0.01, status="feasible"))
     assert possible_improvement(better) == pytest.approx(0.07)  # of 1 + returns
@@ -122,6 +130,9 @@ def test_a_worse_result_is_called_worse(record):
     assert change_text(less, record) == "Worse than the previous placement: 90.00% instead of 94.44%."
     assert change_text(record, less) == "Better than the previous placement: 94.44% instead of 90.00%."
     assert change_text(record, record) == ""
+    cheaper = replace(less, price_usd=record.price_usd - 16_000.0)
+    assert change_text(cheaper, record).endswith("90.00% instead of 94.44%, for $16,000 less.")
+    assert change_text(record, cheaper).endswith("94.44% instead of 90.00%, for $16,000 more.")
     assert change_text(with_returns(record, typical=120.0), with_returns(record)).startswith("Worse")
 
 

@@ -137,7 +137,7 @@ def test_of_many_targets_those_that_the_same_sensors_see_are_joined(placed, tmp_
 def test_without_a_projection_there_is_none_and_a_sentence_says_why(example):
     bare = replace(example.site, geo_reference=GeoReference())
     assert located(example.geometry, bare, example.deployment) is None
-    assert missing_sentence(bare, ("a.kml",)) == "a.kml is not written: the scene's map names no projection"
+    assert missing_sentence(bare, ("a.kml",)) == "a.kml cannot be written: the scene's map names no projection"
     assert missing_sentence(example.site, ("a.kml",)) == ""
 
 

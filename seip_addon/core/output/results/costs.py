@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from ...limits import PRICE
 from ...site.candidates import CandidateSettings
 from ...site.installed_cost import InstalledCost, load_installed_cost
-from ..results.placement_record import PlacementRecord, RecordedSensor
+from .placement_record import PlacementRecord, RecordedSensor
 
 SENSOR = "sensor"
 CENT = 0.01  # dollars to which prices are rounded
@@ -64,12 +65,17 @@ def _items(sensor: RecordedSensor, table: InstalledCost, bracket: float) -> dict
 
 def _table(settings: Mapping[str, Any]) -> InstalledCost:
     """Return the installed costs that a placement was made with, or the shipped ones."""
-    shipped = load_installed_cost()
+    shipped = _shipped()
     given = settings.get("installed_cost")
     if not isinstance(given, Mapping):
         return shipped
     known = {name: value for name, value in given.items() if hasattr(shipped, name) and PRICE.allow(value)}
     return InstalledCost(**(vars(shipped) | known))
+
+
+@cache  # the panel asks at every redraw
+def _shipped() -> InstalledCost:
+    return load_installed_cost()
 
 
 def _bracket(settings: Mapping[str, Any]) -> float:
