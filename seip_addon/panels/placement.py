@@ -246,12 +246,11 @@ def front_text(record: PlacementRecord) -> str:
         else:
             most = max(gap for gap in gaps if gap is not None)
             limit = f"Others have at most {most:.1%} more." if most else "No other has more."
-        what = "Returns from a road user in each turn, and price, of the best placement found for each number"
-        return f"{what}, without a budget. {limit}"
+        return f"Returns in each turn and price of the best placement found for each number. {limit}"
     what = "Coverage by weight" if record.objective.kind == "weighted" else "Coverage"
     missed = max(point.missed for point in record.front)
     limit = f"Others see at most {missed:.1%} of the road more." if missed else "No other sees more."
-    return f"{what} and price of the best placement found for each number, without a budget. {limit}"
+    return f"{what} and price of the best placement found for each number. {limit}"
 
 
 def _draw_details(layout: bpy.types.UILayout, record: PlacementRecord, *, certain: bool) -> None:
@@ -293,8 +292,8 @@ def figures(record: PlacementRecord) -> dict[str, list[tuple[str, str]]]:
     price = [(sensor.id, f"${sensor.price_usd:,.0f}") for sensor in record.sensors]
     return {
         "Seen": seen,
-        "Returns from a Road User in Each Turn": returns,
-        "Returns at Worst Point of Crossing": crossings,
+        "Returns in Each Turn": returns,
+        "Returns at Worst Point": crossings,
         "Price": [*price, ("Total", record.price_text)],
     }
 

@@ -27,15 +27,17 @@ class SEIP_UL_chosen(RowList, bpy.types.UIList):
     bl_idname = "SEIP_UL_chosen"
 
     def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
-        """Draw a sensor: label, height, product and what it sees; its position where there is room."""
+        """Draw a sensor: label, height, product if there are several, position, and what it sees."""
         record = parsed_record(bpy.context.scene.seip.result.record)
         sensor = next((one for one in record.sensors if one.id == item.name), None)
         if sensor is None:
             layout.label(text=item.name)
             return
         row = layout.split(factor=SENSOR_SHARE)
-        words = [item.name, f"{sensor.height_m:g} m", short_name(sensor.sensor_name)]
-        row.label(text="  ".join(words if is_narrow(bpy.context) else [*words, sensor.position]), translate=False)
+        several = len({one.sensor for one in record.sensors}) > 1
+        product = [short_name(sensor.sensor_name)] if several else []
+        words = [item.name, f"{sensor.height_m:g} m", *product, sensor.position]
+        row.label(text="  ".join(words), translate=False)
         row.label(text=f"{sensor.coverage_alone:.1%}")
 
 

@@ -14,7 +14,7 @@ from .labels import labels_of_sensors
 NAME = "coverage"
 AREAS = (
     (contract.WEIGHTED_REGIONS, "weighted region", WEIGHTED_VEIL),
-    (contract.FORBIDDEN_AREAS, "no sensor", FORBIDDEN_VEIL),
+    (contract.FORBIDDEN_AREAS, "no sensor allowed", FORBIDDEN_VEIL),
     (contract.MANDATORY_AREAS, "sensor required", MANDATORY_VEIL),
 )
 """Collections of areas with their words and colours in the legend."""

@@ -180,8 +180,7 @@ def test_numbers_of_sensors_placed_by_returns_show_returns(junction):
     record = parsed_record(junction.seip.result.record)
     by_returns = replace(record, front=(), returns=ReturnsSummary(16.0, {"car": 16.0}, (), front))
     assert placement_panel.numbers(by_returns) == [(1, 0.25, "4 · $1,000"), (2, 1.0, "16 · $2,000")]
-    what = "Returns from a road user in each turn, and price, of the best placement found for each number"
-    text = f"{what}, without a budget. "
+    text = "Returns in each turn and price of the best placement found for each number. "
     assert placement_panel.front_text(by_returns) == f"{text}No other has more."
     for gap, limit in ((0.031, "Others have at most 3.1% more."), (None, "Not every number is proven.")):
         open_ended = replace(by_returns.returns, front=(front[0], replace(front[1], gap=gap)))
@@ -207,7 +206,7 @@ def test_the_text_on_numbers_of_sensors_states_how_much_better_they_could_be(jun
     bpy.ops.seip.solve_placement()
     record = parsed_record(junction.seip.result.record)
     front = tuple(replace(point, missed=0.0) for point in record.front)
-    text = "Coverage and price of the best placement found for each number, without a budget. "
+    text = "Coverage and price of the best placement found for each number. "
     assert placement_panel.front_text(replace(record, front=front)) == f"{text}No other sees more."
     open_ended = replace(record, front=(*front[:-1], replace(front[-1], missed=0.0123)))
     assert placement_panel.front_text(open_ended) == f"{text}Others see at most 1.2% of the road more."

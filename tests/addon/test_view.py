@@ -42,7 +42,7 @@ def test_coverage_is_coloured_with_a_legend(placed, aspect):
     words = [entry.words for entry in block.entries]
     shares = [float(one.split()[-1].rstrip("%")) for one in words if one.endswith("%")]
     assert sum(shares) == pytest.approx(100.0, abs=0.3)
-    assert words[len(shares) :] == ["weighted region", "no sensor"]
+    assert words[len(shares) :] == ["weighted region", "no sensor allowed"]
     assert overlays.handler_count() == 2
 
 
@@ -178,7 +178,7 @@ def test_the_legend_names_the_areas_that_are_shown(placed):
     regions = bpy.data.collections["SEIP Weighted Regions"].objects
     for obj in regions:
         obj.hide_set(True)
-    assert [entry.words for entry in legend_of_coverage(placed).entries][3:] == ["no sensor"]
+    assert [entry.words for entry in legend_of_coverage(placed).entries][3:] == ["no sensor allowed"]
     for obj in bpy.data.collections["SEIP Forbidden Areas"].objects:
         obj.hide_set(True)
     assert len(legend_of_coverage(placed).entries) == 3

@@ -54,6 +54,33 @@ def scenario(window: Window) -> Steps:
     yield from window.click_in_view("seip.choose_sensors(")
     yield 1.0
     yield from window.shot("6-table")
+    yield from window.press("ESC")
+    sections.sensors = False
+    yield from _place_fewer(window)
+
+
+def _place_fewer(window: Window) -> Steps:
+    """Choose a smaller number among the answers, place again, and look at the sensors and the export."""
+    scene = _scene()
+    sections = scene.seip.sections
+    sections.numbers = True
+    yield from window.picture("7-numbers")
+    yield from window.click_in_view("seip.choose_number(count=3")
+    yield 1.0
+    assert scene.seip.goal.count == 3
+    yield from window.picture("8-other-goal")
+    yield from window.click_in_view("seip.solve_placement(")
+    yield 1.0
+    yield from window.until(lambda: session.running is None and len(scene.seip.result.sensors) == 3, 400)
+    assert "less" in scene.seip.result.change
+    yield from window.picture("9-fewer")
+    sections.placement = False
+    sections.results = True
+    sections.view = True
+    yield from window.picture("10-results")
+    sections.results = False
+    sections.export = True
+    yield from window.picture("11-export")
 
 
 def _scene() -> bpy.types.Scene:

@@ -9,7 +9,8 @@ from ...counts import counted
 from ...sensing.lidar.catalogue import load_catalogue
 from ..pictures.drawing import percent
 from ..report.blocks import Block, Bullets, Facts, Paragraph, Picture, Report, Section, Table
-from ..report.wording import date, dollars, sentence
+from ..report.wording import date, dollars
+from ..results.answer import sentence
 from .network_pictures import caption
 from .network_record import PROVEN, NetworkRecord
 from .ranked_sites import RankedSite, gain_text, outcome, ranked_sites, sensors_text

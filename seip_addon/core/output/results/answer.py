@@ -120,7 +120,7 @@ def _outlook(record: PlacementRecord) -> str:
     objective = record.objective
     if objective.status == MOVED:
         return "Sensors were moved by hand."
-    what = purpose(record.notes) or ""
+    what = purpose(record.notes) if record.returns is None else ""  # else the sentence before has said it
     better = "cheaper" if objective.cheapest else "better"
     if objective.status == "optimal":
         return f"No placement of these candidates is {better}{what}."
