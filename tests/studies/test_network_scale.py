@@ -1,12 +1,16 @@
 """Simulated schedules against cases that can be computed by hand."""
 
 import json
+import re
 
 from headless.studies.network_scale import command
 from headless.studies.network_scale.schedule import makespan, simulated_network
 
 import numpy as np
 import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.workflows.network_sites import table_places
 
 
 def test_one_worker_takes_the_sum():
@@ -47,3 +51,25 @@ def test_the_scheduler_is_measured_on_workers_without_bpy(tmp_path):
     figures = json.loads((tmp_path / "scale" / "scale.json").read_text(encoding="utf-8"))
     assert figures["processor_s"]["median"] == 30.0
     assert 0 < figures["overhead_s_per_task"] < 20.0
+
+
+def test_a_random_network_is_a_table_of_separate_junctions(tmp_path):
+    command.main(["--random", "5", "--seed", "3", "-o", str(tmp_path / "one")])
+    command.main(["--random", "5", "--seed", "3", "-o", str(tmp_path / "two")])
+    files = sorted(path.name for path in (tmp_path / "one").iterdir())
+    assert files == [*(f"junction-{number:04d}.osm" for number in range(1, 6)), "sites.csv"]
+    assert all((tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes() for name in files)
+    places = table_places(tmp_path / "one" / "sites.csv", 40.0)
+    assert [place.neighbours for place in places] == [()] * 5
+    for place in places:
+        xml = place.source.read_text(encoding="utf-8")
+        for name, value in (("lat", place.latitude), ("lon", place.longitude)):
+            degrees = np.array([float(one) for one in re.findall(rf'{name}="([\d.]+)"', xml)])
+            assert degrees.min() < value < degrees.max()
+            assert np.ptp(degrees) < 0.02
+
+
+@pytest.mark.parametrize("options", [["-o", "out"], ["city", "--random", "5", "-o", "out"]])
+def test_folders_and_a_random_network_exclude_each_other(options):
+    with pytest.raises(SeipError, match="give --random N"):
+        command.main(options)

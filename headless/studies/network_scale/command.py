@@ -1,5 +1,7 @@
 """Processor time and memory of the sites of a network, and simulated schedules of larger networks.
 
+seip study network-scale --random 100 -o out/random
+seip network out/random/sites.csv --budget 2_000_000 -o city/
 seip study network-scale city/ -o out/scale
 """
 
@@ -13,6 +15,7 @@ from pathlib import Path
 from headless import runtime
 from headless.network_tasks import USAGE, workers
 from headless.options import new_parser, whole_number
+from headless.studies.network_scale.random_network import TABLE, write_random_network
 from headless.studies.network_scale.schedule import simulated_network
 
 import numpy as np
@@ -20,6 +23,7 @@ import numpy as np
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import SEED, Limits
 from seip_addon.core.storage.files import save_json
+from seip_addon.core.workflows.network_sites import MOST_SITES
 
 SIMULATED = ((1_000, 2), (1_000, 32), (10_000, 2), (10_000, 32), (10_000, 256))
 """Numbers of sites and workers whose schedules are simulated."""
@@ -28,9 +32,16 @@ EMPTY_TASKS = 200
 
 
 def main(argv: list[str]) -> None:
-    """Summarise what the surveys of networks took, measure the scheduler, and simulate larger networks."""
+    """Write a random network, or summarise the surveys of networks, measure the scheduler, and simulate more sites."""
     options = _parser().parse_args(argv)
+    if bool(options.folders) == (options.random is not None):
+        raise SeipError("name result folders of `seip network`, or give --random N for a table of random junctions")
     runtime.check_folder(options.output)
+    if options.random is not None:
+        options.output.mkdir(parents=True, exist_ok=True)
+        runtime.finish_with_bar(write_random_network(options.output, options.random, options.seed))
+        runtime.print_line(f"written {options.output / TABLE}")
+        return
     paths = [path for one in options.folders for path in sorted(one.glob(f"*/{USAGE}"))]
     usage = [json.loads(path.read_text(encoding="utf-8")) for path in paths]
     if not usage:
@@ -71,8 +82,13 @@ def _overhead(number: int) -> float:
 
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("study network-scale", "Measure the sites of networks, and simulate larger networks.")
-    parser.add_argument("folders", nargs="+", type=Path, help="result folders of `seip network`")
+    parser.add_argument("folders", nargs="*", type=Path, help="result folders of `seip network`")
+    parser.add_argument(
+        "--random", type=whole_number(Limits(1, MOST_SITES)), metavar="N", help="write a table of N random junctions"
+    )
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the results")
     parser.add_argument("--workers", type=whole_number(Limits(1, 256)), default=2, metavar="N", help="workers")
-    parser.add_argument("--seed", type=whole_number(SEED), default=1, help="seed of the simulated networks")
+    parser.add_argument(
+        "--seed", type=whole_number(SEED), default=1, help="seed of the random junctions and of the simulated networks"
+    )
     return parser
