@@ -59,7 +59,7 @@ def placement_precision(folder: Path, placed: Path, every: float, output: Path) 
     geometry = read_scene(bpy.context.scene).geometry
     _, tests = split_untrained(sampled_runs(survey.runs_beside(scene), geometry.origin, every))
     detector = Detector.load(SHIPPED_DETECTOR)
-    simulator = Simulator(geometry, ScanSettings(), sensors)
+    simulator = Simulator(geometry, ScanSettings(rolling_shutter=True), sensors)  # as the table was made
     placement = MountedSensors(placed.stem, sensors)
     (frames,) = yield from stored_detections(simulator, placement, [detector], tests, output / "detections")
     found = {}
