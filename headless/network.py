@@ -35,6 +35,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.sensing.visibility.ray_casting import engine_name
 from seip_addon.core.site.installed_cost import DEFAULTS
 from seip_addon.core.storage.files import read_small
+from seip_addon.core.workflows.network_flows import with_flows
 from seip_addon.core.workflows.network_sites import (
     APPROACHES,
     NetworkPlace,
@@ -70,6 +71,8 @@ def main(argv: list[str]) -> None:
     objective = Objective(count=options.count, criterion=options.criterion, shares=tuple(options.shares))
     runtime.check_folder(options.output)
     places, name = _places(options)
+    if options.flows is not None:
+        places = runtime.finish_with_bar(with_flows(places, *options.flows))
     request = NetworkRequest(
         budgets=tuple(options.budget),
         tolerance=options.gap,
@@ -231,6 +234,13 @@ def _parser() -> argparse.ArgumentParser:
         default=APPROACHES,
         metavar="M",
         help="length of the approaches of each junction, metres",
+    )
+    chosen.add_argument(
+        "--flows",
+        nargs=2,
+        type=Path,
+        metavar=("NET", "EDGES"),
+        help="weights from traffic: network of SUMO (.net.xml) and its edgeData output, in place of those of a table",
     )
     money = parser.add_argument_group("money")
     money.add_argument(

@@ -66,7 +66,7 @@ def selected_junctions(
     return tuple(found)
 
 
-def metres(latlon: Sequence[tuple[float, float]], origin: tuple[float, float]) -> Float:
+def metres(latlon: Sequence[tuple[float, float]] | Float, origin: tuple[float, float]) -> Float:
     """Return east and north, (n, 2) float64 metres, of latitudes and longitudes near an origin."""
     return plan_metres(np.array(latlon, dtype=np.float64).reshape(-1, 2), np.array(origin))
 
