@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -63,12 +64,24 @@ def connected(address: str | None, workers: int = 1) -> Iterator[Any]:
             ) from error
         except (OSError, ValueError) as error:
             raise SeipError(f"no Dask scheduler answers at {address}; start one, or check the address") from error
-        with client:
+        with _without_log("distributed.client"), client:
             if not client.scheduler_info()["workers"]:
                 raise SeipError(
                     f"the Dask scheduler at {address} has no workers; start some where this package is installed"
                 )
             yield client
+
+
+@contextmanager
+def _without_log(name: str) -> Iterator[None]:
+    """Silence a logger: a lost connection is reported by whoever uses the client, without the traceback of Dask."""
+    logger = logging.getLogger(name)
+    before = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
 
 
 @contextmanager
