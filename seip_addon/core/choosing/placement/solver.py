@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Integer
 from ...counts import counted
 from ...progress import Progress, finish
-from .bounds import Bound, can_reach, lagrangian_bound
+from .bounds import MAX_LISTED_CHOICES, Bound, can_reach, lagrangian_bound
 from .branch_and_bound import BestPlacements, is_worthwhile
 from .decomposition import decomposition_bound
 from .feasibility import starting_choice
@@ -27,10 +27,11 @@ from .integer_program import CoverProgram, is_affordable
 from .local_search import composition_search
 from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
 from .reduced_problem import Instance, common_unit, make_instance
-from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
+from .search_limits import DEFAULT_LIMITS, MIN_PART, Clock, SolverLimits
 from .solvers import check_solver
 from .tie_breaking import MAX_SEARCHED_TIES, canonical_optimum
 
+QUICK_STEPS = 50  # bounding steps before tabu search: a few seconds at the largest sites, and often enough for a proof
 BRANCHING_SHARE = 0.25  # of what is left of the limits, for a first branch and bound, which goes on after other methods
 
 FIRST_DECOMPOSITION_SHARE, FULL_DECOMPOSITION_SHARE = 0.05, 0.4
@@ -150,7 +151,8 @@ def solve_within(
     standing.note(instance.value(steps[-1]), greedy_bound(instance, steps))
     first = yield from standing.shown(greedy_with_swaps(instance, start))
     standing.note(instance.value(first), math.inf)
-    first = yield from standing.shown(composition_search(instance, start, first, clock))
+    if not (yield from standing.shown(_can_be_listed(instance, first, clock))):
+        first = yield from standing.shown(composition_search(instance, start, first, clock))
     if known is not None:
         adapted = yield from _adapted(instance, np.flatnonzero(np.isin(instance.original, known)))
         first = max(first, adapted, key=instance.value)
@@ -186,6 +188,18 @@ def solve_within(
         seconds=clock.seconds,
         notes=tuple(notes),
     )
+
+
+def _can_be_listed(instance: Instance, chosen: Integer, clock: Clock) -> Generator[Progress, None, bool]:
+    """Return whether few bounding steps leave so few candidates that branch and bound soon lists all their choices.
+
+    Then tabu search, which takes longer, cannot add anything. The work of these steps is not counted, so that what is
+    left for the other searches does not depend on them.
+    """
+    apart = Clock(max(clock.seconds_left, MIN_PART), acceptance=clock.acceptance)
+    goal = instance.as_good(instance.value(chosen))
+    keep, _ = yield from lagrangian_bound(instance, goal, apart, iterations=QUICK_STEPS)
+    return math.comb(len(keep), min(instance.count, len(keep) // 2)) <= MAX_LISTED_CHOICES
 
 
 def _adapted(instance: Instance, chosen: Integer) -> Generator[Progress, None, Integer]:
