@@ -47,7 +47,7 @@ site: sumo
 	@echo "pictures and report: out/harbour/"; ls out/harbour/*.png out/harbour/report.*
 
 network: sumo
-	$(PY) -m headless.network scenes/town.osm --junctions all --budget 150_000 -o out/town
+	$(PY) -m headless.network scenes/town.osm --junctions all --budget 150_000 --gap 0.05 -o out/town
 	@echo "map: out/town/network.html, report: out/town/report.html, report.pdf"
 
 test: environment
