@@ -78,7 +78,7 @@ sumo: environment
 test-traffic: sumo
 	$(PY) -m pytest $(SPREAD) -m "not long" tests/core/world/opendrive/test_shipped_maps.py tests/core/world/traffic_simulation \
 	  tests/headless/test_traffic.py tests/core/world/openstreetmap/test_sites.py tests/core/world/openstreetmap/test_bridges.py \
-	  tests/addon/test_network_scene.py
+	  tests/addon/test_network_scene.py tests/core/workflows/test_network_flows.py
 
 # Runs of one scene differ by their seed, and by the second of the signals' cycle of 60 s at which they begin; dense ones
 # have twice the vehicles. They are many and short, as whole runs alone are independent of each other.

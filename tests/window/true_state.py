@@ -111,7 +111,7 @@ def _traffic_is_placed_on(window: Window) -> Steps:
     yield from _press(window, "seip.solve_placement(")
     assert _record()["settings"]["goal"]["scenarios"]["count"] == 4
     assert any(note.startswith("this placement sees ") for note in _record()["notes"])
-    assert (yield from _says(window, "this placement sees "))
+    assert (yield from _says(window, "This placement sees "))
 
 
 def _stopped_work_leaves_no_trace(window: Window) -> Steps:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from defusedxml import ElementTree
+from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import projection
@@ -99,6 +100,7 @@ def elements(path, tag):
     return list(ElementTree.parse(path).getroot().iter(tag))
 
 
+@needs_sumo
 def test_weights_of_a_simulation_are_the_vehicles_whose_routes_enter_the_site(tmp_path):
     """The oracle knows the routes and SUMO's own latitudes and longitudes of the nodes, not the counts of edges."""
     programs = find_sumo()
