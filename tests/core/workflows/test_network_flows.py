@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from defusedxml import ElementTree
-from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import projection
@@ -15,6 +14,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.workflows.network_flows import with_flows
 from seip_addon.core.workflows.network_sites import NetworkPlace, extract_places
+from tests.sumo_here import needs_sumo
 
 UTM = "+proj=utm +zone=31 +ellps=WGS84 +datum=WGS84 +units=m +no_defs"
 OFFSET = (-500_000.0, -6_000_000.0)
