@@ -1,0 +1,80 @@
+"""Chance that traffic hides no road user, against random road users along the line of sight."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.returns.bodies import PANELS
+from seip_addon.core.sensing.returns.expected_returns import all_ray_returns, expected_returns, upright_returns
+from seip_addon.core.sensing.returns.occlusion import HIDING, clear_chance
+from seip_addon.core.sensing.returns.road_users import BODIES, RoadUsers
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+
+GROUND = np.array([[[-90, -90, 0], [90, -90, 0], [90, 90, 0]], [[-90, -90, 0], [90, 90, 0], [-90, 90, 0]]], float)
+
+
+def users_at(points, bodies):
+    count = len(points)
+    no = np.full(count, -1)
+    return RoadUsers(np.array(points, float), np.array(bodies), np.ones(count), no > 0, no, (), 2.0)
+
+
+def clear_share(sensor, user, body, draws, random):
+    """Share of draws in which no obstacle of a Poisson process, as high as a car, stands above the line of sight."""
+    middle = user + np.array([0.0, 0.0, PANELS[BODIES[body]].height / 2])
+    far = math.hypot(*(sensor - user)[:2])
+    clear = 0
+    for _ in range(draws):
+        obstacles = random.uniform(0.0, far, random.poisson(HIDING * far)) / max(far, 1e-9)
+        line = middle[2] + obstacles * (sensor[2] - middle[2])
+        clear += not (line < user[2] + PANELS["car"].height).any()
+    return clear / draws
+
+
+@pytest.mark.parametrize("height", [0.4, 1.2, 1.6, 3.5, 8.0])
+@pytest.mark.parametrize("body", range(len(BODIES)))
+def test_chance_is_the_share_of_random_traffic_that_leaves_the_view_free(height, body):
+    random = np.random.default_rng(7)
+    sensor = np.array([3.0, -2.0, 5.0 + height])
+    points = [[3.0, -1.0, 5.0], [15.0, 4.0, 5.0], [-30.0, 20.0, 5.0]]
+    found = clear_chance(sensor, users_at(points, [body] * len(points)))
+    draws = 4000
+    for chance, point in zip(found, points, strict=True):
+        share = clear_share(sensor, np.array(point), body, draws, random)
+        assert share == pytest.approx(chance, abs=4 * math.sqrt(chance * (1 - chance) / draws) + 1e-3)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.lists(st.tuples(*[st.floats(-80, 80)] * 2, st.floats(-4, 4)), min_size=1, max_size=5),
+    st.floats(0.0, 12.0),
+    st.floats(0.0, 5.0),
+)
+def test_a_higher_sensor_is_hidden_less_and_a_farther_one_more(points, height, more):
+    for body in range(len(BODIES)):
+        users = users_at(points, [body] * len(points))
+        low, high = (clear_chance(np.array([0.0, 0.0, each]), users) for each in (height, height + more))
+        assert (high >= low).all()
+        assert ((low > 0) & (low <= 1)).all()
+        far = users_at([[2 * x, 2 * y, z] for x, y, z in points], [body] * len(points))
+        assert (clear_chance(np.array([0.0, 0.0, height]), far) <= low).all()
+
+
+def test_expected_returns_are_those_of_unhidden_road_users_times_the_chance():
+    model = load_catalogue(())["os1_128"]
+    caster, origin = make_ray_caster(GROUND, "embree"), np.array([0.3, -0.2, 4.6])
+    users = users_at([(9.0, 2.0, 0.0), (20.0, -7.0, 0.0), (-33.0, 5.0, 0.0)], [0, 1, 2])
+    tilt = math.radians(10)
+    tilted = np.array([[math.cos(tilt), 0, math.sin(tilt)], [0, 1, 0], [-math.sin(tilt), 0, math.cos(tilt)]])
+    unhidden = [
+        upright_returns(caster, origin, 0.0, model, users)[0],
+        all_ray_returns(caster, origin, tilted, model, users)[0],
+    ]
+    for orientation, each in zip((np.eye(3), tilted), unhidden, strict=True):
+        found, _ = expected_returns(caster, origin, orientation, model, users)
+        assert found.max() > 0
+        np.testing.assert_allclose(found, each * clear_chance(origin, users), rtol=1e-12)
