@@ -22,6 +22,7 @@ from ..placement.solvers import solver_name
 from .frontier import Options
 
 _SCALE = 1e4  # of prices and values in the program: far above the solvers' absolute tolerances of 1e-6
+_NO_SHARE = 1e-6  # of an alternative in a relaxation: the solvers' own tolerance
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,22 @@ class Allocation:
 
     taken: tuple[int, ...]
     price: float
+    value: float
+
+
+@dataclass(frozen=True)
+class RelaxedAllocation:
+    """Allocation that may mix alternatives of a site, which few sites do.
+
+    Parameters
+    ----------
+    taken : tuple of tuple of int
+        Alternatives of each site that have a share, as indices into its options, by price.
+    value : float
+        Weighted value, which no allocation exceeds.
+    """
+
+    taken: tuple[tuple[int, ...], ...]
     value: float
 
 
@@ -61,6 +78,49 @@ def allocate(options: Sequence[Options], weights: Float, budget: float) -> Alloc
     return best if cheapest is None or cheapest.value < best.value * (1 - 2 * TIE_TOLERANCE) else cheapest
 
 
+def relaxed_allocation(options: Sequence[Options], weights: Float, budget: float) -> RelaxedAllocation | None:
+    """Return the optimum of the linear relaxation, in a hundredth of the time of `allocate`; None if there is none.
+
+    The cheapest alternatives with a share are an allocation within the budget.
+
+    Parameters
+    ----------
+    options, weights, budget
+        As for `allocate`.
+
+    Raises
+    ------
+    SeipError
+        The solver stopped with an error.
+    """
+    if any(len(each.prices) == 0 for each in options):
+        return None
+    program = _Program(options, weights, budget)
+    shares = program.shares(program.value, pulp.LpMaximize, whole=False)
+    if shares is None:
+        return None
+    taken = tuple(
+        tuple(sorted((one for one, share in enumerate(of_site) if share > _NO_SHARE), key=each.prices.__getitem__))
+        for of_site, each in zip(shares, options, strict=True)
+    )
+    value = math.fsum(
+        weight * share * each.values[one]
+        for of_site, each, weight in zip(shares, options, weights, strict=True)
+        for one, share in enumerate(of_site)
+    )
+    return RelaxedAllocation(taken, value)
+
+
+def allocation_of(options: Sequence[Options], weights: Float, taken: Sequence[int]) -> Allocation:
+    """Return the allocation that takes given alternatives."""
+    chosen = list(zip(options, weights, taken, strict=True))
+    return Allocation(
+        tuple(taken),
+        math.fsum(each.prices[one] for each, _, one in chosen),
+        math.fsum(weight * each.values[one] for each, weight, one in chosen),
+    )
+
+
 def cheapest_allocation(options: Sequence[Options]) -> Allocation | None:
     """Return the allocation of least price, whatever its value; None if a site has no alternative."""
     if any(len(each.prices) == 0 for each in options):
@@ -73,7 +133,7 @@ class _Program:
     """The integer program of an allocation."""
 
     def __init__(self, options: Sequence[Options], weights: Float, budget: float) -> None:
-        self._options, self._weights, self._budget = options, weights, budget
+        self._options, self._weights = options, weights
         self.model = pulp.LpProblem("allocation", pulp.LpMaximize)
         most = math.fsum(weight * each.values.max() for each, weight in zip(options, weights, strict=True))
         self.value_scale = _SCALE / most if most > 0 else 1.0
@@ -95,12 +155,25 @@ class _Program:
 
     def solve(self, objective: pulp.LpAffineExpression, sense: int) -> Allocation | None:
         """Return the best allocation for an objective; None if there is none."""
+        shares = self.shares(objective, sense)
+        if shares is None:
+            return None
+        return allocation_of(self._options, self._weights, tuple(one.index(max(one)) for one in shares))
+
+    def shares(self, objective: pulp.LpAffineExpression, sense: int, *, whole: bool = True) -> list[list[float]] | None:
+        """Return the share of each alternative of each site in the optimum; None if there is none.
+
+        Parameters
+        ----------
+        whole : bool
+            Whether each share is 0 or 1; otherwise the linear relaxation is solved.
+        """
         self.model.sense = sense
         self.model.setObjective(objective)
         engine = (
-            pulp.HiGHS(msg=False, gapRel=0.0, threads=1, mip_abs_gap=1e-7)
+            pulp.HiGHS(msg=False, mip=whole, gapRel=0.0, threads=1, mip_abs_gap=1e-7)
             if solver_name("auto") == "highs"
-            else pulp.PULP_CBC_CMD(msg=False, gapRel=0.0, threads=1)
+            else pulp.PULP_CBC_CMD(msg=False, mip=whole, gapRel=0.0, threads=1)
         )
         try:
             self.model.solve(engine)
@@ -108,13 +181,4 @@ class _Program:
             raise SeipError(f"the solver stopped with an error ({error}); choose another solver") from error
         if self.model.sol_status != pulp.LpSolutionOptimal:
             return None
-        shares = ([x.value() or 0.0 for x in of_site] for of_site in self._x)
-        return self._allocation(tuple(one.index(max(one)) for one in shares))
-
-    def _allocation(self, taken: tuple[int, ...]) -> Allocation:
-        chosen = list(zip(self._options, self._weights, taken, strict=True))
-        return Allocation(
-            taken,
-            math.fsum(each.prices[one] for each, _, one in chosen),
-            math.fsum(weight * each.values[one] for each, weight, one in chosen),
-        )
+        return [[x.value() or 0.0 for x in of_site] for of_site in self._x]

@@ -12,7 +12,7 @@ from ...arrays import Float
 from ...errors import SeipError
 from ...progress import Progress
 from ..placement.problem import TIE_TOLERANCE, relative_gap
-from .allocation import Allocation, allocate, cheapest_allocation
+from .allocation import Allocation, allocate, allocation_of, cheapest_allocation, relaxed_allocation
 from .frontier import Frontier, Options, SolvedBudget
 
 FIRST_EFFORT, LAST_EFFORT, GROWTH = 1.0, 64.0, 4.0
@@ -105,7 +105,8 @@ def search_allocations(
     budget twice: once among the placements found, which gives a value that is reached, and once among the bounds of all
     amounts of money, which gives a value that no allocation exceeds. Where the second takes an amount that has not been
     solved, it is solved; where all it takes have been solved, those whose own gaps are largest are searched longer. The
-    requests of all budgets are solved together, so that many workers are busy.
+    requests of all budgets are solved together, so that many workers are busy. As long as the linear relaxation takes
+    amounts that have not been solved, or its gap is small enough, it stands for the integer program.
 
     Parameters
     ----------
@@ -133,15 +134,34 @@ def search_allocations(
     known = yield from _solved(known, first, solve)
     open_goals = list(goals)
     while open_goals:
+        wanted, gaps = {}, {}
         # Goals that differ by their tolerance alone share the work.
-        rounds = {key: _Round(known, weights, *key) for key in dict.fromkeys(goal.money for goal in open_goals)}
-        wanted = {key: one.requests() for key, one in rounds.items()}
-        open_goals = [
-            goal for goal in open_goals if wanted[goal.money] and rounds[goal.money].gap(gap) > goal.tolerance
-        ]
+        for key in dict.fromkeys(goal.money for goal in open_goals):
+            least = min(goal.tolerance for goal in open_goals if goal.money == key)
+            wanted[key], gaps[key] = _relaxed_round(known, weights, *key, gap)
+            if not wanted[key] and gaps[key] > least:
+                exact = _Round(known, weights, *key)
+                wanted[key], gaps[key] = exact.requests(), exact.gap(gap)
+        open_goals = [goal for goal in open_goals if wanted[goal.money] and gaps[goal.money] > goal.tolerance]
         requests = {request for goal in open_goals for request in wanted[goal.money]}
         known = yield from _solved(known, requests, solve)
     return tuple(_Round(known, weights, *goal.money).allocation() for goal in goals)
+
+
+def _relaxed_round(
+    known: Sequence[Frontier], weights: Float, budget: float, minimum: float, gap: Gap
+) -> tuple[list[Request], float]:
+    """Return the amounts to solve next by the linear relaxation, and a gap that is not below that of `_Round`.
+
+    There are no requests if it takes solved amounts only, or if it has no solution.
+    """
+    bounding, found = ([getattr(one, name)(minimum) for one in known] for name in ("bounding_options", "found_options"))
+    upper, among_found = (relaxed_allocation(options, weights, budget) for options in (bounding, found))
+    if upper is None or among_found is None:
+        return [], math.inf
+    lower = allocation_of(found, weights, [parts[0] for parts in among_found.taken])
+    amounts = [each.index[list(parts)].tolist() for each, parts in zip(bounding, upper.taken, strict=True)]
+    return _unsolved(known, amounts), gap(lower.value, max(lower.value, upper.value))
 
 
 class _Round:
@@ -206,13 +226,9 @@ def _open_requests(
     """Return what to solve next: amounts that the bound takes without a search, otherwise those with a gap."""
     amounts = [int(each.index[one]) for each, one in zip(options, upper.taken, strict=True)]
     ends = [float(one.ends[amount]) for one, amount in zip(frontiers, amounts, strict=True)]
-    fresh = [
-        Request(site, end, FIRST_EFFORT)
-        for site, (one, amount, end) in enumerate(zip(frontiers, amounts, ends, strict=True))
-        if amount and not one.spent(end)
-    ]
-    if fresh:
-        return fresh
+    unsolved = _unsolved(frontiers, [[amount] for amount in amounts])
+    if unsolved:
+        return unsolved
     gaps = [
         (weights[site] * (options[site].values[upper.taken[site]] - _reached(one, end)), site)
         for site, (one, end) in enumerate(zip(frontiers, ends, strict=True))
@@ -224,6 +240,16 @@ def _open_requests(
         Request(site, ends[site], min(LAST_EFFORT, frontiers[site].spent(ends[site]) * GROWTH))
         for gap, site in gaps
         if gap >= largest / 4  # smaller ones can wait until these are closed
+    ]
+
+
+def _unsolved(frontiers: Sequence[Frontier], amounts: Sequence[Sequence[int]]) -> list[Request]:
+    """Return requests for amounts of each site that have not been solved; amount 0 needs no search."""
+    return [
+        Request(site, float(one.ends[amount]), FIRST_EFFORT)
+        for site, (one, own) in enumerate(zip(frontiers, amounts, strict=True))
+        for amount in own
+        if amount and not one.spent(float(one.ends[amount]))
     ]
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seip_addon.core.choosing.network import frontier as frontiers
-from seip_addon.core.choosing.network.allocation import allocate
+from seip_addon.core.choosing.network.allocation import allocate, allocation_of, relaxed_allocation
 from seip_addon.core.choosing.network.frontier import Frontier, Options, SolvedBudget, possible_amounts
 from seip_addon.core.choosing.network.network_search import Goal, search_allocations
 from seip_addon.core.errors import SeipError
@@ -168,7 +168,7 @@ def test_money_that_adds_nothing_is_not_spent():
     st.integers(0, 120),
 )
 @settings(max_examples=40, deadline=None)
-def test_allocation_equals_enumeration(tables, budget):
+def test_allocation_equals_enumeration_and_no_relaxed_one_is_worse(tables, budget):
     options = [
         Options(*(np.array(column, dtype=np.float64) for column in zip(*table, strict=True)), np.arange(len(table)))
         for table in tables
@@ -184,6 +184,14 @@ def test_allocation_equals_enumeration(tables, budget):
         assert found.price <= budget * (1 + 1e-9)
     else:
         assert found is None
+    relaxed = relaxed_allocation(options, np.ones(len(options)), float(budget))
+    if within:
+        assert relaxed.value >= max(within) * (1 - 1e-9)
+        lower = allocation_of(options, np.ones(len(options)), [parts[0] for parts in relaxed.taken])
+        assert lower.price <= budget * (1 + 1e-6)
+        assert lower.value <= max(within) * (1 + 1e-9)
+    else:
+        assert relaxed is None
 
 
 @pytest.mark.parametrize("seed", range(30))
