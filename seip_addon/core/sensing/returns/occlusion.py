@@ -28,7 +28,7 @@ from .road_users import BODIES, RoadUsers
 HIDING = 0.1
 """Road users per metre of a line of sight below a car's height that hide what is behind them, μ.
 
-Chosen by average precision on the open benchmark (docs/open-benchmark.md); from 0.06 to 0.2, rank correlations of the
+Chosen by average precision on the open benchmark (docs/open-benchmark.md): from 0.06 to 0.2, rank correlations of the
 criterion with it change by at most 0.02. Vehicles are less dense: a panel that is hidden in part counts as hidden here.
 """
 
