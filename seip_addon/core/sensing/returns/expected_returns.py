@@ -97,11 +97,17 @@ def expected_returns(
     cast : int
         Number of rays.
     """
-    if model.rosette is None and is_upright(orientation):
-        unhidden, cast = upright_returns(caster, origin, yaw_of(orientation), model, users)
-    else:
-        unhidden, cast = all_ray_returns(caster, origin, orientation, model, users)
+    unhidden, cast = unhidden_returns(caster, origin, orientation, model, users)
     return unhidden * clear_chance(origin, users), cast
+
+
+def unhidden_returns(
+    caster: Caster, origin: Float, orientation: Float, model: LidarModel, users: RoadUsers
+) -> tuple[Float, int]:
+    """Compute the expected returns of a sensor from each road user that no other one hides; see `expected_returns`."""
+    if model.rosette is None and is_upright(orientation):
+        return upright_returns(caster, origin, yaw_of(orientation), model, users)
+    return all_ray_returns(caster, origin, orientation, model, users)
 
 
 def upright_returns(

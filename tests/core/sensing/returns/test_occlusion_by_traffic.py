@@ -9,7 +9,12 @@ from hypothesis import strategies as st
 
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.returns.bodies import PANELS
-from seip_addon.core.sensing.returns.expected_returns import all_ray_returns, expected_returns, upright_returns
+from seip_addon.core.sensing.returns.expected_returns import (
+    all_ray_returns,
+    expected_returns,
+    unhidden_returns,
+    upright_returns,
+)
 from seip_addon.core.sensing.returns.occlusion import HIDING, clear_chance
 from seip_addon.core.sensing.returns.road_users import BODIES, RoadUsers
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
@@ -76,5 +81,6 @@ def test_expected_returns_are_those_of_unhidden_road_users_times_the_chance():
     ]
     for orientation, each in zip((np.eye(3), tilted), unhidden, strict=True):
         found, _ = expected_returns(caster, origin, orientation, model, users)
+        np.testing.assert_array_equal(each, unhidden_returns(caster, origin, orientation, model, users)[0])
         assert found.max() > 0
         np.testing.assert_allclose(found, each * clear_chance(origin, users), rtol=1e-12)
