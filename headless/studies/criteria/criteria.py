@@ -12,7 +12,7 @@ import numpy as np
 from seip_addon.core.arrays import Float
 from seip_addon.core.choosing.placement.deployment import weighted_share
 from seip_addon.core.progress import Progress
-from seip_addon.core.sensing.returns.expected_returns import unhidden_returns
+from seip_addon.core.sensing.returns.expected_returns import expected_returns
 from seip_addon.core.sensing.returns.road_users import BODIES, RoadUsers
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.workflows.survey import Survey
@@ -125,7 +125,7 @@ def _returns(
         for sensor in placement.sensors:
             key = (sensor.model.key, *sensor.xyz.tolist(), *sensor.orientation.ravel().tolist())
             if key not in known:
-                known[key], _ = unhidden_returns(caster, sensor.xyz, sensor.orientation, sensor.model, cars)
+                known[key], _ = expected_returns(caster, sensor.xyz, sensor.orientation, sensor.model, cars)
             row += known[key]
         rows.append(row)
     return np.array(rows)

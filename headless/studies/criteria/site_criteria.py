@@ -13,6 +13,7 @@ from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.returns_solver import solve_returns
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.progress import Progress, within
+from seip_addon.core.sensing.returns.occlusion import returns_in_traffic
 from seip_addon.core.sensing.returns.returns_grid import stored_returns
 from seip_addon.core.sensing.returns.road_users import road_users
 from seip_addon.core.sensing.scans.scanner import ReflectiveSurface
@@ -61,12 +62,13 @@ def site_criteria(
     """
     site, visible = survey.site, survey.grid.visible
     users = road_users(survey.geometry)
-    returns = yield from stored_returns(survey.returns_path, site, users, survey.models, survey.settings.engine, 1)
+    grid = yield from stored_returns(survey.returns_path, site, users, survey.models, survey.settings.engine, 1)
+    returns = returns_in_traffic(grid.returns, site.candidates.xyz, users)
     often = vehicle_occupancy(site.targets, runs)
     literature = () if not set(keys) & set(OF_LITERATURE) else (yield from _of_literature(survey, runs))
     criteria = (
         SeenShare("coverage", "coverage", visible, np.ones(len(site.targets))),
-        LogReturns(returns.returns, user_weights(users, Objective())),
+        LogReturns(returns, user_weights(users, Objective())),
         SeenShare("occupancy_entropy", "S-MIG", visible, entropy(often)),
         *literature,
     )

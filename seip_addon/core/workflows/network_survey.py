@@ -15,6 +15,7 @@ from ..choosing.placement.objective import Objective, Solution, criterion_of, pl
 from ..choosing.placement.problem import Placement, relative_gap
 from ..errors import SeipError
 from ..progress import Progress
+from ..sensing.returns.occlusion import returns_in_traffic
 from ..sensing.returns.returns_grid import stored_returns
 from ..sensing.returns.road_users import road_users
 from .network_sites import NetworkPlace
@@ -66,7 +67,8 @@ def site_problem(survey: Survey, objective: Objective, place: NetworkPlace) -> G
         grid = yield from stored_returns(
             survey.returns_path, site, users, survey.models, survey.settings.engine, threads=1
         )
-        returns, weights = grid.returns, user_weights(users, objective)
+        returns = returns_in_traffic(grid.returns, candidates.xyz, users)
+        weights = user_weights(users, objective)
     geographic = site.geographic(candidates.xyz)
     if geographic is None:  # a scene without a projection lies where the table says
         latlon = np.tile((place.latitude, place.longitude), (len(candidates), 1))

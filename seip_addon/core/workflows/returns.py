@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from ..arrays import Float, Integer
 from ..choosing.placement.deployment import deploy
@@ -26,6 +27,7 @@ from ..choosing.placement.search_limits import SolverLimits
 from ..errors import SeipError
 from ..progress import Progress
 from ..sensing.returns.expected_returns import expected_returns
+from ..sensing.returns.occlusion import returns_in_traffic
 from ..sensing.returns.returns_grid import ReturnsGrid, returns_key, stored_returns
 from ..sensing.returns.road_users import BODIES, RoadUsers, road_users
 from ..sensing.visibility.ray_casting import engine_name, make_ray_caster
@@ -48,9 +50,10 @@ def place_by_returns(survey: Survey, objective: Objective, limits: SolverLimits)
     site, models = survey.site, survey.models
     users = road_users(survey.geometry)
     grid = yield from stored_returns(survey.returns_path, site, users, models, survey.settings.engine)
-    problem = _returns_problem(survey, grid, users, objective)
-    placement = yield from solve_returns(problem, grid.returns, limits)
-    greedy = yield from greedy_returns(problem, grid.returns)
+    returns = returns_in_traffic(grid.returns, site.candidates.xyz, users)
+    problem = _returns_problem(survey, returns, users, objective)
+    placement = yield from solve_returns(problem, returns, limits)
+    greedy = yield from greedy_returns(problem, returns)
     return returns_solution(survey, grid, users, objective, (placement, greedy))
 
 
@@ -64,7 +67,7 @@ def returns_solution(
     """Return the solution of a placement that was chosen for returns, with the greedy placement if there is one."""
     placement, greedy = placements
     chosen = placement.chosen
-    summary = summarised(grid, users, objective, chosen)
+    summary = _summarised(grid.returns[chosen], survey.site.candidates.xyz[chosen], users, objective)
     note = f"{CHOSEN_FOR}for returns from road users: {summary.describe()} in one revolution (geometric means)"
     return Solution(
         with_count(objective, survey.site),
@@ -85,14 +88,17 @@ def with_returns_front(survey: Survey, solution: Solution) -> Generator[Progress
         return solution
     users = road_users(survey.geometry)
     grid = yield from stored_returns(survey.returns_path, site, users, models, survey.settings.engine)
-    problem = _returns_problem(survey, grid, users, solution.objective)
-    front = yield from returns_front(problem, grid.returns, solution)
+    returns = returns_in_traffic(grid.returns, site.candidates.xyz, users)
+    problem = _returns_problem(survey, returns, users, solution.objective)
+    front = yield from returns_front(problem, returns, solution)
     return replace(solution, deployment=replace(solution.deployment, returns=replace(summary, front=front)))
 
 
-def _returns_problem(survey: Survey, grid: ReturnsGrid, users: RoadUsers, objective: Objective) -> PlacementProblem:
+def _returns_problem(
+    survey: Survey, returns: NDArray[np.float32], users: RoadUsers, objective: Objective
+) -> PlacementProblem:
     """Return the problem whose weights are those of the road users."""
-    problem = placement_problem(survey.site, grid.returns > 0, survey.models, objective)
+    problem = placement_problem(survey.site, returns > 0, survey.models, objective)
     return replace(problem, weights=user_weights(users, objective))
 
 
@@ -167,14 +173,19 @@ def user_weights(users: RoadUsers, objective: Objective) -> Float:
     return weights
 
 
-def summarised(grid: ReturnsGrid, users: RoadUsers, objective: Objective, chosen: Integer) -> ReturnsSummary:
-    """Return the summary of the returns of chosen poses."""
-    together = grid.returns[chosen].sum(axis=0, dtype=np.float64)
+def _summarised(returns: NDArray[np.float32], origins: Float, users: RoadUsers, objective: Objective) -> ReturnsSummary:
+    """Return the summary of the returns (k, m) of chosen poses at positions (k, 3).
+
+    What the placement was chosen for has an allowance for traffic that hides road users. Returns from pedestrians on
+    crossings have none: they tell whether a pedestrian in plain view is detected.
+    """
+    in_plain_view = returns.sum(axis=0, dtype=np.float64)
+    together = returns_in_traffic(returns, origins, users).sum(axis=0, dtype=np.float64)
     weight = user_weights(users, objective)
     in_regions = weights_in_regions(objective, users.weight, users.central)
     kinds = [(name, users.body == body) for body, name in enumerate(BODIES)]
     of_each: dict[str, float] = {name: _typical(together[own], in_regions[own]) for name, own in kinds}
-    return ReturnsSummary(_typical(together, weight), of_each, _least_on_crossings(together, users))
+    return ReturnsSummary(_typical(together, weight), of_each, _least_on_crossings(in_plain_view, users))
 
 
 def _typical(returns: Float, weight: Float) -> float:

@@ -39,7 +39,7 @@ from seip_addon.core.sensing.lidar.beams import beam_directions
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.noisy_returns import return_chance
 from seip_addon.core.sensing.returns.bodies import PANELS
-from seip_addon.core.sensing.returns.expected_returns import unhidden_returns
+from seip_addon.core.sensing.returns.expected_returns import expected_returns
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.scans.static_scene import StaticScene
@@ -190,7 +190,7 @@ def test_a_cars_returns_are_those_of_a_scan_of_it(turn):
         reach, triangle = make_ray_caster(np.concatenate([static, car])).cast(sensor.xyz, beams, model.max_range)
         on_car = reach[triangle >= len(static)]
         expected.append(return_chance(model, on_car, np.full(len(on_car), CAR.reflected)).sum())
-    found, _ = unhidden_returns(make_ray_caster(static), sensor.xyz, turn, model, cars_at(targets, 1.0))
+    found, _ = expected_returns(make_ray_caster(static), sensor.xyz, turn, model, cars_at(targets, 1.0))
     assert expected[2] == 0  # behind the wall
     assert min(expected[:2]) > 20
     np.testing.assert_allclose(found, expected, rtol=0.02, atol=2.0)

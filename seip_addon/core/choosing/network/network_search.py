@@ -21,6 +21,11 @@ FIRST_SENSORS = (1, 2, 4)
 """Numbers of sensors whose money is solved at every site before any allocation."""
 
 
+MANY_SITES = 30
+"""Number of sites from which rounds use the linear relaxation: the integer program takes a second for 100 sites. With
+few sites it is fast, and spares searches of amounts that only a mixture of alternatives takes."""
+
+
 @dataclass(frozen=True)
 class Request:
     """Request to solve a budget at a site.
@@ -105,8 +110,8 @@ def search_allocations(
     budget twice: once among the placements found, which gives a value that is reached, and once among the bounds of all
     amounts of money, which gives a value that no allocation exceeds. Where the second takes an amount that has not been
     solved, it is solved; where all it takes have been solved, those whose own gaps are largest are searched longer. The
-    requests of all budgets are solved together, so that many workers are busy. As long as the linear relaxation takes
-    amounts that have not been solved, or its gap is small enough, it stands for the integer program.
+    requests of all budgets are solved together, so that many workers are busy. With many sites the linear relaxation
+    stands for the integer program as long as it takes amounts that have not been solved.
 
     Parameters
     ----------
@@ -134,11 +139,14 @@ def search_allocations(
     known = yield from _solved(known, first, solve)
     open_goals = list(goals)
     while open_goals:
-        wanted, gaps = {}, {}
+        wanted: dict[tuple[float, float], list[Request]] = {}
+        gaps: dict[tuple[float, float], float] = {}
         # Goals that differ by their tolerance alone share the work.
         for key in dict.fromkeys(goal.money for goal in open_goals):
             least = min(goal.tolerance for goal in open_goals if goal.money == key)
-            wanted[key], gaps[key] = _relaxed_round(known, weights, *key, gap)
+            wanted[key], gaps[key] = [], math.inf
+            if len(known) >= MANY_SITES:
+                wanted[key], gaps[key] = _relaxed_round(known, weights, *key, gap)
             if not wanted[key] and gaps[key] > least:
                 exact = _Round(known, weights, *key)
                 wanted[key], gaps[key] = exact.requests(), exact.gap(gap)

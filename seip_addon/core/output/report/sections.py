@@ -165,13 +165,14 @@ def _summary(evidence: Evidence) -> str:
         of_each = record.returns.of_each
         named = [f"{returns_text(number)} points on a {name}" for name, number in of_each.items()]
         parts.append(
-            f"In each turn and in ordinary traffic they typically measure {', '.join(named[:-1])} and {named[-1]}."
+            f"In each turn they typically measure {', '.join(named[:-1])} and {named[-1]}, with an allowance for "
+            "traffic in between."
         )
     least = min(record.crossings, key=lambda one: one.least, default=None)
     if least is not None:
         parts.append(
-            f"A pedestrian on a crossing receives at least {returns_text(least.least)} points in each turn on average "
-            f"(at the worst point of the {in_sentence(least.name)})."
+            f"A pedestrian in plain view on a crossing receives at least {returns_text(least.least)} points in each "
+            f"turn (at the worst point of the {in_sentence(least.name)})."
         )
     failed = failures(evidence.site.seen)
     if failed is not None and len(record.sensors) > 1:
@@ -361,8 +362,8 @@ def _places(evidence: Evidence) -> Iterator[Block]:
     if crossings:
         yield Table(("Crossing", "Surface seen", "Points on a pedestrian"), crossings, frozenset({1, 2}))
         yield Paragraph(
-            "Points on a pedestrian are those that all sensors together measure in one turn on average, with other "
-            "traffic that may stand in between, at the worst point of the crossing. "
+            "Points on a pedestrian are those that all sensors together measure in one turn on a pedestrian in plain "
+            "view, at the worst point of the crossing. "
             f"With fewer than {FEW_RETURNS:g} a detector may miss the pedestrian."
         )
         few = [name for name, _, _ in crossings if returns[name] < FEW_RETURNS]

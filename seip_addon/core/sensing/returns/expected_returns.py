@@ -7,11 +7,10 @@ Let a panel of width w, height h and reflectivity :math:`ρ` stand at horizontal
     |φ - φ_0| \le \arcsin\frac{w}{2d}, \qquad z_0 \le d \tan ε \le z_0 + h,
 
 at the range :math:`r = d / \cos ε`. The return is detected with the probability :math:`P(r, ρ \cos ε)` of the sensor's
-law, unless the ray is stopped before by the static scene, at a horizontal distance below d. With the chance q that no
-other road user hides the panel (`occlusion`), the expected number is
+law, unless the ray is stopped before by the static scene, at a horizontal distance below d. The expected number is
 
 .. math::
-    R = q \sum_{\text{free rays on the panel}} P(r, ρ \cos ε).
+    R = \sum_{\text{free rays on the panel}} P(r, ρ \cos ε).
 
 All rays of a channel have the same elevation, so that P is the same for all rays of a channel on a panel, and these
 rays are neighbours. Rays that meet some panel are cast once for all panels. The number of free rays follows from the
@@ -33,7 +32,6 @@ from ..visibility.beam_culling import counted
 from ..visibility.scanning import Caster
 from ..visibility.visibility_model import is_upright, yaw_of
 from .bodies import PANELS
-from .occlusion import clear_chance
 from .road_users import BODIES, RoadUsers
 
 _PAIRS_AT_ONCE = 1 << 21  # pairs of rays and panels in a batch; bounds the memory if rays have no neighbours
@@ -81,7 +79,7 @@ class PanelRows:
 def expected_returns(
     caster: Caster, origin: Float, orientation: Float, model: LidarModel, users: RoadUsers
 ) -> tuple[Float, int]:
-    """Compute the expected returns of a sensor from each road user, in traffic that may hide it.
+    """Compute the expected returns of a sensor from each road user.
 
     Parameters
     ----------
@@ -97,14 +95,6 @@ def expected_returns(
     cast : int
         Number of rays.
     """
-    unhidden, cast = unhidden_returns(caster, origin, orientation, model, users)
-    return unhidden * clear_chance(origin, users), cast
-
-
-def unhidden_returns(
-    caster: Caster, origin: Float, orientation: Float, model: LidarModel, users: RoadUsers
-) -> tuple[Float, int]:
-    """Compute the expected returns of a sensor from each road user that no other one hides; see `expected_returns`."""
     if model.rosette is None and is_upright(orientation):
         return upright_returns(caster, origin, yaw_of(orientation), model, users)
     return all_ray_returns(caster, origin, orientation, model, users)
@@ -113,7 +103,7 @@ def unhidden_returns(
 def upright_returns(
     caster: Caster, origin: Float, yaw: float, model: LidarModel, users: RoadUsers
 ) -> tuple[Float, int]:
-    """Compute the expected returns of an upright sensor from each road user that no other one hides.
+    """Compute the expected returns of an upright sensor from each road user.
 
     Parameters
     ----------
@@ -169,7 +159,7 @@ def upright_returns(
 def all_ray_returns(
     caster: Caster, origin: Float, orientation: Float, model: LidarModel, users: RoadUsers
 ) -> tuple[Float, int]:
-    """Compute the expected returns of a sensor of any pattern and orientation, from road users that no other one hides.
+    """Compute the expected returns of a sensor of any pattern and orientation from each road user.
 
     Parameters
     ----------

@@ -7,19 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.returns.bodies import PANELS
-from seip_addon.core.sensing.returns.expected_returns import (
-    all_ray_returns,
-    expected_returns,
-    unhidden_returns,
-    upright_returns,
-)
-from seip_addon.core.sensing.returns.occlusion import HIDING, clear_chance
+from seip_addon.core.sensing.returns.occlusion import HIDING, clear_chance, returns_in_traffic
 from seip_addon.core.sensing.returns.road_users import BODIES, RoadUsers
-from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
-
-GROUND = np.array([[[-90, -90, 0], [90, -90, 0], [90, 90, 0]], [[-90, -90, 0], [90, 90, 0], [-90, 90, 0]]], float)
 
 
 def users_at(points, bodies):
@@ -69,18 +59,11 @@ def test_a_higher_sensor_is_hidden_less_and_a_farther_one_more(points, height, m
         assert (clear_chance(np.array([0.0, 0.0, height]), far) <= low).all()
 
 
-def test_expected_returns_are_those_of_unhidden_road_users_times_the_chance():
-    model = load_catalogue(())["os1_128"]
-    caster, origin = make_ray_caster(GROUND, "embree"), np.array([0.3, -0.2, 4.6])
-    users = users_at([(9.0, 2.0, 0.0), (20.0, -7.0, 0.0), (-33.0, 5.0, 0.0)], [0, 1, 2])
-    tilt = math.radians(10)
-    tilted = np.array([[math.cos(tilt), 0, math.sin(tilt)], [0, 1, 0], [-math.sin(tilt), 0, math.cos(tilt)]])
-    unhidden = [
-        upright_returns(caster, origin, 0.0, model, users)[0],
-        all_ray_returns(caster, origin, tilted, model, users)[0],
-    ]
-    for orientation, each in zip((np.eye(3), tilted), unhidden, strict=True):
-        found, _ = expected_returns(caster, origin, orientation, model, users)
-        np.testing.assert_array_equal(each, unhidden_returns(caster, origin, orientation, model, users)[0])
-        assert found.max() > 0
-        np.testing.assert_allclose(found, each * clear_chance(origin, users), rtol=1e-12)
+def test_returns_in_traffic_are_those_in_plain_view_times_the_chance():
+    random = np.random.default_rng(3)
+    users = users_at(random.uniform(-60, 60, (20, 3)), random.integers(0, 3, 20))
+    origins, returns = random.uniform(-20, 20, (4, 3)), random.gamma(1.0, 50.0, (4, 20)).astype(np.float32)
+    found = returns_in_traffic(returns, origins, users)
+    assert found.dtype == np.float32
+    expected = [each * clear_chance(origin, users) for each, origin in zip(returns, origins, strict=True)]
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
