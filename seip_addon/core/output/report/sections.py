@@ -150,7 +150,7 @@ def _quality(evidence: Evidence) -> str:
     if returns is None:
         return seen
     on_foot = returns_text(returns.of_each["pedestrian"])
-    return f"about {on_foot} measured points on a pedestrian in each turn of the sensors; {seen}"
+    return f"about {on_foot} points on a pedestrian in each turn of the sensors; {seen}"
 
 
 def _summary(evidence: Evidence) -> str:
