@@ -34,7 +34,7 @@ RESOLUTION = 1 / 128  # metres: resolution of recorded coordinates, as sensors h
 
 @dataclass(frozen=True, eq=False)
 class ChangedSite:
-    """What was built, other than planned.
+    """Site as it was built, with its differences from the plan.
 
     Parameters
     ----------

@@ -132,7 +132,7 @@ def poses_in_traffic(around: Surroundings, poses: Integer) -> Generator[Progress
 
 
 class _Setting:
-    """What all poses have in common: ray caster of the scene, and the points that may be seen."""
+    """Parts that all poses share: ray caster of the scene, and the points that may be seen."""
 
     def __init__(self, around: Surroundings, layer: TrafficLayer) -> None:
         site = around.site
