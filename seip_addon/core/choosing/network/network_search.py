@@ -169,7 +169,7 @@ def _relaxed_round(
         return [], math.inf
     lower = allocation_of(found, weights, [parts[0] for parts in among_found.taken])
     amounts = [each.index[list(parts)].tolist() for each, parts in zip(bounding, upper.taken, strict=True)]
-    return _unsolved(known, amounts), gap(lower.value, max(lower.value, upper.value))
+    return _unsolved(known, amounts, budget), gap(lower.value, max(lower.value, upper.value))
 
 
 class _Round:
@@ -193,7 +193,7 @@ class _Round:
 
     def requests(self) -> list[Request]:
         """Return what to solve next."""
-        return _open_requests(self._known, self._bounding, self._upper, self._weights)
+        return _open_requests(self._known, self._bounding, self._upper, self._weights, self._budget)
 
     def allocation(self) -> NetworkAllocation:
         """Return the allocation among placements found, with its bound."""
@@ -229,12 +229,12 @@ def _first_requests(frontiers: Sequence[Frontier], budget: float) -> list[Reques
 
 
 def _open_requests(
-    frontiers: Sequence[Frontier], options: Sequence[Options], upper: Allocation, weights: Float
+    frontiers: Sequence[Frontier], options: Sequence[Options], upper: Allocation, weights: Float, budget: float
 ) -> list[Request]:
     """Return what to solve next: amounts that the bound takes without a search, otherwise those with a gap."""
     amounts = [int(each.index[one]) for each, one in zip(options, upper.taken, strict=True)]
     ends = [float(one.ends[amount]) for one, amount in zip(frontiers, amounts, strict=True)]
-    unsolved = _unsolved(frontiers, [[amount] for amount in amounts])
+    unsolved = _unsolved(frontiers, [[amount] for amount in amounts], budget)
     if unsolved:
         return unsolved
     gaps = [
@@ -251,14 +251,22 @@ def _open_requests(
     ]
 
 
-def _unsolved(frontiers: Sequence[Frontier], amounts: Sequence[Sequence[int]]) -> list[Request]:
-    """Return requests for amounts of each site that have not been solved; amount 0 needs no search."""
-    return [
-        Request(site, float(one.ends[amount]), FIRST_EFFORT)
-        for site, (one, own) in enumerate(zip(frontiers, amounts, strict=True))
-        for amount in own
-        if amount and not one.spent(float(one.ends[amount]))
-    ]
+def _unsolved(frontiers: Sequence[Frontier], amounts: Sequence[Sequence[int]], budget: float) -> list[Request]:
+    """Return requests for amounts of each site that have not been solved; amount 0 needs no search.
+
+    An amount that has not been solved has the bound of the next larger one that has, so the bound takes the amounts
+    between two solved ones from the lowest upwards, one in each round. The amount in the middle is solved with each: it
+    lowers the bound of half of them at once. Amounts above the budget are left out.
+    """
+    requests = []
+    for site, (one, own) in enumerate(zip(frontiers, amounts, strict=True)):
+        ends = one.ends.tolist()
+        payable = int(np.searchsorted(one.amounts, budget * (1 + TIE_TOLERANCE), side="right"))
+        for amount in own:
+            if amount and not one.spent(ends[amount]):
+                above = next((index for index in range(amount, payable) if one.spent(ends[index])), payable)
+                requests += [Request(site, ends[index], FIRST_EFFORT) for index in {amount, (amount + above) // 2}]
+    return requests
 
 
 def _reached(frontier: Frontier, budget: float) -> float:
