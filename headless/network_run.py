@@ -52,7 +52,7 @@ CURVE = (0.25, 0.5, 0.75, 1.5, 2.0)
 OWN_SITE = "each sensor counts for its own site: what it sees of a neighbouring site is left out"
 SAME_HEIGHT = 0.01  # metres
 CURVE_TOLERANCE = 0.05
-"""Gap up to which the points of the curve are refined: at 0.02, points beyond the budget took longer than the budget."""
+"""Gap up to which the curve is refined; at 0.02, its points beyond the budget took longer than the budget itself."""
 
 
 @dataclass(frozen=True)
