@@ -51,8 +51,9 @@ CURVE = (0.25, 0.5, 0.75, 1.5, 2.0)
 """Shares of the money, besides the whole, at which the curve of value against money is computed."""
 OWN_SITE = "each sensor counts for its own site: what it sees of a neighbouring site is left out"
 SAME_HEIGHT = 0.01  # metres
-CURVE_TOLERANCE = 0.05
-"""Gap up to which the curve is refined; at 0.02, its points beyond the budget took longer than the budget itself."""
+CURVE_TOLERANCE = 0.02
+"""Gap up to which the curve is refined, by short searches: long ones for points beyond the budget took longer than the
+search for the budget itself."""
 
 
 @dataclass(frozen=True)
@@ -395,7 +396,8 @@ class _Network:
     def _curve_goals(self) -> list[Goal]:
         """Return the amounts of money, in one phase, at which the value of the network is computed."""
         tolerance = max(CURVE_TOLERANCE, self._request.tolerance)
-        return [Goal(share * sum(self._request.budgets), tolerance) for share in sorted((*CURVE, 1.0))]
+        budgets = [share * sum(self._request.budgets) for share in sorted((*CURVE, 1.0))]
+        return [Goal(budget, tolerance, effort=network_search.FIRST_EFFORT) for budget in budgets]
 
     def _curve(self, allocations: Sequence[NetworkAllocation]) -> tuple[NetworkPoint, ...]:
         """Return the value of the network for amounts of money, with bounds."""

@@ -53,11 +53,14 @@ class Goal:
         Gap at which the search ends.
     minimum : float
         Least value at each site.
+    effort : float, units of counted work
+        Limit of each search at a site; the gap stays larger than the tolerance where it does not suffice.
     """
 
     budget: float
     tolerance: float
     minimum: float = 0.0
+    effort: float = LAST_EFFORT
 
     @property
     def money(self) -> tuple[float, float]:
@@ -150,9 +153,13 @@ def search_allocations(
             if not wanted[key] and gaps[key] > least:
                 exact = _Round(known, weights, *key)
                 wanted[key], gaps[key] = exact.requests(), exact.gap(gap)
-        open_goals = [goal for goal in open_goals if wanted[goal.money] and gaps[goal.money] > goal.tolerance]
-        requests = {request for goal in open_goals for request in wanted[goal.money]}
-        known = yield from _solved(known, requests, solve)
+        requests = {
+            goal: [one for one in wanted[goal.money] if one.effort <= goal.effort]
+            for goal in open_goals
+            if gaps[goal.money] > goal.tolerance
+        }
+        open_goals = [goal for goal, own in requests.items() if own]
+        known = yield from _solved(known, set().union(*requests.values()), solve)
     return tuple(_Round(known, weights, *goal.money).allocation() for goal in goals)
 
 

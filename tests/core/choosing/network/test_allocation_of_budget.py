@@ -169,6 +169,28 @@ def test_no_site_is_solved_twice_for_the_same_money_and_effort():
 
 
 @pytest.mark.usefixtures("rounds")
+def test_searches_of_a_goal_are_no_longer_than_its_limit_and_its_bound_holds():
+    rng = np.random.default_rng(7)
+    sites = [EnumeratedSite(rng) for _ in range(3)]
+    plain, efforts = solver(sites, 0.05), []
+
+    def solve(requests):
+        efforts.extend(one.effort for one in requests)
+        return (yield from plain(requests))
+
+    known = [site.frontier(40_000.0) for site in sites]
+    limited, free = Goal(40_000.0, 0.0, effort=1.0), Goal(40_000.0, 0.0)
+    (found,) = finish(search_allocations(known, np.ones(3), [limited], solve))
+    assert max(efforts) == 1.0
+    best = best_of_all(sites, np.ones(3), 40_000.0)
+    assert found.value <= best * (1 + 1e-9)
+    assert best * (1 - 1e-9) <= found.bound
+    assert found.bound > found.value * 1.01
+    both = finish(search_allocations(known, np.ones(3), [free, limited], solve))
+    assert [one.bound for one in both] == pytest.approx([best, best])
+
+
+@pytest.mark.usefixtures("rounds")
 def test_search_needs_far_fewer_rounds_than_there_are_amounts():
     amounts = np.arange(257) * 1000.0
     known = [Frontier(amounts, amounts, SolvedBudget(0.0, (), 0.0, 0.0, 0.0, math.inf), 600.0) for _ in range(3)]
