@@ -12,7 +12,7 @@ from ...arrays import Float
 from ...errors import SeipError
 from ...progress import Progress
 from ..placement.problem import TIE_TOLERANCE, relative_gap
-from .allocation import Allocation, allocate, allocation_of, cheapest_allocation, relaxed_allocation
+from .allocation import allocate, allocation_of, cheapest_allocation, relaxed_allocation
 from .frontier import Frontier, Options, SolvedBudget
 
 FIRST_EFFORT, LAST_EFFORT, GROWTH = 1.0, 64.0, 4.0
@@ -112,9 +112,10 @@ def search_allocations(
     Before the first round each site is solved for the money of one sensor, two, four and all. Each round allocates each
     budget twice: once among the placements found, which gives a value that is reached, and once among the bounds of all
     amounts of money, which gives a value that no allocation exceeds. Where the second takes an amount that has not been
-    solved, it is solved; where all it takes have been solved, those whose own gaps are largest are searched longer. The
-    requests of all budgets are solved together, so that many workers are busy. With many sites the linear relaxation
-    stands for the integer program as long as it takes amounts that have not been solved.
+    solved, it is solved, together with the one in the middle below the next solved one; where all it takes have been
+    solved, those whose own gaps are largest are searched longer, up to the effort of the goal. The requests of all
+    budgets are solved together, so that many workers are busy. With many sites the linear relaxation stands for the
+    integer program as long as it takes amounts that have not been solved.
 
     Parameters
     ----------
@@ -144,7 +145,7 @@ def search_allocations(
     while open_goals:
         wanted: dict[tuple[float, float], list[Request]] = {}
         gaps: dict[tuple[float, float], float] = {}
-        # Goals that differ by their tolerance alone share the work.
+        # Goals of the same money share the work; they differ by tolerance and effort alone.
         for key in dict.fromkeys(goal.money for goal in open_goals):
             least = min(goal.tolerance for goal in open_goals if goal.money == key)
             wanted[key], gaps[key] = [], math.inf
@@ -199,8 +200,25 @@ class _Round:
         return gap(self._lower.value, max(self._lower.value, self._upper.value))
 
     def requests(self) -> list[Request]:
-        """Return what to solve next."""
-        return _open_requests(self._known, self._bounding, self._upper, self._weights, self._budget)
+        """Return what to solve next: amounts that the bound takes without a search, otherwise those with a gap."""
+        known, bounding, taken = self._known, self._bounding, self._upper.taken
+        amounts = [int(each.index[one]) for each, one in zip(bounding, taken, strict=True)]
+        unsolved = _unsolved(known, [[amount] for amount in amounts], self._budget)
+        if unsolved:
+            return unsolved
+        ends = [float(one.ends[amount]) for one, amount in zip(known, amounts, strict=True)]
+        gaps = [
+            (self._weights[site] * (bounding[site].values[taken[site]] - _reached(one, end)), site)
+            for site, (one, end) in enumerate(zip(known, ends, strict=True))
+            if amounts[site] and one.spent(end) < LAST_EFFORT
+        ]
+        gaps = [(gap, site) for gap, site in gaps if gap > TIE_TOLERANCE]
+        largest = max((gap for gap, _ in gaps), default=0.0)
+        return [
+            Request(site, ends[site], min(LAST_EFFORT, known[site].spent(ends[site]) * GROWTH))
+            for gap, site in gaps
+            if gap >= largest / 4  # smaller ones can wait until these are closed
+        ]
 
     def allocation(self) -> NetworkAllocation:
         """Return the allocation among placements found, with its bound."""
@@ -233,29 +251,6 @@ def _first_requests(frontiers: Sequence[Frontier], budget: float) -> list[Reques
             if amount <= budget * (1 + TIE_TOLERANCE) and not one.spent(amount)
         ]
     return requests
-
-
-def _open_requests(
-    frontiers: Sequence[Frontier], options: Sequence[Options], upper: Allocation, weights: Float, budget: float
-) -> list[Request]:
-    """Return what to solve next: amounts that the bound takes without a search, otherwise those with a gap."""
-    amounts = [int(each.index[one]) for each, one in zip(options, upper.taken, strict=True)]
-    ends = [float(one.ends[amount]) for one, amount in zip(frontiers, amounts, strict=True)]
-    unsolved = _unsolved(frontiers, [[amount] for amount in amounts], budget)
-    if unsolved:
-        return unsolved
-    gaps = [
-        (weights[site] * (options[site].values[upper.taken[site]] - _reached(one, end)), site)
-        for site, (one, end) in enumerate(zip(frontiers, ends, strict=True))
-        if amounts[site] and one.spent(end) < LAST_EFFORT
-    ]
-    gaps = [(gap, site) for gap, site in gaps if gap > TIE_TOLERANCE]
-    largest = max((gap for gap, _ in gaps), default=0.0)
-    return [
-        Request(site, ends[site], min(LAST_EFFORT, frontiers[site].spent(ends[site]) * GROWTH))
-        for gap, site in gaps
-        if gap >= largest / 4  # smaller ones can wait until these are closed
-    ]
 
 
 def _unsolved(frontiers: Sequence[Frontier], amounts: Sequence[Sequence[int]], budget: float) -> list[Request]:
