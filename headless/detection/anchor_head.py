@@ -5,6 +5,7 @@ SECOND: Sparsely Embedded Convolutional Detection. Sensors 18 (2018).
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import torch
@@ -79,22 +80,26 @@ class AnchorHead(nn.Module):
         output: Tensor = self.final(features)
         return output
 
-    def loss(
-        self, output: Tensor, targets: list[TrainingTargets], grid: PillarGrid, margin: float
-    ) -> dict[str, Tensor]:
+    @staticmethod
+    def target_maps(targets: list[TrainingTargets], grid: PillarGrid, margin: float) -> dict[str, Tensor]:
+        """Return the anchors that count, and those that must find a box; see `heads.DetectionHead`."""
+        assigned = torch.stack([assignment(wanted, grid) for wanted in targets])
+        counted = (assigned != IGNORED) & inner_cells(grid, OUTPUT_STRIDE, margin, assigned.device)
+        positive = (assigned >= 0) & counted
+        place = torch.stack(torch.nonzero(positive, as_tuple=True))
+        cloud, anchor, row, column = place
+        box = matched_boxes(targets, cloud, assigned[cloud, anchor, row, column])
+        return {"positive": positive, "counted": counted, "place": place, "box": box}
+
+    def loss(self, output: Tensor, maps: Mapping[str, Tensor], grid: PillarGrid) -> dict[str, Tensor]:
         """Return the parts of the loss; see `heads.DetectionHead`."""
         predicted = _by_anchor(output)
-        assigned = torch.stack([assignment(wanted, grid) for wanted in targets])
-        counted = (assigned != IGNORED) & inner_cells(grid, OUTPUT_STRIDE, margin, output.device)
-        positive = (assigned >= 0) & counted
-        score = focal_loss(predicted[..., 0], positive, counted)
-
-        cloud, anchor, row, column = torch.nonzero(positive, as_tuple=True)
-        target = matched_boxes(targets, cloud, assigned[cloud, anchor, row, column])
-        anchors = anchor_boxes(grid, anchor, row, column)
+        score = focal_loss(predicted[..., 0], maps["positive"], maps["counted"])
+        cloud, anchor, row, column = maps["place"]
+        target = maps["box"]
         found = predicted[cloud, anchor, row, column]
         count = max(1, len(found))
-        wanted = encoded(target, anchors)
+        wanted = encoded(target, anchor_boxes(grid, anchor, row, column))
         # The sine of the difference of the angles is zero for a box rotated by 180 degrees, too (SECOND): the box loss
         # does not depend on front and back, which the direction classifier learns.
         turn = torch.sin(found[:, 7] - wanted[:, 6])

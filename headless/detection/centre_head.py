@@ -13,6 +13,7 @@ Tracking. CVPR 2021, with three changes for few training steps on sparse clouds:
 """
 
 import math
+from collections.abc import Mapping
 
 import torch
 from torch import Tensor, nn
@@ -61,23 +62,34 @@ class CentreHead(nn.Module):
         """Return the logits of heat for each class, and the box channels: (b, classes + 11, rows, columns)."""
         return torch.cat((self.heat(features), self.box(features)), dim=1)
 
-    def loss(
-        self, output: Tensor, targets: list[TrainingTargets], grid: PillarGrid, margin: float
-    ) -> dict[str, Tensor]:
-        """Return the parts of the loss; see `heads.DetectionHead`."""
-        maps = [_target_maps(wanted, grid, output.device) for wanted in targets]
-        heat, owner = (torch.stack(part) for part in zip(*maps, strict=True))
+    @staticmethod
+    def target_maps(targets: list[TrainingTargets], grid: PillarGrid, margin: float) -> dict[str, Tensor]:
+        """Return heat, cells that count, and cells that learn a box; see `heads.DetectionHead`."""
+        device = targets[0].boxes.device
+        heat, owner = (
+            torch.stack(part) for part in zip(*(_target_maps(wanted, grid, device) for wanted in targets), strict=True)
+        )
         # Cells near road users with too few points take no part: a detection there should be neither rewarded nor
         # punished. Cells near the window's border do not either, as they see only parts of road users.
-        ignored = torch.stack([heat_of(wanted.boxes[~wanted.learnable], grid, output.device)[0] for wanted in targets])
-        counted = (ignored < MIN_HEAT) & inner_cells(grid, OUTPUT_STRIDE, margin, output.device)
-        heat_loss = heat_map_loss(output[:, : len(CLASSES)], heat, counted[:, None])
+        ignored = torch.stack([heat_of(wanted.boxes[~wanted.learnable], grid, device)[0] for wanted in targets])
+        counted = (ignored < MIN_HEAT) & inner_cells(grid, OUTPUT_STRIDE, margin, device)
+        cell = torch.stack(torch.nonzero((owner >= 0) & counted, as_tuple=True))
+        cloud, row, column = cell
+        return {
+            "heat": heat,
+            "counted": counted,
+            "cell": cell,
+            "box": matched_boxes(targets, cloud, owner[cloud, row, column]),
+            "weight": heat.amax(dim=1)[cloud, row, column],
+        }
 
-        cloud, row, column = torch.nonzero((owner >= 0) & counted, as_tuple=True)
-        target = matched_boxes(targets, cloud, owner[cloud, row, column])
-        weight = heat.amax(dim=1)[cloud, row, column]
+    def loss(self, output: Tensor, maps: Mapping[str, Tensor], grid: PillarGrid) -> dict[str, Tensor]:
+        """Return the parts of the loss; see `heads.DetectionHead`."""
+        heat_loss = heat_map_loss(output[:, : len(CLASSES)], maps["heat"], maps["counted"][:, None])
+        cloud, row, column = maps["cell"]
         predicted = output[:, len(CLASSES) :].permute(0, 2, 3, 1)[cloud, row, column]
-        return {"heat": heat_loss, **box_losses(predicted, target, reference_points(grid, row, column), weight)}
+        reference = reference_points(grid, row, column)
+        return {"heat": heat_loss, **box_losses(predicted, maps["box"], reference, maps["weight"])}
 
     def candidates(self, output: Tensor, grid: PillarGrid, least_score: float) -> list[BoxProposals]:
         """Return a box for each peak of heat; see `heads.DetectionHead`."""

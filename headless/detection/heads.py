@@ -1,5 +1,6 @@
 """Interface of detection heads: training targets, decoded boxes and the feature map's cells."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -46,19 +47,27 @@ class BoxProposals:
 class DetectionHead(Protocol):
     """Interface of detection heads, in addition to that of a torch module."""
 
-    def loss(
-        self, output: Tensor, targets: list[TrainingTargets], grid: PillarGrid, margin: float
-    ) -> dict[str, Tensor]:
+    @staticmethod
+    def target_maps(targets: list[TrainingTargets], grid: PillarGrid, margin: float) -> dict[str, Tensor]:
+        """Return the training targets of each cell, by name; they depend on no weight.
+
+        Parameters
+        ----------
+        targets : list of b TrainingTargets
+            In the coordinates of the grid.
+        margin : float, metres
+            Width of a border that the loss ignores: it shows only parts of objects beyond it.
+        """
+
+    def loss(self, output: Tensor, maps: Mapping[str, Tensor], grid: PillarGrid) -> dict[str, Tensor]:
         """Return the weighted terms of the loss; training minimises their sum.
 
         Parameters
         ----------
         output : (b, channels, rows, columns) Tensor
             What the head returns.
-        targets : list of b TrainingTargets
-            In the coordinates of the grid.
-        margin : float, metres
-            Width of a border that the loss ignores: it shows only parts of objects beyond it.
+        maps : mapping of str to Tensor
+            Result of `target_maps`, on the device of the output.
         """
 
     def candidates(self, output: Tensor, grid: PillarGrid, least_score: float) -> list[BoxProposals]:

@@ -4,11 +4,13 @@ Every step takes windows about road users, each from a configuration, a frame an
 number of the step: a training that was stopped goes on as if it had not been.
 """
 
+from __future__ import annotations
+
 import math
 import os
 import threading
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,7 @@ from typing import Any
 import numpy as np
 import torch
 from torch import Tensor
+from torch.utils.data import DataLoader, Dataset
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress
@@ -30,7 +33,7 @@ from .frames import SampledRecording, TrainingSample, drawn, require_separate, s
 from .heads import TrainingTargets
 from .inference import detect_on_level
 from .matching import Rule
-from .pillars import PillarGrid, fill_pillars, grid_over, stacked
+from .pillars import PillarGrid, Pillars, fill_pillars, grid_over, stacked
 from .recordings import SampledRun
 from .settings import BOTTOM, CLASS_CATEGORIES, TOP, NetworkSettings, TrainingSettings
 
@@ -115,7 +118,7 @@ def train(  # noqa: PLR0913  # data, settings, device and initial weights
     Returns
     -------
     TrainedDetector
-        The same bytes for the same arguments, on one kind of processor.
+        The same bytes for the same arguments, on one kind of processor; not on a GPU.
 
     Raises
     ------
@@ -128,9 +131,10 @@ def train(  # noqa: PLR0913  # data, settings, device and initial weights
     if store is not None and Path(store).exists():
         run.restore(store)
     yield run.progress()
+    batches = run.batches()
     while not run.done:
-        with deterministic(settings.threads):  # and no longer: whoever steps this may use torch in between
-            run.advance()
+        with run.arithmetic():  # and no longer: whoever steps this may use torch in between
+            run.advance(next(batches))
             if run.step % settings.validate_every == 0 or run.step == settings.steps:
                 run.validate()
                 if store is not None:
@@ -172,25 +176,36 @@ class _Run:
         self.curve = LearningCurve()
         self.best = _copied(self.detector.state_dict())
 
+    def arithmetic(self) -> AbstractContextManager[None]:
+        """Return the context of a step: one order of sums on the CPU; a GPU has no such sums over pillars."""
+        return deterministic(self.settings.threads) if self.detector.device.type == "cpu" else nullcontext()
+
     @property
     def done(self) -> bool:
         """Whether the training has ended."""
         waited = sum(step > self.curve.best for step in self.curve.validation)
         return self.step >= self.settings.steps or waited >= self.settings.patience
 
-    def advance(self) -> None:
+    def batches(self) -> Iterator[_Batch]:
+        """Return the batches of the remaining steps, for a GPU made ahead by the other cores."""
+        on_cpu = self.detector.device.type == "cpu"
+        loader: DataLoader[_Batch] = DataLoader(
+            _Batches(self),
+            batch_size=None,
+            sampler=range(self.step, self.settings.steps),
+            num_workers=0 if on_cpu else max(1, (os.cpu_count() or 1) - 1),
+            multiprocessing_context=None if on_cpu else "fork",  # samples are shared, not copied
+            generator=torch.Generator(),  # else the loader draws from the generator of the whole process
+        )
+        return iter(loader)
+
+    def advance(self, batch: _Batch) -> None:
         """Do one step."""
         self.detector.train()
-        # A generator for each step, not one for the training: a resumed training draws the same samples as one that was
-        # not interrupted, without storing the generator's state.
-        random = np.random.default_rng([self.settings.seed, 1, self.step])
-        samples = [drawn(self.training_set, random) for _ in range(self.settings.batch)]
-        grid = self.window
-        varied = [vary(sample, grid, random) for sample in samples]
-        pillars = stacked([fill_pillars(one.points, grid, self.detector.settings.most_points) for one in varied], grid)
-        targets = [_targets(one, self.settings.least_points, self.detector.device) for one in varied]
-        output = self.detector(pillars, (len(targets), grid.rows, grid.columns))
-        loss = torch.stack(list(self.detector.detection_head.loss(output, targets, grid, LOSS_MARGIN).values())).sum()
+        pillars, maps = batch
+        output = self.detector(pillars, (self.settings.batch, self.window.rows, self.window.columns))
+        maps = {name: values.to(self.detector.device) for name, values in maps.items()}
+        loss = torch.stack(list(self.detector.detection_head.loss(output, maps, self.window).values())).sum()
         self.optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self.detector.parameters(), MAX_GRADIENT_NORM)
@@ -278,6 +293,31 @@ class _Run:
         return [[one.name, one.traffic, one.placement, count] for one, count in recordings]
 
 
+_Batch = tuple[Pillars, dict[str, Tensor]]  # pillars of the windows of a step, and their training targets
+
+
+class _Batches(Dataset[_Batch]):
+    """Batches of a training by the number of their step."""
+
+    def __init__(self, run: _Run) -> None:
+        self._recordings, self._settings, self._grid = run.training_set, run.settings, run.window
+        self._most_points = run.detector.settings.most_points
+        self._target_maps = run.detector.detection_head.target_maps
+
+    def __len__(self) -> int:
+        return self._settings.steps
+
+    def __getitem__(self, step: int) -> _Batch:
+        # A generator for each step, not one for the training: a resumed training draws the same samples as one that was
+        # not interrupted, without storing the generator's state, and so do processes that make batches side by side.
+        random = np.random.default_rng([self._settings.seed, 1, step])
+        samples = [drawn(self._recordings, random) for _ in range(self._settings.batch)]
+        varied = [vary(sample, self._grid, random, self._settings.least_points) for sample in samples]
+        pillars = stacked([fill_pillars(one.points, self._grid, self._most_points) for one in varied], self._grid)
+        targets = [_targets(one, self._settings.least_points) for one in varied]
+        return pillars, self._target_maps(targets, self._grid, LOSS_MARGIN)
+
+
 def _program() -> str:
     """Return a digest of the code that a training follows from."""
     return digest(*(source_digest(name) for name in (__name__, SampledRun.__module__)))
@@ -290,20 +330,24 @@ def _with_frames(recordings: Sequence[SampledRecording]) -> list[SampledRecordin
     return filled
 
 
-def vary(sample: TrainingSample, window: PillarGrid, random: np.random.Generator) -> TrainingSample:
+def vary(
+    sample: TrainingSample, window: PillarGrid, random: np.random.Generator, least_points: int = 0
+) -> TrainingSample:
     """Return what a window about a random road user shows, moved to the window and varied.
 
-    Half of the windows are about any road user, half about one of a class that
-    is as likely as the others there are: trucks and buses are rare. It is turned
-    by quarters of a circle and a little more, mirrored, stretched and lifted:
-    streets may run anywhere, and vehicles are of all sizes.
+    Half of the windows are about any road user with ``least_points`` returns,
+    half about one of a class that is as likely as the others there are: trucks
+    and buses are rare. It is turned by quarters of a circle and a little more,
+    mirrored, stretched and lifted: streets may run anywhere, and vehicles are
+    of all sizes.
     """
     size = window.columns * window.pillar
     focus = np.array(window.centre)
-    if len(sample.boxes):
-        any_of = np.arange(len(sample.boxes))
+    any_of = np.flatnonzero(sample.returns >= least_points)
+    if len(any_of):
         if random.integers(2):
-            any_of = np.flatnonzero(sample.category == random.choice(np.unique(sample.category)))
+            category = sample.category[any_of]
+            any_of = any_of[category == random.choice(np.unique(category))]
         focus = sample.boxes[random.choice(any_of), :2]
     focus = focus + random.uniform(-MAX_CROP_SHIFT, MAX_CROP_SHIFT, 2) * size
     angle = random.integers(4) * math.pi / 2 + random.uniform(-MAX_ROTATION, MAX_ROTATION)
@@ -363,11 +407,11 @@ def result_of_sample(detector: Detector, area: DetectionArea, sample: TrainingSa
     )
 
 
-def _targets(sample: TrainingSample, least_points: int, device: torch.device) -> TrainingTargets:
+def _targets(sample: TrainingSample, least_points: int) -> TrainingTargets:
     return TrainingTargets(
-        boxes=torch.from_numpy(sample.boxes.astype(np.float32)).to(device),
-        category=torch.from_numpy(sample.category).to(device),
-        learnable=torch.from_numpy(sample.returns >= least_points).to(device),
+        boxes=torch.from_numpy(sample.boxes.astype(np.float32)),
+        category=torch.from_numpy(sample.category),
+        learnable=torch.from_numpy(sample.returns >= least_points),
     )
 
 
