@@ -152,7 +152,7 @@ def file_path(text: str) -> Path:
 
 def _within(limits: Limits, text: str, value: Number) -> Number:
     if not limits.allow(value):
-        raise argparse.ArgumentTypeError(f"must be {limits}, not {text[:40]}")
+        raise argparse.ArgumentTypeError(f"must be {limits.broken_by(value)}, not {text[:40]}")
     return value
 
 

@@ -59,9 +59,9 @@ class NetworkSettings:
         Whether pillars are filled up with zero points that are not masked, as an ablation.
     """
 
-    pillar: float = setting(0.4, "side of a pillar in metres", unit="m", minimum=0.05, maximum=2.0, metavar="M")
+    pillar: float = setting(0.32, "side of a pillar in metres", unit="m", minimum=0.05, maximum=2.0, metavar="M")
     most_points: int = setting(16, "that a pillar keeps", minimum=1, maximum=32, option="points")
-    width: int = setting(32, "channels of the first block", minimum=8, maximum=256)
+    width: int = setting(40, "channels of the first block", minimum=8, maximum=256)
     blocks: tuple[int, int, int] = setting((2, 3, 3), "convolutions in each", minimum=0, maximum=20, metavar="N")
     head: Head = setting("centre", "centres, or anchors as published")
     padded: bool = False

@@ -61,7 +61,13 @@ class Limits:
         if array.dtype.kind in "fiu":
             wrong = array[~self.each(array)].flat[0].item()  # NumPy 2 shows its own scalars with their type
         shown = f"{wrong:g}" if isinstance(wrong, float) else repr(wrong)[:_MAX_QUOTED]
-        return f"is {shown}, not {self}"
+        return f"is {shown}, not {self.broken_by(wrong)}"
+
+    def broken_by(self, value: object) -> str:
+        """Return the limits as text for a value outside them: the upper one if that is not named otherwise."""
+        if self.most >= _OPEN and isinstance(value, int | float) and value > self.most:
+            return f"at most {self.most:g}"
+        return str(self)
 
     def require(self, values: ArrayLike, file: object, field: str, cure: str = "correct it") -> None:
         """Check the values of a field of a file.

@@ -81,7 +81,7 @@ def test_the_shipped_detector_finds_the_car_and_the_bus(folder):
     record = json.loads((folder / "shipped" / "detection.json").read_text(encoding="utf-8"))
     assert record["average_precision"]["bev_0.5"]["average_precision"] > 0.5
     assert {"type1", "type2", "type3"} <= set(record["detector"]["experience"]["sensors"])
-    assert SHIPPED_DETECTOR.stat().st_size < 2_000_000
+    assert SHIPPED_DETECTOR.stat().st_size < 4_000_000
 
 
 def test_the_same_inputs_give_the_same_figures(folder):

@@ -71,5 +71,5 @@ def test_a_site_without_road_or_region_is_refused():
 
 
 def test_a_grid_of_other_pillars_is_refused():
-    with pytest.raises(SeipError, match=r"pillars of 0.4 m does not work with pillars of 0.5 m"):
+    with pytest.raises(SeipError, match=r"pillars of 0.32 m does not work with pillars of 0.5 m"):
         detect(Detector(NETWORK), area_of(hill(), 0.5), street_frame(1))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -21,6 +19,7 @@ from ..output.results.verification_record import (
     VerificationRecord,
 )
 from ..sensing.recordings.verification import Verification, VerifiedSensor
+from ..storage.csv_table import save_csv
 from ..storage.files import whole_file
 from ..storage.json_dataclass import as_json
 
@@ -90,16 +89,13 @@ def save_units(path: Path, recording: str, sensors: Sequence[VerifiedSensor]) ->
 
 def save_changes(path: Path, found: Verification) -> None:
     """Write what differs from the scene as CSV, a row for each change."""
-    table = io.StringIO()
-    write = csv.writer(table, lineterminator="\n")
     sizes = ["x_m", "y_m", "z_m", "length_m", "width_m", "height_m"]
-    write.writerow(["kind", "name", *sizes, "yaw_deg", "rays", "coverage_cost"])
+    rows = []
     for change, cost in zip(found.changes, found.costs, strict=True):
         *numbers, yaw = change.box.tolist()
         figures = [f"{value:.2f}" for value in (*numbers, math.degrees(yaw))]
-        write.writerow([change.kind, change.name, *figures, change.rays, "" if math.isnan(cost) else f"{cost:.5f}"])
-    with whole_file(path) as temporary:
-        temporary.write_text(table.getvalue(), encoding="utf-8")
+        rows.append([change.kind, change.name, *figures, change.rays, "" if math.isnan(cost) else f"{cost:.5f}"])
+    save_csv(path, ["kind", "name", *sizes, "yaw_deg", "rays", "coverage_cost"], rows)
 
 
 def _plain(text: str) -> str:

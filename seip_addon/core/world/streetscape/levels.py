@@ -201,6 +201,8 @@ def _roads(lanes: Sequence[LaneSurface], around: BaseGeometry) -> dict[str, _Roa
 
 def _pairs(roads: Mapping[str, _RoadArea], distance: float) -> list[tuple[str, str]]:
     """Return the pairs of roads within `distance` metres of each other in plan."""
+    if not roads:
+        return []  # the tree takes no query without geometries
     names = list(roads)
     outlines = [roads[name].outline for name in names]
     first, second = shapely.STRtree(outlines).query(outlines, predicate="dwithin", distance=distance)

@@ -228,3 +228,14 @@ def test_where_a_street_to_the_other_level_branches_off_the_surface_is_studied(t
     assert where["Driving lanes"][:, 1].min() < end[1]
     above = where.get("Roads above", np.full((1, 3), DECK))
     assert above[:, 2].min() > 5.0  # nothing hangs at knee height over the studied road
+
+
+def test_a_site_of_roads_that_all_climb_is_built(tmp_path):
+    """No road is level: none shares the surface of another."""
+    hump = (
+        f'<elevation s="0" a="0" b="{DECK / 80}" c="0" d="0"/><elevation s="80" a="{DECK}" b="0" c="0" d="0"/>'
+        f'<elevation s="120" a="{DECK}" b="{-DECK / 80}" c="0" d="0"/>'
+    )
+    bridge = road(geometry(length=200.0, x=-100.0, y=0.0), LANES, number="1", elevation=hump)
+    model = built(tmp_path, (0, 0), ("1",), document(bridge, street("2", 0, -100, 200, np.pi / 2)), radius=80.0)
+    assert any("road 1 lies 6.0 m above road 2" in note for note in model.notes)
