@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import tomllib
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SeipError
+from ..storage.toml_table import parse_toml, toml_text
 from .candidates import Candidates
 
 DEFAULTS = Path(__file__).with_name("installed_cost.toml")
@@ -81,22 +81,17 @@ def load_installed_cost(path: str | os.PathLike[str] | None = None) -> Installed
     SeipError
         The file cannot be read, or has an unknown key or an invalid value.
     """
-    table = _read(DEFAULTS)
+    table = _table(DEFAULTS)
     if path is not None:
-        own = _read(Path(path))
+        own = _table(Path(path))
         for name, value in own.items():
             _check(name, value, path)
         table |= own
     return InstalledCost(**{name: float(value) for name, value in table.items()})
 
 
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SeipError(f"cannot read the installed costs {path}: {error.strerror}") from error
-    except ValueError as error:
-        raise SeipError(f"the installed costs {path} are not valid TOML: {error}") from error
+def _table(path: Path) -> dict[str, Any]:
+    return parse_toml(toml_text(path, "installed costs"), str(path))
 
 
 def _check(name: str, value: object, path: str | os.PathLike[str]) -> None:

@@ -4,6 +4,7 @@ import difflib
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeGuard
 
 from ..errors import SeipError
@@ -19,6 +20,21 @@ class Key:
 
     read: Reader
     default: Any = REQUIRED
+
+
+def toml_text(path: Path, what: str) -> str:
+    """Return the text of a TOML file; ``what`` it holds is for messages.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be read, or is not UTF-8 text.
+    """
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        raise SeipError(f"cannot read the {what} {path}: {reason}; name a TOML file") from error
 
 
 def parse_toml(text: str, file: str) -> dict[str, Any]:

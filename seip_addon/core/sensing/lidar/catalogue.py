@@ -15,7 +15,7 @@ import numpy as np
 
 from ...errors import SeipError
 from ...limits import ACCUMULATION, CHANNELS, GAIN
-from ...storage.toml_table import Key, number, parse_toml, read_table
+from ...storage.toml_table import Key, number, parse_toml, read_table, toml_text
 from .carla_dropoff import CarlaDropoff
 from .model import DetectionLaw, LidarModel
 from .range_equation import MAKER_PROBABILITY, RangeEquation
@@ -50,11 +50,7 @@ def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, Li
             model = _unit(path, catalogue)
             catalogue[model.key] = model
             continue
-        try:
-            content = path.read_text(encoding="utf-8-sig")
-        except (OSError, UnicodeDecodeError) as error:
-            raise SeipError(f"cannot read the LiDAR catalogue {path}: {error}; name a TOML file") from error
-        catalogue |= _parse(content, str(path), catalogue)
+        catalogue |= _parse(toml_text(path, "LiDAR catalogue"), str(path), catalogue)
     return catalogue
 
 

@@ -23,7 +23,7 @@ from ...geometry.plan import covered_share
 from ...geometry.solids import Solid
 from ...site.post_rules import KeepOffArea, RuleName
 from ...site.scene_geometry import DEFAULT_WEIGHT, DESCRIBED, FROM_EXTRACT, FROM_MAP
-from ...storage.toml_table import Key, Reader, is_number, number, parse_toml, read_table, text
+from ...storage.toml_table import Key, Reader, is_number, number, parse_toml, read_table, text, toml_text
 from .roofs import FLAT, Roof
 from .terrain import FlatLand, Relief
 
@@ -345,11 +345,7 @@ def read_site_description(path: Path) -> SiteDescription:
         The file does not exist, is not valid TOML, or has an unknown key (close ones are suggested), a value of the
         wrong type or an invalid shape.
     """
-    try:
-        written = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise SeipError(f"cannot read the site description {path}: {reason}") from error
+    written = toml_text(path, "site description")
     keys = _PLACE | {name: Key(_tables(name), ()) for name in _LISTED}
     values = read_table(parse_toml(written, str(path)), str(path), keys)
     for name, (make, own) in _LISTED.items():
