@@ -67,7 +67,7 @@ def test_a_detector_its_curve_and_its_figures_are_written(folder, capsys):
     assert list(figures) == [str(folder / "third")]
     assert all(0 <= value <= 1 and math.isfinite(value) for value in figures[str(folder / "third")].values())
     said = capsys.readouterr().out
-    assert "pillars of 0.4 m" in said
+    assert "pillars of 0.32 m" in said
     assert "vehicles of one run within 1 m of one of another at the same instant: " in said
 
 
