@@ -71,7 +71,7 @@ def main(argv: list[str]) -> None:
 def _describe(solution: Solution) -> str:
     placement, deployment = solution.placement, solution.deployment
     lines = [
-        f"{survey.describe_sensor(sensor)}: sees {sensor.alone:.1%} of the targets, {sensor.marginal:.1%} alone"
+        f"{survey.describe_sensor(sensor)}: sees {sensor.alone:.1%} of the targets, {sensor.marginal:.1%} only by it"
         for sensor in deployment.sensors
     ]
     central = "" if deployment.central is None else f", central {deployment.central:.2%}"

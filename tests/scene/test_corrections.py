@@ -1,5 +1,6 @@
 """Corrections of a scene: what is added, removed, trimmed and moved, and what is left alone with a sentence."""
 
+import csv
 from dataclasses import replace
 
 import bpy
@@ -13,6 +14,7 @@ from seip_addon.core.sensing.recordings.verification import CoverageSteps, Verif
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.site.targets import generate_targets
+from seip_addon.core.workflows.verification_record import save_changes
 from seip_addon.core.workflows.verifying import box_triangles
 from seip_addon.scene import contract
 from seip_addon.scene.corrections import correct_scene
@@ -291,3 +293,13 @@ def _join(obj, at):
     both = np.concatenate([first, first + np.subtract(at, obj.location)])
     mesh.clear_geometry()
     mesh.from_pydata(both.tolist(), [], np.arange(len(both)).reshape(-1, 3).tolist())
+
+
+def test_names_of_objects_are_no_formulas_in_the_table_of_changes(scene, tmp_path):
+    found = verified(scene, new=[("=HYPERLINK(1)", BOX)])
+    save_changes(tmp_path / "changes.csv", found)
+    with (tmp_path / "changes.csv").open(encoding="utf-8", newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert row["name"] == "'=HYPERLINK(1)"
+    assert row["kind"] == "new"
+    assert float(row["coverage_cost"]) == 0.0
