@@ -137,6 +137,12 @@ def text_width(words: str, size: float, weight: str = "normal") -> float:
     return float(font.get_width_height()[0]) / 64.0 * size / MEASURED_SIZE / 72.0
 
 
+def is_writable(words: str) -> bool:
+    """Return whether the type has all letters of a text; it draws boxes in place of others, such as Chinese ones."""
+    font = _font("normal")
+    return all(letter.isspace() or font.get_char_index(ord(letter)) for letter in words)
+
+
 @cache
 def _font(weight: str) -> FT2Font:
     return get_font(findfont(FontProperties(weight=weight)))

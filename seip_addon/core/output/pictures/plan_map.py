@@ -21,7 +21,7 @@ from ...site.scene_geometry import ASSUMED, OTHER_LEVELS, Mesh, SceneGeometry
 from ...site.site import Site
 from ...site.target_squares import target_squares
 from .coverage_colours import of_placement
-from .drawing import MARK_RADIUS, draw_polygons, text_width
+from .drawing import MARK_RADIUS, draw_polygons, is_writable, text_width
 from .palette import FORBIDDEN, INK, MANDATORY, PAPER, SOFT_INK, WEIGHTED
 from .plan_style import (
     ASSUMED_HEIGHT,
@@ -86,11 +86,14 @@ def draw_map(axes: Axes, content: MapContent, window: Window, width: float) -> N
 def draw_street_names(
     axes: Axes, geometry: SceneGeometry, window: Window, width: float, taken: Sequence[Window] = ()
 ) -> list[Window]:
-    """Write the names of streets along them where they fit, off boxes that are taken, and return their own boxes."""
+    """Write the names of streets along them where they fit, off boxes that are taken, and return their own boxes.
+
+    Names with letters that the type lacks are left out.
+    """
     inch = (window[2] - window[0]) / width
     boxes: list[Window] = []
     for place in geometry.places:
-        if place.crossing:
+        if place.crossing or not is_writable(place.name):
             continue
         parts = [part for part in shapely.get_parts(place.polygon) if part.area > 0]
         inside = [_largest(shapely.intersection(part, shapely.box(*window))) for part in parts]

@@ -164,6 +164,7 @@ def test_streets_are_named_where_they_fit_and_crossings_are_not(example):
         NamedArea("Mill Lane", shapely.box(-55, -7, -7, 7)),
         NamedArea("A street with a name that is far too long for it", shapely.box(7, -7, 15, 7)),
         NamedArea("Crossing of Mill Lane", shapely.box(-12, -7, -8, 7), crossing=True),
+        NamedArea("南京東路", shapely.box(7, -7, 55, 7)),  # the type would draw boxes
     )
     plan = draw_plan(replace(example.geometry, places=places), example.site, example.deployment).axes[0]
     names = {place.name for place in places}
