@@ -65,7 +65,7 @@ class Limits:
 
     def broken_by(self, value: object) -> str:
         """Return the limits as text for a value outside them: the upper one if that is not named otherwise."""
-        if -_OPEN < self.least and self.most >= _OPEN and isinstance(value, int | float) and value > self.most:
+        if self.least > -_OPEN and self.most >= _OPEN and isinstance(value, int | float) and value > self.most:
             return f"at most {self.most:g}"
         return str(self)
 
