@@ -74,9 +74,13 @@ def precision(site, *, rolling_shutter):
 def test_precision_is_that_of_the_same_sensors_with_a_rolling_shutter(site, placed):
     found, sensors = finish(placement_precision(site, placed, EVERY, site.parent / "out"))
     assert sensors == ("os1_128", "os1_128")
-    expected = precision(site, rolling_shutter=True)
-    assert found["vehicles"].value == expected > 0
-    assert precision(site, rolling_shutter=False) != expected
+    assert found["vehicles"].value == precision(site, rolling_shutter=True) > 0
+    # At both shutters the precision may be the same; the files of the detections are named by digests of the scans.
+    precision(site, rolling_shutter=False)
+    stored, rolling, frozen = (
+        {path.name for path in (site.parent / name).rglob("*.npz")} for name in ("out", "direct-True", "direct-False")
+    )
+    assert stored == rolling != frozen
     assert set(found) == {"vehicles"}  # there are no other road users in this traffic
 
 

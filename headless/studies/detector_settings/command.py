@@ -36,12 +36,12 @@ DEFAULT_NETWORK = NetworkSettings()
 NETWORKS = {
     ("as published", "as published"): PUBLISHED_NETWORK,  # slowest, so it starts first
     ("default", "default"): DEFAULT_NETWORK,
-    ("pillars", "0.32 m"): replace(DEFAULT_NETWORK, pillar=0.32),
+    ("pillars", "0.4 m"): replace(DEFAULT_NETWORK, pillar=0.4),
     ("pillars", "0.5 m"): replace(DEFAULT_NETWORK, pillar=0.5),
     ("points in a pillar", "8"): replace(DEFAULT_NETWORK, most_points=8),
     ("points in a pillar", "32"): replace(DEFAULT_NETWORK, most_points=32),
-    ("width", "16"): replace(DEFAULT_NETWORK, width=16),
-    ("width", "64"): replace(DEFAULT_NETWORK, width=64),
+    ("width", "20"): replace(DEFAULT_NETWORK, width=20),
+    ("width", "80"): replace(DEFAULT_NETWORK, width=80),
     ("head", "anchors"): replace(DEFAULT_NETWORK, head="anchor"),
 }
 """Networks compared, by family and name of the setting."""
