@@ -87,7 +87,11 @@ def test_precision_is_that_of_the_same_sensors_with_a_rolling_shutter(site, plac
 def test_the_command_ranks_a_placement_among_those_of_the_table(site, placed, capsys, monkeypatch):
     monkeypatch.setattr(command, "EVERY", EVERY)
     command.main(["--placement", "borough", str(placed), "-o", str(site.parent)])
-    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("vehicles"))
+    said = capsys.readouterr()
+    assert ("another detector" in said.out + said.err) == (
+        Detector.load(SHIPPED_DETECTOR).key != command.TABLE_DETECTOR
+    )
+    (line,) = (line for line in said.out.splitlines() if line.startswith("vehicles"))
     assert re.search(r"average precision [\d.]+% .* above \d+ of 106 placements of 2 × os1_128", line)
 
 

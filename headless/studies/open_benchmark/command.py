@@ -39,6 +39,9 @@ TABLE = Path(__file__).resolve().parents[3] / "docs" / "open-benchmark" / "place
 SCORE_COLUMNS = ("criterion", "road_users", "sites", "spearman", "low", "high", "loss", "loss_low", "loss_high")
 CRITERIA_FOLDER, TABLE_FILE = "criteria", "placements.csv"
 
+TABLE_DETECTOR = "0fcd987846a1b49d68e8de86e5a4efb5ea8e19bcdd8cdf909b1b83358e7f699f"
+"""Digest of the detector with which the shipped table was measured; renew it with the table."""
+
 
 def main(argv: list[str]) -> None:
     """Build the benchmark, or score a criterion or a placement on it."""
@@ -86,6 +89,7 @@ def _build(options: argparse.Namespace) -> None:
 
 
 def _score_placement(options: argparse.Namespace) -> None:
+    from headless.detection.detector import SHIPPED_DETECTOR, Detector  # noqa: PLC0415 -- needs torch
     from headless.studies.open_benchmark.placement import placement_precision  # noqa: PLC0415 -- needs torch
 
     name, scene = options.placement
@@ -102,6 +106,8 @@ def _score_placement(options: argparse.Namespace) -> None:
             f"{road_users}: average precision {precision.describe(1)}, above {worse} of {len(known)} placements of "
             f"{COUNT} × {SENSOR}"
         )
+    if Detector.load(SHIPPED_DETECTOR).key != TABLE_DETECTOR:
+        runtime.warn(["the table was measured with another detector than this placement: its ranks are not comparable"])
     if sensors != (SENSOR,) * COUNT:
         runtime.warn([f"this placement has {', '.join(sensors)}, those of the benchmark {COUNT} × {SENSOR}"])
 
