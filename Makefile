@@ -8,7 +8,7 @@
 # make detection   install PyTorch, for the detector; make test-detection tests it
 # make study       redo the study on the shipped junction: coverage and detection (make -j2 study: ten minutes)
 # make recording   simulate the shipped recording of an installation again
-# make detector    train a detector as the shipped one, at 64 random sites (two hours and a GPU)
+# make detector    train a detector as the shipped one, at 64 random sites (needs a GPU)
 # make ingredients what each ingredient of its training gains at sites not trained on (an hour)
 # make settings    chart what other settings of the detector cost and gain (an hour)
 # make stability   drive every method to where it fails, and write docs/stability.md (two hours)

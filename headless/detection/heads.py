@@ -57,6 +57,12 @@ class DetectionHead(Protocol):
             In the coordinates of the grid.
         margin : float, metres
             Width of a border that the loss ignores: it shows only parts of objects beyond it.
+
+        Returns
+        -------
+        dict of str to Tensor
+            Of each cell or anchor (b, …, rows, columns): its target, and whether it counts in the loss. Of the m that
+            learn a box: their indices (dimensions, m) and the boxes (m, 7), metres and radians.
         """
 
     def loss(self, output: Tensor, maps: Mapping[str, Tensor], grid: PillarGrid) -> dict[str, Tensor]:

@@ -7,6 +7,7 @@ number of the step: a training that was stopped goes on as if it had not been.
 from __future__ import annotations
 
 import math
+import multiprocessing
 import os
 import threading
 from collections.abc import Generator, Iterator, Sequence
@@ -177,7 +178,7 @@ class _Run:
         self.best = _copied(self.detector.state_dict())
 
     def arithmetic(self) -> AbstractContextManager[None]:
-        """Return the context of a step: one order of sums on the CPU; a GPU has no such sums over pillars."""
+        """Return the context of a step: a fixed order of sums on the CPU, which torch lacks for pillars on a GPU."""
         return deterministic(self.settings.threads) if self.detector.device.type == "cpu" else nullcontext()
 
     @property
@@ -187,14 +188,15 @@ class _Run:
         return self.step >= self.settings.steps or waited >= self.settings.patience
 
     def batches(self) -> Iterator[_Batch]:
-        """Return the batches of the remaining steps, for a GPU made ahead by the other cores."""
-        on_cpu = self.detector.device.type == "cpu"
+        """Return the batches of the remaining steps; other processes make them ahead for a GPU."""
+        # Forked processes share the samples, which others would copy; Windows has none.
+        forks = self.detector.device.type == "cuda" and "fork" in multiprocessing.get_all_start_methods()
         loader: DataLoader[_Batch] = DataLoader(
             _Batches(self),
             batch_size=None,
             sampler=range(self.step, self.settings.steps),
-            num_workers=0 if on_cpu else max(1, (os.cpu_count() or 1) - 1),
-            multiprocessing_context=None if on_cpu else "fork",  # samples are shared, not copied
+            num_workers=max(1, (os.cpu_count() or 1) - 1) if forks else 0,
+            multiprocessing_context="fork" if forks else None,
             generator=torch.Generator(),  # else the loader draws from the generator of the whole process
         )
         return iter(loader)
