@@ -7,11 +7,12 @@ real program and as ``python -m headless.x arguments`` on the bpy module.
 import logging
 import os
 import signal
+import stat
 import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NoReturn, TypeVar
 
@@ -157,7 +158,7 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
         signal.signal(number, lambda which, _frame: sys.exit(128 + which))
     try:
         try:
-            main(arguments())
+            main(refuse_pipes(arguments()))
         finally:
             _leave_folders()
     except SeipError as error:
@@ -165,6 +166,17 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
     except KeyboardInterrupt as stop:
         _end(EXIT_STOPPED, str(stop) or "stopped, no result written")
     _end(0)
+
+
+def refuse_pipes(words: list[str]) -> list[str]:
+    """Return the arguments of a command, if none is a pipe or a device: readers go back and forth in their files."""
+    for word in words:
+        path = Path(word.partition("=")[2] if word.startswith("--") else word)
+        with suppress(OSError, ValueError):  # longer than a name can be, or with a null character
+            kind = path.stat().st_mode
+            if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)) and path != Path(os.devnull):
+                raise SeipError(f"{path} is neither a file nor a folder: write what it holds to a file, and name that")
+    return words
 
 
 def _leave_folders() -> None:

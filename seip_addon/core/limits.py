@@ -203,8 +203,8 @@ DRAWS = Limits(1, 100_000)
 
 SENSORS = Limits(1, 100_000)
 SEED = Limits(0, 2**63 - 1)
-EFFORT = Limits(0.0, 1e9)
-"""Counted work."""
+EFFORT = Limits(0.0, 1e12)
+"""Limit of a search, in counted work or seconds."""
 
 LIDAR_RANGE = Limits(0.0, 10_000.0, "m")
 """Distance of a return from its sensor."""

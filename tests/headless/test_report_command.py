@@ -2,6 +2,7 @@
 
 import json
 import shlex
+from dataclasses import replace
 
 from headless import place, report
 from headless import survey as surveys
@@ -113,16 +114,10 @@ def test_every_option_survives_the_record(folder, typed):
     parse = place._parser().parse_args  # noqa: SLF001  # what the command itself reads options with
     asked = parse(["a.blend", "-o", "out", *typed])
     settings = surveys.read_survey_settings(asked)
-    record = load_placement(folder / "placement.json")
     goal = read_objective(asked)
-    content = record.as_json()
-    content["settings"] = {
-        **settings.as_record(),
-        "goal": as_json(goal),
-        "render": not asked.no_render,
-    }
-    (folder.parent / "typed.json").write_text(json.dumps(content), encoding="utf-8")
-    words = shlex.split(repeating_command(load_placement(folder.parent / "typed.json")))
+    recorded = {**settings.as_record(), "goal": as_json(goal), "render": not asked.no_render}
+    record = replace(load_placement(folder / "placement.json"), settings=json.loads(json.dumps(recorded)))
+    words = shlex.split(repeating_command(record))
     again = parse(words[2:])
     assert surveys.read_survey_settings(again) == settings
     assert read_objective(again) == goal

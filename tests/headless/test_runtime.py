@@ -1,4 +1,5 @@
 import io
+import os
 import signal
 import subprocess
 import sys
@@ -50,6 +51,16 @@ def test_success_is_status_0() -> None:
     with pytest.raises(SystemExit) as end:
         runtime.run(lambda _argv: None)
     assert end.value.code == 0
+
+
+def test_a_pipe_is_refused_before_a_reader_waits_for_it(tmp_path, capsys) -> None:
+    pipe = tmp_path / "map.osm"
+    os.mkfifo(pipe)
+    for words in (["place", str(pipe)], [f"--traffic={pipe}"]):
+        with pytest.raises(SeipError, match=r"map\.osm is neither a file nor a folder: write .* to a file"):
+            runtime.refuse_pipes(words)
+    plain = [str(tmp_path), "no such file", "x" * 5000, "\0", os.devnull, "--count=3"]
+    assert runtime.refuse_pipes(plain) == plain
 
 
 def test_a_defect_keeps_its_traceback() -> None:

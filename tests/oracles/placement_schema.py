@@ -56,14 +56,14 @@ def settings() -> dict[str, Any]:
     shares = {"type": "array", "items": number("number", WEIGHT), "minItems": 3, "maxItems": 3}
     known = {
         "grid_spacing_m": number("number", SIZE),
-        "candidates": {"type": "object", "required": ["sensors"], "properties": {"sensors": texts}},
+        "candidates": {"type": "object", "properties": {"sensors": texts}},
         "visibility": anything,
         "goal": {"type": "object", "properties": {"shares": shares}},
         "catalogue": texts,
         "engine": text,
         "solver": text,
         "installed_cost": {"anyOf": [anything, {"type": "null"}]},
-        "time_limit_s": {"type": "number", "minimum": 0},
+        "time_limit_s": number("number", EFFORT),
         "effort": number("number", EFFORT),
         "spacings_because": text,
         "render": truth,

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import math
 import os
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..errors import SeipError
+from ..limits import DISTANCE, PRICE
 from ..storage.toml_table import parse_toml, toml_text
 from .candidates import Candidates
 
 DEFAULTS = Path(__file__).with_name("installed_cost.toml")
-MOST = 1e9
-"""Largest figure in dollars or metres; larger ones are rejected as typing errors."""
+Dollars = Annotated[float, PRICE]
 
 
 @dataclass(frozen=True)
@@ -33,13 +32,13 @@ class InstalledCost:
         Costs of electricity and of the data line.
     """
 
-    new_post_usd: float
-    existing_pole_usd: float
-    mast_arm_usd: float
-    mast_arm_beyond_m: float
-    power_new_post_usd: float
-    power_existing_pole_usd: float
-    backhaul_usd: float
+    new_post_usd: Dollars
+    existing_pole_usd: Dollars
+    mast_arm_usd: Dollars
+    mast_arm_beyond_m: Annotated[float, DISTANCE]
+    power_new_post_usd: Dollars
+    power_existing_pole_usd: Dollars
+    backhaul_usd: Dollars
 
     def over(self, candidates: Candidates, bracket: float) -> Candidates:
         """Return candidates with the cost of installation at each position.
@@ -98,6 +97,6 @@ def _check(name: str, value: object, path: str | os.PathLike[str]) -> None:
     known = [each.name for each in fields(InstalledCost)]
     if name not in known:
         raise SeipError(f"{path} has the unknown key {name!r}; the keys of installed costs are {', '.join(known)}")
-    number = value if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
-    if not 0 <= number <= MOST:
-        raise SeipError(f"{name} in {path} must be a number from 0 to {MOST:g}, not {value!r}")
+    limits = DISTANCE if name.endswith("_m") else PRICE
+    if not isinstance(value, int | float) or isinstance(value, bool) or not limits.allow(value):
+        raise SeipError(f"{name} in {path} must be {limits}, not {value!r}")

@@ -66,8 +66,18 @@ def _key(kind: object, each: "Field[Any]") -> str:
 
 def _written(holder: object, each: "Field[Any]") -> object:
     value = getattr(holder, each.name)
+    return _degrees(value) if _is_angle(holder, each.name) else as_json(value)
+
+
+def _degrees(angle: Any) -> Any:  # noqa: ANN401 -- a number, or several
+    if isinstance(angle, tuple | list):
+        return [_degrees(one) for one in angle]
     # rounding to a millionth of a degree hides the last bits, which differ between platforms
-    return round(math.degrees(value), 6) + 0.0 if _is_angle(holder, each.name) else as_json(value)
+    return round(math.degrees(angle), 6) + 0.0
+
+
+def _radians(angle: Any) -> Any:  # noqa: ANN401 -- as above
+    return tuple(map(_radians, angle)) if isinstance(angle, tuple) else math.radians(angle)
 
 
 def _read(kind: Any, value: Any, where: str) -> Any:  # noqa: ANN401 -- types and values of any kind
@@ -111,7 +121,7 @@ def _object(kind: Any, content: dict[str, Any], where: str) -> Any:  # noqa: ANN
         key = _key(kind, each)
         if key in content:
             read = _read(hints[each.name], content[key], _at(where, key))
-            values[each.name] = math.radians(read) if key != each.name else read
+            values[each.name] = _radians(read) if key != each.name else read
         elif each.default is MISSING:
             raise ValueError(f"{_at(where, key)} is missing")
     return kind(**values)

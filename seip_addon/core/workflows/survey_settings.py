@@ -10,7 +10,6 @@ from typing import Any
 
 from ..choosing.placement.search_limits import DEFAULT_EFFORT, SolverLimits
 from ..choosing.placement.solvers import check_solver
-from ..output.results.headings import tilt_degrees
 from ..sensing.lidar.catalogue import find_models, load_catalogue
 from ..sensing.lidar.model import LidarModel
 from ..sensing.visibility.ray_casting import Engine
@@ -19,6 +18,7 @@ from ..settings import setting
 from ..site.candidates import CandidateSettings
 from ..site.installed_cost import InstalledCost
 from ..site.weather import Weather
+from ..storage.json_dataclass import as_json
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class SurveySettings:
         limits = _finite({"time_limit_s": self.time_limit or math.inf, "effort": self.limits.work})
         return {
             "grid_spacing_m": self.grid_spacing,
-            "candidates": _candidates_record(self.candidates),
+            "candidates": as_json(self.candidates),
             "visibility": asdict(self.visibility),
             "weather": _finite(asdict(self.weather)),
             "reflectivity": list(self.reflectivity),
@@ -118,9 +118,3 @@ class SurveySettings:
 def _finite(record: Mapping[str, Any]) -> dict[str, Any]:
     """Return a record without infinite values, which JSON cannot represent."""
     return {name: value for name, value in record.items() if math.isfinite(value)}
-
-
-def _candidates_record(settings: CandidateSettings) -> dict[str, Any]:
-    record = asdict(settings)
-    tilts = record.pop("tilts")
-    return record | {"tilts_deg": [tilt_degrees(tilt) for tilt in tilts]}

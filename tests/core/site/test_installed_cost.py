@@ -77,7 +77,7 @@ def test_a_table_of_one_s_own_changes_what_it_names(tmp_path):
     ("text", "says"),
     [
         ("post = 3", "unknown key 'post'.*new_post_usd, "),
-        ("backhaul_usd = -1", "backhaul_usd in .* must be a number from 0 to 1e.09, not -1"),
+        ("backhaul_usd = -1", "backhaul_usd in .* must be 0 to 1e.09 USD, not -1"),
         ("backhaul_usd = true", "not True"),
         ("backhaul_usd = nan", "not nan"),
         ('backhaul_usd = "much"', "not 'much'"),

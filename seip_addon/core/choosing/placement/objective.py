@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SeipError
-from ...limits import CHOSEN_WEIGHT, COUNT, DISTANCE, PRICE, SHARE
+from ...limits import CHOSEN_WEIGHT, COUNT, DISTANCE, PRICE, SENSORS, SHARE
 from ...sensing.lidar.carla_dropoff import CarlaDropoff
 from ...sensing.lidar.model import LidarModel
 from ...settings import setting
@@ -115,6 +115,12 @@ class Objective:
             value = getattr(self, name)
             if value is not None and not limits.allow(value):
                 raise SeipError(f"the {name.replace('_', ' ')} must be {limits}, not {value}")
+        for name, number in (
+            ("number of sensors", self.count),
+            ("number of sensors that must see a target", self.seen_by),
+        ):
+            if number is not None and not SENSORS.allow(number):
+                raise SeipError(f"the {name} must be {SENSORS}, not {number}")
         if self.coverage is not None and not 0 < self.coverage <= 1:
             raise SeipError(f"the coverage to reach must be a share above 0 and at most 1, not {self.coverage:g}")
         weight = self.central_weight

@@ -29,6 +29,7 @@ from ..results.verification_record import VerificationRecord, load_verification
 
 PICTURES = ("view.png", "plan.png")
 CLOSE_UPS = "sensors.png"
+SHARE_ERROR = 1e-8  # shares are rounded to nine digits
 SAME_PLACE = 0.001
 """Metres by which the planned position in a verification may differ from the placement: poses in scenes are rounded."""
 
@@ -78,10 +79,7 @@ class Evidence:
     def geo_reference(self) -> GeoReference:
         """Georeference of the map."""
         known = self.record.site.geo_reference
-        if known is None:
-            return GeoReference()
-        x, y, z = known.header_offset_m
-        return GeoReference(known.projection, (x, y, z, np.radians(known.header_heading_deg)))
+        return GeoReference() if known is None else known.geo_reference
 
 
 def load_evidence(folder: Path) -> Evidence:
@@ -100,8 +98,7 @@ def load_evidence(folder: Path) -> Evidence:
     key = record.inputs.get("visibility")
     if site.key != key or len(site.seen) != len(record.sensors):
         raise SeipError(f"{folder} holds files of different placements: place the sensors again")
-    counts = record.counts
-    if (counts.targets, counts.poses) != (len(site.targets), len(site.problem.prices)):
+    if not _agree(record, site):
         raise SeipError(f"placement.json and site.npz in {folder} contradict each other: place the sensors again")
     names = [*PICTURES]
     names += POSE_ERROR_PICTURES if record.request.goal.scenarios.errs else ()
@@ -112,6 +109,18 @@ def load_evidence(folder: Path) -> Evidence:
         paths = [folder / VERIFICATION_FOLDER / name for name in VERIFICATION_PICTURES]
         pictures |= {path.name: _picture(path, "verify the installation again") for path in paths if path.is_file()}
     return Evidence(record, site, pictures, _close_ups(folder / CLOSE_UPS, len(record.sensors)), verification)
+
+
+def _agree(record: PlacementRecord, site: SiteFile) -> bool:
+    """Return whether the figures of a placement are those of its site."""
+    counts, seen = record.counts, site.seen
+    recorded = np.array([record.coverage.whole, *(sensor.coverage_alone for sensor in record.sensors)])
+    computed = np.array([seen.any(axis=0).mean(), *seen.mean(axis=1)])
+    numbers = (counts.targets, counts.targets_central, counts.poses)
+    central = int(np.count_nonzero(site.targets.central))
+    return numbers == (len(site.targets), central, len(site.problem.prices)) and bool(
+        (np.abs(recorded - computed) <= SHARE_ERROR).all()
+    )
 
 
 def _verification(folder: Path, record: PlacementRecord) -> VerificationRecord | None:

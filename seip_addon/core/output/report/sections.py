@@ -13,7 +13,6 @@ from ...choosing.placement.deployment import BAND, UNRANKED
 from ...choosing.placement.objective import CHOSEN_FOR, MOVED, SAME_PRICE, purpose
 from ...choosing.placement.returns_summary import FEW_RETURNS, SURFACE_SEEN, ReturnsSummary, returns_text
 from ...counts import counted
-from ...sensing.visibility.settings import VisibilitySettings
 from ...site.candidates import PAPER_TYPES
 from ..pictures.drawing import percent
 from ..results.answer import sentence
@@ -611,9 +610,8 @@ def _settings(evidence: Evidence) -> Iterator[tuple[str, str]]:
     positions = f"{counts.positions:,}, of which {counts.positions_on_poles:,} on existing poles"
     yield "Positions", f"{positions}; with all heights, types and directions {counts.poses:,}"
     yield "Road", f"{len(targets):,} squares of {targets.spacing:g} m, {evidence.area:,.0f} m² together"
-    visibility = record.settings.get("visibility")
-    delta = visibility.get("delta") if isinstance(visibility, dict) else None
-    yield "A square is seen", f"if a measured point lies within {delta or VisibilitySettings().delta:g} m of its centre"
+    delta = record.request.visibility.delta
+    yield "A square is seen", f"if a measured point lies within {delta:g} m of its centre"
     yield "Made", f"{record.times.created} by {record.objective.solver}"
     yield "With", ", ".join(f"{name} {version}" for name, version in record.versions.items())
     for name, value in record.inputs.items():

@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
-from ...limits import PRICE
-from ...site.candidates import CandidateSettings
 from ...site.installed_cost import InstalledCost, load_installed_cost
 from .placement_record import PlacementRecord, RecordedSensor
 
@@ -51,7 +48,8 @@ class Costs:
 
 def costs_of(record: PlacementRecord) -> Costs:
     """Return the costs of a placement; installation is that of the record, or of the shipped table if it has none."""
-    table, bracket = _table(record.settings), _bracket(record.settings)
+    settings = record.request
+    table, bracket = settings.installed_cost or _shipped(), settings.candidates.bracket
     return Costs(tuple(_items(sensor, table, bracket) for sensor in record.sensors), not record.installed)
 
 
@@ -63,22 +61,6 @@ def _items(sensor: RecordedSensor, table: InstalledCost, bracket: float) -> dict
     return {SENSOR: sensor.price_usd - (recorded or 0.0), **installation}
 
 
-def _table(settings: Mapping[str, Any]) -> InstalledCost:
-    """Return the installed costs that a placement was made with, or the shipped ones."""
-    shipped = _shipped()
-    given = settings.get("installed_cost")
-    if not isinstance(given, Mapping):
-        return shipped
-    known = {name: value for name, value in given.items() if hasattr(shipped, name) and PRICE.allow(value)}
-    return InstalledCost(**(vars(shipped) | known))
-
-
 @cache  # the panel asks at every redraw
 def _shipped() -> InstalledCost:
     return load_installed_cost()
-
-
-def _bracket(settings: Mapping[str, Any]) -> float:
-    candidates = settings.get("candidates")
-    value = candidates.get("bracket") if isinstance(candidates, Mapping) else None
-    return float(value) if isinstance(value, int | float) else CandidateSettings().bracket

@@ -13,7 +13,7 @@ import numpy as np
 from ... import limits
 from ...arrays import Float, Integer
 from ...choosing.placement.deployment import GainBand, Sensor, TypeBand, price_text
-from ...choosing.placement.objective import FrontPoint, Objective, Solution
+from ...choosing.placement.objective import FrontPoint, Solution
 from ...choosing.placement.problem import Placement
 from ...choosing.placement.returns_summary import CrossingReturns, ReturnsPoint, ReturnsSummary, share_reached
 from ...geometry.geo_reference import GeoReference
@@ -24,6 +24,7 @@ from ...site.site import Site
 from ...site.sources import SourceCount
 from ...storage.json_dataclass import from_json
 from .headings import degrees, tilt_degrees
+from .recorded_settings import RecordedSettings
 
 Coordinate = Annotated[float, limits.LOCAL_COORDINATE]
 MapCoordinate = Annotated[float, limits.MAP_COORDINATE]
@@ -71,6 +72,11 @@ class RecordedGeoReference:
     projection: str
     header_offset_m: MapPoint
     header_heading_deg: Degrees
+
+    @property
+    def geo_reference(self) -> GeoReference:
+        """The georeference of the map."""
+        return GeoReference(self.projection, (*self.header_offset_m, math.radians(self.header_heading_deg)))
 
 
 @dataclass(frozen=True)
@@ -221,21 +227,6 @@ class RecordedTimes:
 
 
 @dataclass(frozen=True)
-class RecordedCandidates:
-    """The sensor types that there were to choose from, by catalogue key."""
-
-    sensors: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class PlacementRequest:
-    """Settings of a record that are read again: objective and sensor types."""
-
-    goal: Objective
-    candidates: RecordedCandidates
-
-
-@dataclass(frozen=True)
 class PlacementRecord:
     """Content of ``placement.json`` without its schema, key by key; see docs/formats.md.
 
@@ -275,9 +266,9 @@ class PlacementRecord:
     crossings: tuple[CrossingReturns, ...] = ()
 
     @cached_property
-    def request(self) -> PlacementRequest:
-        """Objective and sensor types."""
-        return from_json(PlacementRequest, self.settings, "settings")
+    def request(self) -> RecordedSettings:
+        """The settings that this program reads again."""
+        return from_json(RecordedSettings, self.settings, "settings")
 
     @property
     def poses(self) -> Integer:

@@ -3,7 +3,7 @@ import json
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -12,11 +12,12 @@ import pytest
 
 from seip_addon.core.choosing.placement.objective import MOVED, Objective, Solution
 from seip_addon.core.choosing.placement.problem import Placement
-from seip_addon.core.choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
+from seip_addon.core.choosing.placement.returns_summary import CrossingReturns, ReturnsPoint, ReturnsSummary
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record, save_placement
 from seip_addon.core.output.results.placement_record import PlacementRecord, Provenance, placement_record
+from seip_addon.core.output.results.recorded_settings import RecordedSettings
 from seip_addon.core.output.results.versions import versions
 from tests.builders.small_junction import Example, make_example
 from tests.oracles.json_schema import violations
@@ -42,7 +43,7 @@ def example() -> Example:
 def run() -> dict[str, Any]:
     settings = {
         "grid_spacing_m": 1.0,
-        "candidates": {"sensors": ("type1", "vlp32c"), "heights": (3.5, 5.4)},
+        "candidates": {"sensors": ("type1", "type2", "vlp32c"), "heights": (3.5, 5.4)},
         "goal": asdict(GOAL),
     }
     created = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
@@ -86,7 +87,7 @@ def record(example, run, request) -> PlacementRecord:
     if request.param == "by hand":
         return made_by_hand(example, run)
     if request.param == "by returns":
-        return replace(make_record(example, run), returns=RETURNS)
+        return replace(make_record(example, run), returns=RETURNS, crossings=RETURNS.crossings)
     return make_record(example, run, **({} if request.param == "placed" else {"bound": math.inf, "gap": math.inf}))
 
 
@@ -104,6 +105,7 @@ def whole(example, run) -> dict:
             coverage=coverage,
             greedy=greedy,
             returns=RETURNS,
+            crossings=RETURNS.crossings,
         )
     )
 
@@ -137,7 +139,7 @@ def refusal(content: dict) -> str:
 
 def is_open(place: tuple) -> bool:
     """Return whether a value is none that this program reads again, so that it may be anything."""
-    return place[0] == "settings" and place[1:2] not in {(), ("goal",), ("candidates",)}
+    return place[0] == "settings" and place[1:2] not in {(), *((each.name,) for each in fields(RecordedSettings))}
 
 
 def test_the_record_is_what_the_schema_says_and_json_can_hold_it(example, run, tmp_path):
@@ -190,8 +192,7 @@ def test_every_number_of_the_schema_has_limits():
 
     found = dict(numbers(SCHEMA, "$"))
     assert len(found) > 40
-    without = {where for where, part in found.items() if not {"minimum", "maximum"} <= part.keys()}
-    assert without == {"$.properties.settings.properties.time_limit_s"}  # which may be any
+    assert not {where for where, part in found.items() if not {"minimum", "maximum"} <= part.keys()}
 
 
 @pytest.mark.parametrize(
@@ -245,12 +246,21 @@ def test_keys_of_which_this_version_knows_nothing_are_passed_over(whole):
     assert content_of(parsed_record(json.dumps(content))) == whole
 
 
+CONTRADICTIONS = {
+    ("sensors", 0): "the prices of the sensors add up to 0",
+    ("returns", "of_each", "car"): "returns.typical 42.5 is not between those of each road user",
+    ("returns", "crossings", 0): "returns.crossings and crossings contradict each other",
+}
+"""Parts without which the others contradict each other, which a schema cannot state."""
+
+
 def test_a_part_that_is_missing_is_missed(whole):
     for place in every_place(whole):
         changed = copy.deepcopy(whole)
         del parent(changed, place)[place[-1]]
-        if place == ("sensors", 0):  # prices then do not add up, which a schema cannot state
-            assert "the prices of the sensors add up to 0" in refusal(changed)
+        contradiction = CONTRADICTIONS.get(place)
+        if contradiction:
+            assert contradiction in refusal(changed)
         else:
             assert bool(refusal(changed)) == bool(violations(changed, SCHEMA)), place
 
@@ -266,11 +276,8 @@ def test_a_part_of_another_type_is_refused(whole, value):
         if sentence:
             assert re.fullmatch(r"the placement that this scene keeps .*; place the sensors again.*", sentence)
         elif violations(changed, SCHEMA):
-            assert is_open(place) or (place[-1], value) in {
-                ("status", "text"),
-                ("returns", None),
-                *((name, None) for name in LEFT_OUT),
-            }, place
+            absent = value is None and place[-1] in {"returns", *LEFT_OUT}
+            assert is_open(place) or absent or (place[-1], value) == ("status", "text"), place
 
 
 def test_a_text_that_no_file_can_hold_is_refused(record):
@@ -421,8 +428,53 @@ FAULTS = {
     "no date": (("times", "created"), "x", "times.created is not a date and time: 'x'"),
     "fewer than no targets": (("counts", "targets"), -1, "counts.targets is -1"),
     "more central targets": (("counts", "targets_central"), 10**9, "targets_central is above counts.targets"),
+    "a planned sensor in the ground": (("sensors", 0, "height_m"), -5.0, "height_m of sensor 'S1' is -5"),
+    "no number of sensors": (("settings", "goal", "count"), -5, "the number of sensors must be 1 to 100,000, not -5"),
+    "more sensors than the objective allows": (("settings", "goal", "count"), 1, "3 sensors are more than settings"),
+    "a price above the budget": (("settings", "goal", "budget"), 1.0, "price_usd .* is above settings.goal.budget"),
+    "an objective of another kind": (("settings", "goal", "coverage"), 0.5, "not what settings.goal asks for"),
+    "a spacing beyond all": (("settings", "grid_spacing_m"), 3e29, r"grid_spacing_m is 3e\+29, not"),
+    "a negative height to choose from": (("settings", "candidates", "heights"), [-5.0], "a mounting height must be"),
+    "a setting in words": (("settings", "effort"), "x", "settings.effort must be a number"),
+    "a negative effort": (("settings", "effort"), -1e308, r"settings.effort is -1e\+308, not"),
+    "another delta": (("settings", "visibility"), {"delta": 3e29}, "delta must be a positive number of metres"),
+    "another greedy gap": (("greedy", "gap_to_placement"), 0.9, "greedy.gap_to_placement is 0.9, but greedy reaches"),
+    "a type that was not there": (("sensors", 0, "sensor"), "os2_128", "'os2_128' is not in settings.candidates"),
     "an endless step": (("times", "durations_s", "visibility"), 1e300, "not 0 to 2,592,000 s"),
 }
+
+
+FRONT = (ReturnsPoint(1, 20.0, 10_000.0, 0.5), ReturnsPoint(2, 42.5, 20_000.0, 0.25), ReturnsPoint(3, 60.0, 3e4, None))
+FAULTS_OF_RETURNS = {
+    "another mean": (("returns", "typical"), 43.5, "returns.typical is 43.5, but objective.value is the logarithm"),
+    "a mean beyond all": (("returns", "of_each", "car"), 42.0, "not between those of each road user"),
+    "another crossing": (("returns", "crossings", 0, "least"), 99.0, "returns.crossings and crossings contradict"),
+    "fewer returns of more sensors": (("returns", "front", 1, "returns"), 19.0, "returns.front .* at 2 sensors"),
+    "a lower bound of more sensors": (("returns", "front", 0, "gap"), 9.0, "returns.front .* at 2 sensors"),
+    "the same number twice": (("returns", "front", 1, "count"), 1, "returns.front contradicts itself at 1 sensors"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS_OF_RETURNS)
+def test_contradicting_returns_are_refused(example, run, name):
+    place, value, complaint = FAULTS_OF_RETURNS[name]
+    returns = replace(RETURNS, front=FRONT)
+    known = replace(example.deployment, returns=returns)
+    chosen = [sensor.pose for sensor in known.sensors]
+    best = solution(chosen, objective=math.log(43.5), bound=math.log(43.5), gap=0.0)
+    made = placement_record(example.site, Solution(GOAL, best, None, known, crossings=RETURNS.crossings), **run)
+    content = content_of(made)
+    assert not refusal(content)
+    parent(content, place)[place[-1]] = value
+    assert re.search(complaint, refusal(content)), refusal(content)
+
+
+def test_geographic_coordinates_that_contradict_the_map_are_refused(example, run):
+    for name in ("latitude_deg", "longitude_deg", "altitude_m", "easting_m"):
+        content = content_of(make_record(located(example), run))
+        assert not refusal(content)
+        content["sensors"][1][name] += 0.01
+        assert re.search(f"{name}.* of sensor 'S2' are not", refusal(content))
 
 
 @pytest.mark.parametrize("name", FAULTS)

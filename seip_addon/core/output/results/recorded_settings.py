@@ -1,0 +1,46 @@
+"""Settings in a ``placement.json`` that this program reads again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from ... import limits
+from ...choosing.placement.objective import Objective
+from ...choosing.placement.search_limits import DEFAULT_EFFORT
+from ...sensing.visibility.ray_casting import Engine
+from ...sensing.visibility.settings import VisibilitySettings
+from ...site.candidates import CandidateSettings
+from ...site.installed_cost import InstalledCost
+from ...site.weather import Weather
+
+
+@dataclass(frozen=True)
+class RecordedSettings:
+    """Settings of a placement; records of earlier versions may lack all but the objective and the sensor types.
+
+    Parameters
+    ----------
+    goal : Objective
+    catalogue : tuple of str
+        Names of the user's own catalogues, without their folders.
+    time_limit_s : float, optional
+        None for no limit.
+    render : bool
+        Whether the result includes a rendered view.
+    """
+
+    goal: Objective
+    candidates: CandidateSettings
+    visibility: VisibilitySettings = VisibilitySettings()
+    weather: Weather = Weather()
+    reflectivity: tuple[str, ...] = ()
+    grid_spacing_m: Annotated[float, limits.SIZE] = 1.0
+    catalogue: tuple[str, ...] = ()
+    engine: Engine = "auto"
+    solver: str = "auto"
+    effort: Annotated[float, limits.EFFORT] = DEFAULT_EFFORT
+    time_limit_s: Annotated[float, limits.EFFORT] | None = None
+    installed_cost: InstalledCost | None = None
+    render: bool = False
+    spacings_because: str = ""
