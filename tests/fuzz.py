@@ -30,7 +30,7 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -576,12 +576,18 @@ _FAULTS = {
     "yaw_deg": ("1e30", "-1e4"),
     "targets": ("-1", "1e30"),
     "value": ("-3", "1e300"),
+    "gap_to_placement": ("0.9", "-0.9"),
+    "grid_spacing_m": ("-1", "3e29"),
+    "delta": ("-1", "3e29"),
+    "effort": ("-1e308", "3e29"),
+    "spacing": ("-1", "3e29"),
 }
 
 
 def _mutate_record(random: Random, content: bytes) -> Case:
     if random.random() < 0.3:
-        name = sorted(_FAULTS)[int(random.integers(len(_FAULTS)))]
+        names = [name for name in sorted(_FAULTS) if f'"{name}": ' in content.decode()]
+        name = names[int(random.integers(len(names)))]
         pattern = rf'"{name}": (-?[\d.]+(?:e[-+]?\d+)?)'
         return Case(_changed(random, content.decode(), pattern, _FAULTS[name]), contradicts=True)
     if random.random() < 0.1:
@@ -593,7 +599,9 @@ def _read_record(path: Path, _: bytes) -> None:
     from seip_addon.core.output.results.placement_file import load_placement  # noqa: PLC0415
 
     record = load_placement(path)
-    require_physical(record.as_json() | {"settings": None}, "placement.json")
+    settings = asdict(record.request)
+    settings["weather"]["visibility"] = min(settings["weather"]["visibility"], 1e6)  # infinite in clear air
+    require_physical(record.as_json() | {"settings": settings}, "placement.json")
     assert len({sensor.id for sensor in record.sensors}) == len(record.sensors), "two sensors of one label"
 
 
