@@ -246,7 +246,7 @@ def front_text(record: PlacementRecord) -> str:
         else:
             most = max(gap for gap in gaps if gap is not None)
             limit = f"Others have at most {most:.1%} more." if most else "No other has more."
-        return f"Returns in each turn and price of the best placement found for each number. {limit}"
+        return f"Returns per revolution and price of the best placement found for each number. {limit}"
     what = "Coverage by weight" if record.objective.kind == "weighted" else "Coverage"
     missed = max(point.missed for point in record.front)
     limit = f"Others see at most {missed:.1%} of the road more." if missed else "No other sees more."

@@ -180,7 +180,7 @@ def test_numbers_of_sensors_placed_by_returns_show_returns(junction):
     record = parsed_record(junction.seip.result.record)
     by_returns = replace(record, front=(), returns=ReturnsSummary(16.0, {"car": 16.0}, (), front))
     assert placement_panel.numbers(by_returns) == [(1, 0.25, "4 · $1,000"), (2, 1.0, "16 · $2,000")]
-    text = "Returns in each turn and price of the best placement found for each number. "
+    text = "Returns per revolution and price of the best placement found for each number. "
     assert placement_panel.front_text(by_returns) == f"{text}No other has more."
     for gap, limit in ((0.031, "Others have at most 3.1% more."), (None, "Not every number is proven.")):
         open_ended = replace(by_returns.returns, front=(front[0], replace(front[1], gap=gap)))

@@ -100,6 +100,10 @@ class TypeBand:
     low: Annotated[float, SHARE]
     high: Annotated[float, SHARE]
 
+    def describe(self) -> str:
+        """Return the band as text: one share where both ends read the same."""
+        return _span(self.low, self.high)
+
 
 @dataclass(frozen=True)
 class GainBand:
@@ -132,14 +136,19 @@ class GainBand:
         if self.sheets:
             sheets = ", ".join(self.sheets)
             messages.append(
-                f"{BAND} coverage is {self.low:.1%} to {self.high:.1%}: detection by {sheets} is derived from data "
+                f"{BAND} coverage is {_span(self.low, self.high)}: detection by {sheets} is derived from data "
                 "sheets, not calibrated on a sweep"
             )
         types = dict.fromkeys(one for pair in self.unranked for one in pair)
         if types:
-            bands = ", ".join(f"{one.sensor} {one.low:.0%} to {one.high:.0%}" for one in types)
+            bands = ", ".join(f"{one.sensor} {one.describe()}" for one in types)
             messages.append(f"{UNRANKED}, as their bands overlap where the sensors are mounted: {bands}")
         return tuple(messages)
+
+
+def _span(low: float, high: float) -> str:
+    ends = dict.fromkeys(f"{share:.1%}" for share in (low, high))
+    return " to ".join(ends)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from collections.abc import Generator
 from dataclasses import replace
 
 from ...errors import SeipError
-from ...progress import Progress
+from ...progress import Progress, within
 from .objective import CHOSEN_FOR, MOVED, SAME_PRICE, FrontPoint, Solution
 from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
 from .search_limits import SolverLimits
@@ -50,10 +50,11 @@ def price_front(
     known, caps = _certified(problem, solution), _proven_limits(problem, solution, whole)
     found: dict[int, Placement] = {}
     for count in range(1, most + 1):
-        yield Progress(count - 1, most, "solving for fewer and more sensors", counted=False)
+        step = Progress(count - 1, most, "solving for fewer and more sensors", counted=False)
+        yield step
         try:
             limited = replace(problem, count=count, budget=None)
-            found[count] = known.get(count) or (yield from solve(limited, limits, chosen))
+            found[count] = known.get(count) or (yield from within(step, solve(limited, limits, chosen)))
         except SeipError:  # fewer than the rules demand
             continue
     return tuple(_point(count, found, known, caps, whole) for count in found)

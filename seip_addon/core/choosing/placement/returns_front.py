@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SeipError
-from ...progress import Progress
+from ...progress import Progress, within
 from .objective import MOVED, Solution
 from .price_front import EFFORT, MORE
 from .problem import Placement, PlacementProblem
@@ -50,13 +50,14 @@ def returns_front(
     is_for_number = solution.objective.budget is None and solution.objective.count == len(chosen)
     found: dict[int, list[Placement]] = {}
     for count in range(1, most + 1):
-        yield Progress(count - 1, most, "solving for fewer and more sensors", counted=False)
+        step = Progress(count - 1, most, "solving for fewer and more sensors", counted=False)
+        yield step
         found[count] = [placement] if count == len(chosen) else []
         if count == len(chosen) and is_for_number:
             continue
         try:
             limited = replace(problem, count=count, budget=None)
-            found[count].append((yield from solve_returns(limited, returns, limits)))
+            found[count].append((yield from within(step, solve_returns(limited, returns, limits))))
         except SeipError:  # fewer than the rules demand
             continue
     bounds = {

@@ -64,7 +64,7 @@ def _quality(record: NetworkRecord) -> str:
         return f"{outcome(record, record.value)} of the road is seen ({mean})"
     total = math.fsum(site.weight for site in usable) or 1.0
     seen = math.fsum(site.weight * site.coverage for site in usable) / total
-    points = f"about {outcome(record, record.value)} measured points on a typical road user in each turn of the sensors"
+    points = f"about {outcome(record, record.value)} measured points on a typical road user in each revolution"
     return f"{points}; {percent(min(seen, 1.0))} of the road is seen ({mean})"
 
 

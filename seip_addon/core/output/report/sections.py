@@ -149,7 +149,7 @@ def _quality(evidence: Evidence) -> str:
     if returns is None:
         return seen
     on_foot = returns_text(returns.of_each["pedestrian"])
-    return f"about {on_foot} points on a pedestrian in each turn of the sensors; {seen}"
+    return f"about {on_foot} points on a pedestrian in each revolution; {seen}"
 
 
 def _summary(evidence: Evidence) -> str:
@@ -164,14 +164,14 @@ def _summary(evidence: Evidence) -> str:
         of_each = record.returns.of_each
         named = [f"{returns_text(number)} points on a {name}" for name, number in of_each.items()]
         parts.append(
-            f"In each turn they typically measure {', '.join(named[:-1])} and {named[-1]}, with an allowance for "
-            "traffic in between."
+            f"In each revolution they typically measure {', '.join(named[:-1])} and {named[-1]}, with an allowance "
+            "for traffic in between."
         )
     least = min(record.crossings, key=lambda one: one.least, default=None)
     if least is not None:
         parts.append(
             f"A pedestrian in plain view on a crossing receives at least {returns_text(least.least)} points in each "
-            f"turn (at the worst point of the {in_sentence(least.name)})."
+            f"revolution (at the worst point of the {in_sentence(least.name)})."
         )
     failed = failures(evidence.site.seen)
     if failed is not None and len(record.sensors) > 1:
@@ -361,8 +361,8 @@ def _places(evidence: Evidence) -> Iterator[Block]:
     if crossings:
         yield Table(("Crossing", "Surface seen", "Points on a pedestrian"), crossings, frozenset({1, 2}))
         yield Paragraph(
-            "Points on a pedestrian are those that all sensors together measure in one turn on a pedestrian in plain "
-            "view, at the worst point of the crossing. "
+            "Points on a pedestrian are those that all sensors together measure in one revolution on a pedestrian in "
+            "plain view, at the worst point of the crossing. "
             f"With fewer than {FEW_RETURNS:g} a detector may miss the pedestrian."
         )
         few = [name for name, _, _ in crossings if returns[name] < FEW_RETURNS]
@@ -482,8 +482,8 @@ def _returns_front(record: PlacementRecord, returns: ReturnsSummary) -> Iterator
     """Return the table of numbers of sensors of a placement that was chosen for returns."""
     yield Paragraph(
         "With fewer or more sensors under the same rules, regardless of price, the best choices found by a short "
-        "search typically measure these numbers of points on a road user in each turn; shares in the last column "
-        f"are of 1 + points.{_without_budget(record)}"
+        "search typically measure these numbers of points on a road user in each revolution; shares in the last "
+        f"column are of 1 + points.{_without_budget(record)}"
     )
     yield Picture(
         front_chart(returns_front_plot(returns.front, (len(record.sensors), returns.typical))),
@@ -535,7 +535,9 @@ def _losses(evidence: Evidence) -> Iterator[Block]:
     if not errors and not scenarios.errs:
         errors = ["The loss from sensors that stand or point a little off their plan was not evaluated."]
     if scenarios.kind != "traffic":
-        errors.append("The road is empty in this study: vehicles that block the view were not evaluated.")
+        errors.append("The share of the road seen is that of an empty road: runs of traffic were not evaluated.")
+        if record.returns is not None:
+            errors.append("Points on road users have an allowance for vehicles that block the view on average.")
     if errors:
         yield Bullets(tuple(errors))
     for name in (*POSE_ERROR_PICTURES, *TRAFFIC_PICTURES):

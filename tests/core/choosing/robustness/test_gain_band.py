@@ -97,5 +97,6 @@ def test_types_whose_bands_overlap_are_not_ranked():
     bands = (TypeBand("a", 0.2, 0.5), TypeBand("b", 0.5, 0.9), TypeBand("c", 0.95, 0.96))
     band = GainBand(0.2, 0.5, ("a",), bands)
     assert [(one.sensor, other.sensor) for one, other in band.unranked] == [("a", "b")]
-    assert band.messages()[1].endswith("a 20% to 50%, b 50% to 90%")
+    assert band.messages()[1].endswith("a 20.0% to 50.0%, b 50.0% to 90.0%")
+    assert TypeBand("a", 0.4701, 0.4703).describe() == "47.0%"
     assert GainBand(0.2, 0.5, (), bands[::2]).messages() == ()

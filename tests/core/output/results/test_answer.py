@@ -96,7 +96,7 @@ def test_returns_are_compared_as_a_share_of_returns(record):
     one = with_returns(record)
     assert status_text(one) == "150 returns · $48k · proven"
     assert answer(one)[0].startswith(
-        "150 returns from a road user in each turn: 494 from a car, 71 from a cyclist and 36 from a pedestrian."
+        "150 returns from a road user in each revolution: 494 from a car, 71 from a cyclist and 36 from a pedestrian."
     )
     value = one.objective.value
     better = replace(one, objective=replace(one.objective, bound=value + math.log(1.07), gap=0.01, status="feasible"))

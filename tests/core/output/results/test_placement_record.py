@@ -248,7 +248,6 @@ def test_keys_of_which_this_version_knows_nothing_are_passed_over(whole):
 
 CONTRADICTIONS = {
     ("sensors", 0): "the prices of the sensors add up to 0",
-    ("returns", "of_each", "car"): "returns.typical 42.5 is not between those of each road user",
     ("returns", "crossings", 0): "returns.crossings and crossings contradict each other",
 }
 """Parts without which the others contradict each other, which a schema cannot state."""
@@ -447,7 +446,6 @@ FAULTS = {
 FRONT = (ReturnsPoint(1, 20.0, 10_000.0, 0.5), ReturnsPoint(2, 42.5, 20_000.0, 0.25), ReturnsPoint(3, 60.0, 3e4, None))
 FAULTS_OF_RETURNS = {
     "another mean": (("returns", "typical"), 43.5, "returns.typical is 43.5, but objective.value is the logarithm"),
-    "a mean beyond all": (("returns", "of_each", "car"), 42.0, "not between those of each road user"),
     "another crossing": (("returns", "crossings", 0, "least"), 99.0, "returns.crossings and crossings contradict"),
     "fewer returns of more sensors": (("returns", "front", 1, "returns"), 19.0, "returns.front .* at 2 sensors"),
     "a lower bound of more sensors": (("returns", "front", 0, "gap"), 9.0, "returns.front .* at 2 sensors"),
