@@ -176,8 +176,9 @@ def with_other_carriageways(
             # Flat caps end the band with its lane, so that it does not reach into other arms of the junction.
             band = shapely.LineString(middle).buffer(MAX_MEDIAN, cap_style="flat")
             bands.setdefault(names[lane.road_id], []).append((band, _heading(lane)))
-    # A road with its opposite direction right next to it is a whole street, not one carriageway of a divided one.
-    two_way = _two_way_roads(surfaces)
+    # A road with its opposite direction right next to it is a whole street, not one carriageway of a divided one; if
+    # that direction is among the given lanes, this one is the other half of their street.
+    facing, given = _facing_roads(surfaces), {lane.road_id for lane in lanes}
     sides = {name: closed(united(band for band, _ in own), JUNCTION_REACH) for name, own in bands.items()}
     # Opposite carriageways: one-way roads of the same name, parallel to a lane whose band they meet. They are clipped
     # to the bands, so that they end where the given lanes end.
@@ -185,7 +186,7 @@ def with_other_carriageways(
         # Headings are compared modulo 180 degrees below, because the opposite carriageway leads the other way.
         shapely.make_valid(lane.polygon).intersection(sides[names[lane.road_id]])
         for lane in surfaces
-        if lane.road_id not in two_way
+        if (lane.road_id not in facing or facing[lane.road_id] & given)
         and any(
             abs(math.remainder(_heading(lane) - heading, math.pi)) < PARALLEL and band.intersects(lane.polygon)
             for band, heading in bands.get(names.get(lane.road_id, ""), ())
@@ -204,8 +205,8 @@ def with_other_carriageways(
     return united([streets, united(links).intersection(united(sides.values()))])
 
 
-def _two_way_roads(surfaces: Sequence[LaneSurface]) -> frozenset[str]:
-    """Return the ids of one-way roads whose inner edge is that of a road in the opposite direction."""
+def _facing_roads(surfaces: Sequence[LaneSurface]) -> dict[str, set[str]]:
+    """Return the roads in the opposite direction on whose inner edge a one-way road lies, by the ids of such roads."""
     # The inner edge of the innermost lane is the centre line of a street whose directions are not divided: there both
     # roads touch. Comparing the middles of edges keeps out roads that only meet end to end.
     innermost: dict[str, LaneSurface] = {}
@@ -217,12 +218,12 @@ def _two_way_roads(surfaces: Sequence[LaneSurface]) -> frozenset[str]:
     roads = list(innermost)
     middles = [edge.interpolate(0.5, normalized=True) for edge in edges]
     one, other = shapely.STRtree(edges).query(middles, predicate="dwithin", distance=TOUCH)
-    return frozenset(
-        roads[a]
-        for a, b in zip(one.tolist(), other.tolist(), strict=True)
-        if a != b
-        and abs(math.remainder(_heading(innermost[roads[a]]) - _heading(innermost[roads[b]]), math.tau)) > math.pi / 2
-    )
+    facing: dict[str, set[str]] = {}
+    for a, b in zip(one.tolist(), other.tolist(), strict=True):
+        turn = math.remainder(_heading(innermost[roads[a]]) - _heading(innermost[roads[b]]), math.tau)
+        if a != b and abs(turn) > math.pi / 2:
+            facing.setdefault(roads[a], set()).add(roads[b])
+    return facing
 
 
 def _runs_along(lane: LaneSurface, headings: Iterable[float]) -> bool:
