@@ -264,7 +264,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     warnings = road_warnings(road_map, (*street.lanes, *street.crossing.lanes), names, origin)
     yield next(stages)
     return SiteModel(
-        name=description.name or road_map.name,
+        name=description.name or _map_title(road_map.name, description.junction),
         origin=origin,
         geo_reference=road_map.geo_reference,
         header_offset=road_map.header_offset,
@@ -435,6 +435,11 @@ def _is_covered(placed: PlacedObject, modelled: shapely.STRtree) -> bool:
     rings = rings or [footprint(placed) + placed.position]
     area = shapely.union_all([shapely.make_valid(shapely.Polygon(ring[:, :2])) for ring in rings])
     return covered_share(area, modelled) > MAX_COVERED
+
+
+def _map_title(name: str, junction: str | None) -> str:
+    """Return the title of a site without a description: the map, and the junction that was asked for."""
+    return ", ".join(filter(None, (name, junction and f"junction {junction}")))
 
 
 def _with_source(part: Part, description: SiteDescription) -> Part:
