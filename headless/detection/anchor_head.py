@@ -80,6 +80,11 @@ class AnchorHead(nn.Module):
         output: Tensor = self.final(features)
         return output
 
+    @property
+    def branches(self) -> tuple[nn.Sequential, ...]:
+        """Networks side by side that make the output; see `heads.DetectionHead`."""
+        return (nn.Sequential(self.final),)
+
     @staticmethod
     def target_maps(targets: list[TrainingTargets], grid: PillarGrid, margin: float) -> dict[str, Tensor]:
         """Return the anchors that count, and those that must find a box; see `heads.DetectionHead`."""

@@ -60,7 +60,12 @@ class CentreHead(nn.Module):
 
     def forward(self, features: Tensor) -> Tensor:
         """Return the logits of heat for each class, and the box channels: (b, classes + 11, rows, columns)."""
-        return torch.cat((self.heat(features), self.box(features)), dim=1)
+        return torch.cat([branch(features) for branch in self.branches], dim=1)
+
+    @property
+    def branches(self) -> tuple[nn.Sequential, ...]:
+        """Networks side by side that make the output; see `heads.DetectionHead`."""
+        return self.heat, self.box
 
     @staticmethod
     def target_maps(targets: list[TrainingTargets], grid: PillarGrid, margin: float) -> dict[str, Tensor]:

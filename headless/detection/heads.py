@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from .pillars import PillarGrid
 
@@ -46,6 +46,13 @@ class BoxProposals:
 
 class DetectionHead(Protocol):
     """Interface of detection heads, in addition to that of a torch module."""
+
+    @property
+    def branches(self) -> tuple[nn.Sequential, ...]:
+        """Networks side by side whose outputs are those of the head, in order.
+
+        Each is at most one 3 × 3 convolution with batch normalisation and ReLU, then one of 1 × 1.
+        """
 
     @staticmethod
     def target_maps(targets: list[TrainingTargets], grid: PillarGrid, margin: float) -> dict[str, Tensor]:

@@ -14,10 +14,9 @@ from seip_addon.core.sensing.scans.frame import Frame
 from .detection_area import DetectionArea
 from .detector import Detector
 from .frame_results import Detections
-from .network import OUTPUT_STRIDE
 from .pillars import PillarGrid, fill_pillars
 from .rotated_boxes import in_plan, suppress
-from .settings import GRID_STRIDE
+from .sparse_inference import sparse_output
 
 MIN_SCORE = 0.05  # boxes below it are not kept: average precision hardly sees them, and time is spent on each
 TIMED_RUNS = 5  # of an inference that is timed, of which the median is taken
@@ -65,14 +64,9 @@ def detect_on_level(
             f"{grid.pillar:g} m: lay the grid with its own"
         )
     detector.eval()
-    # Beyond the border of its input a convolution sees zeros, which differ from empty pillars: along the border the
-    # network then finds road users where there is not a single return. A border of empty pillars keeps this outside.
-    widened = grid.widened(GRID_STRIDE)
-    pillars = fill_pillars(cloud[grid.holds(cloud)], widened, detector.settings.most_points)
-    output = detector(pillars, (1, widened.rows, widened.columns))
-    border = GRID_STRIDE // OUTPUT_STRIDE
-    inner = output[:, :, border:-border, border:-border]
-    (found,) = detector.detection_head.candidates(inner, grid, least_score)
+    pillars = fill_pillars(cloud, grid, detector.settings.most_points)
+    output = sparse_output(detector, pillars, grid.rows, grid.columns, grid.pillar)
+    (found,) = detector.detection_head.candidates(output, grid, least_score)
     stays = suppress(in_plan(found.boxes), found.score, MAX_OVERLAP)
     return Detections(
         boxes=found.boxes[stays].double().cpu().numpy(),
