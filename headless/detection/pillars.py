@@ -71,16 +71,6 @@ class PillarGrid:
         half = pillars * self.pillar / 2
         return replace(self, west=x - half, south=y - half, columns=pillars, rows=pillars)
 
-    def widened(self, pillars: int) -> PillarGrid:
-        """Return the grid with a border of empty pillars on each side."""
-        return replace(
-            self,
-            west=self.west - pillars * self.pillar,
-            south=self.south - pillars * self.pillar,
-            columns=self.columns + 2 * pillars,
-            rows=self.rows + 2 * pillars,
-        )
-
     def holds(self, xyz: NDArray[np.float32] | Float) -> Boolean:
         """Return which points (n, 3) lie in the grid, between bottom and top."""
         x, y, z = xyz[:, 0], xyz[:, 1], xyz[:, 2]

@@ -44,10 +44,10 @@ def cloud(seed, points) -> np.ndarray:
 
 @torch.inference_mode()
 def dense_output(detector, pillars) -> torch.Tensor:
-    wide = GRID.widened(BORDER)
+    rows, columns = GRID.rows + 2 * BORDER, GRID.columns + 2 * BORDER
     row, column = np.divmod(pillars.pillar, GRID.columns)
-    moved = replace(pillars, pillar=(row + BORDER) * wide.columns + column + BORDER)
-    output = detector(moved, (1, wide.rows, wide.columns))
+    moved = replace(pillars, pillar=(row + BORDER) * columns + column + BORDER)
+    output = detector(moved, (1, rows, columns))
     inner = BORDER // OUTPUT_STRIDE
     return output[:, :, inner:-inner, inner:-inner]
 
