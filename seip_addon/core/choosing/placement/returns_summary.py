@@ -10,6 +10,8 @@ from ...limits import COUNT, PRICE, Limits
 RETURNS = Limits(0.0, COUNT.most)
 FEW_RETURNS = 5.0
 """Number of returns from a pedestrian below which a warning names the crossing."""
+FEW = f"fewer than {FEW_RETURNS:g} returns from a pedestrian"
+"""Beginning of that warning."""
 
 SURFACE_SEEN = (
     "Seen means that the surface of the road itself is measured. People and vehicles reflect more light and are "
@@ -107,4 +109,4 @@ class ReturnsSummary:
         if not few:
             return ()
         named = ", ".join(f"{one.name} ({_rounded_down(one.least)})" for one in few)
-        return (f"fewer than {FEW_RETURNS:g} returns from a pedestrian at the worst point of: {named}",)
+        return (f"{FEW} at the worst point of: {named}",)

@@ -134,12 +134,15 @@ def _from_nearest(origins: Sequence[Centre], points: Float) -> tuple[Integer, Fl
 
 
 def _where(own: Integer, middle: Float, targets: Targets, areas: Sequence[Area]) -> str:
-    """Return where a blind spot is: the area that holds most of it, and distance and direction from a centre."""
+    """Return where a blind spot is: the area that holds most of it, and distance and direction from a centre.
+
+    A page names the only centre before its list of blind spots.
+    """
     origins = centres(targets, areas)
     (nearest,), (angle,), (distance,) = _from_nearest(origins, middle[None])
     direction = DIRECTIONS[round(float(angle) / (math.pi / 4)) % 8]
     away = f"{distance:.0f} m {direction} of" if distance >= MIN_DISTANCE else "at"
-    words = f"{away} the centre of {origins[nearest].name}"
+    words = f"{away} the centre" + (f" of {origins[nearest].name}" if len(origins) > 1 else "")
     shares = [(int(area.within[own].sum()), area.name) for area in areas]
     most, name = max(shares, key=lambda one: one[0], default=(0, ""))
     return f"{name}, {words}" if 2 * most >= len(own) else words

@@ -11,7 +11,7 @@ import numpy as np
 from ...arrays import Float
 from ...choosing.placement.deployment import BAND, UNRANKED
 from ...choosing.placement.objective import CHOSEN_FOR, MOVED, SAME_PRICE, purpose
-from ...choosing.placement.returns_summary import FEW_RETURNS, SURFACE_SEEN, ReturnsSummary, returns_text
+from ...choosing.placement.returns_summary import FEW, FEW_RETURNS, SURFACE_SEEN, ReturnsSummary, returns_text
 from ...counts import counted
 from ...site.candidates import PAPER_TYPES
 from ..pictures.drawing import percent
@@ -423,7 +423,7 @@ def _other_choices(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
     yield Paragraph(proof(evidence))
     same_price = _same_price(evidence)
-    elsewhere = (POSE_ERRORS, CHOSEN_FOR, BAND, UNRANKED, *LOCATED_FILES, *([SAME_PRICE] if same_price else []))
+    elsewhere = (POSE_ERRORS, CHOSEN_FOR, BAND, UNRANKED, FEW, *LOCATED_FILES, *([SAME_PRICE] if same_price else []))
     notes = [sentence(note) for note in record.notes if not note.startswith(elsewhere)]
     notes += [same_price] if same_price else []
     notes.append("“Proven” refers to the model: this scene, these sensor models and this definition of seen.")

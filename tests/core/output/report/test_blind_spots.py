@@ -51,7 +51,7 @@ def test_a_blind_spot_is_named_after_the_place_that_holds_most_of_it():
     lane = Area("Mill Lane", "place", np.arange(10) < 4)
     seen = np.isin(np.arange(10), (4, 5))
     found = {spot.where: len(spot.targets) for spot in blind_spots(targets, seen, (lane,))}
-    assert found == {"Mill Lane, 7 m west of the centre of the road": 4, "5 m east of the centre of the road": 4}
+    assert found == {"Mill Lane, 7 m west of the centre": 4, "5 m east of the centre": 4}
 
 
 def test_places_are_counted_from_the_junction_and_not_from_the_middle_of_a_bounding_box():
@@ -62,9 +62,9 @@ def test_places_are_counted_from_the_junction_and_not_from_the_middle_of_a_bound
     unseen = (np.abs(y) < 1) & np.isin(x, (0.0, 8.0, 24.0, 26.0, 28.0))
     found = [(spot.area, spot.where) for spot in blind_spots(targets, ~unseen, (box,))]
     assert found == [
-        (12.0, "26 m east of the centre of Central box"),
-        (4.0, "Central box, at the centre of Central box"),
-        (4.0, "8 m east of the centre of Central box"),
+        (12.0, "26 m east of the centre"),
+        (4.0, "Central box, at the centre"),
+        (4.0, "8 m east of the centre"),
     ]
 
 
