@@ -190,7 +190,8 @@ def _draw_obstacles(plan: Axes, content: MapContent, shown: BaseGeometry) -> Non
     triangles = _obstacles(occluders, shown)
     colours = HEIGHT_CMAP(content.heights(_above_road(content.site, triangles)))
     style = {"facecolors": colours, "edgecolors": "none", "antialiaseds": False}
-    draw_polygons(plan, triangles[:, :, :2], **style, zorder=OBSTACLE)
+    # Below the coverage: what a tree or a bridge covers of the studied road is seen through it, under its outline.
+    draw_polygons(plan, triangles[:, :, :2], **style, zorder=TARGET - 0.5)
     draw_area(plan, outline(triangles), facecolor="none", edgecolor="#3d4542", linewidth=0.5, zorder=OBSTACLE)
     for mesh in occluders:
         if mesh.height_assumed:

@@ -42,9 +42,12 @@ def pixel_at(figure, xy):
     return pixels[pixels.shape[0] - 1 - int(row), int(column), :3] / 255
 
 
-def test_every_target_is_painted_by_how_many_sensors_see_it(example):
+@pytest.mark.parametrize("below_a_bridge", [False, True])
+def test_every_target_is_painted_by_how_many_sensors_see_it(example, below_a_bridge):
     """Where no marker, label or line lies on it, the picture has the class's colour at the target."""
-    figure = draw_plan(example.geometry, example.site, example.deployment)
+    deck = Mesh("Deck", np.array([[(-200, -60, 6), (200, -60, 6), (0, 250, 6)]], dtype=np.float64))
+    occluders = (*example.geometry.occluders, *([deck] if below_a_bridge else []))
+    figure = draw_plan(replace(example.geometry, occluders=occluders), example.site, example.deployment)
     figure.canvas.draw()
     pixels = np.asarray(figure.canvas.buffer_rgba())[::-1, :, :3] / 255
     where = figure.axes[0].transData.transform(example.site.targets.xyz[:, :2]).astype(int)
