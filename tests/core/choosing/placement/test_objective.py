@@ -84,7 +84,7 @@ def test_a_plan_tells_what_was_asked_and_what_greedy_finds(example):
         ({"forbidden": ("a",), "mandatory": ("a",)}, "'a' is both forbidden and mandatory"),
         ({"mandatory": ("signal pole 9",)}, "did you mean 'signal pole"),
         ({"forbidden": ("zzz",)}, "there is no position 'zzz'"),
-        ({"count": 0}, "the number of sensors is 0"),
+        ({"count": 0}, "the number of sensors must be 1 to 100,000, not 0"),
         ({"count": 10_000}, "10000 sensors are requested, but"),
         ({"budget": 10.0}, "below the cheapest sensor"),
     ],
