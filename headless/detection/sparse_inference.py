@@ -1,9 +1,9 @@
 """Evaluation of a trained network only at cells near returns.
 
-Without the static background, a cloud fills a percent of the pillars. Elsewhere each layer returns its response to
-emptiness, which is the same in all cells: it is computed once. A convolution is then a product of matrices over the
-cells that a return can influence (as in B. Graham, L. van der Maaten: Submanifold Sparse Convolutional Networks, 2017,
-but with all cells that a dense convolution would change, so that the result is the same).
+Without the static background, about one pillar in a hundred has returns. Elsewhere each layer returns its response to
+emptiness, a pattern of a few cells that repeats: it is computed once. A convolution is then a product of matrices over
+the cells that a return can influence (as in B. Graham, L. van der Maaten: Submanifold Sparse Convolutional Networks,
+2017, but with all cells that a dense convolution would change, so that the result is the same up to rounding).
 
 The plane beyond the grid counts as empty. A dense convolution has zeros there instead, to which the network responds
 with road users that do not exist.
@@ -58,7 +58,8 @@ class _Plane:
 def sparse_output(detector: Detector, pillars: Pillars, rows: int, columns: int, pillar: float) -> Tensor:
     """Return the output of a detector's head for one cloud.
 
-    Cells farther than `REACH` from all returns have the output of an empty cloud.
+    Cells farther from all returns than `REACH`, along rows or columns and in whole cells, have the output of an empty
+    cloud.
 
     Parameters
     ----------
@@ -89,14 +90,14 @@ def sparse_output(detector: Detector, pillars: Pillars, rows: int, columns: int,
     side = max(len(pattern) for pattern in empty)
     patterns = [pattern.repeat(side // len(pattern), side // len(pattern), 1) for pattern in empty]
     known = torch.cat(features, dim=1)
-    known = torch.cat((known, known.new_zeros((1, known.shape[1]))))  # the last row stands for cells that none asks for
+    known = torch.cat((known, known.new_zeros((1, known.shape[1]))))  # a row for all other cells, which is never read
     output = _head_output(detector, _Plane(around, known), cells, torch.cat(patterns, dim=2))
     inner = border // OUTPUT_STRIDE
     return output[:, :, inner:-inner, inner:-inner]
 
 
 def _border(blocks: tuple[int, ...]) -> int:
-    """Return the pillars beyond the grid that returns in it can change and that change its cells."""
+    """Return the width, in pillars, of the border outside the grid through which returns in it affect its cells."""
     sees, stride = OUTPUT_STRIDE, 1  # pillars on each side of a cell: first those of the head
     for count in blocks:
         sees += stride + count * 2 * stride

@@ -203,7 +203,7 @@ DRAWS = Limits(1, 100_000)
 
 SENSORS = Limits(1, 100_000)
 SEED = Limits(0, 2**63 - 1)
-EFFORT = Limits(0.0, 1e12)
+EFFORT = Limits(0.0, 1e15)
 """Limit of a search, in counted work or seconds."""
 
 LIDAR_RANGE = Limits(0.0, 10_000.0, "m")

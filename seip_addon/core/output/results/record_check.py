@@ -15,6 +15,7 @@ from .placement_record import PlacementRecord
 _CENT = 0.01  # dollars to which prices are rounded
 _SHARE_ERROR = 2e-9  # by which a rounded share may exceed another
 _VALUE_ERROR = 1e-6  # by which a value may exceed its bound, and gaps may differ, relatively: solvers round
+_LARGEST_LOGARITHM = 700.0  # of a float: larger ones cannot be exponentiated
 _RETURNS_ERROR = 1e-3  # by which returns, rounded to three digits, may differ, relatively
 _GEOGRAPHIC_ERRORS = np.array([1e-6, 1e-6, 1e-5])  # degrees, about 0.1 m, and metres
 _COORDINATE_ERROR = 2e-3  # metres: eastings and northings are rounded to the millimetre
@@ -138,7 +139,7 @@ def _check_objective(record: PlacementRecord) -> None:
     )
     if objective.gap is not None and value > 0:
         of_returns = objective.sought == "most returns"  # whose values are logarithms
-        gap = math.expm1(min(bound - value, 700.0)) if of_returns else abs(bound - value) / value
+        gap = math.expm1(min(bound - value, _LARGEST_LOGARITHM)) if of_returns else abs(bound - value) / value
         _require(
             abs(objective.gap - gap) <= _VALUE_ERROR * (1 + gap),
             f"objective.gap is {objective.gap:g}, but the gap of value and bound is {gap:g}",
@@ -154,7 +155,8 @@ def _check_greedy(record: PlacementRecord) -> None:
         greedy.value <= objective.bound + slack,
         f"greedy.value {greedy.value:g} is above objective.bound {objective.bound:g}",
     )
-    reached = share_reached(greedy.value, objective.value, of_returns=objective.sought == "most returns")
+    better = min(greedy.value, objective.value + _LARGEST_LOGARITHM)
+    reached = share_reached(better, objective.value, of_returns=objective.sought == "most returns")
     _require(
         abs(1.0 - reached - greedy.gap_to_placement) <= _VALUE_ERROR,
         f"greedy.gap_to_placement is {greedy.gap_to_placement:g}, but greedy reaches {reached:g} of the objective",
@@ -167,9 +169,10 @@ def _check_returns(record: PlacementRecord) -> None:
         return
     _require(
         objective.sought != "most returns"
-        or abs(math.expm1(objective.value) - returns.typical) <= _RETURNS_ERROR * (1 + returns.typical),
+        or abs(math.expm1(min(objective.value, _LARGEST_LOGARITHM)) - returns.typical)
+        <= _RETURNS_ERROR * (1 + returns.typical),
         f"returns.typical is {returns.typical:g}, but objective.value is the logarithm of "
-        f"{math.exp(min(objective.value, 700.0)):g}",
+        f"{math.exp(min(objective.value, _LARGEST_LOGARITHM)):g}",
     )
     earlier = not record.crossings  # records of earlier versions lack them
     _require(earlier or returns.crossings == record.crossings, "returns.crossings and crossings contradict each other")

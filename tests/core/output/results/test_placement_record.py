@@ -467,6 +467,16 @@ def test_contradicting_returns_are_refused(example, run, name):
     assert re.search(complaint, refusal(content)), refusal(content)
 
 
+def test_logarithms_of_returns_beyond_all_floats_are_refused(example, run):
+    made = make_record(example, run)
+    content = content_of(replace(made, returns=RETURNS, crossings=RETURNS.crossings))
+    content["objective"] |= {"sought": "most returns", "value": 1e6, "bound": None, "gap": None}
+    assert "but objective.value is the logarithm of 1.0142" in refusal(content)
+    content["objective"] |= {"value": math.log(43.5), "bound": 1e6}
+    content["greedy"] |= {"value": 1e6}
+    assert "greedy.gap_to_placement is" in refusal(content)
+
+
 def test_geographic_coordinates_that_contradict_the_map_are_refused(example, run):
     for name in ("latitude_deg", "longitude_deg", "altitude_m", "easting_m"):
         content = content_of(make_record(located(example), run))
