@@ -42,7 +42,7 @@ def is_available(solver: str) -> bool:
     """Return whether a known solver can run here."""
     if solver == "cbc":
         return os.access(pulp_cbc_path, os.R_OK)
-    return _PULP_NAME[solver] in pulp.listSolvers(onlyAvailable=True)
+    return bool(pulp.getSolver(_PULP_NAME[solver], msg=False).available())
 
 
 def _available() -> list[str]:

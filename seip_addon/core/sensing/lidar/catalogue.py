@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -43,8 +44,7 @@ def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, Li
     SeipError
         A file cannot be read, or a model in it is invalid.
     """
-    shipped = resources.files(__package__).joinpath("catalogue.toml").read_text(encoding="utf-8")
-    catalogue = _parse(shipped, "catalogue.toml", {})
+    catalogue = dict(_shipped())
     for path in map(Path, extra):
         if is_unit_file(path):
             model = _unit(path, catalogue)
@@ -67,6 +67,17 @@ def find_models(catalogue: Mapping[str, LidarModel], keys: Sequence[str]) -> dic
             close = difflib.get_close_matches(key, catalogue, n=3, cutoff=0.4) or list(catalogue)
             raise SeipError(f"no LiDAR '{key}' in the catalogue; did you mean {', '.join(close)}?")
     return {key: catalogue[key] for key in keys}
+
+
+@cache
+def _shipped() -> dict[str, LidarModel]:
+    """Return the shipped models, which panels ask for at every change; their arrays are shared, so made read-only."""
+    text = resources.files(__package__).joinpath("catalogue.toml").read_text(encoding="utf-8")
+    models = _parse(text, "catalogue.toml", {})
+    for model in models.values():
+        model.elevations.setflags(write=False)
+        model.azimuth_offsets.setflags(write=False)
+    return models
 
 
 def _unit(named: Path, catalogue: Mapping[str, LidarModel]) -> LidarModel:
