@@ -421,32 +421,37 @@ def _copied(state: dict[str, Any]) -> dict[str, Tensor]:
     return {name: value.detach().clone() for name, value in state.items()}
 
 
+DETERMINISTIC = 2
+"""torch's mode in which operations that are not deterministic raise an error."""
+
+
 class _Torch:
     """Global settings of torch: set by the first user, restored after the last."""
 
     def __init__(self) -> None:
         self._lock, self._users = threading.Lock(), 0
-        self._before = (0, False, False)
+        self._before = (0, 0, False)
 
     def enter(self, threads: int) -> None:
         # torch has one such setting for the whole process, and trainings run in several threads: only the first user
         # changes it, and only the last restores it.
         with self._lock:
             if not self._users:
-                self._before = (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled(), _fills())
-                self._set(threads, deterministic=True, fill=False)  # filling is a debugging aid, and takes a tenth
+                self._before = (torch.get_num_threads(), torch.get_deterministic_debug_mode(), _fills())
+                self._set(threads, DETERMINISTIC, fill=False)  # filling is a debugging aid, and takes a tenth
             self._users += 1
 
     def leave(self) -> None:
         with self._lock:
             self._users -= 1
             if not self._users:
-                threads, deterministic, fill = self._before
-                self._set(threads, deterministic=deterministic, fill=fill)
+                threads, mode, fill = self._before
+                self._set(threads, mode, fill=fill)
 
-    def _set(self, threads: int, *, deterministic: bool, fill: bool) -> None:
+    def _set(self, threads: int, mode: int, *, fill: bool) -> None:
         torch.set_num_threads(threads)
-        torch.use_deterministic_algorithms(deterministic)
+        # `torch.use_deterministic_algorithms` sets the same, but imports torch's compiler first, for two seconds.
+        torch.set_deterministic_debug_mode(mode)
         torch.utils.deterministic.fill_uninitialized_memory = fill  # type: ignore[attr-defined]  # torch types lack it
 
 

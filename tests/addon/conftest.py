@@ -11,7 +11,7 @@ from seip_addon import preferences
 def add_on(tmp_path, monkeypatch):
     """Register the add-on for one test, and see that it leaves nothing behind."""
     monkeypatch.setattr(preferences, "cache_folder", lambda: tmp_path / "cache")
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     before = set(dir(bpy.types))
     seip_addon.register()
     yield

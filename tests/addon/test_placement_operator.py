@@ -379,7 +379,7 @@ def test_a_region_without_targets_has_its_sentence(junction):
 def test_an_unsaved_file_says_where_it_would_write(junction, monkeypatch):
     bpy.ops.seip.solve_placement()
     junction.seip.result.folder = "//seip-result/"
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     from seip_addon.operators.results import no_folder  # noqa: PLC0415  # registered with the add-on
 

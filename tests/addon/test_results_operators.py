@@ -171,7 +171,7 @@ def test_following_leaves_nothing_behind(placed):
     assert session.following is None
     assert len(handlers) == count
     bpy.ops.seip.follow_sensors()
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     assert session.following is None
 
 

@@ -44,7 +44,7 @@ def put_sensors(scene):
     sensors = contract.find_or_make(scene, contract.SENSORS)
     for label, at in (("S1", (9.5, 9.5, 6.0)), ("S2", (-9.5, -9.5, 6.0))):
         empty = bpy.data.objects.new(label, None)
-        empty["seip_sensor"], empty["seip_label"], empty.location = "os0_128", label, at
+        empty["seip_sensor"], empty["seip_label"], empty.location = "os0_32", label, at
         sensors.objects.link(empty)
     bpy.context.view_layer.update()
     return read_sensors(scene, load_catalogue())
@@ -250,7 +250,7 @@ def test_a_saved_file_keeps_what_was_found(verified, tmp_path):
 
 def test_the_units_are_in_a_catalogue(verified, tmp_path):
     models = load_catalogue((tmp_path / "out" / "verification" / "units.toml",))
-    assert {"os0_128_s1", "os0_128_s2"} < set(models)
+    assert {"os0_32_s1", "os0_32_s2"} < set(models)
     record = json.loads((tmp_path / "out" / "verification" / "verification.json").read_text(encoding="utf-8"))
     assert record["recording"] == "july"
     assert 0.8 < record["sensors"][0]["gain"]["value"] < 1.2

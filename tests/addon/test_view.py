@@ -108,7 +108,7 @@ def test_draw_handlers_are_always_removed(placed, ending):
         assert overlays.handler_count() == 2
         bpy.ops.seip.hide_sight_lines()
     elif ending == "another file":
-        bpy.ops.wm.read_factory_settings(use_empty=True)
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     elif ending == "unregister":
         seip_addon.unregister()
     else:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def make_scene(geometry: SceneGeometry) -> bpy.types.Scene:
     """Return the scene of a fresh file, filled by the scene contract."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     scene.name = geometry.name
     scene["seip_origin"] = geometry.origin.tolist()

@@ -1,7 +1,10 @@
 """The command that evaluates a placement by what a trained detector finds."""
 
+import contextlib
+import io
 import json
 import re
+import shutil
 
 import pytest
 
@@ -48,8 +51,16 @@ def arguments(folder, output, *runs, **changed):
     return [str(given["scene"]), "--traffic", *traffic, *named]
 
 
-def test_figures_charts_and_detections_are_written(folder, capsys):
-    detect.main(arguments(folder, "out"))
+@pytest.fixture(scope="module")
+def printed(folder):
+    """What is printed when both runs are detected, into the folder ``out``."""
+    text = io.StringIO()
+    with contextlib.redirect_stdout(text):
+        detect.main(arguments(folder, "out"))
+    return text.getvalue()
+
+
+def test_figures_charts_and_detections_are_written(folder, printed):
     record = json.loads((folder / "out" / "detection.json").read_text(encoding="utf-8"))
     assert [run["name"] for run in record["traffic"]] == ["first", "second"]
     assert {"bev_0.7", "car_van_0.7", "truck_bus_0.7"} <= set(record["average_precision"])
@@ -68,10 +79,9 @@ def test_figures_charts_and_detections_are_written(folder, capsys):
         assert len(list((folder / "out" / form).glob("*.txt"))) == frames
     for chart in ("where.png", "errors.png", "precision_recall.png"):
         assert (folder / "out" / chart).read_bytes().startswith(b"\x89PNG")
-    said = capsys.readouterr()
-    assert "bev_0.7: AP" in said.out
-    assert "with a score of" in said.out
-    assert re.search(r"fullest frame, [\d,]+ returns: \d+\.\d\d s on \d+ cores", said.out)
+    assert "bev_0.7: AP" in printed
+    assert "with a score of" in printed
+    assert re.search(r"fullest frame, [\d,]+ returns: \d+\.\d\d s on \d+ cores", printed)
     assert any("trained on clouds of vlp16" in sentence for sentence in record["warnings"])
 
 
@@ -84,19 +94,19 @@ def test_the_shipped_detector_finds_the_car_and_the_bus(folder):
     assert SHIPPED_DETECTOR.stat().st_size < 4_000_000
 
 
-def test_the_same_inputs_give_the_same_figures(folder):
-    for output in ("one", "other"):
+@pytest.mark.usefixtures("printed")
+def test_the_same_inputs_give_the_same_figures_and_nothing_of_an_earlier_longer_run_stays(folder):
+    shutil.copytree(folder / "out", folder / "again")
+    counts, figures = [], []
+    for output in ("again", "new"):
         detect.main(arguments(folder, output, "first.npz"))
-    one, other = ((folder / output / "detection.json").read_bytes() for output in ("one", "other"))
-    assert one == other
-
-
-def test_detections_of_an_earlier_longer_run_do_not_stay(folder):
-    counts = []
-    for runs in (("first.npz", "second.npz"), ("first.npz",)):
-        detect.main(arguments(folder, "again", *runs))
-        counts.append({form: len(list((folder / "again" / form).glob("*.txt"))) for form in ("kitti", "openpcdet")})
-    assert counts[0] == {form: 2 * count for form, count in counts[1].items()}
+        figures.append((folder / output / "detection.json").read_bytes())
+        counts.append({form: len(list((folder / output / form).glob("*.txt"))) for form in ("kitti", "openpcdet")})
+    assert figures[0] == figures[1]
+    assert counts[0] == counts[1]
+    assert {form: len(list((folder / "out" / form).glob("*.txt"))) for form in counts[0]} == {
+        form: 2 * count for form, count in counts[0].items()
+    }
 
 
 def test_mistakes_are_named(folder, tmp_path):

@@ -27,7 +27,7 @@ def test_the_panel_names_rules_that_there_are():
 @pytest.fixture
 def placed(small_scene, tmp_path):
     """The small junction with two sensors, open and saved, with the add-on, and an untrained detector."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     seip_addon.register()
     bpy.ops.wm.open_mainfile(filepath=str(small_scene))
     example = make_example()

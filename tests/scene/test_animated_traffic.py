@@ -27,7 +27,7 @@ SIZES = {
 
 @pytest.fixture
 def scene():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     scene[contract.ORIGIN] = ORIGIN.tolist()
     return scene
@@ -92,7 +92,7 @@ def test_objects_are_where_the_trajectories_are_at_every_frame(scene, fps, base)
 
 @given(st.integers(0, 1000), st.sampled_from([0.04, 0.1, 0.5]), st.floats(0.0, 900.0), st.integers(1, 4))
 def test_objects_are_where_random_trajectories_are(seed, step, start, samples):
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     scene[contract.ORIGIN] = ORIGIN.tolist()
     trajectories = traffic(seed, 3, samples, step, round(start, 2))

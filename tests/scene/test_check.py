@@ -15,7 +15,7 @@ from seip_addon.scene.read import read_scene
 
 @pytest.fixture
 def scene():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     sheet(scene, "region", contract.REGION, 40, 5)
     sheet(scene, "road", contract.ROADS, 60, 7)
@@ -68,7 +68,7 @@ def test_a_sound_scene_has_no_problem_and_is_laid_out(scene):
 
 
 def test_an_empty_scene_lacks_everything():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     assert [severity for severity, _, _ in problems(bpy.context.scene)] == ["ERROR"] * 3
 
 

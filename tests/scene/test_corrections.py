@@ -40,7 +40,7 @@ def cube(name, at, size=1.0, collection=contract.OCCLUDERS):
 
 @pytest.fixture
 def scene():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     for name in (contract.REGION, contract.ROADS):
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata([(-10, -10, 0), (10, -10, 0), (10, 10, 0), (-10, 10, 0)], [], [(0, 1, 2, 3)])

@@ -19,7 +19,7 @@ from seip_addon.scene.read import read_scene
 
 @pytest.fixture
 def scene():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     sheet(scene, "region", (contract.REGION,), 40, 5)
     sheet(scene, "road", (contract.ROADS,), 60, 7)

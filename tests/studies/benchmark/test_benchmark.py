@@ -173,7 +173,7 @@ def test_a_box_is_its_own_bounding_box():
 
 
 def test_decimation_leaves_fewer_faces_and_no_object_behind():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     x, y = np.meshgrid(np.arange(8.0), np.arange(8.0), indexing="ij")
     corner = np.stack([x.ravel(), y.ravel(), np.sin(x.ravel())], axis=1)
     steps = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]])
