@@ -562,7 +562,7 @@ def _read_detector(path: Path, _: bytes) -> None:
 def _records(folder: Path) -> list[bytes]:
     from tests.builders.report_folder import make_folder  # noqa: PLC0415
 
-    make_folder(folder / "sample")
+    make_folder(folder / "sample", pictures=True)
     return [(folder / "sample" / "placement.json").read_bytes()]
 
 
@@ -608,7 +608,7 @@ def _read_record(path: Path, _: bytes) -> None:
 def _site_files(folder: Path) -> list[bytes]:
     from tests.builders.report_folder import make_folder  # noqa: PLC0415
 
-    make_folder(folder / "sample")
+    make_folder(folder / "sample", pictures=True)
     return [(folder / "sample" / "site.npz").read_bytes()]
 
 

@@ -35,11 +35,17 @@ CROSSING = CrossingReturns("Crossing of High Street", 4.25)
 
 
 def make_folder(
-    folder: Path, *, goal: Objective | None = None, place: GeoReference = UTM, effort: float = 0.0, **found
+    folder: Path,
+    *,
+    goal: Objective | None = None,
+    place: GeoReference = UTM,
+    effort: float = 0.0,
+    pictures: bool = False,
+    **found,
 ) -> Example:
     """Write what `seip place` writes, but for what only Blender can, and return what it is about.
 
-    The front of other numbers of sensors is searched for with an effort above 0.
+    The front of other numbers of sensors is searched for with an effort above 0. Pictures take most of the time.
     """
     example = make_example()
     example = replace(
@@ -82,8 +88,9 @@ def make_folder(
     problem = placement_constraints(example.site, example.models, goal)
     save_site_file(folder / "site.npz", KEY, example.geometry, example.site, solution, problem)
     VisibilityGrid(np.packbits(example.visible, axis=1), example.visible.shape, KEY, {}).save(folder / "visibility.npz")
-    save_plan_view(folder / "plan.png", example.geometry, example.site, deployment)
-    save_close_ups(folder / "sensors.png", example.geometry, example.site, deployment, (), {})
+    if pictures:
+        save_plan_view(folder / "plan.png", example.geometry, example.site, deployment)
+        save_close_ups(folder / "sensors.png", example.geometry, example.site, deployment, (), {})
     return example
 
 

@@ -6,10 +6,13 @@ import numpy as np
 import shapely
 
 from seip_addon.core.geometry.plan import plane_height, signed_area
-from seip_addon.core.site.roles import AREA_OVERLAYS
+from seip_addon.core.site.roles import AREA_OVERLAYS, Role
 
 STEEP = 0.3  # cosine of the slope from which on a face is no surface to walk or drive on
 LEAST = 1e-6  # square metres
+MAX_OVERLAP = 0.2  # m² of pavement in lanes: rounding along hundreds of metres of edges
+MAX_HOLE = 4.0  # m²: smaller holes in the carriageway are no islands
+MAX_COINCIDENT = 0.5  # m² of faces in one place, of a site of some 10,000 m²
 
 
 def triangles(part):
@@ -62,6 +65,19 @@ def coincident_areas(parts, within=1e-3):
             if len(near) > 2:
                 found[tuple(sorted((names[a], names[b])))] += shapely.Polygon(near[:, :2]).area
     return found
+
+
+def check_surfaces(model):
+    """No pavement or place for posts lies in a lane, lanes leave no small holes, no two faces lie in one place."""
+    roads = plan([part for part in model.parts if Role.ROADS in part.roles])
+    walked = plan([part for part in model.parts if part.name.startswith("Pavements")])
+    posts = plan([part for part in model.parts if Role.CANDIDATE_AREAS in part.roles])
+    assert walked.intersection(roads).area < MAX_OVERLAP
+    assert posts.intersection(roads).area < MAX_OVERLAP
+    holes = [shapely.Polygon(ring).area for part in shapely.get_parts(roads) for ring in part.interiors]
+    assert sum(hole for hole in holes if hole < MAX_HOLE) < MAX_OVERLAP
+    found = coincident_areas(surfaces(model))
+    assert sum(found.values()) < MAX_COINCIDENT, found
 
 
 def _kept(corners, sign, most):

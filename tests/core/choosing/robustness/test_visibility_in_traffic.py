@@ -99,7 +99,7 @@ def views(instants, layer="road", around=AROUND):
     return np.array([seen.seen(instant) for instant in range(len(instants))])
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(st.lists(crowds, min_size=1, max_size=3))
 def test_one_instant_at_a_time_gives_what_all_together_give(instants):
     poses = finish(poses_in_traffic(AROUND, POSES))

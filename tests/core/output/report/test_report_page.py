@@ -69,7 +69,7 @@ class Page(HTMLParser):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report") / "out"
-    make_folder(folder, effort=EFFORT)
+    make_folder(folder, effort=EFFORT, pictures=True)
     finish(write_report(folder))
     return folder
 
@@ -114,7 +114,7 @@ def test_the_same_folder_gives_the_same_bytes(folder, tmp_path):
     first = [(folder / name).read_bytes() for name in REPORT_FILES]
     finish(write_report(folder))
     assert [(folder / name).read_bytes() for name in REPORT_FILES] == first
-    make_folder(tmp_path / "elsewhere", effort=EFFORT)
+    make_folder(tmp_path / "elsewhere", effort=EFFORT, pictures=True)
     finish(write_report(tmp_path / "elsewhere"))
     assert [(tmp_path / "elsewhere" / name).read_bytes() for name in REPORT_FILES] == first
 
@@ -322,8 +322,6 @@ def test_close_ups_are_those_of_the_sheet(folder):
 
 def test_without_pictures_there_is_still_a_report(tmp_path):
     make_folder(tmp_path)
-    for name in ("plan.png", "sensors.png"):
-        (tmp_path / name).unlink()
     assert len(blocks(tmp_path, Picture)) == 1  # the blind spots
     assert blocks(tmp_path, Pictures) == []
 
@@ -434,7 +432,7 @@ def broken(folder, name, content):
     return folder
 
 
-def test_each_wrong_folder_has_its_sentence(tmp_path):
+def test_each_wrong_folder_has_its_sentence(folder, tmp_path):
     with pytest.raises(SeipError, match=r"there is no folder .*nowhere: name the one that `seip place`"):
         load_evidence(tmp_path / "nowhere")
     with pytest.raises(SeipError, match=r"holds no placement\.json: name a folder"):
@@ -448,7 +446,7 @@ def test_each_wrong_folder_has_its_sentence(tmp_path):
     with pytest.raises(SeipError, match=r"sensors\.png is damaged or no picture"):
         load_evidence(broken(tmp_path / "d", "sensors.png", b"\x89PNG"))
     with pytest.raises(SeipError, match=r"sensors\.png is of another placement: place the sensors again"):
-        load_evidence(broken(tmp_path / "e", "sensors.png", (tmp_path / "d" / "plan.png").read_bytes()))
+        load_evidence(broken(tmp_path / "e", "sensors.png", (folder / "plan.png").read_bytes()))
 
 
 def test_files_of_different_placements_are_told_apart(tmp_path):

@@ -24,6 +24,7 @@ from tests.builders.osm_text import (
     roundabout,
     slope,
 )
+from tests.oracles.face_areas import check_surfaces
 from tests.sumo_here import needs_sumo
 
 pytestmark = needs_sumo
@@ -61,6 +62,7 @@ def test_a_kind_of_junction_becomes_a_sound_site(name, tmp_path):
     driving = plan(model, "Driving lanes")
     holes = [ring for part in shapely.get_parts(driving) for ring in part.interiors]
     assert sum(shapely.Polygon(hole).area for hole in holes if shapely.Polygon(hole).area < 30) < 1.0
+    check_surfaces(model)
 
 
 def test_the_map_and_the_model_of_an_extract_carry_its_credit(tmp_path):

@@ -17,9 +17,9 @@ from seip_addon.core.world.streetscape.description import SiteDescription
 from seip_addon.core.world.streetscape.footways import without_doubles
 from seip_addon.core.world.streetscape.model import site_model
 from seip_addon.core.world.streetscape.road_surface import markings, roadside, without_gaps, without_loose_ends
-from tests.builders.osm_text import JUNCTIONS, crossing
+from tests.builders.osm_text import crossing
 from tests.builders.street_map import street_map
-from tests.oracles.face_areas import coincident_areas, plan, surfaces
+from tests.oracles.face_areas import check_surfaces, plan
 from tests.sumo_here import needs_sumo
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -33,37 +33,12 @@ REAL = {
     "opendrive/Town05.xodr": {"near": (-49.0, -1.0)},
     "opendrive/Town01.xodr": {"anywhere": True},
 }
-MAX_OVERLAP = 0.2  # m² of pavement in lanes: rounding along hundreds of metres of edges
-MAX_HOLE = 4.0  # m²: smaller holes in the carriageway are no islands
-MAX_COINCIDENT = 0.5  # m² of faces in one place, of a site of some 10,000 m²
-
-
-def check(model):
-    """No pavement or place for posts lies in a lane, lanes leave no small holes, no two faces lie in one place."""
-    roads = plan([part for part in model.parts if Role.ROADS in part.roles])
-    walked = plan([part for part in model.parts if part.name.startswith("Pavements")])
-    posts = plan([part for part in model.parts if Role.CANDIDATE_AREAS in part.roles])
-    assert walked.intersection(roads).area < MAX_OVERLAP
-    assert posts.intersection(roads).area < MAX_OVERLAP
-    holes = [shapely.Polygon(ring).area for part in shapely.get_parts(roads) for ring in part.interiors]
-    assert sum(hole for hole in holes if hole < MAX_HOLE) < MAX_OVERLAP
-    found = coincident_areas(surfaces(model))
-    assert sum(found.values()) < MAX_COINCIDENT, found
-
-
-@needs_sumo
-@pytest.mark.parametrize("name", [*JUNCTIONS])
-def test_surfaces_of_an_extract_lie_beside_each_other(name, tmp_path):
-    extract = JUNCTIONS[name]()
-    source = extract.write(tmp_path / "place.osm")
-    place = SiteRequest(near_latlon=(extract.latitude, extract.longitude))
-    check(finish(build_site(source, place)).model)
 
 
 @needs_sumo
 def test_surfaces_of_the_shipped_extract_lie_beside_each_other():
     asked = SiteRequest(junction=("Harbour Road", "Rope Lane"))
-    check(finish(build_site(ROOT / "scenes" / "harbour.osm", asked)).model)
+    check_surfaces(finish(build_site(ROOT / "scenes" / "harbour.osm", asked)).model)
 
 
 @pytest.mark.slow
@@ -73,7 +48,7 @@ def test_surfaces_of_real_places_lie_beside_each_other(name):
     source = SHARED / name
     if not source.is_file():
         pytest.skip(f"{source} is not beside the project")
-    check(finish(build_site(source, SiteRequest(**REAL[name]))).model)
+    check_surfaces(finish(build_site(source, SiteRequest(**REAL[name]))).model)
 
 
 def test_a_lane_that_overlaps_another_road_gives_way(tmp_path):
@@ -87,7 +62,7 @@ def test_a_lane_that_overlaps_another_road_gives_way(tmp_path):
     )
     path.write_text(path.read_text().replace("</OpenDRIVE></OpenDRIVE>", "</OpenDRIVE>"), encoding="utf-8")
     model = finish(site_model(read_map(path), SiteDescription(near=(0.0, 0.0), radius=60.0)))
-    check(model)
+    check_surfaces(model)
     roads = plan([part for part in model.parts if Role.ROADS in part.roles])
     assert shapely.contains_xy(roads, *(np.array([[-40.0, 5.0]]) - model.origin[:2]).T).all()
 
