@@ -2,14 +2,13 @@
 
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from ...errors import SeipError
-from ...sensing.traffic.varied_bodies import draw_size
 from ...settings import setting
 from ...storage.files import whole_file
 from .street_network import DRIVING, PARKED_CLASS, PARKING, WALKING, NetworkEdge, NetworkLane, StreetNetwork
@@ -22,6 +21,8 @@ _DELIVERY_SHARE = 0.35  # of the vans and trucks; they stop once on their way
 _STOP_SECONDS = (20.0, 60.0)  # seconds
 _PARKED_GAP = 0.5  # least metres between parked cars
 _BAY_LENGTH = 6.5  # metres of kerb for a parked car
+MAX_PARKED_LENGTH = _BAY_LENGTH - _PARKED_GAP  # metres
+PARKED = "parked_"  # begins the types of parked vehicles
 _OCCUPIED_SHARE = 0.6  # of the bays in parking lanes
 _FIRST_BAY = 35.0  # metres from the start of the street
 _ROWS_ALONG = 2  # positions for a row of cars along the kerb of a street, one behind the other
@@ -109,6 +110,15 @@ class KerbParking:
     first: float = _FIRST_BAY
 
 
+class Departure(NamedTuple):
+    """An element of the route file: when it departs (seconds), its id, its type, and its text without that."""
+
+    depart: float
+    name: str
+    type: str
+    text: str
+
+
 @dataclass(frozen=True)
 class Demand:
     """Traffic volumes by kind of road user.
@@ -123,8 +133,6 @@ class Demand:
         Pedestrians that start, per arm of the network.
     shares : mapping of str to float
         Shares of the vehicles by category.
-    own_sizes : bool
-        Whether each road user has its own size, drawn as in `varied_bodies`, instead of a model's.
     kerb : KerbParking
         Parking at kerbs, used if no street has parking lanes.
     """
@@ -135,7 +143,6 @@ class Demand:
     )
     pedestrians: float = setting(200.0, "persons per hour and arm", minimum=0.0, maximum=MAX_FLOW, metavar="N")
     shares: Mapping[str, float] = field(default_factory=VEHICLE_SHARES.copy)
-    own_sizes: bool = False
     kerb: KerbParking = KerbParking()
 
     def __post_init__(self) -> None:
@@ -152,6 +159,13 @@ class Demand:
             raise SeipError(
                 f"shares of vehicles must be for {', '.join(VEHICLE_SHARES)}, with one above 0, not {self.shares}"
             )
+
+    def own_types(self, departures: Sequence[Departure], seed: int) -> Mapping[str, str]:  # noqa: ARG002
+        """Return the elements of types that departures have instead of a model's, by the names of these.
+
+        Here there are none; a demand whose road users differ returns those of `type_line`.
+        """
+        return {}
 
 
 def write_routes(
@@ -186,57 +200,29 @@ def write_routes(
             entries.append(_vehicle(f"{seed}.{arm.id}.{len(entries)}", depart, route, demand.shares, free, random))
     entries += _walkers(network, demand.pedestrians * len(arms), seed, duration)
     entries.sort(key=lambda entry: entry.depart)
-    own = _own_type_lines(entries, np.random.default_rng([seed, 3])) if demand.own_sizes else ()
-    texts = (entry.text.format(type=entry.name if demand.own_sizes else entry.type) for entry in entries)
-    lines = ["<routes>", *_type_lines(), *own, *texts, "</routes>"]
+    own = demand.own_types(entries, seed)
+    texts = (entry.text.format(type=entry.name if entry.name in own else entry.type) for entry in entries)
+    lines = ["<routes>", *_type_lines(), *own.values(), *texts, "</routes>"]
     with whole_file(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-class _Departure(NamedTuple):
-    """An element of the route file: when it departs (seconds), its id, its type, and its text without that."""
-
-    depart: float
-    name: str
-    type: str
-    text: str
 
 
 def _type_lines() -> Iterator[str]:
     for models in MODELS.values():
         for name, model in models.items():
-            yield _driven_type(name, model)
+            yield type_line(name, model)
             if model.v_class in ("passenger", "delivery"):
-                yield _parked_type(f"{_PARKED}{name}", model)
+                yield type_line(f"{PARKED}{name}", model, parked=True)
 
 
-_PARKED = "parked_"  # begins the types of parked vehicles
-
-
-def _own_type_lines(entries: list[_Departure], random: np.random.Generator) -> Iterator[str]:
-    """Yield a type for each road user, with its own size; parked vehicles fit into their bays."""
-    known = {name: (category, model) for category, models in MODELS.items() for name, model in models.items()}
-    for entry in entries:
-        parked = entry.type.startswith(_PARKED)
-        category, model = known[entry.type.removeprefix(_PARKED)]
-        size = draw_size(category, random)
-        while parked and size[0] > _BAY_LENGTH - _PARKED_GAP:
-            size = draw_size(category, random)
-        own = model._replace(length=size[0], width=size[1], height=size[2])
-        yield _parked_type(entry.name, own) if parked else _driven_type(entry.name, own)
-
-
-def _driven_type(name: str, model: RoadUserModel) -> str:
-    stop = "" if model.v_class == "pedestrian" else ' jmStoplineGap="1.5" lcKeepRight="0"'
-    return _type_line(name, model.v_class, model, stop)
-
-
-def _parked_type(name: str, model: RoadUserModel) -> str:
-    return _type_line(name, PARKED_CLASS, model, f' minGap="{_PARKED_GAP}"')
-
-
-def _type_line(name: str, v_class: str, model: RoadUserModel, more: str) -> str:
+def type_line(name: str, model: RoadUserModel, *, parked: bool = False) -> str:
+    """Return the type of a model, or of a parked vehicle of it, as an element of a route file."""
     length, width, height = model.length, model.width, model.height
+    if parked:
+        v_class, more = PARKED_CLASS, f' minGap="{_PARKED_GAP}"'
+    else:
+        v_class = model.v_class
+        more = "" if v_class == "pedestrian" else ' jmStoplineGap="1.5" lcKeepRight="0"'
     return (
         f'<vType id="{name}" vClass="{v_class}" guiShape="{model.shape}" length="{length}" width="{width}" '
         f'height="{height}" maxSpeed="{model.speed}"{more}/>'
@@ -265,13 +251,13 @@ def _vehicle(
     share_of: Mapping[str, float],
     free: set[str],
     random: np.random.Generator,
-) -> _Departure:
+) -> Departure:
     categories, shares = list(share_of), np.array(list(share_of.values()))
     category = str(random.choice(categories, p=shares / shares.sum()))
     delivers = category in {"van", "truck"} and random.random() < _DELIVERY_SHARE
     stop = _delivery([edge for edge in route if edge.id in free], random) if delivers else ""
     edges = " ".join(edge.id for edge in route)
-    return _Departure(
+    return Departure(
         depart,
         f"{category}-{number}",
         _pick(MODELS[category], random),
@@ -328,7 +314,7 @@ def _bays(
 
 def _parked(
     bays: list[tuple[NetworkEdge, NetworkLane, float]], seed: int, random: np.random.Generator
-) -> Iterator[_Departure]:
+) -> Iterator[Departure]:
     models = MODELS["car"] | {"small_van": MODELS["van"]["small_van"]}
     for number, (edge, lane, middle) in enumerate(bays):
         model = _pick(models, random)
@@ -338,7 +324,7 @@ def _parked(
             f'departPos="{front:.2f}" departSpeed="0"><route edges="{edge.id}"/>'
             f'<stop lane="{edge.id}_{lane.index}" endPos="{front:.2f}" duration="{_PARKING_SECONDS:.0f}"/></vehicle>'
         )
-        yield _Departure(0.0, f"parked-{seed}.{number}", f"{_PARKED}{model}", text)
+        yield Departure(0.0, f"parked-{seed}.{number}", f"{PARKED}{model}", text)
 
 
 def _rows(
@@ -362,7 +348,7 @@ def _rows(
                 yield edge, lane, float(place)
 
 
-def _walkers(network: StreetNetwork, rate: float, seed: int, duration: float) -> Iterator[_Departure]:
+def _walkers(network: StreetNetwork, rate: float, seed: int, duration: float) -> Iterator[Departure]:
     random = np.random.default_rng([seed, 2])
     pavements = [
         (edge, lane)
@@ -384,7 +370,7 @@ def _walkers(network: StreetNetwork, rate: float, seed: int, duration: float) ->
         goal = int(random.choice(np.flatnonzero(within)))
         (origin, first), (target, last) = pavements[start], pavements[goal]
         begin, end = random.uniform(2.0, first.length - 2.0), random.uniform(2.0, last.length - 2.0)
-        yield _Departure(
+        yield Departure(
             depart,
             f"pedestrian-{seed}.{number}",
             _pick(MODELS["pedestrian"], random),
