@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Boolean, Float, Integer
+from ...site.locations import DIRECTIONS, direction
 from ...site.targets import Targets
 from ..results.site_file import PLACE, WEIGHTED, Area
 
-DIRECTIONS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
 ARMS = DIRECTIONS[::2]
 MIN_DISTANCE = 0.5  # metres from a centre from which on there is a direction from it
 
@@ -139,9 +139,9 @@ def _where(own: Integer, middle: Float, targets: Targets, areas: Sequence[Area])
     A page names the only centre before its list of blind spots.
     """
     origins = centres(targets, areas)
-    (nearest,), (angle,), (distance,) = _from_nearest(origins, middle[None])
-    direction = DIRECTIONS[round(float(angle) / (math.pi / 4)) % 8]
-    away = f"{distance:.0f} m {direction} of" if distance >= MIN_DISTANCE else "at"
+    (nearest,), _, (distance,) = _from_nearest(origins, middle[None])
+    towards = direction(middle[:2] - origins[nearest].xy)
+    away = f"{distance:.0f} m {towards} of" if distance >= MIN_DISTANCE else "at"
     words = f"{away} the centre" + (f" of {origins[nearest].name}" if len(origins) > 1 else "")
     shares = [(int(area.within[own].sum()), area.name) for area in areas]
     most, name = max(shares, key=lambda one: one[0], default=(0, ""))
