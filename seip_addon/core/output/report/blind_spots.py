@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 from ...arrays import Boolean, Float, Integer
 from ...site.locations import DIRECTIONS, direction
@@ -149,25 +150,10 @@ def _where(own: Integer, middle: Float, targets: Targets, areas: Sequence[Area])
 
 
 def _components(places: Float) -> Integer:
-    """Return a number for each whole place (n, 2), the same for those that are joined by steps of one."""
-    column, row = places.astype(np.int64).T
-    width = int(row.max(initial=0)) + 2  # no row's end is beside another's beginning
-    code = column * width + row
-    order = np.argsort(code)
-    labels = np.arange(len(code))
-    ones, others = [], []
-    for step in (1, width):
-        at = np.searchsorted(code[order], code + step)
-        found = np.flatnonzero((at < len(code)) & (code[order[np.minimum(at, len(code) - 1)]] == code + step))
-        ones.append(found)
-        others.append(order[at[found]])
-    one, other = np.concatenate(ones), np.concatenate(others)
-    while True:
-        lower = np.minimum(labels[one], labels[other])
-        new = labels.copy()
-        np.minimum.at(new, one, lower)
-        np.minimum.at(new, other, lower)
-        new = new[new]
-        if np.array_equal(new, labels):
-            return labels
-        labels = new
+    """Return a number for each whole place (n, 2), the same for those whose squares are joined by sides."""
+    squares, of = np.unique(places, axis=0, return_inverse=True)
+    parts = shapely.get_parts(shapely.coverage_union_all(shapely.box(*squares.T, *(squares + 1.0).T)))
+    part, square = shapely.STRtree(shapely.points(squares + 0.5)).query(parts, predicate="contains")
+    labels = np.empty(len(squares), dtype=np.int64)
+    labels[square] = part
+    return np.asarray(labels[of.ravel()])
