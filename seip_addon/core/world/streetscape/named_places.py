@@ -81,8 +81,8 @@ def _crossings(
     for one in objects:
         if one.kind == CROSSING:
             is_assumed = one.name == ASSUMED_CROSSING
-            area = shapely.intersection(_area(one), region, grid_size=GRID)
-            name = one.name if one.name and not is_assumed else _crossed(streets, _area(one))
+            area = shapely.intersection(area_in_plan(one), region, grid_size=GRID)
+            name = one.name if one.name and not is_assumed else _crossed(streets, area_in_plan(one))
             area = without_crumbs(without(area, taken))  # streets that meet at an acute angle are crossed together
             if area.area >= LEAST_AREA:
                 taken = taken.union(area)
@@ -145,8 +145,8 @@ def _crossed(streets: Mapping[str, BaseGeometry], area: BaseGeometry) -> str:
     return f"Crossing of {nearest}" if nearest else ""
 
 
-def _area(crossing: PlacedObject) -> BaseGeometry:
-    rings = [outline.base for outline in crossing.outlines if len(outline.base) >= 3] or [
-        footprint(crossing) + crossing.position
-    ]
+def area_in_plan(placed: PlacedObject) -> BaseGeometry:
+    """Return the area in plan of an object: of its outlines, or of its box or cylinder."""
+    rings = [outline.base for outline in placed.outlines if len(outline.base) >= 3]
+    rings = rings or [footprint(placed) + placed.position]
     return shapely.union_all([shapely.make_valid(shapely.Polygon(ring[:, :2])) for ring in rings])
