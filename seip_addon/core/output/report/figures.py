@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import ListedColormap
-from matplotlib.figure import Figure
 
 from ...arrays import Float
-from ..pictures.drawing import as_png, draw_attribution, draw_callouts
+from ..pictures.drawing import as_png, draw_attribution, draw_callouts, new_page
 from ..pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
 from ..pictures.plan_style import Style
 from ..pictures.scale_bar import draw_north, draw_scale, north_paper, scale_paper
@@ -32,8 +30,7 @@ def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
     sensors = np.array([sensor.local_m[:2] for sensor in evidence.sensors]).reshape(-1, 2)
     window = _window(np.vstack((targets.xyz[:, :2], sensors)))
     page = (MAP_WIDTH, MAP_WIDTH * (window[3] - window[1]) / (window[2] - window[0]))
-    figure = Figure(page, dpi=DPI, facecolor=PAPER)
-    FigureCanvasAgg(figure)
+    figure = new_page(page, DPI)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set(xticks=(), yticks=())
     axes.spines[:].set(color=SOFT_INK, linewidth=0.8)
@@ -114,8 +111,7 @@ def front_chart(
         Upper end of the axis.
     """
     counts, values, more = zip(*rows, strict=True)
-    figure = Figure(CHART_SIZE, dpi=DPI, facecolor=PAPER, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_page(CHART_SIZE, DPI, layout="constrained")
     axes = figure.add_subplot()
     style: Style = {"color": SEEN_COLOURS[2], "ecolor": SOFT_INK, "capsize": 4, "markersize": 8}
     axes.errorbar(counts, values, yerr=np.array([np.zeros(len(more)), more]), marker="o", linewidth=1.6, **style)
