@@ -1,6 +1,7 @@
 """Traffic of a training site: volumes, mix and signals drawn randomly for each run."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,12 +10,14 @@ from seip_addon.core.world.traffic_simulation.demand import (
     MODELS,
     PARKED,
     VEHICLE_SHARES,
+    Bay,
     Demand,
     Departure,
-    KerbParking,
+    rows_at_kerbs,
     type_line,
 )
 from seip_addon.core.world.traffic_simulation.simulation import SignalPlan
+from seip_addon.core.world.traffic_simulation.street_network import StreetNetwork
 
 from .street_plan import StreetPlan
 from .varied_bodies import draw_size
@@ -35,8 +38,48 @@ BAYS = (3, 9)  # bays in a row at the kerb; the upper end is excluded
 FIRST_BAY = (18.0, 40.0)  # metres from the junction
 
 
-class DemandOfOwnSizes(Demand):
-    """Demand in which each road user has its own size, drawn as in `varied_bodies`, instead of a model's."""
+@dataclass(frozen=True)
+class KerbParking:
+    """Rows of parked cars at kerbs; see `rows_at_kerbs`.
+
+    Parameters
+    ----------
+    bays : int
+        Number of bays in a row.
+    occupied : float
+        Share of the bays with a car.
+    streets : float
+        Share of the streets with room for a row that have one.
+    first : float, metres
+        Distance from the start of the street to the first bay.
+    """
+
+    bays: int = 3
+    occupied: float = 1.0
+    streets: float = 0.5
+    first: float = 35.0
+
+
+@dataclass(frozen=True)
+class DrawnDemand(Demand):
+    """Demand with parking at kerbs as asked for, in which each road user has a size of its own.
+
+    Sizes are drawn as in `varied_bodies`, instead of taken from a model.
+
+    Parameters
+    ----------
+    kerb : KerbParking
+        Parking at kerbs, used if no street has parking lanes.
+    """
+
+    kerb: KerbParking = KerbParking()
+
+    def kerb_bays(self, network: StreetNetwork, seed: int, random: Random) -> Iterator[Bay]:
+        """Yield the bays with parked cars at kerbs."""
+        kerb = self.kerb
+        for bay in rows_at_kerbs(network, seed, kerb.streets, kerb.bays, kerb.first):
+            if kerb.occupied >= 1.0 or random.random() < kerb.occupied:
+                yield bay
 
     def own_types(self, departures: Sequence[Departure], seed: int) -> dict[str, str]:
         """Return a type for each road user, with its own size; parked vehicles fit into their bays."""
@@ -54,7 +97,7 @@ class DemandOfOwnSizes(Demand):
         return types
 
 
-def draw_demand(plan: StreetPlan, random: Random) -> DemandOfOwnSizes:
+def draw_demand(plan: StreetPlan, random: Random) -> DrawnDemand:
     """Draw the demand of a run."""
     widest = max(arm.lanes_in for arm in plan.arms)
     logarithms = MIX_SPREAD * random.standard_normal(len(VEHICLE_SHARES))
@@ -64,7 +107,7 @@ def draw_demand(plan: StreetPlan, random: Random) -> DemandOfOwnSizes:
     }
     whole = sum(mix.values())
     least = {name: max(share / whole, LEAST_SHARES.get(name, 0.0)) for name, share in mix.items()}
-    return DemandOfOwnSizes(
+    return DrawnDemand(
         flow=round(float(random.uniform(*FLOW[widest])), 0),
         turns=tuple(random.dirichlet([4.0, 10.0, 4.0]).round(3).tolist()),
         pedestrians=round(float(random.uniform(*PEDESTRIANS)), 0),

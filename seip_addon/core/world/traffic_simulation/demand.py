@@ -88,26 +88,8 @@ VEHICLE_SHARES = {"car": 0.58, "van": 0.13, "truck": 0.10, "bus": 0.06, "motorcy
 """Shares of the vehicles that enter on each arm."""
 
 
-@dataclass(frozen=True)
-class KerbParking:
-    """Rows of parked cars in the outer of several lanes of streets on which vehicles leave the network.
-
-    Parameters
-    ----------
-    bays : int
-        Number of bays in a row.
-    occupied : float
-        Share of the bays with a car.
-    streets : float
-        Share of the streets with room for a row that have one.
-    first : float, metres
-        Distance from the start of the street to the first bay.
-    """
-
-    bays: int = 3
-    occupied: float = 1.0
-    streets: float = 0.5
-    first: float = _FIRST_BAY
+Bay = tuple[NetworkEdge, NetworkLane, float]
+"""Street, lane and middle (metres along it) of a parked car."""
 
 
 class Departure(NamedTuple):
@@ -133,8 +115,6 @@ class Demand:
         Pedestrians that start, per arm of the network.
     shares : mapping of str to float
         Shares of the vehicles by category.
-    kerb : KerbParking
-        Parking at kerbs, used if no street has parking lanes.
     """
 
     flow: float = setting(600.0, "vehicles per hour and arm", maximum=MAX_FLOW, metavar="N")
@@ -143,7 +123,6 @@ class Demand:
     )
     pedestrians: float = setting(200.0, "persons per hour and arm", minimum=0.0, maximum=MAX_FLOW, metavar="N")
     shares: Mapping[str, float] = field(default_factory=VEHICLE_SHARES.copy)
-    kerb: KerbParking = KerbParking()
 
     def __post_init__(self) -> None:
         if not 0.0 < self.flow <= MAX_FLOW:
@@ -167,6 +146,10 @@ class Demand:
         """
         return {}
 
+    def kerb_bays(self, network: StreetNetwork, seed: int, random: np.random.Generator) -> Iterator[Bay]:  # noqa: ARG002
+        """Return the bays with parked cars at kerbs, used if no street has parking lanes."""
+        return rows_at_kerbs(network, seed)
+
 
 def write_routes(
     path: str | os.PathLike[str], network: StreetNetwork, demand: Demand, seed: int, duration: float
@@ -189,7 +172,7 @@ def write_routes(
     # Parking, each arm, pedestrians and sizes have random streams of their own: changing the demand of one of them
     # does not change the draws of the others.
     random = np.random.default_rng([seed, 0])
-    bays = _bays(network, demand.kerb, seed, random)
+    bays = _bays(network, demand, seed, random)
     entries = list(_parked(bays, seed, random))
     # Deliveries stop in the outer lane: not on streets where parked cars stand in it.
     free = set(network.edges) - {edge.id for edge, lane, _ in bays if lane.use == DRIVING}
@@ -293,13 +276,11 @@ def _delivery(streets: list[NetworkEdge], random: np.random.Generator) -> str:
     return f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{random.uniform(*_STOP_SECONDS):.0f}"/>'
 
 
-def _bays(
-    network: StreetNetwork, kerb: KerbParking, seed: int, random: np.random.Generator
-) -> list[tuple[NetworkEdge, NetworkLane, float]]:
-    """Return the middles of the bays with parked cars: in parking lanes, otherwise in rows at the kerb.
+def _bays(network: StreetNetwork, demand: Demand, seed: int, random: np.random.Generator) -> list[Bay]:
+    """Return the bays with parked cars: in parking lanes, otherwise in rows at the kerb.
 
-    A row is in the outer of several lanes of some streets on which vehicles leave the network. Bays are not marked on
-    the road. Those of one seed lie between those of the others, so that parked cars stand at different positions.
+    Bays are not marked on the road. Those of one seed lie between those of the others, so that parked cars stand at
+    different positions.
     """
     shift = _BAY_LENGTH * (seed * _SHIFT % 1.0)
     bays = [
@@ -309,12 +290,12 @@ def _bays(
         for place in np.arange(_BAY_LENGTH + shift, lane.length - _BAY_LENGTH / 2.0 - 1.0, _BAY_LENGTH)
         if random.random() < _OCCUPIED_SHARE
     ]
-    return bays or list(_rows(network, kerb, seed, random))
+    if bays:
+        return bays
+    return [bay for bay in demand.kerb_bays(network, seed, random) if bay[2] < bay[1].length - _BAY_LENGTH]
 
 
-def _parked(
-    bays: list[tuple[NetworkEdge, NetworkLane, float]], seed: int, random: np.random.Generator
-) -> Iterator[Departure]:
+def _parked(bays: list[Bay], seed: int, random: np.random.Generator) -> Iterator[Departure]:
     models = MODELS["car"] | {"small_van": MODELS["van"]["small_van"]}
     for number, (edge, lane, middle) in enumerate(bays):
         model = _pick(models, random)
@@ -327,25 +308,35 @@ def _parked(
         yield Departure(0.0, f"parked-{seed}.{number}", f"{PARKED}{model}", text)
 
 
-def _rows(
-    network: StreetNetwork, kerb: KerbParking, seed: int, random: np.random.Generator
-) -> Iterator[tuple[NetworkEdge, NetworkLane, float]]:
-    """Yield the bays of rows of cars: successive seeds use other streets, then positions along them, then a shift."""
+def rows_at_kerbs(
+    network: StreetNetwork, seed: int, share: float = 0.5, count: int = 3, first: float = _FIRST_BAY
+) -> Iterator[Bay]:
+    """Yield the bays of rows in the outer of several lanes of streets on which vehicles leave the network.
+
+    Successive seeds use other streets, then positions along them, then a shift.
+
+    Parameters
+    ----------
+    share : float
+        Share of the streets with room for a row that have one.
+    count : int
+        Number of bays in a row.
+    first : float, metres
+        Distance from the start of the street to the first bay.
+    """
     exits = [
         edge for edge in network.edges.values() if len(edge.lanes_for(DRIVING)) > 1 and not network.has_next_edge(edge)
     ]
-    rows = math.ceil(kerb.streets * len(exits))
+    rows = math.ceil(share * len(exits))
     # Rows are numbered over all seeds. The remainder by the number of streets is the street, the quotient counts the
     # rows used there before: first the positions along the kerb, and when all are used, a shift by a part of a bay.
     for number in range(seed * rows, (seed + 1) * rows):
         edge = exits[number % len(exits)]
         lane = edge.lanes_for(DRIVING)[0]
         along, turn = number // len(exits) % _ROWS_ALONG, number // len(exits) // _ROWS_ALONG
-        first = kerb.first + _BAY_LENGTH * (along * kerb.bays + turn * _SHIFT % 1.0)
-        for place in first + _BAY_LENGTH * np.arange(kerb.bays):
-            held = kerb.occupied >= 1.0 or random.random() < kerb.occupied
-            if held and place < lane.length - _BAY_LENGTH:
-                yield edge, lane, float(place)
+        start = first + _BAY_LENGTH * (along * count + turn * _SHIFT % 1.0)
+        for place in start + _BAY_LENGTH * np.arange(count):
+            yield edge, lane, float(place)
 
 
 def _walkers(network: StreetNetwork, rate: float, seed: int, duration: float) -> Iterator[Departure]:

@@ -18,7 +18,7 @@ from seip_addon.core.sensing.traffic.vehicle_types import read_vehicle_types
 from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
 from seip_addon.core.world.traffic_simulation import simulation as sumo
-from seip_addon.core.world.traffic_simulation.demand import MODELS, VEHICLE_SHARES, Demand, KerbParking, write_routes
+from seip_addon.core.world.traffic_simulation.demand import MODELS, VEHICLE_SHARES, Demand, write_routes
 from seip_addon.core.world.traffic_simulation.street_network import DRIVING, PARKING, WALKING, read_network
 from tests.builders.street_network import BAYS, ROAD, edge, network, three_ways, way
 from tests.sumo_here import needs_sumo
@@ -152,18 +152,6 @@ def test_rows_of_parked_cars_leave_a_lane_and_deliveries_keep_clear(tmp_path):
     assert others
     assert not parked & set(others)
     assert not any(lane.startswith("in") for lane in others)  # it has one lane: nobody could pass
-
-
-def test_rows_at_the_kerb_are_as_asked_for(tmp_path):
-    def stops(**kerb):
-        root, _ = routes(tmp_path, three_ways(tmp_path), kerb=KerbParking(**kerb))
-        return [vehicle.find("stop") for vehicle in root.iter("vehicle") if vehicle.get("id").startswith("parked")]
-
-    assert len({stop.get("lane") for stop in stops(streets=1.0)}) == 3
-    assert not stops(bays=0)
-    assert not stops(occupied=0.0)
-    assert 0 < len(stops(bays=8, occupied=0.5, streets=1.0)) < len(stops(bays=8, streets=1.0))
-    assert min(float(stop.get("endPos")) for stop in stops(first=10.0)) < 17.0
 
 
 @pytest.mark.parametrize("shares", [{"tram": 1.0}, {"car": 0.0}, {"car": 1.0, "bus": -0.1}, {}])
