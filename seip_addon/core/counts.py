@@ -1,4 +1,6 @@
-"""Counted nouns for messages: "1 tree", "1,200 trees"."""
+"""Numbers for messages and scales: counted nouns, durations and round numbers."""
+
+import math
 
 
 def counted(number: int, one: str, several: str = "") -> str:
@@ -21,3 +23,9 @@ def duration_text(seconds: float) -> str:
     if seconds < 100:
         return f"{max(seconds, 1):.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
+
+
+def round_number(most: float) -> float:
+    """Return the largest 1, 2 or 5 times a power of ten that is at most a positive number."""
+    decade = 10.0 ** math.floor(math.log10(most))
+    return max(step * decade for step in (1, 2, 5) if step * decade <= most)

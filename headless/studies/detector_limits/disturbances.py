@@ -15,6 +15,7 @@ from typing import ClassVar
 
 from headless.detection.detector import Detector
 from headless.detection.frame_points import POINT_FIELDS, recounted, some_points
+from headless.studies.random_sites.varied_bodies import resized
 
 import numpy as np
 
@@ -25,7 +26,6 @@ from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import Simulation
 from seip_addon.core.sensing.traffic.trajectories import Trajectories, some_users
-from seip_addon.core.sensing.traffic.varied_bodies import resized
 
 ERROR_AXIS = np.array([1.0, 1.0, 0.0]) / math.sqrt(2)
 """Unit vector of position and tilt errors, diagonal in plan, along no street."""

@@ -56,7 +56,7 @@ REMEDIES: Mapping[str, str] = {
     TiltError.name: _CALIBRATION,
     ClockOffset.name: "a single cloud does not show it: synchronise the sensors' clocks to better than that",
     SensorFailure.name: "`seip place --failures mean` optimises for the loss of any one sensor",
-    OtherSizes.name: "training with varied bodies: seip_addon.core.sensing.traffic.varied_bodies",
+    OtherSizes.name: "training with varied bodies: headless.studies.random_sites.varied_bodies",
     Thinned.name: "none needed: thinner traffic hides less",
     CappedPillars.name: f"a warning if more than {MAX_OVERFULL_SHARE:.0%} of the pillars with points are over-full",
 }

@@ -13,13 +13,13 @@ from headless.detection.run_detection import AT_ONCE, detect_in_runs
 from headless.detection.training import deterministic
 from headless.side_by_side import side_by_side
 from headless.studies.detector_limits.paired_change import ResampledPrecision, change, level
+from headless.studies.random_sites.varied_bodies import resized
 from headless.studies.site_training.training_site import TrainingSite
 
 import numpy as np
 
 from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.sensing.traffic.varied_bodies import resized
 
 from .variants import ALL, SIZE_CHANGE, Ingredients
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from headless.detection.detection_area import DetectionArea
 from headless.detection.recordings import SampledRun
+from headless.studies.random_sites.varied_bodies import resized, with_sizes
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,6 @@ from seip_addon.core.geometry.height_raster import HeightRaster
 from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
-from seip_addon.core.sensing.traffic.varied_bodies import resized, with_sizes
 from seip_addon.core.world.traffic_simulation.demand import MODELS
 
 SIZE_CHANGE = 0.15  # largest relative change of the dimensions of road users, in a training and in a test

@@ -1,11 +1,26 @@
 """Traffic of a training site: volumes, mix and signals drawn randomly for each run."""
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
-from seip_addon.core.world.traffic_simulation.demand import VEHICLE_SHARES, Demand, KerbParking
+from seip_addon.core.world.traffic_simulation.demand import (
+    MAX_PARKED_LENGTH,
+    MODELS,
+    PARKED,
+    VEHICLE_SHARES,
+    Bay,
+    Demand,
+    Departure,
+    rows_at_kerbs,
+    type_line,
+)
 from seip_addon.core.world.traffic_simulation.simulation import SignalPlan
+from seip_addon.core.world.traffic_simulation.street_network import StreetNetwork
 
 from .street_plan import StreetPlan
+from .varied_bodies import draw_size
 
 Random = np.random.Generator
 
@@ -23,7 +38,66 @@ BAYS = (3, 9)  # bays in a row at the kerb; the upper end is excluded
 FIRST_BAY = (18.0, 40.0)  # metres from the junction
 
 
-def draw_demand(plan: StreetPlan, random: Random) -> Demand:
+@dataclass(frozen=True)
+class KerbParking:
+    """Rows of parked cars at kerbs; see `rows_at_kerbs`.
+
+    Parameters
+    ----------
+    bays : int
+        Number of bays in a row.
+    occupied : float
+        Share of the bays with a car.
+    streets : float
+        Share of the streets with room for a row that have one.
+    first : float, metres
+        Distance from the start of the street to the first bay.
+    """
+
+    bays: int = 3
+    occupied: float = 1.0
+    streets: float = 0.5
+    first: float = 35.0
+
+
+@dataclass(frozen=True)
+class DrawnDemand(Demand):
+    """Demand with parking at kerbs as asked for, in which each road user has a size of its own.
+
+    Sizes are drawn as in `varied_bodies`, instead of taken from a model.
+
+    Parameters
+    ----------
+    kerb : KerbParking
+        Parking at kerbs, used if no street has parking lanes.
+    """
+
+    kerb: KerbParking = KerbParking()
+
+    def kerb_bays(self, network: StreetNetwork, seed: int, random: Random) -> Iterator[Bay]:
+        """Yield the bays with parked cars at kerbs."""
+        kerb = self.kerb
+        for bay in rows_at_kerbs(network, seed, kerb.streets, kerb.bays, kerb.first):
+            if kerb.occupied >= 1.0 or random.random() < kerb.occupied:
+                yield bay
+
+    def own_types(self, departures: Sequence[Departure], seed: int) -> dict[str, str]:
+        """Return a type for each road user, with its own size; parked vehicles fit into their bays."""
+        random = np.random.default_rng([seed, 3])
+        known = {name: (category, model) for category, models in MODELS.items() for name, model in models.items()}
+        types = {}
+        for departure in departures:
+            parked = departure.type.startswith(PARKED)
+            category, model = known[departure.type.removeprefix(PARKED)]
+            length, width, height = draw_size(category, random)
+            while parked and length > MAX_PARKED_LENGTH:
+                length, width, height = draw_size(category, random)
+            own = model._replace(length=length, width=width, height=height)
+            types[departure.name] = type_line(departure.name, own, parked=parked)
+        return types
+
+
+def draw_demand(plan: StreetPlan, random: Random) -> DrawnDemand:
     """Draw the demand of a run."""
     widest = max(arm.lanes_in for arm in plan.arms)
     logarithms = MIX_SPREAD * random.standard_normal(len(VEHICLE_SHARES))
@@ -33,12 +107,11 @@ def draw_demand(plan: StreetPlan, random: Random) -> Demand:
     }
     whole = sum(mix.values())
     least = {name: max(share / whole, LEAST_SHARES.get(name, 0.0)) for name, share in mix.items()}
-    return Demand(
+    return DrawnDemand(
         flow=round(float(random.uniform(*FLOW[widest])), 0),
         turns=tuple(random.dirichlet([4.0, 10.0, 4.0]).round(3).tolist()),
         pedestrians=round(float(random.uniform(*PEDESTRIANS)), 0),
         shares={name: round(share / sum(least.values()), 4) for name, share in least.items()},
-        own_sizes=True,
         kerb=KerbParking(
             bays=int(random.integers(*BAYS)),
             occupied=round(float(random.uniform(0.5, 1.0)), 2),

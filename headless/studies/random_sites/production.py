@@ -14,7 +14,6 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.sensing.traffic.source import describe_categories
-from seip_addon.core.sensing.traffic.varied_bodies import shaped
 from seip_addon.core.site.candidates import PAPER_TYPES, CandidateSettings
 from seip_addon.core.site.check import check_site
 from seip_addon.core.site.scene_geometry import SceneGeometry
@@ -36,6 +35,7 @@ from seip_addon.scene.check import contents_of
 from .demand_draw import draw_demand, draw_signals
 from .extract_text import LATITUDE, LONGITUDE, write_extract, write_terrain
 from .street_plan import StreetPlan, draw_plan, with_tram
+from .varied_bodies import shaped
 
 SCHEMA, VERSION = "seip.training_site", 1
 MAX_ATTEMPTS = 8  # plans that are drawn for a site until one passes the check

@@ -9,13 +9,13 @@ from headless.detection.detection_area import DetectionArea
 from headless.detection.field_conditions import field_recording
 from headless.detection.frames import Recording
 from headless.detection.recordings import MountedSensors, SampledRun, Simulator
+from headless.studies.random_sites.companions import with_companions
+from headless.studies.random_sites.varied_bodies import resized
 
 import numpy as np
 
 from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.lidar.model import LidarModel
-from seip_addon.core.sensing.traffic.companions import with_companions
-from seip_addon.core.sensing.traffic.varied_bodies import resized
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.scene_geometry import SceneGeometry
 

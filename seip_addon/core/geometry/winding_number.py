@@ -26,10 +26,15 @@ def enclosed(points: Float, triangles: Float) -> Boolean:
     Returns
     -------
     (n,) bool
-        Same result as comparing `winding_number` with 0.5.
+        Same result as computing the winding number from all triangles.
 
     Notes
     -----
+    The winding number is 1 (or −1) inside and 0 outside, in between if the soup is open; introduced for open and
+    inconsistent meshes by Jacobson et al. (2013). If shells of opposite orientation lie within each other, or faces are
+    oriented at random, their contributions cancel and a point inside counts as outside. That does no harm here: a
+    sensor enclosed by faces sees nothing.
+
     Triangles are grouped into blocks, and a far block is approximated by its moments, as in the fast winding numbers of
     Barill et al. (2018), here with a bound on the error of each block. A point whose winding number is nearer to 0.5
     than the total error is computed again with smaller errors, and finally without any.
@@ -49,29 +54,6 @@ def _encloses(blocks: Blocks, point: Float) -> bool:
         if abs(abs(number) - 0.5) > error:
             break
     return abs(number) > 0.5
-
-
-def winding_number(points: Float, triangles: Float) -> Float:
-    """Generalised winding number of a triangle soup: 1 (or −1) inside, 0 outside, in between if it is open.
-
-    Parameters
-    ----------
-    points : (n, 3) float64, metres
-    triangles : (m, 3, 3) float64, metres
-
-    Returns
-    -------
-    (n,) float64
-
-    Notes
-    -----
-    If shells of opposite orientation lie within each other, or faces are oriented at random, their contributions cancel
-    and a point inside counts as outside. That does no harm here: a sensor enclosed by faces sees nothing.
-
-    Introduced for open and inconsistent meshes by Jacobson et al. (2013).
-    """
-    numbers = [_shares(triangles - point).sum() for point in points]
-    return np.array(numbers, dtype=np.float64)
 
 
 def _shares(triangles: Float) -> Float:

@@ -155,16 +155,7 @@ def heights_of(texts: Sequence[str]) -> tuple[float, ...]:
     SeipError
         One is neither.
     """
-    heights: list[float] = []
-    for text in texts:
-        named = _named_by(text, 0.0, MAX_SENSOR_HEIGHT)
-        if not named:
-            raise SeipError(
-                f"{text!r} is neither a height in metres nor a range FROM:TO:STEP "
-                f"up to {MAX_SENSOR_HEIGHT:g} m in steps of at least {_MIN_STEP:g} m"
-            )
-        heights += named
-    return tuple(heights)
+    return tuple(_numbers(texts, 0.0, MAX_SENSOR_HEIGHT, _HEIGHTS))
 
 
 def tilts_of(texts: Sequence[str]) -> tuple[float, ...]:
@@ -175,20 +166,26 @@ def tilts_of(texts: Sequence[str]) -> tuple[float, ...]:
     SeipError
         One is neither.
     """
-    tilts: list[float] = []
-    for text in texts:
-        named = _named_by(text, -MAX_TILT, MAX_TILT)
-        if not named:
-            raise SeipError(
-                f"{text!r} is neither a tilt in degrees nor a range FROM:TO:STEP within "
-                f"±{MAX_TILT:g}° in steps of at least {_MIN_STEP:g}°"
-            )
-        tilts += [math.radians(tilt) + 0.0 for tilt in named]
-    return tuple(tilts)
+    return tuple(math.radians(tilt) + 0.0 for tilt in _numbers(texts, -MAX_TILT, MAX_TILT, _TILTS))
 
 
 _MIN_STEP = 0.01
 """Least step of a range, metres or degrees; finer ranges are rejected as typing errors."""
+_HEIGHTS = (
+    f"a height in metres nor a range FROM:TO:STEP up to {MAX_SENSOR_HEIGHT:g} m in steps of at least {_MIN_STEP:g} m"
+)
+_TILTS = f"a tilt in degrees nor a range FROM:TO:STEP within ±{MAX_TILT:g}° in steps of at least {_MIN_STEP:g}°"
+
+
+def _numbers(texts: Sequence[str], above: float, most: float, what: str) -> list[float]:
+    """Return the numbers that all texts name; ``what`` they may be is for messages."""
+    numbers: list[float] = []
+    for text in texts:
+        named = _named_by(text, above, most)
+        if not named:
+            raise SeipError(f"{text!r} is neither {what}")
+        numbers += named
+    return numbers
 
 
 def _named_by(text: str, above: float, most: float) -> list[float]:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
-from ..errors import SeipError
 from ..limits import DISTANCE, PRICE
-from ..storage.toml_table import parse_toml, toml_text
+from ..storage.toml_table import REQUIRED, Key, number, parse_toml, read_table, toml_text
 from .candidates import Candidates
 
 DEFAULTS = Path(__file__).with_name("installed_cost.toml")
@@ -80,23 +80,14 @@ def load_installed_cost(path: str | os.PathLike[str] | None = None) -> Installed
     SeipError
         The file cannot be read, or has an unknown key or an invalid value.
     """
-    table = _table(DEFAULTS)
-    if path is not None:
-        own = _table(Path(path))
-        for name, value in own.items():
-            _check(name, value, path)
-        table |= own
-    return InstalledCost(**{name: float(value) for name, value in table.items()})
+    shipped = _table(DEFAULTS, {})
+    return InstalledCost(**(shipped if path is None else _table(Path(path), shipped)))
 
 
-def _table(path: Path) -> dict[str, Any]:
-    return parse_toml(toml_text(path, "installed costs"), str(path))
-
-
-def _check(name: str, value: object, path: str | os.PathLike[str]) -> None:
-    known = [each.name for each in fields(InstalledCost)]
-    if name not in known:
-        raise SeipError(f"{path} has the unknown key {name!r}; the keys of installed costs are {', '.join(known)}")
-    limits = DISTANCE if name.endswith("_m") else PRICE
-    if not isinstance(value, int | float) or isinstance(value, bool) or not limits.allow(value):
-        raise SeipError(f"{name} in {path} must be {limits}, not {value!r}")
+def _table(path: Path, defaults: Mapping[str, float]) -> dict[str, float]:
+    content = parse_toml(toml_text(path, "installed costs"), str(path))
+    keys = {
+        each.name: Key(number(DISTANCE if each.name.endswith("_m") else PRICE), defaults.get(each.name, REQUIRED))
+        for each in fields(InstalledCost)
+    }
+    return read_table(content, str(path), keys)

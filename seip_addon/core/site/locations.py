@@ -20,7 +20,7 @@ MAX_FROM_CORNER = 20.0  # metres from a kerb farther from the nearest street to 
 MAX_FROM_CROSSING = 60.0  # metres up to which a crossing says where a sensor is
 
 
-def direction(towards: Float) -> str:
+def direction(towards: Float | tuple[float, float]) -> str:
     """Return the compass direction of a vector in plan (2,); north is the direction of the map's y axis."""
     return DIRECTIONS[round(math.atan2(towards[1], towards[0]) / (math.pi / 4)) % 8]
 

@@ -243,7 +243,7 @@ def read_small(path: Path, most: int, cure: str) -> bytes:
     return content
 
 
-def parse_json(text: str) -> Any:  # noqa: ANN401  # any JSON
+def parse_json(text: str | bytes) -> Any:  # noqa: ANN401  # any JSON
     """Return the content of a JSON text; raise `ValueError` or `RecursionError` if it is damaged or has NaN."""
 
     def refuse(name: str) -> NoReturn:

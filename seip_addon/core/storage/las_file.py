@@ -26,7 +26,7 @@ def opened_las(path: Path) -> Any:  # noqa: ANN401  # laspy has no types
     SeipError
         The file is missing or damaged, or laspy is not installed.
     """
-    laspy = _laspy(path)
+    laspy = laspy_for(f"reading {path.name}", compressed=path.suffix.lower() == ".laz")
     if not path.is_file():
         raise SeipError(f"no such file: {path}; check its path")
     try:
@@ -157,12 +157,17 @@ def damaged_las(path: Path, error: Exception) -> SeipError:
     return SeipError(f"{path.name} is not a readable LAS or LAZ file ({first[:100]}); write or download it again")
 
 
-def _laspy(path: Path) -> ModuleType:
+def laspy_for(work: str, *, compressed: bool) -> ModuleType:
+    """Return laspy; ``work`` that needs it, such as "reading a.las", is for messages.
+
+    Raises
+    ------
+    SeipError
+        It is not installed, or lazrs is not, which it needs for LAZ (``compressed``).
+    """
     try:
-        if path.suffix.lower() == ".laz":
+        if compressed:
             importlib.import_module("lazrs")
         return importlib.import_module("laspy")
     except ModuleNotFoundError as error:
-        raise SeipError(
-            f"reading {path.name} needs {error.name}, which is not installed; pip install laspy lazrs"
-        ) from error
+        raise SeipError(f"{work} needs {error.name}, which is not installed; pip install laspy lazrs") from error

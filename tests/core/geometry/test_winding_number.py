@@ -6,10 +6,11 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.geometry.winding_number import Blocks, enclosed, winding_number
+from seip_addon.core.geometry.winding_number import Blocks, enclosed
 from seip_addon.core.site.obstruction import inside_any, post_blocked
 from seip_addon.core.site.scene_geometry import Mesh
 from tests.oracles.random_cases import cases
+from tests.oracles.winding_number import winding_number
 
 TETRAHEDRON = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)], dtype=float)
 FACES = np.array([(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)])

@@ -5,7 +5,7 @@ from itertools import combinations
 
 from headless.studies.random_sites import command as generate_sites
 from headless.studies.random_sites import production
-from headless.studies.random_sites.demand_draw import LEAST_SHARES, draw_demand
+from headless.studies.random_sites.demand_draw import LEAST_SHARES, DrawnDemand, draw_demand
 from headless.studies.random_sites.extract_text import LATITUDE, LONGITUDE, write_extract, write_terrain
 from headless.studies.random_sites.production import SiteSettings, run_path
 from headless.studies.random_sites.street_plan import MAX_SLOPE, MIN_ANGLES, draw_plan
@@ -109,7 +109,10 @@ def test_demand_has_what_is_rare_and_differs_from_run_to_run():
     flows = [demand.flow for demand in demands]
     assert min(flows) < 400
     assert max(flows) > 800
-    assert all(demand.own_sizes and sum(demand.shares.values()) == pytest.approx(1.0, abs=0.01) for demand in demands)
+    assert all(
+        isinstance(demand, DrawnDemand) and sum(demand.shares.values()) == pytest.approx(1.0, abs=0.01)
+        for demand in demands
+    )
 
 
 @pytest.mark.parametrize(

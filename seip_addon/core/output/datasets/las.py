@@ -10,14 +10,12 @@ the file itself; the GPS time is the time of the simulation; the intensity has 1
 ``instance`` is the road user, −1 for none. Source: ASPRS, "LAS Specification 1.4 - R15".
 """
 
-import importlib
 import io
 from collections.abc import Callable
-from types import ModuleType
 
 import numpy as np
 
-from ...errors import SeipError
+from ...storage.las_file import laspy_for
 from .format_interface import Format
 from .sample import Sample, TrafficRun
 
@@ -34,20 +32,12 @@ def sample_files(sample: Sample) -> dict[str, Callable[[], bytes]]:
 
 def notes(run: TrafficRun) -> tuple[str, ...]:  # noqa: ARG001  # the same for every run
     """Note nothing, but see that LAZ can be written here."""
-    _laspy()
+    laspy_for("writing LAZ", compressed=True)
     return ()
 
 
-def _laspy() -> ModuleType:
-    try:
-        importlib.import_module("lazrs")
-        return importlib.import_module("laspy")
-    except ModuleNotFoundError as error:
-        raise SeipError(f"writing LAZ needs {error.name}, which is not here; pip install laspy lazrs") from error
-
-
 def _laz(sample: Sample) -> bytes:
-    laspy = _laspy()
+    laspy = laspy_for("writing LAZ", compressed=True)
     frame = sample.frame
     header = laspy.LasHeader(version="1.4", point_format=6)
     header.scales = np.full(3, RESOLUTION)

@@ -12,7 +12,7 @@ from urllib.parse import quote
 import numpy as np
 
 from ...arrays import Integer
-from ...counts import counted
+from ...counts import counted, round_number
 from ..pictures.drawing import percent
 from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK
 from ..report.html import STYLE
@@ -167,9 +167,7 @@ def _described(record: NetworkRecord, site: NetworkSite) -> str:
 
 
 def _scale(view: NetworkView) -> str:
-    longest = view.width / 6
-    decade = 10.0 ** math.floor(math.log10(longest))
-    length = max(step * decade for step in (1, 2, 5) if step * decade <= longest)
+    length = round_number(view.width / 6)
     words = f"{length:g} m" if length < 1000 else f"{length / 1000:g} km"
     width = f"{100 * length / view.width:.3f}%"
     return f'<div style="flex: 1 0 100%"><div class="scale" style="width: {width}"></div><span>{words}</span></div>'

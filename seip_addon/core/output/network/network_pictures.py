@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ...arrays import Float
 from ..pictures.chart_style import add_legend, new_figure, set_title, style_axes
-from ..pictures.drawing import add_axes, as_png, credits_box, draw_attribution, draw_callouts
+from ..pictures.drawing import add_axes, as_png, credits_box, draw_attribution, draw_callouts, new_page
 from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK
 from ..pictures.plan_style import Style
 from ..pictures.scale_bar import draw_north, draw_scale, north_paper, scale_paper
@@ -34,8 +33,7 @@ CRITERIA = {
 def draw_map(record: NetworkRecord, view: NetworkView) -> bytes:
     """Return the sites on the streets as PNG, the first of them with their ranks; the view has the shape of the map."""
     width, height = MAP_SIZE
-    figure = Figure(MAP_SIZE, dpi=DPI, facecolor=PAPER)
-    FigureCanvasAgg(figure)
+    figure = new_page(MAP_SIZE, DPI)
     axes = add_axes(figure, 0.0, LEGEND_HEIGHT, width, height - LEGEND_HEIGHT)
     left, bottom, right, top = view.window
     axes.set(xlim=(left, right), ylim=(bottom, top))

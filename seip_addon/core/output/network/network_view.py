@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 
 from ...arrays import Float
+from ...counts import round_number
 from ...geometry.tangent_plane import plan_metres
 from ..pictures.palette import PAPER_STREETS
 from .network_record import NetworkRecord
@@ -79,12 +80,7 @@ def radius_of(record: NetworkRecord, view: NetworkView, money: float) -> float:
 def legend_money(record: NetworkRecord) -> tuple[float, ...]:
     """Return round amounts of money whose circles a legend shows."""
     most = max((site.price_usd for site in record.sites), default=0.0)
-    return tuple(sorted({_round(most / 6), _round(most)})) if most >= 1 else ()
-
-
-def _round(amount: float) -> float:
-    decade = 10.0 ** math.floor(math.log10(amount))
-    return max(step * decade for step in (1, 2, 5) if step * decade <= amount)
+    return tuple(sorted({round_number(most / 6), round_number(most)})) if most >= 1 else ()
 
 
 def _middle(degrees: Float) -> Float:

@@ -6,12 +6,11 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Literal
 
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ...estimates import IntervalEstimate
-from .drawing import save_png
-from .palette import INK, PAPER, SERIES_COLOURS, SOFT_INK
+from .drawing import new_page, save_png
+from .palette import INK, SERIES_COLOURS, SOFT_INK
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # one more than colours, so that pairs repeat only after 42 series
 DASHED = (0, (4, 2))
@@ -32,8 +31,7 @@ def new_figure(
     width: float, height: float, panels: int = 1, *, dpi: int = 160, sharey: bool = False
 ) -> tuple[Figure, Sequence[Axes]]:
     """Return a figure, ``width`` by ``height`` inches, with panels side by side."""
-    figure = Figure((width, height), dpi=dpi, facecolor=PAPER, layout="constrained")
-    FigureCanvasAgg(figure)  # measures text
+    figure = new_page((width, height), dpi, layout="constrained")
     return figure, list(figure.subplots(1, panels, sharey=sharey, squeeze=False)[0])
 
 

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from PIL import Image
 
 from ...arrays import Float
@@ -26,6 +24,7 @@ from .drawing import (
     draw_attribution,
     draw_callouts,
     markers_of,
+    new_page,
 )
 from .palette import INK, PAPER
 from .plan_map import SENSOR, MapContent, Window, draw_map, draw_street_names, map_content
@@ -90,8 +89,7 @@ def _plan(content: MapContent, sensor: Sensor) -> Image.Image:
     x, y = sensor.xyz[:2].tolist()
     up = REACH * height / width
     window = (x - REACH, y - up, x + REACH, y + up)
-    figure = Figure((width, height), dpi=DPI, facecolor=PAPER)
-    FigureCanvasAgg(figure)
+    figure = new_page((width, height), DPI)
     axes = add_axes(figure, 0.0, 0.0, width, height)
     draw_map(axes, content, window, width)
     inch = 2 * REACH / width
@@ -125,8 +123,7 @@ def _mark(axes: Axes, content: MapContent, sensor: Sensor, window: Window, taken
 def _labelled(view: Image.Image, sensor: Sensor, place: tuple[float, float], attribution: Sequence[str]) -> Image.Image:
     """Return a rendered close-up with a ring round the sensor and its label."""
     width, height = TILE[0] / DPI, TILE[1] / DPI
-    figure = Figure((width, height), dpi=DPI, facecolor=PAPER)
-    FigureCanvasAgg(figure)
+    figure = new_page((width, height), DPI)
     axes = add_axes(figure, 0.0, 0.0, width, height)
     axes.axis("off")
     paper = Image.new("RGB", TILE, "#e9edf0")

@@ -65,11 +65,6 @@ class Colouring:
         share: Float = np.bincount(self.of, minlength=len(self.words)) / max(len(self.of), 1)
         return share
 
-    @property
-    def legend(self) -> Legend:
-        """Legend of the classes."""
-        return Legend(self.title, self.words, self.colours, self.shares)
-
 
 RETURNS_CLASSES = (1.0, FEW_RETURNS, 20.0)
 """Returns from a pedestrian at which the classes of a plan change."""

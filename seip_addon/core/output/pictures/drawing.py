@@ -6,10 +6,11 @@ import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
@@ -36,6 +37,13 @@ NAME_SIZE, RESULT_SIZE = 18.0, 12.0  # points
 TOP, NAME_LINE, RESULT_LINE = 0.2, 0.34, 0.24  # inches
 MEASURED_SIZE = 20.0  # points, at which the widths of texts are measured
 SEPARATOR = "  ·  "
+
+
+def new_page(size: tuple[float, float], dpi: float, layout: Literal["constrained"] | None = None) -> Figure:
+    """Return an empty figure, width by height inches, whose texts can be measured."""
+    figure = Figure(size, dpi=dpi, facecolor=PAPER, layout=layout)
+    FigureCanvasAgg(figure)  # measures text
+    return figure
 
 
 def save_png(path: str | os.PathLike[str], figure: Figure) -> None:

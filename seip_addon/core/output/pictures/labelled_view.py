@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Rectangle
@@ -20,6 +19,7 @@ from .drawing import (
     credits_of,
     draw_sensors,
     heading_of,
+    new_page,
     percent,
     save_png,
     text_width,
@@ -80,8 +80,7 @@ def save_labelled_view(  # noqa: PLR0913  # what is written on the picture
     credit = credits_of(site, created)
     foot = len(rows) * LEGEND_LINE + len(credit) * CREDIT_LINE + MARGIN / 2
     page = height + heading.height + foot
-    figure = Figure((width, page), dpi=DPI, facecolor=PAPER)
-    FigureCanvasAgg(figure)  # measures text
+    figure = new_page((width, page), DPI)
     view = figure.add_axes((0.0, foot / page, 1.0, height / page))
     view.set(xticks=(), yticks=(), facecolor=BACKGROUND_COLOUR)
     view.spines[:].set_visible(False)

@@ -7,7 +7,6 @@ from functools import partial
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from shapely.geometry.base import BaseGeometry
@@ -26,6 +25,7 @@ from .drawing import (
     draw_sensors,
     heading_of,
     markers_of,
+    new_page,
     save_png,
 )
 from .palette import INK, PAPER
@@ -91,10 +91,8 @@ def draw_plan(
     window = _window(shown, map_height)
     content = map_content(geometry, site, deployment, window)
     heading, legend = heading_of(site, deployment, MAP_WIDTH), PlanLegend(content, MAP_WIDTH, notes)
-    figure = Figure(
-        (MAP_WIDTH + 2 * MARGIN, heading.height + map_height + legend.height + 2 * MARGIN), dpi=DPI, facecolor=PAPER
-    )
-    FigureCanvasAgg(figure)  # measures text
+    size = (MAP_WIDTH + 2 * MARGIN, heading.height + map_height + legend.height + 2 * MARGIN)
+    figure = new_page(size, DPI)
     heading.draw(figure, MARGIN)
     foot = legend.height + 2 * MARGIN
     plan = add_axes(figure, MARGIN, foot, MAP_WIDTH, map_height)

@@ -1,11 +1,10 @@
 """Scale bar and north arrow of a map."""
 
-import math
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
+from ...counts import round_number
 from .palette import INK, PAPER
 from .plan_style import Style
 
@@ -15,7 +14,7 @@ TEXT = 6.0  # drawing order: over the map and under its sensors
 
 def draw_scale(plan: Axes, inch: float, longest: float = 2.0) -> None:
     """Draw a scale bar of a round length, at most ``longest`` inches; ``inch`` is an inch of the plan in metres."""
-    length = _scale_length(inch, longest)
+    length = round_number(longest * inch)
     left, bottom = plan.get_xlim()[0] + 0.25 * inch, plan.get_ylim()[0] + 0.25 * inch
     _draw_paper(plan, *scale_paper(plan.get_xlim()[0], plan.get_ylim()[0], inch, longest))
     for part in range(4):
@@ -28,15 +27,9 @@ def draw_scale(plan: Axes, inch: float, longest: float = 2.0) -> None:
         plan.text(left + at, bottom + 0.13 * inch, words, **style)
 
 
-def _scale_length(inch: float, longest: float) -> float:
-    """Return the largest round length, metres, of at most so many inches of the plan."""
-    decade = 10.0 ** math.floor(math.log10(longest * inch))
-    return max(step * decade for step in (1, 2, 5) if step * decade <= longest * inch)
-
-
 def scale_paper(left: float, bottom: float, inch: float, longest: float = 2.0) -> tuple[float, float, float, float]:
     """Return left, bottom, width and height of what the scale is drawn on, in the map's lower left corner."""
-    return left + 0.12 * inch, bottom + 0.13 * inch, _scale_length(inch, longest) + 0.55 * inch, 0.52 * inch
+    return left + 0.12 * inch, bottom + 0.13 * inch, round_number(longest * inch) + 0.55 * inch, 0.52 * inch
 
 
 def north_paper(right: float, top: float, inch: float) -> tuple[float, float, float, float]:

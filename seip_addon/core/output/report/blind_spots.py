@@ -7,12 +7,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 from ...arrays import Boolean, Float, Integer
+from ...site.locations import DIRECTIONS, direction
 from ...site.targets import Targets
 from ..results.site_file import PLACE, WEIGHTED, Area
 
-DIRECTIONS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
 ARMS = DIRECTIONS[::2]
 MIN_DISTANCE = 0.5  # metres from a centre from which on there is a direction from it
 
@@ -139,9 +140,9 @@ def _where(own: Integer, middle: Float, targets: Targets, areas: Sequence[Area])
     A page names the only centre before its list of blind spots.
     """
     origins = centres(targets, areas)
-    (nearest,), (angle,), (distance,) = _from_nearest(origins, middle[None])
-    direction = DIRECTIONS[round(float(angle) / (math.pi / 4)) % 8]
-    away = f"{distance:.0f} m {direction} of" if distance >= MIN_DISTANCE else "at"
+    (nearest,), _, (distance,) = _from_nearest(origins, middle[None])
+    towards = direction(middle[:2] - origins[nearest].xy)
+    away = f"{distance:.0f} m {towards} of" if distance >= MIN_DISTANCE else "at"
     words = f"{away} the centre" + (f" of {origins[nearest].name}" if len(origins) > 1 else "")
     shares = [(int(area.within[own].sum()), area.name) for area in areas]
     most, name = max(shares, key=lambda one: one[0], default=(0, ""))
@@ -149,25 +150,10 @@ def _where(own: Integer, middle: Float, targets: Targets, areas: Sequence[Area])
 
 
 def _components(places: Float) -> Integer:
-    """Return a number for each whole place (n, 2), the same for those that are joined by steps of one."""
-    column, row = places.astype(np.int64).T
-    width = int(row.max(initial=0)) + 2  # no row's end is beside another's beginning
-    code = column * width + row
-    order = np.argsort(code)
-    labels = np.arange(len(code))
-    ones, others = [], []
-    for step in (1, width):
-        at = np.searchsorted(code[order], code + step)
-        found = np.flatnonzero((at < len(code)) & (code[order[np.minimum(at, len(code) - 1)]] == code + step))
-        ones.append(found)
-        others.append(order[at[found]])
-    one, other = np.concatenate(ones), np.concatenate(others)
-    while True:
-        lower = np.minimum(labels[one], labels[other])
-        new = labels.copy()
-        np.minimum.at(new, one, lower)
-        np.minimum.at(new, other, lower)
-        new = new[new]
-        if np.array_equal(new, labels):
-            return labels
-        labels = new
+    """Return a number for each whole place (n, 2), the same for those whose squares are joined by sides."""
+    squares, of = np.unique(places, axis=0, return_inverse=True)
+    parts = shapely.get_parts(shapely.coverage_union_all(shapely.box(*squares.T, *(squares + 1.0).T)))
+    part, square = shapely.STRtree(shapely.points(squares + 0.5)).query(parts, predicate="contains")
+    labels = np.empty(len(squares), dtype=np.int64)
+    labels[square] = part
+    return np.asarray(labels[of.ravel()])

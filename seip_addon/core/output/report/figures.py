@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import ListedColormap
-from matplotlib.figure import Figure
 
 from ...arrays import Float
-from ...choosing.placement.objective import FrontPoint
-from ...choosing.placement.returns_summary import ReturnsPoint, returns_text
-from ..pictures.drawing import as_png, draw_attribution, draw_callouts
+from ..pictures.drawing import as_png, draw_attribution, draw_callouts, new_page
 from ..pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
 from ..pictures.plan_style import Style
 from ..pictures.scale_bar import draw_north, draw_scale, north_paper, scale_paper
@@ -35,8 +30,7 @@ def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
     sensors = np.array([sensor.local_m[:2] for sensor in evidence.sensors]).reshape(-1, 2)
     window = _window(np.vstack((targets.xyz[:, :2], sensors)))
     page = (MAP_WIDTH, MAP_WIDTH * (window[3] - window[1]) / (window[2] - window[0]))
-    figure = Figure(page, dpi=DPI, facecolor=PAPER)
-    FigureCanvasAgg(figure)
+    figure = new_page(page, DPI)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set(xticks=(), yticks=())
     axes.spines[:].set(color=SOFT_INK, linewidth=0.8)
@@ -93,18 +87,20 @@ def _apart(points: Float, distance: float) -> Float:
     return moved
 
 
-@dataclass(frozen=True)
-class FrontPlot:
-    """Values to chart against the number of sensors.
+def front_chart(
+    rows: Sequence[tuple[int, float, float]],
+    placed: tuple[int, float],
+    label: str,
+    text: Callable[[float], str],
+    high: float,
+) -> bytes:
+    """Return values against the number of sensors as PNG.
 
     Parameters
     ----------
-    counts : sequence of int
-        Numbers of sensors.
-    values : sequence of float
-        Value of the best placement found for each number.
-    more : sequence of float
-        Largest amount by which the value of another placement could be larger.
+    rows : sequence of (int, float, float)
+        Number of sensors, value of the best placement found for it, and the largest amount by which the value of
+        another placement could be larger.
     placed : (int, float)
         Number of sensors and value of the placement itself.
     label : str
@@ -114,73 +110,21 @@ class FrontPlot:
     high : float
         Upper end of the axis.
     """
-
-    counts: Sequence[int]
-    values: Sequence[float]
-    more: Sequence[float]
-    placed: tuple[int, float]
-    label: str
-    text: Callable[[float], str]
-    high: float
-
-
-def coverage_front(points: Sequence[FrontPoint], placed: tuple[int, float]) -> FrontPlot:
-    """Return the road seen against the number of sensors.
-
-    Parameters
-    ----------
-    placed : (int, float)
-        Number of sensors and covered share of the weight of the placement.
-    """
-    return FrontPlot(
-        counts=[point.count for point in points],
-        values=[100 * point.coverage for point in points],
-        more=[100 * point.missed for point in points],
-        placed=(placed[0], 100 * placed[1]),
-        label="road seen, %",
-        text=lambda value: f"{value:.1f}%",
-        high=100.0,
-    )
-
-
-def returns_front_plot(points: Sequence[ReturnsPoint], placed: tuple[int, float]) -> FrontPlot:
-    """Return the typical number of returns against the number of sensors.
-
-    Parameters
-    ----------
-    placed : (int, float)
-        Number of sensors and typical number of returns of the placement.
-    """
-    more = [(1.0 + point.returns) * (point.gap or 0.0) for point in points]  # gaps are shares of 1 + returns
-    return FrontPlot(
-        counts=[point.count for point in points],
-        values=[point.returns for point in points],
-        more=more,
-        placed=placed,
-        label="typical points on a road user",
-        text=returns_text,
-        high=max(point.returns + extra for point, extra in zip(points, more, strict=True)),
-    )
-
-
-def front_chart(plot: FrontPlot) -> bytes:
-    """Return values against the number of sensors as PNG."""
-    figure = Figure(CHART_SIZE, dpi=DPI, facecolor=PAPER, layout="constrained")
-    FigureCanvasAgg(figure)
+    counts, values, more = zip(*rows, strict=True)
+    figure = new_page(CHART_SIZE, DPI, layout="constrained")
     axes = figure.add_subplot()
     style: Style = {"color": SEEN_COLOURS[2], "ecolor": SOFT_INK, "capsize": 4, "markersize": 8}
-    more = np.array([np.zeros(len(plot.more)), plot.more])
-    axes.errorbar(plot.counts, plot.values, yerr=more, marker="o", linewidth=1.6, **style)
-    for place in zip(plot.counts, plot.values, strict=True) if len(plot.counts) <= MOST_LABELLED else ():
+    axes.errorbar(counts, values, yerr=np.array([np.zeros(len(more)), more]), marker="o", linewidth=1.6, **style)
+    for place in zip(counts, values, strict=True) if len(counts) <= MOST_LABELLED else ():
         about: Style = {"xytext": (0, -18), "textcoords": "offset points", "ha": "center", "size": 10}
-        axes.annotate(plot.text(place[1]), place, **about)
+        axes.annotate(text(place[1]), place, **about)
     ring: Style = {"markersize": 17, "mfc": "none", "mec": INK, "mew": 1.8, "linestyle": "none"}
-    axes.plot(*plot.placed, marker="o", label="this placement", **ring)
+    axes.plot(*placed, marker="o", label="this placement", **ring)
     axes.set_xlabel("number of sensors", size=11)
-    axes.set_ylabel(plot.label, size=11)
-    axes.set_xticks(plot.counts)
+    axes.set_ylabel(label, size=11)
+    axes.set_xticks(counts)
     axes.tick_params(labelsize=10)
-    low, high = min(plot.values), plot.high
+    low = min(values)
     axes.set_ylim(low - max(0.04 * high, 0.2 * (high - low)), high + max(0.01 * high, 0.06 * (high - low)))
     axes.margins(x=0.08)
     axes.grid(visible=True, color="#d8dde1", linewidth=0.6)

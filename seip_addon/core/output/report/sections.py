@@ -37,7 +37,7 @@ from ..results.verification_text import (
 from .blind_spots import BlindSpot, blind_spots, centres, seen_places
 from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Report, Section, Table
 from .evidence import Evidence
-from .figures import blind_spot_map, coverage_front, front_chart, returns_front_plot
+from .figures import blind_spot_map, front_chart
 from .losses import failures
 from .repeat import repeating_command
 from .wording import (
@@ -463,7 +463,13 @@ def _front(evidence: Evidence) -> Iterator[Block]:
         f"search see:{weighted}{_without_budget(record)}"
     )
     yield Picture(
-        front_chart(coverage_front(record.front, (len(record.sensors), _weighted_share(evidence)))),
+        front_chart(
+            [(point.count, 100 * point.coverage, 100 * point.missed) for point in record.front],
+            (len(record.sensors), 100 * _weighted_share(evidence)),
+            "road seen, %",
+            "{:.1f}%".format,
+            100.0,
+        ),
         "Road seen by number of sensors; a line above a point extends to what no choice can exceed.",
     )
     rows = tuple(
@@ -480,13 +486,21 @@ def _front(evidence: Evidence) -> Iterator[Block]:
 
 def _returns_front(record: PlacementRecord, returns: ReturnsSummary) -> Iterator[Block]:
     """Return the table of numbers of sensors of a placement that was chosen for returns."""
+    # Gaps are shares of 1 + returns.
+    charted = [(one.count, one.returns, (1.0 + one.returns) * (one.gap or 0.0)) for one in returns.front]
     yield Paragraph(
         "With fewer or more sensors under the same rules, regardless of price, the best choices found by a short "
         "search typically measure these numbers of points on a road user in each revolution; shares in the last "
         f"column are of 1 + points.{_without_budget(record)}"
     )
     yield Picture(
-        front_chart(returns_front_plot(returns.front, (len(record.sensors), returns.typical))),
+        front_chart(
+            charted,
+            (len(record.sensors), returns.typical),
+            "typical points on a road user",
+            returns_text,
+            max(value + more for _, value, more in charted),
+        ),
         "Typical points on a road user by number of sensors; where there is a proof, a line above a point extends to "
         "what no choice can exceed.",
     )

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from ...counts import counted
+from ...site.locations import direction
 from .verification_record import RecordedChange, RecordedPose, RecordedSteps, VerificationRecord
 
 LEAST_COST = 0.0005
 """Share of coverage that is shown as 0.1 points."""
 
-_DIRECTIONS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
 _LEAST_SHIFT, _LEAST_ANGLE = 0.005, 0.05  # metres and degrees that are shown as 0.01 m and 0.1 degrees
 _NAMED = 3  # changes that are named in a sentence
 
@@ -39,8 +39,7 @@ def _direction_text(pose: RecordedPose) -> str:
         parts.append(f"turned {abs(turn):.1f}° {'counter-clockwise' if turn > 0 else 'clockwise'} as seen from above")
     if lean >= _LEAST_ANGLE:
         # A rotation vector (x, y) about horizontal axes moves the top of the sensor along (y, -x).
-        towards = _DIRECTIONS[round(math.atan2(-lean_x, lean_y) / (math.pi / 4)) % 8]
-        parts.append(f"tilted {lean:.1f}° to the {towards}")
+        parts.append(f"tilted {lean:.1f}° to the {direction((lean_y, -lean_x))}")
     within = _within(max(pose.rotation_half_width_deg), 100, "hundredths of a degree", "one hundredth of a degree")
     if not parts:
         return f"It points as planned, within {within}."

@@ -3,7 +3,6 @@
 Follows https://www.cityjson.org/specs/2.0.1; all contents of a file are checked.
 """
 
-import json
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,6 +17,7 @@ from ...errors import SeipError
 from ...geometry.reference_systems import epsg_code
 from ...limits import ELEVATION, MAP_COORDINATE
 from ...site.sources import one_line
+from ...storage.files import parse_json, read_small
 
 VERSIONS = ("1.1", "2.0")
 HIGHEST_LOD = 2.2
@@ -116,13 +116,7 @@ def _attribution(content: dict[str, Any]) -> str:
 def _parsed(path: Path) -> dict[str, Any]:
     name = path.name
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise SeipError(f"{name} is larger than {MAX_BYTES / 1e6:.0f} MB; {_CUT}")
-        content = json.loads(path.read_bytes(), parse_constant=_refuse_constant)
-    except FileNotFoundError as error:
-        raise SeipError(f"no such file: {path}; check its path") from error
-    except OSError as error:
-        raise SeipError(f"cannot read {path}: {error.strerror or error}; check that it is a readable file") from error
+        content = parse_json(read_small(path, MAX_BYTES, _CUT))
     except (ValueError, RecursionError) as error:  # invalid JSON, encoding or numbers
         sequence = "a sequence of features is collected into one model by cjseq collect"
         why = sequence if "Extra data" in str(error) else f"{str(error)[:120]}; download the model again"
@@ -138,17 +132,13 @@ def _parsed(path: Path) -> dict[str, Any]:
     return content
 
 
-def _refuse_constant(constant: str) -> NoReturn:
-    raise ValueError(f"{constant} is not a number")
-
-
 def _code(content: Mapping[str, Any]) -> int | None:
     metadata = content.get("metadata")
     text = metadata.get("referenceSystem") if isinstance(metadata, dict) else None
     return epsg_code(text) if isinstance(text, str) else None
 
 
-_CUT = "cut the place out of it (cjio model.city.json subset --bbox minx miny maxx maxy save place.city.json)"
+_CUT = "cut the place out of the model (cjio model.city.json subset --bbox minx miny maxx maxy save place.city.json)"
 
 
 class _Reader:

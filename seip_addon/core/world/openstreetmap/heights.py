@@ -18,7 +18,7 @@ import heapq
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -146,31 +146,22 @@ class _Strand:
         return int(self.nodes[-1 if (contact == "end") != back else 0])
 
 
-@dataclass(eq=False)
 class _Network:
     """Graph of places along streets, with the largest height difference between neighbouring places."""
 
-    road_map: RoadMap
-    lanes: Mapping[str, Sequence[LaneSurface]]
-    sources: Mapping[str, str]
-    ways: Mapping[int, Way]
-    structures: Structures
-    ground: Ground | None
-    strands: list[_Strand] = field(default_factory=list)
-    strand_of: dict[str, _Strand] = field(default_factory=dict)
-    xy: Float = field(default_factory=lambda: np.empty((0, 2)))
-    heading: Float = field(default_factory=lambda: np.empty(0))
-    rise: Float = field(default_factory=lambda: np.empty(0))
-    """Heights of the ground, straight between the ends of bridges, (n,) metres."""
-    start: Float = field(default_factory=lambda: np.empty(0))
-    """Heights of the map on that ground, (n,) metres."""
-    banks: Float = field(default_factory=lambda: np.empty(0))
-    """Heights of bridges between their banks, (n,) metres; elsewhere minus infinity."""
-    layers: Integer = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    streets: Integer = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    limits: list[list[tuple[int, float]]] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        road_map: RoadMap,
+        lanes: Mapping[str, Sequence[LaneSurface]],
+        sources: Mapping[str, str],
+        ways: Mapping[int, Way],
+        structures: Structures,
+        ground: Ground | None,
+    ) -> None:
+        self.road_map, self.lanes, self.sources = road_map, lanes, sources
+        self.ways, self.structures, self.ground = ways, structures, ground
+        self.strands: list[_Strand] = []
+        self.strand_of: dict[str, _Strand] = {}
         # Places are sampled along streets only. Roads within junctions get no places: they link the ends of streets,
         # and their heights follow from these ends (`above_ground`).
         own = [road for road in self.road_map.roads if road.junction_id is None]
@@ -188,6 +179,7 @@ class _Network:
             grounds.append(road.elevation(along))
             count += len(along)
         self.xy, self.heading = np.concatenate(places), np.concatenate(headings)
+        # Heights of the ground, straight between the ends of bridges, and of bridges between their banks, metres.
         self.rise = self._rise(self.xy)
         self.banks = np.full(count, -np.inf)
         of_strand = np.repeat(np.arange(len(self.strands)), [len(one.nodes) for one in self.strands])
@@ -201,8 +193,8 @@ class _Network:
                 self.rise[strand.nodes] = _straight(self.rise[ends], len(strand.nodes))
                 if self.ground is not None:
                     self.banks[strand.nodes] = _straight(self._rise(self._outside(ends)), len(strand.nodes))
-        self.start = np.concatenate(grounds) + self.rise
-        self.limits = [[] for _ in range(count)]
+        self.start = np.concatenate(grounds) + self.rise  # heights of the map on that ground, metres
+        self.limits: list[list[tuple[int, float]]] = [[] for _ in range(count)]
         on_bank = self._on_bank()
         for one, other, limit in self._pairs():
             # Terrain may be steeper than the grade, so the limit is never below the difference that exists already: the

@@ -39,7 +39,6 @@ from .map_furniture import (
     arm_heading,
     building_parts,
     facade,
-    footprint,
     is_trunk,
     landings,
     local_objects,
@@ -47,7 +46,7 @@ from .map_furniture import (
     pole_part,
     tree_part,
 )
-from .named_places import named_places, street_names
+from .named_places import area_in_plan, named_places, street_names
 from .object_kinds import Kind, kind_of
 from .parts import Part
 from .place import SCENE_MARGIN, Place, shifted
@@ -431,10 +430,7 @@ def _without_covered(
 
 
 def _is_covered(placed: PlacedObject, modelled: shapely.STRtree) -> bool:
-    rings = [outline.base for outline in placed.outlines if len(outline.base) >= 3]
-    rings = rings or [footprint(placed) + placed.position]
-    area = shapely.union_all([shapely.make_valid(shapely.Polygon(ring[:, :2])) for ring in rings])
-    return covered_share(area, modelled) > MAX_COVERED
+    return covered_share(area_in_plan(placed), modelled) > MAX_COVERED
 
 
 def _map_title(name: str, junction: str | None) -> str:

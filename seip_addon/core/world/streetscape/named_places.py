@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
@@ -10,6 +9,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ...geometry.plan import without
+from ...site.locations import direction
 from ...site.scene_geometry import NamedArea
 from ..opendrive.lanes import LaneSurface
 from ..opendrive.objects import PlacedObject
@@ -22,7 +22,6 @@ ASSUMED_CROSSING = "Assumed crossing"
 """Name of a crossing in the map of an extract that the extract itself does not contain."""
 MAX_MEDIAN = 6.0  # metres between the crossings of two carriageways that are one
 ROUNDABOUT = "Roundabout"
-DIRECTIONS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
 _MIDDLE = shapely.Point(0.0, 0.0)  # of the place, local axes
 GRID = 1e-3  # metres to which outlines are rounded, so that intersections do not fail
 LEAST_AREA = 1.0
@@ -82,8 +81,8 @@ def _crossings(
     for one in objects:
         if one.kind == CROSSING:
             is_assumed = one.name == ASSUMED_CROSSING
-            area = shapely.intersection(_area(one), region, grid_size=GRID)
-            name = one.name if one.name and not is_assumed else _crossed(streets, _area(one))
+            area = shapely.intersection(area_in_plan(one), region, grid_size=GRID)
+            name = one.name if one.name and not is_assumed else _crossed(streets, area_in_plan(one))
             area = without_crumbs(without(area, taken))  # streets that meet at an acute angle are crossed together
             if area.area >= LEAST_AREA:
                 taken = taken.union(area)
@@ -116,14 +115,14 @@ def _by_arm(name: str, area: BaseGeometry, region: BaseGeometry) -> Iterator[tup
     for part in shapely.get_parts(shapely.intersection(area, region, grid_size=GRID)):
         if part.area >= LEAST_AREA:
             arms.setdefault(_direction(part), []).append(part)
-    for direction, parts in arms.items():
-        yield (f"{name}, {direction} arm" if len(arms) > 1 else name), shapely.union_all(parts)
+    for towards, parts in arms.items():
+        yield (f"{name}, {towards} arm" if len(arms) > 1 else name), shapely.union_all(parts)
 
 
 def _direction(area: BaseGeometry) -> str:
     """Return the compass direction from the centre of the place to an area."""
     middle = area.centroid
-    return DIRECTIONS[round(math.atan2(middle.y, middle.x) / (math.tau / len(DIRECTIONS))) % len(DIRECTIONS)]
+    return direction((middle.x, middle.y))
 
 
 def street_names(road_map: RoadMap) -> dict[str, str]:
@@ -146,8 +145,8 @@ def _crossed(streets: Mapping[str, BaseGeometry], area: BaseGeometry) -> str:
     return f"Crossing of {nearest}" if nearest else ""
 
 
-def _area(crossing: PlacedObject) -> BaseGeometry:
-    rings = [outline.base for outline in crossing.outlines if len(outline.base) >= 3] or [
-        footprint(crossing) + crossing.position
-    ]
+def area_in_plan(placed: PlacedObject) -> BaseGeometry:
+    """Return the area in plan of an object: of its outlines, or of its box or cylinder."""
+    rings = [outline.base for outline in placed.outlines if len(outline.base) >= 3]
+    rings = rings or [footprint(placed) + placed.position]
     return shapely.union_all([shapely.make_valid(shapely.Polygon(ring[:, :2])) for ring in rings])

@@ -8,6 +8,7 @@ import shapely
 
 from ...arrays import Float
 from ...geometry.solids import Solid
+from .terrain import triangulate
 
 HIPPED = {"hipped", "half-hipped", "mansard", "side_hipped", "side_half-hipped"}
 RIDGED = {"gabled", "gambrel", "saltbox", "round", *HIPPED}
@@ -57,7 +58,7 @@ def house(outline: shapely.Polygon, base: float, eaves: float, *, side: str, roo
     """
     outline = shapely.set_precision(shapely.remove_repeated_points(outline), _GRID)
     rise = _Rise(outline, roof)
-    triangles = np.concatenate([_triangles(piece) for piece in rise.pieces])
+    triangles = np.concatenate([triangulate(piece, least=0.0) for piece in rise.pieces])
     corners, index = np.unique(triangles.reshape(-1, 2), axis=0, return_inverse=True)
     index = index.reshape(-1, 3)
     count = len(corners)
@@ -73,16 +74,6 @@ def house(outline: shapely.Polygon, base: float, eaves: float, *, side: str, roo
     faces = (*walls, *caps, *floors)
     materials = (*([side] * len(walls)), *(["roof"] * len(caps)), *([side] * len(floors)))
     return Solid(np.concatenate([top, floor]), faces, materials)
-
-
-def _triangles(piece: shapely.Polygon) -> Float:
-    """Return a polygon as counter-clockwise triangles (n, 3, 2) that use only its corners."""
-    parts = shapely.get_parts(shapely.constrained_delaunay_triangles(piece))
-    corners = shapely.get_coordinates([part.exterior for part in parts]).reshape(-1, 4, 2)[:, :3]
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    turn = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    turned: Float = np.where(turn[:, None, None] < 0, corners[:, ::-1], corners)
-    return np.asarray(turned[np.abs(turn) > 0.0])
 
 
 class _Rise:

@@ -234,13 +234,16 @@ def _cells(area: BaseGeometry, spacing: float, steep: BaseGeometry | None = None
     return kept
 
 
-def triangulate(area: BaseGeometry | NDArray[np.object_]) -> Float:
-    """Return (n, 3, 2) counter-clockwise triangles that fill areas in plan, without additional corners."""
+def triangulate(area: BaseGeometry | NDArray[np.object_], least: float = MIN_AREA) -> Float:
+    """Return (n, 3, 2) counter-clockwise triangles that fill areas in plan, without additional corners.
+
+    Triangles of at most ``least`` square metres are left out.
+    """
     pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(area))
     corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
     area = signed_area(corners)
     corners[area < 0] = corners[area < 0, ::-1]
-    kept: Float = corners[np.abs(area) > MIN_AREA]
+    kept: Float = corners[np.abs(area) > least]
     return kept
 
 

@@ -2,14 +2,13 @@
 
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from ...errors import SeipError
-from ...sensing.traffic.varied_bodies import draw_size
 from ...settings import setting
 from ...storage.files import whole_file
 from .street_network import DRIVING, PARKED_CLASS, PARKING, WALKING, NetworkEdge, NetworkLane, StreetNetwork
@@ -22,6 +21,8 @@ _DELIVERY_SHARE = 0.35  # of the vans and trucks; they stop once on their way
 _STOP_SECONDS = (20.0, 60.0)  # seconds
 _PARKED_GAP = 0.5  # least metres between parked cars
 _BAY_LENGTH = 6.5  # metres of kerb for a parked car
+MAX_PARKED_LENGTH = _BAY_LENGTH - _PARKED_GAP  # metres
+PARKED = "parked_"  # begins the types of parked vehicles
 _OCCUPIED_SHARE = 0.6  # of the bays in parking lanes
 _FIRST_BAY = 35.0  # metres from the start of the street
 _ROWS_ALONG = 2  # positions for a row of cars along the kerb of a street, one behind the other
@@ -87,26 +88,17 @@ VEHICLE_SHARES = {"car": 0.58, "van": 0.13, "truck": 0.10, "bus": 0.06, "motorcy
 """Shares of the vehicles that enter on each arm."""
 
 
-@dataclass(frozen=True)
-class KerbParking:
-    """Rows of parked cars in the outer of several lanes of streets on which vehicles leave the network.
+Bay = tuple[NetworkEdge, NetworkLane, float]
+"""Street, lane and middle (metres along it) of a parked car."""
 
-    Parameters
-    ----------
-    bays : int
-        Number of bays in a row.
-    occupied : float
-        Share of the bays with a car.
-    streets : float
-        Share of the streets with room for a row that have one.
-    first : float, metres
-        Distance from the start of the street to the first bay.
-    """
 
-    bays: int = 3
-    occupied: float = 1.0
-    streets: float = 0.5
-    first: float = _FIRST_BAY
+class Departure(NamedTuple):
+    """An element of the route file: when it departs (seconds), its id, its type, and its text without that."""
+
+    depart: float
+    name: str
+    type: str
+    text: str
 
 
 @dataclass(frozen=True)
@@ -123,10 +115,6 @@ class Demand:
         Pedestrians that start, per arm of the network.
     shares : mapping of str to float
         Shares of the vehicles by category.
-    own_sizes : bool
-        Whether each road user has its own size, drawn as in `varied_bodies`, instead of a model's.
-    kerb : KerbParking
-        Parking at kerbs, used if no street has parking lanes.
     """
 
     flow: float = setting(600.0, "vehicles per hour and arm", maximum=MAX_FLOW, metavar="N")
@@ -135,8 +123,6 @@ class Demand:
     )
     pedestrians: float = setting(200.0, "persons per hour and arm", minimum=0.0, maximum=MAX_FLOW, metavar="N")
     shares: Mapping[str, float] = field(default_factory=VEHICLE_SHARES.copy)
-    own_sizes: bool = False
-    kerb: KerbParking = KerbParking()
 
     def __post_init__(self) -> None:
         if not 0.0 < self.flow <= MAX_FLOW:
@@ -152,6 +138,17 @@ class Demand:
             raise SeipError(
                 f"shares of vehicles must be for {', '.join(VEHICLE_SHARES)}, with one above 0, not {self.shares}"
             )
+
+    def own_types(self, departures: Sequence[Departure], seed: int) -> Mapping[str, str]:  # noqa: ARG002
+        """Return the elements of types that departures have instead of a model's, by the names of these.
+
+        Here there are none; a demand whose road users differ returns those of `type_line`.
+        """
+        return {}
+
+    def kerb_bays(self, network: StreetNetwork, seed: int, random: np.random.Generator) -> Iterator[Bay]:  # noqa: ARG002
+        """Return the bays with parked cars at kerbs, used if no street has parking lanes."""
+        return rows_at_kerbs(network, seed)
 
 
 def write_routes(
@@ -175,7 +172,7 @@ def write_routes(
     # Parking, each arm, pedestrians and sizes have random streams of their own: changing the demand of one of them
     # does not change the draws of the others.
     random = np.random.default_rng([seed, 0])
-    bays = _bays(network, demand.kerb, seed, random)
+    bays = _bays(network, demand, seed, random)
     entries = list(_parked(bays, seed, random))
     # Deliveries stop in the outer lane: not on streets where parked cars stand in it.
     free = set(network.edges) - {edge.id for edge, lane, _ in bays if lane.use == DRIVING}
@@ -186,57 +183,29 @@ def write_routes(
             entries.append(_vehicle(f"{seed}.{arm.id}.{len(entries)}", depart, route, demand.shares, free, random))
     entries += _walkers(network, demand.pedestrians * len(arms), seed, duration)
     entries.sort(key=lambda entry: entry.depart)
-    own = _own_type_lines(entries, np.random.default_rng([seed, 3])) if demand.own_sizes else ()
-    texts = (entry.text.format(type=entry.name if demand.own_sizes else entry.type) for entry in entries)
-    lines = ["<routes>", *_type_lines(), *own, *texts, "</routes>"]
+    own = demand.own_types(entries, seed)
+    texts = (entry.text.format(type=entry.name if entry.name in own else entry.type) for entry in entries)
+    lines = ["<routes>", *_type_lines(), *own.values(), *texts, "</routes>"]
     with whole_file(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-class _Departure(NamedTuple):
-    """An element of the route file: when it departs (seconds), its id, its type, and its text without that."""
-
-    depart: float
-    name: str
-    type: str
-    text: str
 
 
 def _type_lines() -> Iterator[str]:
     for models in MODELS.values():
         for name, model in models.items():
-            yield _driven_type(name, model)
+            yield type_line(name, model)
             if model.v_class in ("passenger", "delivery"):
-                yield _parked_type(f"{_PARKED}{name}", model)
+                yield type_line(f"{PARKED}{name}", model, parked=True)
 
 
-_PARKED = "parked_"  # begins the types of parked vehicles
-
-
-def _own_type_lines(entries: list[_Departure], random: np.random.Generator) -> Iterator[str]:
-    """Yield a type for each road user, with its own size; parked vehicles fit into their bays."""
-    known = {name: (category, model) for category, models in MODELS.items() for name, model in models.items()}
-    for entry in entries:
-        parked = entry.type.startswith(_PARKED)
-        category, model = known[entry.type.removeprefix(_PARKED)]
-        size = draw_size(category, random)
-        while parked and size[0] > _BAY_LENGTH - _PARKED_GAP:
-            size = draw_size(category, random)
-        own = model._replace(length=size[0], width=size[1], height=size[2])
-        yield _parked_type(entry.name, own) if parked else _driven_type(entry.name, own)
-
-
-def _driven_type(name: str, model: RoadUserModel) -> str:
-    stop = "" if model.v_class == "pedestrian" else ' jmStoplineGap="1.5" lcKeepRight="0"'
-    return _type_line(name, model.v_class, model, stop)
-
-
-def _parked_type(name: str, model: RoadUserModel) -> str:
-    return _type_line(name, PARKED_CLASS, model, f' minGap="{_PARKED_GAP}"')
-
-
-def _type_line(name: str, v_class: str, model: RoadUserModel, more: str) -> str:
+def type_line(name: str, model: RoadUserModel, *, parked: bool = False) -> str:
+    """Return the type of a model, or of a parked vehicle of it, as an element of a route file."""
     length, width, height = model.length, model.width, model.height
+    if parked:
+        v_class, more = PARKED_CLASS, f' minGap="{_PARKED_GAP}"'
+    else:
+        v_class = model.v_class
+        more = "" if v_class == "pedestrian" else ' jmStoplineGap="1.5" lcKeepRight="0"'
     return (
         f'<vType id="{name}" vClass="{v_class}" guiShape="{model.shape}" length="{length}" width="{width}" '
         f'height="{height}" maxSpeed="{model.speed}"{more}/>'
@@ -265,13 +234,13 @@ def _vehicle(
     share_of: Mapping[str, float],
     free: set[str],
     random: np.random.Generator,
-) -> _Departure:
+) -> Departure:
     categories, shares = list(share_of), np.array(list(share_of.values()))
     category = str(random.choice(categories, p=shares / shares.sum()))
     delivers = category in {"van", "truck"} and random.random() < _DELIVERY_SHARE
     stop = _delivery([edge for edge in route if edge.id in free], random) if delivers else ""
     edges = " ".join(edge.id for edge in route)
-    return _Departure(
+    return Departure(
         depart,
         f"{category}-{number}",
         _pick(MODELS[category], random),
@@ -307,13 +276,11 @@ def _delivery(streets: list[NetworkEdge], random: np.random.Generator) -> str:
     return f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{random.uniform(*_STOP_SECONDS):.0f}"/>'
 
 
-def _bays(
-    network: StreetNetwork, kerb: KerbParking, seed: int, random: np.random.Generator
-) -> list[tuple[NetworkEdge, NetworkLane, float]]:
-    """Return the middles of the bays with parked cars: in parking lanes, otherwise in rows at the kerb.
+def _bays(network: StreetNetwork, demand: Demand, seed: int, random: np.random.Generator) -> list[Bay]:
+    """Return the bays with parked cars: in parking lanes, otherwise in rows at the kerb.
 
-    A row is in the outer of several lanes of some streets on which vehicles leave the network. Bays are not marked on
-    the road. Those of one seed lie between those of the others, so that parked cars stand at different positions.
+    Bays are not marked on the road. Those of one seed lie between those of the others, so that parked cars stand at
+    different positions.
     """
     shift = _BAY_LENGTH * (seed * _SHIFT % 1.0)
     bays = [
@@ -323,12 +290,12 @@ def _bays(
         for place in np.arange(_BAY_LENGTH + shift, lane.length - _BAY_LENGTH / 2.0 - 1.0, _BAY_LENGTH)
         if random.random() < _OCCUPIED_SHARE
     ]
-    return bays or list(_rows(network, kerb, seed, random))
+    if bays:
+        return bays
+    return [bay for bay in demand.kerb_bays(network, seed, random) if bay[2] < bay[1].length - _BAY_LENGTH]
 
 
-def _parked(
-    bays: list[tuple[NetworkEdge, NetworkLane, float]], seed: int, random: np.random.Generator
-) -> Iterator[_Departure]:
+def _parked(bays: list[Bay], seed: int, random: np.random.Generator) -> Iterator[Departure]:
     models = MODELS["car"] | {"small_van": MODELS["van"]["small_van"]}
     for number, (edge, lane, middle) in enumerate(bays):
         model = _pick(models, random)
@@ -338,31 +305,41 @@ def _parked(
             f'departPos="{front:.2f}" departSpeed="0"><route edges="{edge.id}"/>'
             f'<stop lane="{edge.id}_{lane.index}" endPos="{front:.2f}" duration="{_PARKING_SECONDS:.0f}"/></vehicle>'
         )
-        yield _Departure(0.0, f"parked-{seed}.{number}", f"{_PARKED}{model}", text)
+        yield Departure(0.0, f"parked-{seed}.{number}", f"{PARKED}{model}", text)
 
 
-def _rows(
-    network: StreetNetwork, kerb: KerbParking, seed: int, random: np.random.Generator
-) -> Iterator[tuple[NetworkEdge, NetworkLane, float]]:
-    """Yield the bays of rows of cars: successive seeds use other streets, then positions along them, then a shift."""
+def rows_at_kerbs(
+    network: StreetNetwork, seed: int, share: float = 0.5, count: int = 3, first: float = _FIRST_BAY
+) -> Iterator[Bay]:
+    """Yield the bays of rows in the outer of several lanes of streets on which vehicles leave the network.
+
+    Successive seeds use other streets, then positions along them, then a shift.
+
+    Parameters
+    ----------
+    share : float
+        Share of the streets with room for a row that have one.
+    count : int
+        Number of bays in a row.
+    first : float, metres
+        Distance from the start of the street to the first bay.
+    """
     exits = [
         edge for edge in network.edges.values() if len(edge.lanes_for(DRIVING)) > 1 and not network.has_next_edge(edge)
     ]
-    rows = math.ceil(kerb.streets * len(exits))
+    rows = math.ceil(share * len(exits))
     # Rows are numbered over all seeds. The remainder by the number of streets is the street, the quotient counts the
     # rows used there before: first the positions along the kerb, and when all are used, a shift by a part of a bay.
     for number in range(seed * rows, (seed + 1) * rows):
         edge = exits[number % len(exits)]
         lane = edge.lanes_for(DRIVING)[0]
         along, turn = number // len(exits) % _ROWS_ALONG, number // len(exits) // _ROWS_ALONG
-        first = kerb.first + _BAY_LENGTH * (along * kerb.bays + turn * _SHIFT % 1.0)
-        for place in first + _BAY_LENGTH * np.arange(kerb.bays):
-            held = kerb.occupied >= 1.0 or random.random() < kerb.occupied
-            if held and place < lane.length - _BAY_LENGTH:
-                yield edge, lane, float(place)
+        start = first + _BAY_LENGTH * (along * count + turn * _SHIFT % 1.0)
+        for place in start + _BAY_LENGTH * np.arange(count):
+            yield edge, lane, float(place)
 
 
-def _walkers(network: StreetNetwork, rate: float, seed: int, duration: float) -> Iterator[_Departure]:
+def _walkers(network: StreetNetwork, rate: float, seed: int, duration: float) -> Iterator[Departure]:
     random = np.random.default_rng([seed, 2])
     pavements = [
         (edge, lane)
@@ -384,7 +361,7 @@ def _walkers(network: StreetNetwork, rate: float, seed: int, duration: float) ->
         goal = int(random.choice(np.flatnonzero(within)))
         (origin, first), (target, last) = pavements[start], pavements[goal]
         begin, end = random.uniform(2.0, first.length - 2.0), random.uniform(2.0, last.length - 2.0)
-        yield _Departure(
+        yield Departure(
             depart,
             f"pedestrian-{seed}.{number}",
             _pick(MODELS["pedestrian"], random),

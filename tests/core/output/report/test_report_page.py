@@ -20,9 +20,9 @@ from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.output.pictures.close_up_sheet import TILE
+from seip_addon.core.output.report import sections
 from seip_addon.core.output.report.blocks import Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Table
 from seip_addon.core.output.report.evidence import load_evidence
-from seip_addon.core.output.report.figures import returns_front_plot
 from seip_addon.core.output.report.html import as_html
 from seip_addon.core.output.report.sections import make_report
 from seip_addon.core.output.report.wording import certificate_sentence, date, geographic, plain_warning
@@ -337,7 +337,7 @@ def test_the_table_of_numbers_is_that_of_the_record(folder):
     assert "at most 1.4 percentage points more" in text
 
 
-def test_the_table_of_numbers_of_a_placement_for_returns_is_of_returns(folder):
+def test_the_table_of_numbers_of_a_placement_for_returns_is_of_returns(folder, monkeypatch):
     front = (
         ReturnsPoint(1, 8.24, 18_000.0, 0.0),
         ReturnsPoint(3, 25.0, 54_000.0, 0.0312),
@@ -345,6 +345,9 @@ def test_the_table_of_numbers_of_a_placement_for_returns_is_of_returns(folder):
     )
     returns = ReturnsSummary(25.0, {"car": 80.0, "cyclist": 30.0, "pedestrian": 20.0}, (), front)
     evidence = load_evidence(folder)
+    charts = []
+    drawn = sections.front_chart
+    monkeypatch.setattr(sections, "front_chart", lambda *given: charts.append(given) or drawn(*given))
     report = make_report(replace(evidence, record=replace(evidence.record, returns=returns)))
     (table,) = (table for table in blocks_of(report, Table) if table.head[0] == "Sensors")
     assert table.head == ("Sensors", "Sensors, $", "Points", "Other choices")
@@ -353,9 +356,10 @@ def test_the_table_of_numbers_of_a_placement_for_returns_is_of_returns(folder):
         ("3", "54,000", "25", "at most 3.2% more"),
         ("4", "72,000", "31", "may have more"),
     )
-    plot = returns_front_plot(front, (3, 25.0))
-    assert plot.more == [0.0, pytest.approx(26.0 * 0.0312), 0.0]
-    assert plot.high == 31.0
+    ((rows, placed, _, _, high),) = charts
+    assert [more for _, _, more in rows] == [0.0, pytest.approx(26.0 * 0.0312), 0.0]
+    assert placed == (3, 25.0)
+    assert high == 31.0
     text = text_of(folder, returns=returns)
     assert "these numbers of points on a road user" in text
     assert "none sees more" not in text

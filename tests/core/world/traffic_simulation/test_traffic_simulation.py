@@ -18,24 +18,13 @@ from seip_addon.core.sensing.traffic.vehicle_types import read_vehicle_types
 from seip_addon.core.sumo_programs import find_sumo
 from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
 from seip_addon.core.world.traffic_simulation import simulation as sumo
-from seip_addon.core.world.traffic_simulation.demand import MODELS, VEHICLE_SHARES, Demand, KerbParking, write_routes
+from seip_addon.core.world.traffic_simulation.demand import MODELS, VEHICLE_SHARES, Demand, write_routes
 from seip_addon.core.world.traffic_simulation.street_network import DRIVING, PARKING, WALKING, read_network
+from tests.builders.street_network import BAYS, ROAD, edge, network, three_ways, way
 from tests.sumo_here import needs_sumo
 
 ROOT = Path(__file__).resolve().parents[4]
 MAPS = Path(os.environ.get("SEIP_MAPS", ROOT.parent / "shared" / "opendrive"))
-
-LANE = '<lane id="{edge}_{index}" index="{index}" {who} length="{length}" shape="0,0 {length},0"/>'
-ROAD, PAVEMENT, BAYS = 'disallow="pedestrian"', 'allow="pedestrian"', 'allow="custom1"'
-
-
-def edge(name, end, *lanes, length=120):
-    parts = "".join(LANE.format(edge=name, index=index, who=who, length=length) for index, who in enumerate(lanes))
-    return f'<edge id="{name}" from="x" to="{end}">{parts}</edge>'
-
-
-def way(start, end, direction, lane=0):
-    return f'<connection from="{start}" to="{end}" fromLane="{lane}" toLane="0" dir="{direction}"/>'
 
 
 @pytest.mark.parametrize(
@@ -59,26 +48,6 @@ def way(start, end, direction, lane=0):
 def test_a_network_with_impossible_figures_is_refused(tmp_path, text, complaint):
     with pytest.raises(SeipError, match=complaint):
         network(tmp_path, text)
-
-
-def network(folder, *elements):
-    path = folder / "n.net.xml"
-    path.write_text(f"<net>{''.join(elements)}</net>", encoding="utf-8")
-    return read_network(path)
-
-
-def three_ways(folder):
-    """An arm `in` that leads left, on and right, each with a pavement."""
-    return network(
-        folder,
-        '<edge id=":j_0" function="internal"><lane id=":j_0_0" index="0" length="5" shape="0,0 1,0"/></edge>',
-        edge("in", "j", PAVEMENT, ROAD),
-        *(edge(name, "out", PAVEMENT, ROAD, ROAD) for name in ("left", "on", "right")),
-        '<junction id="j" type="traffic_light" x="3" y="4"/><junction id="out" type="dead_end" x="0" y="0"/>',
-        *(way("in", name, direction, 1) for name, direction in (("left", "l"), ("on", "s"), ("right", "R"))),
-        way("in", "in", "t", 1),
-        way(":j_0", "on", "s"),
-    )
 
 
 def routes(folder, streets, seed=1, duration=3600.0, **demand):
@@ -183,36 +152,6 @@ def test_rows_of_parked_cars_leave_a_lane_and_deliveries_keep_clear(tmp_path):
     assert others
     assert not parked & set(others)
     assert not any(lane.startswith("in") for lane in others)  # it has one lane: nobody could pass
-
-
-def test_rows_at_the_kerb_are_as_asked_for(tmp_path):
-    def stops(**kerb):
-        root, _ = routes(tmp_path, three_ways(tmp_path), kerb=KerbParking(**kerb))
-        return [vehicle.find("stop") for vehicle in root.iter("vehicle") if vehicle.get("id").startswith("parked")]
-
-    assert len({stop.get("lane") for stop in stops(streets=1.0)}) == 3
-    assert not stops(bays=0)
-    assert not stops(occupied=0.0)
-    assert 0 < len(stops(bays=8, occupied=0.5, streets=1.0)) < len(stops(bays=8, streets=1.0))
-    assert min(float(stop.get("endPos")) for stop in stops(first=10.0)) < 17.0
-
-
-def test_own_sizes_are_drawn_for_each_road_user(tmp_path):
-    root, text = routes(tmp_path, three_ways(tmp_path), flow=1500.0, own_sizes=True)
-    types = finish(read_vehicle_types([tmp_path / "r.rou.xml"]))
-    moving = [entry for entry in root if entry.tag in ("vehicle", "person")]
-    assert all(entry.get("type") == entry.get("id") for entry in moving)
-    for entry in moving:
-        category, own = entry.get("id").partition("-")[0], types[entry.get("id")]
-        assert own.category in ({"car", "van"} if category == "parked" else {category})
-        assert category != "parked" or own.length <= 6.0
-    cars = [types[entry.get("id")] for entry in moving if entry.get("id").startswith("car")]
-    assert len({(car.length, car.width, car.height) for car in cars}) > 0.9 * len(cars) > 50
-    assert all(3.6 <= car.length <= 5.2 for car in cars)
-    assert text == routes(tmp_path, three_ways(tmp_path), flow=1500.0, own_sizes=True)[1]
-    _, plain = routes(tmp_path, three_ways(tmp_path), flow=1500.0)
-    drives = [line.partition('depart="')[2] for line in plain.decode().splitlines() if "<vehicle " in line]
-    assert drives == [line.partition('depart="')[2] for line in text.decode().splitlines() if "<vehicle " in line]
 
 
 @pytest.mark.parametrize("shares", [{"tram": 1.0}, {"car": 0.0}, {"car": 1.0, "bus": -0.1}, {}])

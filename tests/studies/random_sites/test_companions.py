@@ -2,15 +2,16 @@
 
 from pathlib import Path
 
+from headless.studies.random_sites.companions import MOST_COMPANIONS, with_companions
+
 import numpy as np
 import pytest
 
 from seip_addon.core.progress import finish
-from seip_addon.core.sensing.traffic.companions import MOST_COMPANIONS, with_companions
 from seip_addon.core.sensing.traffic.overlaps import find_overlaps
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 
-RUN = Path(__file__).parents[4] / "scenes" / "junction_traffic_dense" / "run-21.npz"
+RUN = Path(__file__).parents[3] / "scenes" / "junction_traffic_dense" / "run-21.npz"
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...progress import Progress
-from .overlaps import find_overlaps
-from .trajectories import SAMPLED, RoadUser, Trajectories, some_users
+from seip_addon.core.progress import Progress
+from seip_addon.core.sensing.traffic.overlaps import find_overlaps
+from seip_addon.core.sensing.traffic.trajectories import SAMPLED, RoadUser, Trajectories, some_users
+
 from .varied_bodies import draw_size
 
 IN_COMPANY = 0.4

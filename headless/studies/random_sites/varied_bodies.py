@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...arrays import Float
-from ...errors import SeipError
-from ...progress import Progress
-from .overlaps import find_overlaps
-from .trajectories import CATEGORIES, RoadUser, Trajectories
+from seip_addon.core.arrays import Float
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import Progress
+from seip_addon.core.sensing.traffic.overlaps import find_overlaps
+from seip_addon.core.sensing.traffic.trajectories import CATEGORIES, RoadUser, Trajectories
 
 CORRELATION = 0.5  # correlation of any two dimensions of one kind of road user
 REACH = 2.0  # largest distance of a drawn dimension from the mean, in standard deviations
