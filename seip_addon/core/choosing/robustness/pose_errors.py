@@ -98,20 +98,13 @@ def _standard_normal(seed: int, position: Sequence[int], draws: int) -> Float:
     return np.random.default_rng(words).standard_normal((draws, _KINDS_DRAWN))
 
 
-def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> tuple[PoseDraws, Boolean]:
+def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> PoseDraws:
     """Move sensors that a draw puts inside an object to the opposite side, or, if that fails, to the planned position.
 
     Parameters
     ----------
     xyz : (s, 3) float64, metres
         Planned positions.
-
-    Returns
-    -------
-    PoseDraws
-        Draws without sensors inside objects.
-    (n, s) bool
-        Whether each draw would have put the sensor inside an object.
     """
     shift = draws.shift.copy()
     blocked: Boolean = inside_any((xyz + shift).reshape(-1, 3), objects).reshape(shift.shape[:-1])
@@ -120,4 +113,4 @@ def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> tup
     where = np.broadcast_to(xyz, shift.shape)
     still[blocked] = inside_any(where[blocked] + shift[blocked], objects)
     shift[still] = 0.0
-    return replace(draws, shift=shift), blocked
+    return replace(draws, shift=shift)

@@ -14,11 +14,11 @@ from ..placement.risk import Risk
 from ..placement.scenarios import Scenarios
 from ..placement.search_limits import DEFAULT_LIMITS, SolverLimits
 from ..placement.solver import solve
+from .pose_study import LOW_QUANTILE
 from .robust_placement import at_least, foresee, outcomes_of, solve_robust
 from .scenario_visibility import ScenarioVisibility
 from .visibility_under_errors import draws_for, visibility_under_errors
 
-LOW_QUANTILE = 0.05  # quantile of coverage by which placements are compared
 COMPARED_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))  # compared by default
 
 
@@ -143,7 +143,7 @@ def _views(
     if not scenarios.errs:
         return ScenarioVisibility(np.packbits(problem.visible[poses], axis=1)[None], problem.visible.shape[1])
     number, seed = (scenarios.evaluated, scenarios.seed + 1) if held_out else (scenarios.optimised, scenarios.seed)
-    drawn, _ = draws_for(around, poses, scenarios.pose_errors, number, seed)
+    drawn = draws_for(around, poses, scenarios.pose_errors, number, seed)
     return (yield from visibility_under_errors(around, poses, drawn))
 
 
