@@ -125,8 +125,7 @@ def verify(
     for done, (scene, at) in enumerate(steps):
         yield Progress(done, len(steps), "computing coverage", counted=False)
         figures.append(coverage(scene, at))
-    seen = _seen_in_recording(targets, sensors, settings)
-    figures.append(float(np.mean(seen)))
+    figures.append(float(np.mean(_seen_in_recording(targets, sensors, settings))))
     objects = [change for change in changes if change.kind != VEHICLE][:_MOST_PRICED]
     costs = dict.fromkeys(map(id, changes), float("nan"))
     for done, change in enumerate(objects):
@@ -134,9 +133,7 @@ def verify(
         others = [other for other in changes if other is not change]
         costs[id(change)] = coverage(_corrected(geometry, static, others), installed) - figures[2]
     yield Progress(len(objects), len(objects), "computing what each change costs")
-    return Verification(
-        tuple(sensors), changes, tuple(costs.values()), CoverageSteps(*figures), corrected, targets, seen
-    )
+    return Verification(tuple(sensors), changes, tuple(costs.values()), CoverageSteps(*figures), corrected)
 
 
 def _paired(planned: Sequence[MountedSensor], recording: Recording) -> list[tuple[MountedSensor, SensorRecording]]:
