@@ -295,7 +295,10 @@ def site_front(  # noqa: PLR0913  # what is measured, and how much of it
     """
     settings, candidates, key = VisibilitySettings(), site.candidates, models[0].lidar.key
     check_objective(site, {key: models[0].lidar}, Objective(count=max(counts)))
-    engines = {model.name: VisibilityModel(site, settings, model.caster(site.triangles)) for model in models}
+    targets, reflectivity = site.targets.xyz, site.reflectivity
+    engines = {
+        model.name: VisibilityModel(targets, reflectivity, settings, model.caster(site.triangles)) for model in models
+    }
     costs = {model.name: Cost() for model in models}
     seen = {model.name: np.zeros((len(candidates), len(site.targets)), dtype=bool) for model in models}
     for poses in sharing_rays(candidates.xyz, candidates.yaw, candidates.tilt):

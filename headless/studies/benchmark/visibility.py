@@ -95,7 +95,7 @@ class FullAndLazy:
         self._site, self._models, self._settings = site, models, settings
         self._caster = make_ray_caster(site.triangles, engine)
         self._surfaces = near_surfaces(site.triangles, site.targets.xyz, settings.delta, site.reflectivity)
-        self._lazy = VisibilityModel(site, settings, self._caster)
+        self._lazy = VisibilityModel(site.targets.xyz, site.reflectivity, settings, self._caster)
 
     def full(self, poses: Integer) -> tuple[Boolean, int]:
         """Cast every ray of poses at one position; return the visible targets, (k, t) bool, and the number of rays."""

@@ -44,7 +44,7 @@ def visibility_under_errors(
     keys, xyz = candidates.sensor[poses].tolist(), candidates.xyz[poses]
     yaw, tilt = candidates.yaw[poses], candidates.tilt[poses]
     caster = make_ray_caster(site.triangles, engine_name(around.engine))
-    model = VisibilityModel(site, around.sight, caster)
+    model = VisibilityModel(site.targets.xyz, site.reflectivity, around.sight, caster)
     together = sharing_rays(xyz, yaw, tilt)
     packed = np.zeros((len(draws), len(poses), (len(site.targets) + 7) // 8), dtype=np.uint8)
     orientations = draws.orientations(yaw, tilt)
