@@ -38,7 +38,8 @@ def by_full_scan(caster, model, xyz, orientation, delta=SIGHT.delta):
     distance, triangle = caster.cast(xyz, directions, model.max_range)
     hit = (triangle >= 0) & (distance >= model.min_range)
     seen = np.zeros(len(SITE.targets), dtype=bool)
-    seen[TargetIndex(SITE.targets.xyz, delta).within_delta(xyz + directions[hit] * distance[hit, None])] = True
+    _, targets = TargetIndex(SITE.targets.xyz, delta).pairs_within_delta(xyz + directions[hit] * distance[hit, None])
+    seen[targets] = True
     return seen
 
 
