@@ -190,7 +190,7 @@ def test_a_cars_returns_are_those_of_a_scan_of_it(turn):
         reach, triangle = make_ray_caster(np.concatenate([static, car])).cast(sensor.xyz, beams, model.max_range)
         on_car = reach[triangle >= len(static)]
         expected.append(return_chance(model, on_car, np.full(len(on_car), CAR.reflected)).sum())
-    found, _ = expected_returns(make_ray_caster(static), sensor.xyz, turn, model, cars_at(targets, 1.0))
+    found, _ = expected_returns(make_ray_caster(static), sensor.xyz, turn, model, cars_at(targets))
     assert expected[2] == 0  # behind the wall
     assert min(expected[:2]) > 20
     np.testing.assert_allclose(found, expected, rtol=0.02, atol=2.0)
