@@ -8,6 +8,7 @@ from functools import partial
 
 from headless.studies.benchmark.approximations import Approximation
 from headless.studies.benchmark.resource_usage import Expense
+from headless.studies.full_scan import seen_by_tilted_full_scan
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
 from seip_addon.core.sensing.visibility.ray_casting import Engine, RayCaster, make_ray_caster
 from seip_addon.core.sensing.visibility.scanning import ScanPosition
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
-from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel, seen_by_tilted_full_scan
+from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel
 from seip_addon.core.site.site import Site
 
 ENGINES: tuple[Engine, ...] = ("bvh", "embree")

@@ -4,6 +4,8 @@ import math
 from dataclasses import replace
 from types import SimpleNamespace
 
+from headless.studies.full_scan import beam_directions
+
 import pytest
 
 pytest.importorskip("torch", reason="torch is not installed: make detection")
@@ -35,7 +37,6 @@ from seip_addon.core.choosing.placement.search_limits import DEFAULT_LIMITS
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation
 from seip_addon.core.progress import finish
-from seip_addon.core.sensing.lidar.beams import beam_directions
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.noisy_returns import return_chance
 from seip_addon.core.sensing.returns.bodies import PANELS

@@ -13,13 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...arrays import Boolean, Float, Integer
-from ...geometry.orientation import orientation as orientation_of
 from ...geometry.orientation import rotated
 from ...site.site import Site
 from ..lidar.model import LidarModel
-from .near_surfaces import NearSurfaces, near_surfaces, rotated_surfaces
+from .near_surfaces import near_surfaces, rotated_surfaces
 from .ray_casting import Engine, RayCaster, engine_name, make_ray_caster
-from .scanning import Caster, ScanPosition, seen_by_all_rays, seen_by_near_rays
+from .scanning import Caster, ScanPosition, seen_by_near_rays
 from .settings import VisibilitySettings
 
 _MAX_LEVEL_ANGLE = 1e-6
@@ -89,17 +88,6 @@ def visibility_model(site: Site, settings: VisibilitySettings, engine: Engine = 
     """Return a visibility model with a ray caster of its own."""
     caster = make_ray_caster(site.triangles, engine_name(engine))
     return VisibilityModel(site.targets.xyz, site.reflectivity, settings, caster)
-
-
-def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, surfaces: NearSurfaces) -> tuple[Boolean, int]:
-    """Find the targets that sensors tilted by an angle (radians) see, by casting every ray: the reference."""
-    if tilt == 0:
-        return seen_by_all_rays(position, surfaces)
-    orientation = orientation_of(position.yaw, tilt)
-    if is_upright(orientation):
-        return seen_by_all_rays(replace(position, yaw=yaw_of(orientation)), surfaces)
-    in_axes = rotated_surfaces(surfaces, position.origin, orientation)
-    return seen_by_all_rays(in_sensor_axes(position, orientation), in_axes)
 
 
 def is_upright(orientation: Float) -> bool:

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 from headless.convergence import Evaluator
+from headless.studies.full_scan import beam_directions
 from headless.studies.stability.criterion import in_view
 
 import numpy as np
@@ -19,7 +20,6 @@ from seip_addon.core.choosing.robustness.visibility_under_errors import visibili
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import angles_of, describe_turn, orientation, orientations, rotated
 from seip_addon.core.progress import finish
-from seip_addon.core.sensing.lidar.beams import beam_directions
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.scans.sensor import level_orientation

@@ -3,12 +3,13 @@
 import math
 from dataclasses import replace
 
+from headless.studies.full_scan import beam_directions
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.sensing.lidar.beams import beam_directions
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.sensor import level_orientation
 from seip_addon.core.sensing.visibility.chunks import compute_rows
