@@ -43,7 +43,6 @@ from seip_addon.core.storage.files import digest, save_json, whole_file
 from seip_addon.core.storage.json_dataclass import as_json, from_json
 from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.workflows.network_sites import NetworkPlace
-from seip_addon.core.workflows.network_survey import TakenPlacement
 from seip_addon.core.workflows.survey_settings import SurveySettings
 
 PROBLEM, SEARCHES = SURVEY_FILES[3], "searches.json"
@@ -460,7 +459,7 @@ def _placed(
     def job(site: _Site, one: SolvedBudget) -> PlaceJob:
         files = {name: (site.folder / name).read_bytes() for name in SURVEY_FILES if (site.folder / name).exists()}
         objective = replace(request.objective, budget=one.price)
-        return PlaceJob(files, request.settings, objective, TakenPlacement(one, one.bound), request.memory)
+        return PlaceJob(files, request.settings, objective, one, request.memory)
 
     jobs = [lambda site=site, one=one: job(site, one) for site, one, _ in wanted]
     for done, (number, result) in enumerate(workers.run(write_placement, jobs), start=1):

@@ -22,7 +22,6 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.workflows.network_sites import NetworkPlace
-from seip_addon.core.workflows.network_survey import TakenPlacement
 from seip_addon.core.workflows.survey_settings import SurveySettings
 
 FORMAT = "seip-network-site/1"
@@ -86,7 +85,7 @@ class PlaceJob:
     files: Files
     settings: SurveySettings
     objective: Objective
-    taken: TakenPlacement
+    taken: SolvedBudget
     memory: int
 
 

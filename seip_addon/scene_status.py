@@ -88,7 +88,7 @@ def expected_seconds(scene: bpy.types.Scene) -> float | None:
     if check is None or check.estimate is None or isinstance(settings, str) or isinstance(check.settings, str):
         return None
     ratio = _rays(settings) / max(_rays(check.settings), 1.0)
-    return search + check.estimate.seconds * ratio * (1.0 + 2.0 * _counts_returns(scene, settings))
+    return search + check.estimate * ratio * (1.0 + 2.0 * _counts_returns(scene, settings))
 
 
 def _rays(settings: SurveySettings) -> float:

@@ -28,7 +28,6 @@ from .core.sensing.scans.sensor import MountedSensor
 from .core.sensing.scans.simulation import Simulation
 from .core.sensing.traffic.source import TrafficFiles
 from .core.sensing.traffic.trajectories import Trajectories
-from .core.sensing.visibility.estimate import Estimate
 from .core.sensing.visibility.visibility_model import VisibilityModel
 from .core.storage.files import check_folder
 from .core.workflows.site_places import SitePlaces
@@ -130,13 +129,13 @@ class CheckedScene:
         Whether the scene has changed since.
     settings : SurveySettings or str
         See `scene_status.checked_settings`.
-    estimate : Estimate or None
-        Time and memory that the visibility grid will take with these settings.
+    estimate : float or None
+        Seconds that the visibility grid will take with these settings.
     """
 
     watch: Watch
     settings: SurveySettings | str
-    estimate: Estimate | None = None
+    estimate: float | None = None
 
 
 @dataclass

@@ -330,7 +330,7 @@ def _mutate_routes(random: Random, content: bytes) -> Case:
 
 def _read_routes(path: Path, content: bytes) -> None:
     from seip_addon.core.progress import finish  # noqa: PLC0415
-    from seip_addon.core.sensing.traffic.sumo_files import read_net_offset  # noqa: PLC0415
+    from seip_addon.core.sensing.traffic.source import read_net_offset  # noqa: PLC0415
     from seip_addon.core.sensing.traffic.vehicle_types import read_vehicle_types  # noqa: PLC0415
 
     if b"netOffset" in content:

@@ -12,7 +12,7 @@ from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.output.results.placement_record import relevant_warnings
 from ..core.progress import Progress, finish
-from ..core.sensing.visibility.estimate import Estimate
+from ..core.sensing.visibility.estimate import estimate_visibility
 from ..core.site.check import SceneContents, SiteCheck, check_site
 from ..core.site.obstruction import NO_OBSTACLES_MESSAGE
 from ..core.site.roles import Role
@@ -22,7 +22,6 @@ from ..core.workflows.site_building import BuiltSite, SiteRequest, build_site
 from ..core.workflows.site_places import SitePlaces, site_places
 from ..core.workflows.survey import Layout, lay_out
 from ..core.workflows.survey_settings import SurveySettings
-from ..core.workflows.visibility_estimate import estimate
 from ..core.world.streetscape.description import DESCRIPTION_SUFFIX
 from ..core.world.streetscape.mesh_place import MeshPlace, mesh_place
 from ..properties import traffic
@@ -418,13 +417,13 @@ class SEIP_OT_add_area(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_check_site(LongWork[tuple[SiteCheck, Estimate | None]], bpy.types.Operator):
+class SEIP_OT_check_site(LongWork[tuple[SiteCheck, float | None]], bpy.types.Operator):
     """Count what the scene holds by role, and list what stops a placement or harms its answer"""
 
     bl_idname = "seip.check_site"
     bl_label = "Check Site"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SiteCheck, Estimate | None]]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SiteCheck, float | None]]:
         """Read the scene as it is now."""
         self._watch, self._settings = watch(scene), scene_status.checked_settings(scene)
         contents = contents_of(scene)
@@ -435,7 +434,7 @@ class SEIP_OT_check_site(LongWork[tuple[SiteCheck, Estimate | None]], bpy.types.
             settings = error
         return _checked(contents, settings, preferences.cores())
 
-    def conclude(self, scene: bpy.types.Scene, result: tuple[SiteCheck, Estimate | None]) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: tuple[SiteCheck, float | None]) -> None:
         """List what was found."""
         check, estimated = result
         session.checks[scene.session_uid] = CheckedScene(self._watch, self._settings, estimated)
@@ -455,7 +454,7 @@ class SEIP_OT_check_site(LongWork[tuple[SiteCheck, Estimate | None]], bpy.types.
 
 def _checked(
     contents: SceneContents, settings: SurveySettings | SeipError, cores: int | None
-) -> Generator[Progress, None, tuple[SiteCheck, Estimate | None]]:
+) -> Generator[Progress, None, tuple[SiteCheck, float | None]]:
     """Check a scene; if it can be laid out, estimate the time of its visibility grid as well."""
     layouts: list[Layout] = []
 
@@ -469,7 +468,9 @@ def _checked(
     check = yield from check_site(contents, laid_out)
     if any(problem.severity == "ERROR" for problem in check.problems) or not layouts:
         return check, None
-    return check, (yield from estimate(layouts[0], cores))
+    layout = layouts[0]
+    sight, engine = layout.settings.visibility, layout.settings.engine
+    return check, (yield from estimate_visibility(layout.site, layout.models, sight, engine, cores))
 
 
 def in_short(problems: Iterable[SEIP_PG_problem]) -> str:

@@ -12,12 +12,11 @@ from seip_addon.core.output.results.verification_record import (
     SCHEMA,
     RecordedBackground,
     RecordedChange,
-    RecordedGain,
     RecordedPose,
-    RecordedReturns,
-    RecordedSteps,
     VerificationRecord,
 )
+from seip_addon.core.sensing.recordings.unit_gain import Gain, ReturnShare
+from seip_addon.core.sensing.recordings.verification import CoverageSteps
 from seip_addon.core.storage.files import save_json
 from seip_addon.core.storage.json_dataclass import as_json
 
@@ -27,7 +26,7 @@ CHANGES = (
     RecordedChange("new", "Found 3", (30.0, 9.0, 1.0, 1.0, 1.0, 2.0, 0.0), 30, 0.0001),
     RecordedChange("vehicle", "Found 2", (5.0, 0.0, 1.0, 4.5, 1.8, 1.6, 0.0), 200, None),
 )
-STEPS = RecordedSteps(0.62, 0.6, 0.605, 0.51, 0.7)
+STEPS = CoverageSteps(0.62, 0.6, 0.605, 0.51, 0.7)
 
 
 def make_pose(
@@ -36,7 +35,7 @@ def make_pose(
     planned: tuple[float, ...],
     shift: tuple[float, float, float] = (0.3, -0.2, 0.0),
     rotation: tuple[float, float, float] = (0.0, -2.0, -1.5),
-    gain: RecordedGain | None = RecordedGain(0.64, 0.49, 0.81),  # noqa: B008  # frozen
+    gain: Gain | None = Gain(0.64, 0.49, 0.81),  # noqa: B008  # frozen
 ) -> RecordedPose:
     """Return a sensor off its plan by a shift in metres and a rotation vector in degrees."""
     at = tuple(one + by for one, by in zip(planned, shift, strict=True))
@@ -53,9 +52,9 @@ def make_pose(
         background=RecordedBackground(30, 60.0, 0.05),
         gain=gain,
         returns=(
-            RecordedReturns("road", 10.0, 20.0, 900, 0.9, 0.85, 0.86),
-            RecordedReturns("road", 20.0, 30.0, 700, 0.8, 0.5, 0.45),
-            RecordedReturns("objects", 20.0, 30.0, 700, 0.9, 0.1, 0.1),
+            ReturnShare("road", 10.0, 20.0, 900, 0.9, 0.85, 0.86),
+            ReturnShare("road", 20.0, 30.0, 700, 0.8, 0.5, 0.45),
+            ReturnShare("objects", 20.0, 30.0, 700, 0.9, 0.1, 0.1),
         ),
     )
 

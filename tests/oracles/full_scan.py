@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 
+from headless.studies.full_scan import seen_by_tilted_full_scan
+
 import numpy as np
 
 from seip_addon.core.arrays import Boolean
@@ -10,7 +12,6 @@ from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
 from seip_addon.core.sensing.visibility.ray_casting import RayCaster
 from seip_addon.core.sensing.visibility.scanning import ScanPosition
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
-from seip_addon.core.sensing.visibility.visibility_model import seen_by_tilted_full_scan
 from seip_addon.core.site.site import Site
 
 

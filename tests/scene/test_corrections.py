@@ -12,8 +12,7 @@ from seip_addon.core.sensing.recordings.comparison import Change
 from seip_addon.core.sensing.recordings.registration import Registration
 from seip_addon.core.sensing.recordings.verification import CoverageSteps, Verification, VerifiedSensor
 from seip_addon.core.sensing.scans.sensor import MountedSensor
-from seip_addon.core.site.scene_geometry import SceneGeometry, joined
-from seip_addon.core.site.targets import generate_targets
+from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.workflows.verification_record import save_changes
 from seip_addon.core.workflows.verifying import box_triangles
 from seip_addon.scene import contract
@@ -62,15 +61,12 @@ def verified(scene, gone=(), new=(), sensors=(), keep=None):
         if stays.any():
             occluders.append(replace(mesh, triangles=mesh.triangles[stays], reflectivity=None))
     changes += [Change("new", name, box, 50, NONE) for name, box in new]
-    targets = generate_targets(geometry.region, joined(geometry.roads), 4.0, ())
     return Verification(
         sensors=tuple(sensors),
         changes=tuple(changes),
         costs=(0.0,) * len(changes),
         coverage=CoverageSteps(0.5, 0.5, 0.5, 0.5, 0.5),
         corrected=replace(geometry, occluders=tuple(occluders)),
-        targets=targets,
-        measured_seen=np.zeros(len(targets), dtype=bool),
     )
 
 

@@ -3,6 +3,8 @@
 import math
 from dataclasses import replace
 
+from headless.studies.full_scan import beam_directions
+
 import bpy
 import numpy as np
 import pytest
@@ -10,7 +12,6 @@ from mathutils import Vector
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation, rotated
-from seip_addon.core.sensing.lidar.beams import beam_directions
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY
 from seip_addon.scene import contract

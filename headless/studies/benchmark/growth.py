@@ -126,7 +126,7 @@ def visibility_cost(
     def make() -> VisibilityModel:
         needed = needed_triangles(site.triangles, poses.xyz, site.targets.xyz, settings.delta, longest)
         caster = make_ray_caster(site.triangles, keep=needed.keep)
-        return VisibilityModel(site, settings, caster)
+        return VisibilityModel(site.targets.xyz, site.reflectivity, settings, caster)
 
     def work() -> None:
         model = for_site.time(make)

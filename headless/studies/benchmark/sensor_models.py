@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from headless.studies.benchmark.visibility import Cost, sampled_places
+from headless.studies.full_scan import seen_by_all_rays
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.chunks import compute_rows, sharing_rays
 from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
 from seip_addon.core.sensing.visibility.ray_casting import RayCaster, make_ray_caster
-from seip_addon.core.sensing.visibility.scanning import ScanPosition, seen_by_all_rays
+from seip_addon.core.sensing.visibility.scanning import ScanPosition
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel
 from seip_addon.core.site.candidates import Candidates
@@ -295,7 +296,10 @@ def site_front(  # noqa: PLR0913  # what is measured, and how much of it
     """
     settings, candidates, key = VisibilitySettings(), site.candidates, models[0].lidar.key
     check_objective(site, {key: models[0].lidar}, Objective(count=max(counts)))
-    engines = {model.name: VisibilityModel(site, settings, model.caster(site.triangles)) for model in models}
+    targets, reflectivity = site.targets.xyz, site.reflectivity
+    engines = {
+        model.name: VisibilityModel(targets, reflectivity, settings, model.caster(site.triangles)) for model in models
+    }
     costs = {model.name: Cost() for model in models}
     seen = {model.name: np.zeros((len(candidates), len(site.targets)), dtype=bool) for model in models}
     for poses in sharing_rays(candidates.xyz, candidates.yaw, candidates.tilt):

@@ -8,6 +8,7 @@ from functools import partial
 
 from headless.studies.benchmark.approximations import Approximation
 from headless.studies.benchmark.resource_usage import Expense
+from headless.studies.full_scan import seen_by_tilted_full_scan
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
 from seip_addon.core.sensing.visibility.ray_casting import Engine, RayCaster, make_ray_caster
 from seip_addon.core.sensing.visibility.scanning import ScanPosition
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
-from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel, seen_by_tilted_full_scan
+from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel
 from seip_addon.core.site.site import Site
 
 ENGINES: tuple[Engine, ...] = ("bvh", "embree")
@@ -95,7 +96,7 @@ class FullAndLazy:
         self._site, self._models, self._settings = site, models, settings
         self._caster = make_ray_caster(site.triangles, engine)
         self._surfaces = near_surfaces(site.triangles, site.targets.xyz, settings.delta, site.reflectivity)
-        self._lazy = VisibilityModel(site, settings, self._caster)
+        self._lazy = VisibilityModel(site.targets.xyz, site.reflectivity, settings, self._caster)
 
     def full(self, poses: Integer) -> tuple[Boolean, int]:
         """Cast every ray of poses at one position; return the visible targets, (k, t) bool, and the number of rays."""

@@ -82,7 +82,7 @@ def criteria_of(
     """
     targets = survey.site.targets
     seen = [one.deployment.seen_by > 0 for one in placements]
-    returns = yield from _returns(simulator, placements, cars_at(targets.xyz, targets.spacing))
+    returns = yield from _returns(simulator, placements, cars_at(targets.xyz))
     return (
         Criterion("coverage", "coverage", np.array([one.deployment.coverage for one in placements])),
         *(
@@ -131,8 +131,8 @@ def _returns(
     return np.array(rows)
 
 
-def cars_at(points: Float, spacing: float) -> RoadUsers:
+def cars_at(points: Float) -> RoadUsers:
     """Return a car at each of some points (m, 3), metres."""
     count = len(points)
     body, none = np.full(count, BODIES.index("car")), np.full(count, -1)
-    return RoadUsers(points, body, np.ones(count), np.zeros(count, dtype=bool), none, (), spacing)
+    return RoadUsers(points, body, np.ones(count), np.zeros(count, dtype=bool), none, ())

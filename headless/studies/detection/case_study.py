@@ -29,12 +29,12 @@ from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.detection_record import Precision
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.sensing.traffic.parked import shared_bays
 from seip_addon.core.sensing.traffic.run_overlap import MATCH_RADIUS, require_independent, vehicle_positions
 from seip_addon.core.workflows.survey import Survey
 
 from .claims import SeedResult
 from .kitti_precision import Kitti, kitti
+from .shared_bays import shared_bays
 
 MIN_RUNS = 4  # one to learn from, one for validation, two for tests
 RUNS_PER_TEST, RUNS_PER_VALIDATION = 2, 8  # of all runs one half is for tests, and one eighth for validation

@@ -21,7 +21,8 @@ import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.progress import finish
-from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
+from seip_addon.core.sensing.lidar.model import DetectionLaw, LidarModel
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import Simulation
@@ -99,7 +100,7 @@ class DropOff(Disturbance):
         """Return the sensors with a larger general drop-off."""
 
         def lossy(model: LidarModel) -> LidarModel:
-            return replace(model, law=model.law.losing(self.size))
+            return replace(model, law=losing(model.law, self.size))
 
         return _with_models(sensors, lossy)
 
@@ -293,6 +294,13 @@ def _with_models(
     sensors: Sequence[MountedSensor], change: Callable[[LidarModel], LidarModel]
 ) -> tuple[MountedSensor, ...]:
     return tuple(replace(sensor, model=change(sensor.model)) for sensor in sensors)
+
+
+def losing(law: DetectionLaw, share: float) -> DetectionLaw:
+    """Return a law of detection with a share, below 1, of the detected returns lost."""
+    if isinstance(law, CarlaDropoff):
+        return replace(law, general=law.general + (1.0 - law.general) * share)
+    return replace(law, ceiling=law.ceiling * (1.0 - share))
 
 
 def _rotated(frame: Frame, wrong: OfOneSensor, sensors: Sequence[MountedSensor], axis: Float) -> Frame:

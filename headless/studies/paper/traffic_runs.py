@@ -16,8 +16,7 @@ from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.sensing.traffic.run_overlap import VehiclePositions, overlap_of, vehicle_positions
-from seip_addon.core.sensing.traffic.source import TrafficFiles
-from seip_addon.core.sensing.traffic.sumo_files import read_net_offset
+from seip_addon.core.sensing.traffic.source import TrafficFiles, read_net_offset
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.storage.files import digest, save_json

@@ -35,6 +35,9 @@ from .robustness_rows import pose_rows, robust_rows, traffic_rows
 from .solver_limits import solver_rows, solver_study
 from .weather import untouched_types, weather_rows, weather_study
 
+TAIL_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
+"""Risks studied over pose errors: the mean, the worst quarter and the worst scenario."""
+
 RISKS = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
 """Risks studied: failure of a sensor, and coverage by two sensors."""
 
@@ -203,9 +206,8 @@ def solvers(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
 def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study a placement under pose errors."""
     survey, around = scene.survey, surroundings(scene.survey)
-    study = yield from robust_study(
-        around, scene.problem(scene.sensor), scene.scope.robust, limits=survey.settings.limits
-    )
+    problem = scene.problem(scene.sensor)
+    study = yield from robust_study(around, problem, scene.scope.robust, TAIL_RISKS, survey.settings.limits)
     chosen = study.nominal[0].placement.chosen
     deployment = deploy(survey.site, survey.models, survey.grid.rows(chosen), chosen)
     under_errors = yield from pose_study(around, deployment, scene.scope.poses)

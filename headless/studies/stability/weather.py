@@ -6,13 +6,14 @@ import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
+from headless.studies.full_scan import beam_directions
+
 import numpy as np
 
 from seip_addon.core.arrays import Integer
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.sensing.lidar.beams import beam_directions
 from seip_addon.core.sensing.lidar.noisy_returns import return_chance
 from seip_addon.core.sensing.scans.scanner import ReflectiveSurface
 from seip_addon.core.sensing.scans.sensor import MountedSensor

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,22 +21,6 @@ from ..sensing.returns.road_users import road_users
 from .network_sites import NetworkPlace
 from .returns import returns_solution, user_weights
 from .survey import Survey
-
-
-@dataclass(frozen=True)
-class TakenPlacement:
-    """Placement of a site that the allocation takes.
-
-    Parameters
-    ----------
-    solved : SolvedBudget
-        Poses, those installed before included, with value and bound.
-    bound : float
-        Bound on the value for that money.
-    """
-
-    solved: SolvedBudget
-    bound: float
 
 
 def site_problem(survey: Survey, objective: Objective, place: NetworkPlace) -> Generator[Progress, None, SiteProblem]:
@@ -96,16 +80,15 @@ def site_problem(survey: Survey, objective: Objective, place: NetworkPlace) -> G
     return problem
 
 
-def taken_solution(survey: Survey, objective: Objective, taken: TakenPlacement) -> Generator[Progress, None, Solution]:
+def taken_solution(survey: Survey, objective: Objective, taken: SolvedBudget) -> Generator[Progress, None, Solution]:
     """Return the solution of the placement that an allocation takes at a site, as `place` returns it."""
     objective = _at_site(survey, objective)
-    solved = taken.solved
-    chosen = np.array(solved.chosen, dtype=np.int64)
-    optimal = taken.bound <= solved.value
+    chosen = np.array(taken.chosen, dtype=np.int64)
+    optimal = taken.bound <= taken.value
     rows = survey.grid.rows(chosen)
     covered = float(rows.any(axis=0).sum())
     of_returns = criterion_of(objective, survey.models) == "returns"
-    value, bound = (solved.value, taken.bound) if of_returns else (covered, taken.bound * rows.shape[1])
+    value, bound = (taken.value, taken.bound) if of_returns else (covered, taken.bound * rows.shape[1])
     placement = Placement(
         chosen=chosen,
         objective=value,
@@ -115,7 +98,7 @@ def taken_solution(survey: Survey, objective: Objective, taken: TakenPlacement) 
         solver="network allocation",
         seconds=0.0,
         covered=covered,
-        price=solved.price,
+        price=taken.price,
         notes=("the money at this site is its share of the budget of a network",),
     )
     if of_returns:

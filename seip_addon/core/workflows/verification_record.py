@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +11,7 @@ from ..output.results.verification_record import (
     SCHEMA,
     RecordedBackground,
     RecordedChange,
-    RecordedGain,
     RecordedPose,
-    RecordedReturns,
-    RecordedSteps,
     VerificationRecord,
 )
 from ..sensing.recordings.verification import Verification, VerifiedSensor
@@ -41,8 +37,7 @@ def record_of(site: str, recording: str, found: Verification) -> VerificationRec
         )
         for change, cost in zip(found.changes, found.costs, strict=True)
     ]
-    steps = RecordedSteps(**asdict(found.coverage))
-    return VerificationRecord(site, recording, tuple(map(_pose, found.sensors)), tuple(changes), steps)
+    return VerificationRecord(site, recording, tuple(map(_pose, found.sensors)), tuple(changes), found.coverage)
 
 
 def verification_record(site: str, recording: str, found: Verification) -> dict[str, Any]:
@@ -63,8 +58,8 @@ def _pose(one: VerifiedSensor) -> RecordedPose:
         rotation_half_width_deg=tuple(math.degrees(angle) for angle in pose.half_width[3:]),  # type: ignore[arg-type]
         match=pose.match,
         background=RecordedBackground(background.sweeps, background.seconds, background.uncertain),
-        gain=None if one.gain is None else RecordedGain(**asdict(one.gain)),
-        returns=tuple(RecordedReturns(**asdict(share)) for share in one.shares),
+        gain=one.gain,
+        returns=one.shares,
     )
 
 

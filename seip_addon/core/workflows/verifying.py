@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import count
 
 import numpy as np
@@ -42,15 +42,6 @@ from ..site.targets import Targets, generate_targets
 _FOUND = re.compile(r"Found (\d{1,9})\b")  # name of an object that a verification added
 _BOX_MARGIN = 1.0  # metres around a box that an earlier verification added
 _MOST_PRICED = 20  # changes whose cost in coverage is computed, those with most rays
-
-
-@dataclass(frozen=True, eq=False)
-class _Surroundings:
-    """Targets and static surfaces, for visibility."""
-
-    targets: Targets
-    triangles: Float
-    reflectivity: Float
 
 
 def verify(
@@ -103,8 +94,8 @@ def verify(
 
     def coverage(scene: SceneGeometry, at: Sequence[MountedSensor]) -> float:
         surfaces = static_scene(scene, planned)
-        around = _Surroundings(targets, surfaces.triangles, surfaces.reflectivity)
-        model = VisibilityModel(around, settings, make_ray_caster(surfaces.triangles, engine))
+        caster = make_ray_caster(surfaces.triangles, engine)
+        model = VisibilityModel(targets.xyz, surfaces.reflectivity, settings, caster)
         seen = np.any([model.see(one.model, one.xyz, one.orientation) for one in at], axis=0)
         return float(np.mean(seen))
 
@@ -125,8 +116,7 @@ def verify(
     for done, (scene, at) in enumerate(steps):
         yield Progress(done, len(steps), "computing coverage", counted=False)
         figures.append(coverage(scene, at))
-    seen = _seen_in_recording(targets, sensors, settings)
-    figures.append(float(np.mean(seen)))
+    figures.append(float(np.mean(_seen_in_recording(targets, sensors, settings))))
     objects = [change for change in changes if change.kind != VEHICLE][:_MOST_PRICED]
     costs = dict.fromkeys(map(id, changes), float("nan"))
     for done, change in enumerate(objects):
@@ -134,9 +124,7 @@ def verify(
         others = [other for other in changes if other is not change]
         costs[id(change)] = coverage(_corrected(geometry, static, others), installed) - figures[2]
     yield Progress(len(objects), len(objects), "computing what each change costs")
-    return Verification(
-        tuple(sensors), changes, tuple(costs.values()), CoverageSteps(*figures), corrected, targets, seen
-    )
+    return Verification(tuple(sensors), changes, tuple(costs.values()), CoverageSteps(*figures), corrected)
 
 
 def _paired(planned: Sequence[MountedSensor], recording: Recording) -> list[tuple[MountedSensor, SensorRecording]]:

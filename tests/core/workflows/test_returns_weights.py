@@ -11,7 +11,7 @@ from seip_addon.core.workflows.returns import CROSSING_SHARE, user_weights
 def users(bodies, crossings, weight=None):
     count = len(bodies)
     weight = np.ones(count) if weight is None else np.array(weight)
-    return RoadUsers(np.zeros((count, 3)), np.array(bodies), weight, weight > 1, np.array(crossings), ("zebra",), 2.0)
+    return RoadUsers(np.zeros((count, 3)), np.array(bodies), weight, weight > 1, np.array(crossings), ("zebra",))
 
 
 def test_each_kind_has_its_share_and_half_of_the_pedestrians_is_on_crossings():

@@ -4,6 +4,8 @@ import math
 from dataclasses import replace
 from types import SimpleNamespace
 
+from headless.studies.full_scan import beam_directions
+
 import pytest
 
 pytest.importorskip("torch", reason="torch is not installed: make detection")
@@ -35,7 +37,6 @@ from seip_addon.core.choosing.placement.search_limits import DEFAULT_LIMITS
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation
 from seip_addon.core.progress import finish
-from seip_addon.core.sensing.lidar.beams import beam_directions
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.noisy_returns import return_chance
 from seip_addon.core.sensing.returns.bodies import PANELS
@@ -190,7 +191,7 @@ def test_a_cars_returns_are_those_of_a_scan_of_it(turn):
         reach, triangle = make_ray_caster(np.concatenate([static, car])).cast(sensor.xyz, beams, model.max_range)
         on_car = reach[triangle >= len(static)]
         expected.append(return_chance(model, on_car, np.full(len(on_car), CAR.reflected)).sum())
-    found, _ = expected_returns(make_ray_caster(static), sensor.xyz, turn, model, cars_at(targets, 1.0))
+    found, _ = expected_returns(make_ray_caster(static), sensor.xyz, turn, model, cars_at(targets))
     assert expected[2] == 0  # behind the wall
     assert min(expected[:2]) > 20
     np.testing.assert_allclose(found, expected, rtol=0.02, atol=2.0)

@@ -3,6 +3,8 @@
 import math
 from dataclasses import replace
 
+from headless.studies.full_scan import beam_directions
+
 import pytest
 
 pytest.importorskip("torch", reason="torch is not installed: make detection")
@@ -15,7 +17,6 @@ import numpy as np
 import shapely
 
 from seip_addon.core.geometry.orientation import orientation
-from seip_addon.core.sensing.lidar.beams import beam_directions
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.scanner import ReflectiveSurface
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories

@@ -22,6 +22,7 @@ from headless.studies.detector_limits.disturbances import (
     TiltError,
     YawError,
     keeping_at_most,
+    losing,
     range_in,
 )
 
@@ -29,6 +30,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.scans.simulation import ScanSettings, prepare
 from seip_addon.core.sensing.scans.static_scene import static_scene
 from seip_addon.core.sensing.traffic.bodies import fitted_body
@@ -86,6 +88,11 @@ def test_the_share_lost_is_the_share_asked_for(share, plain):
     assert abs(len(left) - expected) < 4 * spread
     whole = {tuple(point) for point in plain.points.tolist()}
     assert all(tuple(point) in whole for point in left.points.tolist())  # lost, not drawn again
+
+
+def test_a_law_that_loses_half_detects_half():
+    clear = RangeEquation.of_ranges(40.0, 110.0)
+    assert losing(clear, 0.5).chance(np.array([1.0]), np.array([1.0]))[0] == pytest.approx(clear.ceiling / 2)
 
 
 def test_a_larger_loss_takes_what_a_smaller_one_takes():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self, TypeVar
 
@@ -112,3 +113,45 @@ def cliques(conflict: Boolean) -> Integer:
             clique[members] = first
     numbered: Integer = np.unique(clique, return_inverse=True)[1]
     return numbered
+
+
+def superfluous(
+    instance: Constrained, positions: Integer, useful: Boolean, no_more: Callable[[Integer], Boolean]
+) -> Boolean:
+    """Mark candidates that no canonical optimum contains, (c,) bool.
+
+    A candidate that is of no use and serves no mandatory group only adds to the number of sensors. A candidate can be
+    replaced by another one at the same position that is of at least the same use, is in at least the same groups,
+    excludes nothing more, and is cheaper (or costs the same and comes first): value, number, price, double coverage
+    and order all stay or improve.
+
+    Parameters
+    ----------
+    positions : (c,) int64
+        Position of each candidate.
+    useful : (c,) bool
+        Whether a candidate adds to the value of a placement.
+    no_more : callable
+        From indices of candidates (k,) to (k, k) bool, for each pair: whether the first adds no more than the second,
+        whatever else is chosen.
+    """
+    out: Boolean = ~useful & ~instance.mandatory.any(axis=0)
+    excluded = instance.conflict | np.eye(len(instance), dtype=bool)
+    by_position = np.argsort(positions, kind="stable")
+    for group in np.split(by_position, np.flatnonzero(np.diff(positions[by_position])) + 1):
+        rank = np.lexsort((group, instance.price[group])).argsort()
+        replaceable = (
+            (rank[None, :] < rank[:, None])
+            & no_more(group)
+            & subsets(instance.mandatory[:, group].T)
+            & subsets(excluded[group]).T
+        )
+        out[group] |= replaceable.any(axis=1)
+    return out
+
+
+def subsets(rows: Boolean) -> Boolean:
+    """Return for each pair of rows whether the first is a subset of the second, (k, k) bool."""
+    overlap = rows.astype(np.float32) @ rows.T.astype(np.float32)
+    subset: Boolean = overlap == overlap.diagonal()[:, None]
+    return subset

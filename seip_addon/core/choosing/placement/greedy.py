@@ -61,7 +61,7 @@ def greedy_bound(instance: Instance, steps: Iterable[Integer]) -> float:
     return min([instance.total, *reached])
 
 
-def orders(instance: Instance) -> list[bool]:
+def orders(instance: Constrained) -> list[bool]:
     """Return whether to choose greedily by gain per price; under a budget both orders are tried."""
     return [False, True] if math.isfinite(instance.budget) and instance.price.max() > 0 else [False]
 

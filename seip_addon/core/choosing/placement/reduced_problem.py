@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Boolean, Float, Integer
 from ...errors import SeipError
-from .constraints import Constrained, constraints_of
+from .constraints import Constrained, constraints_of, subsets, superfluous
 from .multi_cover import COVERAGE, MultiCover
 from .problem import TIE_TOLERANCE, PlacementProblem, canonical_order
 
@@ -164,7 +164,9 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
         margin=BOUND_ROUNDING * total,
         **constraints_of(problem, order),
     )
-    return instance.part(np.flatnonzero(~_superfluous(instance, problem.positions[order]))), 1 / unit
+    sees = instance.visible.any(axis=1)
+    needed = ~superfluous(instance, problem.positions[order], sees, lambda some: subsets(instance.visible[some]))
+    return instance.part(np.flatnonzero(needed)), 1 / unit
 
 
 def common_unit(weights: Float) -> tuple[float, bool]:
@@ -214,34 +216,3 @@ def merge_targets(visible: Boolean, weight: Float) -> tuple[Boolean, Float]:
     _, first, group = np.unique(keys, return_index=True, return_inverse=True)
     merged: Boolean = np.take(visible, first, axis=1)  # indexed, it would hold the rows of targets together in memory
     return merged, np.bincount(group, weight).astype(np.float64)
-
-
-def _superfluous(instance: Instance, positions: Integer) -> Boolean:
-    """Mark candidates that no canonical optimum contains.
-
-    A candidate that sees nothing and serves no mandatory group only adds to the number of sensors. A candidate can be
-    replaced by another one at the same position that sees at least the same targets, is in at least the same groups,
-    excludes nothing more, and is cheaper (or costs the same and comes first): coverage, number, price, double coverage
-    and order all stay or improve.
-    """
-    superfluous: Boolean = ~instance.visible.any(axis=1) & ~instance.mandatory.any(axis=0)
-    excluded = instance.conflict | np.eye(len(instance), dtype=bool)
-    by_position = np.argsort(positions, kind="stable")
-    for group in np.split(by_position, np.flatnonzero(np.diff(positions[by_position])) + 1):
-        price = instance.price[group]
-        rank = np.lexsort((group, price)).argsort()
-        replaceable = (
-            (rank[None, :] < rank[:, None])
-            & _within(instance.visible[group])
-            & _within(instance.mandatory[:, group].T)
-            & _within(excluded[group]).T
-        )
-        superfluous[group] |= replaceable.any(axis=1)
-    return superfluous
-
-
-def _within(rows: Boolean) -> Boolean:
-    """Return for each pair of rows whether the first is a subset of the second, (k, k) bool."""
-    overlap = rows.astype(np.float32) @ rows.T.astype(np.float32)
-    subset: Boolean = overlap == overlap.diagonal()[:, None]
-    return subset

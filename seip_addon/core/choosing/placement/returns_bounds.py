@@ -59,14 +59,11 @@ class ReturnsBound:
     ----------
     value : float
         Upper bound on what any placement adds.
-    fixed : float
-        Part of the bound that does not depend on candidates: the weighted sum of c.
     selection : Selection
         The candidates of largest contributions.
     """
 
     value: float
-    fixed: float
     selection: Selection
 
 
@@ -107,7 +104,7 @@ class Completion:
         fixed = float(rules.weight @ intercept)
         selection = select(rules, score)
         # single precision may have made the scores too small, and a bound must not be
-        return ReturnsBound((fixed + selection.value) * (1 + ROUNDING) + ROUNDING, fixed, selection)
+        return ReturnsBound((fixed + selection.value) * (1 + ROUNDING) + ROUNDING, selection)
 
     def falling_bounds(self, share: Float, clock: Clock) -> Iterator[tuple[ReturnsBound, Float]]:
         """Yield bounds, each with the fractional choice of candidates from which it was computed.

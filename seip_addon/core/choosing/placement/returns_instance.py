@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Boolean, Float, Integer
 from ...errors import SeipError
-from .constraints import Constrained, constraints_of
+from .constraints import Constrained, constraints_of, superfluous
 from .problem import TIE_TOLERANCE, PlacementProblem, canonical_order
 
 _ROWS_AT_ONCE = 32
@@ -106,25 +106,11 @@ def make_returns_instance(problem: PlacementProblem, returns: NDArray[np.float32
         weight=problem.weights[met] / problem.weights.sum(),
         **constraints_of(problem, order),
     )
-    return instance.of(np.flatnonzero(~_dominated(instance, problem.positions[order])))
+    meets = (instance.returns > 0).any(axis=1)
+    needed = ~superfluous(instance, problem.positions[order], meets, lambda some: _no_more(instance.returns[some]))
+    return instance.of(np.flatnonzero(needed))
 
 
-def _dominated(instance: ReturnsInstance, positions: Integer) -> Boolean:
-    """Return the candidates that no best placement needs, (c,) bool."""
-    out: Boolean = ~(instance.returns > 0).any(axis=1) & ~instance.mandatory.any(axis=0)
-    excluded = instance.conflict | np.eye(len(instance), dtype=bool)
-    by_position = np.argsort(positions, kind="stable")
-    for group in np.split(by_position, np.flatnonzero(np.diff(positions[by_position])) + 1):
-        for one in group:
-            for other in group:
-                first = (instance.price[other], other) < (instance.price[one], one)
-                if (
-                    first
-                    and not out[other]
-                    and (instance.returns[other] >= instance.returns[one]).all()
-                    and (instance.mandatory[:, other] >= instance.mandatory[:, one]).all()
-                    and (excluded[other] <= excluded[one]).all()
-                ):
-                    out[one] = True
-                    break
-    return out
+def _no_more(returns: NDArray[np.float32]) -> Boolean:
+    """Return for each pair of rows whether the first has no more returns from anyone than the second, (k, k) bool."""
+    return np.stack([(returns <= row).all(axis=1) for row in returns], axis=1)

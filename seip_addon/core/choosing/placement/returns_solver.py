@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...arrays import Boolean, Float, Integer
 from ...progress import Progress
 from .feasibility import starting_choice
-from .greedy import addable
+from .greedy import addable, orders
 from .integer_program import fits
 from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
 from .reduced_problem import make_instance
@@ -123,7 +123,7 @@ def greedy_returns(problem: PlacementProblem, returns: NDArray[np.float32]) -> G
     clock = Clock(math.inf)
     instance = make_returns_instance(problem, returns)
     start = yield from _starting_choice(problem, instance, "highs")
-    choices = [greedy(instance, start, clock, per_price=per_price) for per_price in _orders(instance)]
+    choices = [greedy(instance, start, clock, per_price=per_price) for per_price in orders(instance)]
     chosen = max(choices, key=instance.value)
     return assess(
         problem,
@@ -183,7 +183,7 @@ def improved_greedy(
 ) -> Generator[Progress, None, Integer]:
     """Return the best of several greedy choices after swaps, ascending."""
     best = yield from swapped(instance, greedy(instance, start, clock), clock, standing)
-    if True in _orders(instance):
+    if True in orders(instance):
         other = yield from swapped(instance, greedy(instance, start, clock, per_price=True), clock, standing)
         best = max(best, other, key=instance.value)
     first = np.where(addable(instance, start), _gains(instance, instance.together(start), clock), 0.0)
@@ -235,11 +235,6 @@ def _best_of_each_price(instance: ReturnsInstance, gain: Float) -> list[int]:
         if np.isfinite(own).any():
             best.append(int(np.argmax(own)))
     return best
-
-
-def _orders(instance: ReturnsInstance) -> list[bool]:
-    """Return whether to choose greedily by gain per price; under a budget both orders are tried."""
-    return [False, True] if math.isfinite(instance.budget) and instance.price.max() > 0 else [False]
 
 
 @dataclass(order=True)

@@ -45,7 +45,7 @@ class Risk:
     tail : float
         α, the share of the worst scenarios that are averaged; 1 for the expectation, 0 for the single worst one.
     seen_by : int
-        κ, the number of sensors that must see a target.
+        κ, the number of sensors that must see a target, at least 1.
     failure : {"none", "worst", "mean"}
         Failure of one sensor: none, the most important one, or any of them on average.
     """
@@ -53,12 +53,6 @@ class Risk:
     tail: float = 1.0
     seen_by: int = 1
     failure: Failure = "none"
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.tail <= 1:
-            raise SeipError(f"the tail must be a share of the scenarios from 0 to 1, not {self.tail:g}")
-        if self.seen_by < 1:
-            raise SeipError(f"the number of sensors that see a target is {self.seen_by}; it must be at least 1")
 
     @property
     def least_sensors(self) -> int:

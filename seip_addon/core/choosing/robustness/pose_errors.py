@@ -19,9 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...arrays import Boolean, Float
-from ...errors import SeipError
 from ...geometry.orientation import orientations
-from ...limits import DRAWS
 from ...site.obstruction import inside_any
 from ...site.scene_geometry import Mesh
 from ..placement.scenarios import PoseErrors
@@ -61,12 +59,6 @@ class PoseDraws:
         return orientations(planned_yaw + self.yaw, planned_tilt + self.pitch, self.roll)
 
 
-def require_draws(draws: int) -> None:
-    """Raise SeipError if the number of draws is below one, or too large for memory."""
-    if not DRAWS.allow(draws):
-        raise SeipError(f"the number of draws or scenarios of pose errors must be {DRAWS}, not {draws}")
-
-
 def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseDraws:
     """Draw random pose errors of sensors.
 
@@ -78,12 +70,9 @@ def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseD
     ----------
     foot : (s, 3) float64, metres
         Ground point of each sensor's position; equal ones have equal errors.
-    seed : int
-        At least 0.
+    draws, seed : int
+        Number of draws, at least 1, and a seed of at least 0; see `Scenarios`.
     """
-    require_draws(draws)
-    if seed < 0:
-        raise SeipError(f"the seed of the pose errors must be a whole number of at least 0, not {seed}")
     positions, of_position = np.unique(np.rint(foot / _MICROMETRE).astype(np.int64), axis=0, return_inverse=True)
     standard = np.stack([_standard_normal(seed, position, draws) for position in positions.tolist()], axis=1)
     scale = [errors.position, errors.position, errors.height, errors.yaw, errors.tilt, errors.tilt]
@@ -98,20 +87,13 @@ def _standard_normal(seed: int, position: Sequence[int], draws: int) -> Float:
     return np.random.default_rng(words).standard_normal((draws, _KINDS_DRAWN))
 
 
-def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> tuple[PoseDraws, Boolean]:
+def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> PoseDraws:
     """Move sensors that a draw puts inside an object to the opposite side, or, if that fails, to the planned position.
 
     Parameters
     ----------
     xyz : (s, 3) float64, metres
         Planned positions.
-
-    Returns
-    -------
-    PoseDraws
-        Draws without sensors inside objects.
-    (n, s) bool
-        Whether each draw would have put the sensor inside an object.
     """
     shift = draws.shift.copy()
     blocked: Boolean = inside_any((xyz + shift).reshape(-1, 3), objects).reshape(shift.shape[:-1])
@@ -120,4 +102,4 @@ def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> tup
     where = np.broadcast_to(xyz, shift.shape)
     still[blocked] = inside_any(where[blocked] + shift[blocked], objects)
     shift[still] = 0.0
-    return replace(draws, shift=shift), blocked
+    return replace(draws, shift=shift)

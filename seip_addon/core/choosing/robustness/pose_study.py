@@ -14,13 +14,12 @@ from ...arrays import Boolean, Float
 from ...estimates import IntervalEstimate, mean_of, quantile_of
 from ...progress import Progress
 from ...sensing.visibility.surroundings import Surroundings
-from ...site.site import Site
 from ..placement.deployment import Deployment
 from ..placement.scenarios import ERROR_KINDS, PoseErrors
 from .scenario_visibility import ScenarioVisibility
 from .visibility_under_errors import draws_for, visibility_under_errors
 
-QUANTILES = (0.05, 0.5, 0.95)
+LOW_QUANTILE = 0.05  # quantile of coverage that is reported, and by which placements are compared
 
 NOTABLE_LOSS = 0.01  # share of the targets whose loss, in one of twenty draws, is worth a warning
 
@@ -48,74 +47,46 @@ class PoseStudySettings:
 
 
 @dataclass(frozen=True, eq=False)
-class Coverages:
-    """Coverage of a placement in each of n draws.
-
-    Parameters
-    ----------
-    whole : (n,) float64
-        Share of all targets that is seen.
-    central : (n,) float64 or None
-        Share of the targets in weighted regions that is seen; None if there are none.
-    """
-
-    whole: Float
-    central: Float | None
-
-
-@dataclass(frozen=True, eq=False)
 class PoseStudy:
-    """Coverage of a placement under pose errors.
+    """Coverage of a placement under pose errors, as a share of all targets.
 
     Parameters
     ----------
-    planned : Coverages
-        Coverage of the poses as planned: n = 1.
-    together : Coverages
-        Coverage with errors of all sensors.
-    alone : tuple of Coverages
+    planned : float
+        Coverage of the poses as planned.
+    together : (n,) float64
+        Coverage in each of n draws with errors of all sensors.
+    alone : tuple of (n,) float64
         Coverage with errors of only one sensor, for each sensor, in the same draws.
-    by_kind : dict of str to Coverages
-        Coverage with a single kind of error, for each kind.
-    blocked : float
-        Share of the drawn poses that were inside an object and were moved out of it.
+    by_kind : dict of str to (m,) float64
+        Coverage in each of m draws with a single kind of error, for each kind.
     """
 
     settings: PoseStudySettings
     labels: tuple[str, ...]
-    planned: Coverages
-    together: Coverages
-    alone: tuple[Coverages, ...]
-    by_kind: dict[str, Coverages]
-    blocked: float
+    planned: float
+    together: Float
+    alone: tuple[Float, ...]
+    by_kind: dict[str, Float]
 
     def quantile(self, share: float) -> IntervalEstimate:
-        """Estimate a quantile of the whole coverage."""
-        return quantile_of(self.together.whole, share)
+        """Estimate a quantile of the coverage."""
+        return quantile_of(self.together, share)
 
     def loss_by_sensor(self) -> tuple[IntervalEstimate, ...]:
         """Estimate the mean loss of coverage if only one sensor has errors, for each sensor."""
-        return tuple(mean_of(self.planned.whole[0] - coverages.whole) for coverages in self.alone)
+        return tuple(mean_of(self.planned - coverage) for coverage in self.alone)
 
     def loss_by_kind(self) -> dict[str, IntervalEstimate]:
         """Estimate the mean loss of coverage from each kind of error by itself."""
-        return {kind: mean_of(self.planned.whole[0] - each.whole) for kind, each in self.by_kind.items()}
+        return {kind: mean_of(self.planned - coverage) for kind, coverage in self.by_kind.items()}
 
     def worst_sensor(self) -> tuple[str, bool]:
         """Return the sensor whose errors cost most, and whether this is significant in the draws."""
         losses = self.loss_by_sensor()
         worst = max(range(len(losses)), key=lambda number: losses[number].value)
-        behind = [
-            self.alone[number].whole - self.alone[worst].whole for number in range(len(losses)) if number != worst
-        ]
+        behind = [self.alone[number] - self.alone[worst] for number in range(len(losses)) if number != worst]
         return self.labels[worst], losses[worst].low > 0 and all(mean_of(difference).low > 0 for difference in behind)
-
-    def is_converged(self) -> bool:
-        """Return whether half of the draws give the same mean and quantiles, within their intervals."""
-        whole = self.together.whole
-        half = whole[: len(whole) // 2]
-        pairs = [(mean_of(half), mean_of(whole)), *((quantile_of(half, q), quantile_of(whole, q)) for q in QUANTILES)]
-        return all(one.agrees_with(other) for one, other in pairs)
 
 
 def pose_study(
@@ -128,55 +99,50 @@ def pose_study(
     deployment : Deployment
         Placement at candidate poses of the site.
     """
-    site = around.site
     poses = np.array([sensor.pose for sensor in deployment.sensors if sensor.pose is not None], dtype=np.int64)
 
-    def views(errors: PoseErrors, draws: int) -> Generator[Progress, None, tuple[ScenarioVisibility, Boolean]]:
-        drawn, blocked = draws_for(around, poses, errors, draws, settings.seed)
-        seen = yield from visibility_under_errors(around, poses, drawn)
-        return seen, blocked
+    def views(errors: PoseErrors, draws: int) -> Generator[Progress, None, ScenarioVisibility]:
+        drawn = draws_for(around, poses, errors, draws, settings.seed)
+        return (yield from visibility_under_errors(around, poses, drawn))
 
-    as_planned, _ = yield from views(PoseErrors(0.0, 0.0, 0.0, 0.0), 1)
+    as_planned = yield from views(PoseErrors(0.0, 0.0, 0.0, 0.0), 1)
     planned = as_planned.seen(0)
-    together, blocked = yield from views(settings.errors, settings.draws)
+    together = yield from views(settings.errors, settings.draws)
     by_kind = {}
     for kind in ERROR_KINDS:
         if settings.draws_of_kind and getattr(settings.errors, kind) > 0:
-            of_kind, _ = yield from views(settings.errors.alone(kind), settings.draws_of_kind)
-            by_kind[kind] = _coverages(site, [of_kind.seen(draw) for draw in range(len(of_kind))])
+            of_kind = yield from views(settings.errors.alone(kind), settings.draws_of_kind)
+            by_kind[kind] = _coverage([of_kind.seen(draw) for draw in range(len(of_kind))])
     return PoseStudy(
         settings=settings,
         labels=tuple(sensor.label for sensor in deployment.sensors),
-        planned=_coverages(site, [planned]),
-        together=_coverages(site, [together.seen(draw) for draw in range(len(together))]),
-        alone=tuple(_one_errs(site, planned, together, number) for number in range(len(poses))),
+        planned=float(planned.any(axis=0).mean()),
+        together=_coverage([together.seen(draw) for draw in range(len(together))]),
+        alone=tuple(_one_errs(planned, together, number) for number in range(len(poses))),
         by_kind=by_kind,
-        blocked=float(blocked.mean()),
     )
 
 
-def _coverages(site: Site, views: Sequence[Boolean]) -> Coverages:
+def _coverage(views: Sequence[Boolean]) -> Float:
     """Return the joint coverage of rows of V in each draw."""
-    seen = np.array([rows.any(axis=0) for rows in views])
-    central = site.targets.central
-    return Coverages(seen.mean(axis=1), seen[:, central].mean(axis=1) if central.any() else None)
+    return np.array([rows.any(axis=0).mean() for rows in views])
 
 
-def _one_errs(site: Site, planned: Boolean, together: ScenarioVisibility, number: int) -> Coverages:
+def _one_errs(planned: Boolean, together: ScenarioVisibility, number: int) -> Float:
     others = np.delete(planned, number, axis=0).any(axis=0)
-    return _coverages(site, [np.stack([others, row]) for row in together.seen_by_pose(number)])
+    return _coverage([np.stack([others, row]) for row in together.seen_by_pose(number)])
 
 
 def pose_warnings(study: PoseStudy) -> tuple[str, ...]:
     """Return a warning if pose errors cost a placement much of its coverage."""
-    lost = study.planned.whole[0] - study.quantile(QUANTILES[0]).value
+    lost = study.planned - study.quantile(LOW_QUANTILE).value
     return (pose_message(study),) if lost >= NOTABLE_LOSS else ()
 
 
 def pose_message(study: PoseStudy) -> str:
     """Return a message on the 5 % quantile of a placement's coverage and the sensor whose errors cost most."""
-    errors, low = study.settings.errors, study.quantile(QUANTILES[0])
-    lost = max(study.planned.whole[0] - low.value, 0.0)
+    errors, low = study.settings.errors, study.quantile(LOW_QUANTILE)
+    lost = max(study.planned - low.value, 0.0)
     worst, certain = study.worst_sensor()
     which = f"{worst}'s error costs most" if certain else "no sensor's error stands out"
     return (

@@ -14,12 +14,10 @@ from ..placement.risk import Risk
 from ..placement.scenarios import Scenarios
 from ..placement.search_limits import DEFAULT_LIMITS, SolverLimits
 from ..placement.solver import solve
+from .pose_study import LOW_QUANTILE
 from .robust_placement import at_least, foresee, outcomes_of, solve_robust
 from .scenario_visibility import ScenarioVisibility
 from .visibility_under_errors import draws_for, visibility_under_errors
-
-LOW_QUANTILE = 0.05  # quantile of coverage by which placements are compared
-COMPARED_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))  # compared by default
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +68,11 @@ class RobustStudy:
         Placement chosen for the poses as planned, once for each outcome by which the others are evaluated.
     robust : tuple of Contender
         Placement for each risk measure.
-    total : float
-        Weight of all targets.
     """
 
     scenarios: Scenarios
     nominal: tuple[Contender, ...]
     robust: tuple[Contender, ...]
-    total: float
 
     def beside(self, contender: Contender) -> Contender:
         """Return the nominal optimum, evaluated by the same outcome as a contender."""
@@ -91,18 +86,12 @@ class RobustStudy:
         """Estimate the gain in the 5 % quantile over unseen draws against the nominal optimum."""
         return quantile_gain(contender.unseen, self.beside(contender).unseen, LOW_QUANTILE)
 
-    def is_converged(self, contender: Contender) -> bool:
-        """Return whether half of the unseen draws give the same estimates, within their intervals."""
-        half = len(contender.unseen) // 2
-        saved = quantile_gain(contender.unseen[:half], self.beside(contender).unseen[:half], LOW_QUANTILE)
-        return saved.agrees_with(self.saving(contender))
-
 
 def robust_study(
     around: Surroundings,
     problem: PlacementProblem,
     scenarios: Scenarios,
-    risks: Sequence[Risk] = COMPARED_RISKS,
+    risks: Sequence[Risk],
     limits: SolverLimits = DEFAULT_LIMITS,
 ) -> Generator[Progress, None, RobustStudy]:
     """Optimise for the planned poses and for each risk measure, and evaluate all placements on held-out scenarios.
@@ -131,9 +120,7 @@ def robust_study(
         placed = at_least(found, nominal, risk.of(outcomes_of(problem, spread, risk, nominal.chosen)))
         entries.append((risk.describe() if scenarios.errs else risk.describe_outcome(), placed, risk.alone))
     contenders = yield from _evaluated(around, problem, scenarios, entries)
-    return RobustStudy(
-        scenarios, tuple(contenders[: len(ways)]), tuple(contenders[len(ways) :]), float(problem.weights.sum())
-    )
+    return RobustStudy(scenarios, tuple(contenders[: len(ways)]), tuple(contenders[len(ways) :]))
 
 
 def _views(
@@ -143,7 +130,7 @@ def _views(
     if not scenarios.errs:
         return ScenarioVisibility(np.packbits(problem.visible[poses], axis=1)[None], problem.visible.shape[1])
     number, seed = (scenarios.evaluated, scenarios.seed + 1) if held_out else (scenarios.optimised, scenarios.seed)
-    drawn, _ = draws_for(around, poses, scenarios.pose_errors, number, seed)
+    drawn = draws_for(around, poses, scenarios.pose_errors, number, seed)
     return (yield from visibility_under_errors(around, poses, drawn))
 
 

@@ -4,7 +4,7 @@ from collections.abc import Generator
 
 import numpy as np
 
-from ...arrays import Boolean, Integer
+from ...arrays import Integer
 from ...progress import Progress
 from ...sensing.visibility.chunks import sharing_rays
 from ...sensing.visibility.ray_casting import engine_name, make_ray_caster
@@ -15,9 +15,7 @@ from .pose_errors import PoseDraws, draw_errors, out_of_objects
 from .scenario_visibility import ScenarioVisibility, each_in_threads
 
 
-def draws_for(
-    around: Surroundings, poses: Integer, errors: PoseErrors, draws: int, seed: int
-) -> tuple[PoseDraws, Boolean]:
+def draws_for(around: Surroundings, poses: Integer, errors: PoseErrors, draws: int, seed: int) -> PoseDraws:
     """Draw errors of some of a site's poses that put no sensor inside an object; see `out_of_objects`."""
     candidates = around.site.candidates
     drawn = draw_errors(errors, candidates.position[candidates.position_of[poses]], draws, seed)
@@ -46,7 +44,7 @@ def visibility_under_errors(
     keys, xyz = candidates.sensor[poses].tolist(), candidates.xyz[poses]
     yaw, tilt = candidates.yaw[poses], candidates.tilt[poses]
     caster = make_ray_caster(site.triangles, engine_name(around.engine))
-    model = VisibilityModel(site, around.sight, caster)
+    model = VisibilityModel(site.targets.xyz, site.reflectivity, around.sight, caster)
     together = sharing_rays(xyz, yaw, tilt)
     packed = np.zeros((len(draws), len(poses), (len(site.targets) + 7) // 8), dtype=np.uint8)
     orientations = draws.orientations(yaw, tilt)

@@ -9,6 +9,8 @@ from typing import Annotated, Literal
 
 from ... import limits
 from ...errors import SeipError
+from ...sensing.recordings.unit_gain import Gain, ReturnShare
+from ...sensing.recordings.verification import CoverageSteps
 from ...storage.files import read_small
 from ...storage.json_dataclass import from_json
 
@@ -21,7 +23,6 @@ Size = Annotated[float, limits.DISTANCE]
 Degrees = Annotated[float, limits.DEGREES]
 Share = Annotated[float, limits.SHARE]
 Count = Annotated[int, limits.COUNT]
-Factor = Annotated[float, limits.GAIN]
 Vector = tuple[Coordinate, Coordinate, Coordinate]
 Angles = tuple[Degrees, Degrees, Degrees]
 Row = tuple[Annotated[float, limits.Limits(-1.001, 1.001)], ...]
@@ -35,28 +36,6 @@ class RecordedBackground:
     sweeps: Count
     seconds: Annotated[float, limits.DURATION]
     uncertain: Share
-
-
-@dataclass(frozen=True)
-class RecordedGain:
-    """Received power of a unit as a multiple of that in its model's law, with its 95 % interval."""
-
-    value: Factor
-    low: Factor
-    high: Factor
-
-
-@dataclass(frozen=True)
-class RecordedReturns:
-    """Shares of the rays that return from a kind of surface in one range; see `ReturnShare`."""
-
-    surface: str
-    low: Size
-    high: Size
-    rays: Count
-    predicted: Share
-    fitted: Share
-    measured: Share
 
 
 @dataclass(frozen=True)
@@ -87,8 +66,8 @@ class RecordedPose:
     rotation_half_width_deg: Angles
     match: Share
     background: RecordedBackground
-    gain: RecordedGain | None
-    returns: tuple[RecordedReturns, ...]
+    gain: Gain | None
+    returns: tuple[ReturnShare, ...]
 
     @property
     def planned_m(self) -> tuple[float, ...]:
@@ -114,17 +93,6 @@ class RecordedChange:
 
 
 @dataclass(frozen=True)
-class RecordedSteps:
-    """Coverage from the plan to the recording; see `CoverageSteps`."""
-
-    promised: Share
-    pose: Share
-    obstacles: Share
-    installed: Share
-    returned: Share
-
-
-@dataclass(frozen=True)
 class VerificationRecord:
     """Content of ``verification.json``.
 
@@ -138,7 +106,7 @@ class VerificationRecord:
     recording: str
     sensors: tuple[RecordedPose, ...]
     changes: tuple[RecordedChange, ...]
-    coverage: RecordedSteps
+    coverage: CoverageSteps
 
 
 def load_verification(path: Path) -> VerificationRecord:

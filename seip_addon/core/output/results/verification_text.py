@@ -7,8 +7,9 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from ...counts import counted
+from ...sensing.recordings.verification import CoverageSteps
 from ...site.locations import direction
-from .verification_record import RecordedChange, RecordedPose, RecordedSteps, VerificationRecord
+from .verification_record import RecordedChange, RecordedPose, VerificationRecord
 
 LEAST_COST = 0.0005
 """Share of coverage that is shown as 0.1 points."""
@@ -95,7 +96,7 @@ def vehicles(record: VerificationRecord) -> int:
     return sum(change.kind == "vehicle" for change in record.changes)
 
 
-def coverage_rows(steps: RecordedSteps) -> list[tuple[str, float, float | None]]:
+def coverage_rows(steps: CoverageSteps) -> list[tuple[str, float, float | None]]:
     """Return the causes by which coverage differs from the promise, with the coverage after each and its effect."""
     shares = (steps.promised, steps.pose, steps.obstacles, steps.installed)
     causes = ("as promised", "sensors where they are", "objects as they are", "gains as they are")
@@ -109,7 +110,7 @@ def signed_points(effect: float) -> str:
     return f"{'−' if number < 0 else '+' if number > 0 else ''}{abs(number):.1f}"
 
 
-def coverage_text(steps: RecordedSteps) -> str:
+def coverage_text(steps: CoverageSteps) -> str:
     """Return promised and installed coverage, and what makes the difference."""
     names = ("poses of the sensors", "changed objects", "gain")
     effects = [effect for _, _, effect in coverage_rows(steps) if effect is not None]

@@ -59,19 +59,3 @@ def _turns(steps: int, step: float, first: float) -> tuple[Float, Float]:
     """Return cosines and sines of ``steps`` azimuths at equal distances, in radians, from a first one on."""
     angle = first + step * np.arange(steps)
     return np.cos(angle), np.sin(angle)
-
-
-def beam_directions(model: LidarModel, yaw: float = 0.0) -> Float:
-    """Return the unit directions of one revolution or frame.
-
-    Parameters
-    ----------
-    yaw : float, radians
-        Direction of azimuth zero, counter-clockwise from +x.
-
-    Returns
-    -------
-    (channels, azimuth_count, 3) float64
-    """
-    rays = np.arange(model.channels * model.azimuth_count)
-    return BeamPattern(model, yaw).directions(rays).reshape(model.channels, model.azimuth_count, 3)

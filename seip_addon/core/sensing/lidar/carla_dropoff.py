@@ -55,10 +55,6 @@ class CarlaDropoff:
         """Return the law in air with additional extinction, in 1/m, on the way out and back."""
         return replace(self, attenuation=self.attenuation + 2.0 * extinction)
 
-    def losing(self, share: float) -> CarlaDropoff:
-        """Return the law with a share of the detected returns lost."""
-        return replace(self, general=self.general + (1.0 - self.general) * share)
-
     def strength(self, distance: Float, reflected: Float) -> Float:
         """Return I, (n,) float64, of hits; see `RangeEquation.strength`."""
         intensity: Float = reflected * np.exp(-self.attenuation * distance)

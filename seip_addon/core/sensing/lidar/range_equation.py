@@ -144,10 +144,6 @@ class RangeEquation:
         """Return the law of a sensor that receives ``gain`` times the power."""
         return replace(self, threshold=self.threshold - math.log(gain))
 
-    def losing(self, share: float) -> RangeEquation:
-        """Return the law with a share, below 1, of the detected returns lost."""
-        return replace(self, ceiling=self.ceiling * (1.0 - share))
-
     def as_dropoff(self) -> CarlaDropoff:
         """Return the drop-off with the same losses at two ranges, for a surface of `DROPOFF_REFLECTIVITY`.
 

@@ -6,9 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
+from ... import limits
 from ...arrays import Boolean, Float, Integer
 from ...estimates import student_quantile
 from ..lidar.carla_dropoff import CarlaDropoff
@@ -32,9 +34,9 @@ _LEAST_IN_BIN = 30
 class Gain:
     """Received power of a unit as a multiple of that in its model's law, with its 95 % interval."""
 
-    value: float
-    low: float
-    high: float
+    value: Annotated[float, limits.GAIN]
+    low: Annotated[float, limits.GAIN]
+    high: Annotated[float, limits.GAIN]
 
 
 @dataclass(frozen=True)
@@ -53,12 +55,12 @@ class ReturnShare:
     """
 
     surface: str
-    low: float
-    high: float
-    rays: int
-    predicted: float
-    fitted: float
-    measured: float
+    low: Annotated[float, limits.DISTANCE]
+    high: Annotated[float, limits.DISTANCE]
+    rays: Annotated[int, limits.COUNT]
+    predicted: Annotated[float, limits.SHARE]
+    fitted: Annotated[float, limits.SHARE]
+    measured: Annotated[float, limits.SHARE]
 
 
 def fitted_gain(one: RayComparison) -> Gain | None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from ...arrays import Boolean
+from ... import limits
 from ...site.scene_geometry import SceneGeometry
-from ...site.targets import Targets
 from .background import Background
 from .comparison import Change, RayComparison
 from .registration import Registration
@@ -38,7 +38,7 @@ class VerifiedSensor:
     shares: tuple[ReturnShare, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class CoverageSteps:
     """Coverage of the same targets, 0 to 1, from the plan to the recording.
 
@@ -57,11 +57,11 @@ class CoverageSteps:
         where the surface differs from place to place, because one bright spot within δ is enough.
     """
 
-    promised: float
-    pose: float
-    obstacles: float
-    installed: float
-    returned: float
+    promised: Annotated[float, limits.SHARE]
+    pose: Annotated[float, limits.SHARE]
+    obstacles: Annotated[float, limits.SHARE]
+    installed: Annotated[float, limits.SHARE]
+    returned: Annotated[float, limits.SHARE]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +76,6 @@ class Verification:
         Coverage that each change costs (0 to 1, negative if it gains); NaN for vehicles and for small changes.
     corrected : SceneGeometry
         The scene with the changes, without vehicles.
-    measured_seen : (t,) bool
-        Targets seen in the recording.
     """
 
     sensors: tuple[VerifiedSensor, ...]
@@ -85,5 +83,3 @@ class Verification:
     costs: tuple[float, ...]
     coverage: CoverageSteps
     corrected: SceneGeometry
-    targets: Targets
-    measured_seen: Boolean

@@ -40,8 +40,6 @@ class RoadUsers:
         Index of the crossing that a pedestrian stands on; -1 elsewhere.
     crossings : tuple of str
         Names of the crossings.
-    spacing : float, metres
-        Distance between neighbouring road users.
     """
 
     xyz: Float
@@ -50,7 +48,6 @@ class RoadUsers:
     central: Boolean
     crossing: Integer
     crossings: tuple[str, ...]
-    spacing: float
 
     def __len__(self) -> int:
         """Return the number of road users."""
@@ -89,7 +86,6 @@ def road_users(geometry: SceneGeometry, spacing: float = SPACING) -> RoadUsers:
         central=np.concatenate([*[on_road.central] * len(BODIES), central]),
         crossing=crossing,
         crossings=tuple(area.name for area in areas),
-        spacing=spacing,
     )
 
 

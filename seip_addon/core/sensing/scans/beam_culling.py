@@ -9,6 +9,7 @@ import numpy as np
 from ...arrays import Float, Integer
 from ..lidar.azimuth_steps import steps_in_arcs
 from ..lidar.model import LidarModel
+from ..visibility.beam_culling import counted
 
 
 class BeamWindows:
@@ -52,7 +53,7 @@ class BeamWindows:
         )
         # An arc may run over step 0 of an all-round channel: its steps wrap. The rows of a hull in a channel have no
         # step in common, so that no ray comes twice for a hull.
-        steps = _counted(first, count) % self._steps
+        steps = counted(first, count) % self._steps
         return np.repeat(hull[arc], count), np.repeat(channel[arc] * self._steps, count) + steps
 
     def _channels_at(self, points: Float, near: Float) -> tuple[Integer, Integer]:
@@ -68,7 +69,7 @@ class BeamWindows:
         count = np.maximum(np.searchsorted(self._slope, most, side="right") - low, 0)
         # hulls out of range are left out: no ray towards them can hit anything in them
         count[near > self._reach] = 0
-        return np.repeat(np.arange(len(points)), count), self._channel[_counted(low, count)]
+        return np.repeat(np.arange(len(points)), count), self._channel[counted(low, count)]
 
 
 def _azimuths(points: Float) -> tuple[Float, Float, Float]:
@@ -88,9 +89,3 @@ def _azimuths(points: Float) -> tuple[Float, Float, Float]:
     # an arc of half a turn or more means that the sensor is inside the hull, which then lies in all directions
     within = half >= math.pi / 2
     return middle, np.where(within, math.pi, half), np.where(within, 0.0, np.maximum(along.min(axis=1), 0.0))
-
-
-def _counted(first: Integer, count: Integer) -> Integer:
-    """Return the concatenated ranges of ``count`` whole numbers from each ``first`` on."""
-    numbers: Integer = np.arange(count.sum()) + np.repeat(first - (np.cumsum(count) - count), count)
-    return numbers

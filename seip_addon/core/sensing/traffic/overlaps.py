@@ -1,14 +1,14 @@
 """Removal of overlapping road users from simulated traffic."""
 
 from collections.abc import Generator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
 from ...arrays import Float, Integer
 from ...progress import Progress
-from .trajectories import Snapshot, Trajectories
+from .trajectories import Snapshot, Trajectories, some_users
 
 MIN_OVERLAP = 0.02  # square metres; smaller overlaps of two footprints are only contact
 
@@ -96,18 +96,6 @@ def without_overlaps(trajectories: Trajectories) -> Generator[Progress, None, tu
         gone.append(int(user[np.lexsort((user, stay[user], -others))[0]]))
         pairs = pairs[(pairs != gone[-1]).all(axis=1)]
     names = tuple(trajectories.users[number].name for number in sorted(gone))
-    return _without(trajectories, gone), names
-
-
-def _without(trajectories: Trajectories, gone: list[int]) -> Trajectories:
-    stays = np.ones(len(trajectories), dtype=np.bool_)
-    stays[gone] = False
-    counts = np.diff(trajectories.first)
-    kept = np.repeat(stays, counts)
-    arrays = {name: getattr(trajectories, name)[kept] for name in ("time", "position", "yaw", "pitch", "speed")}
-    return replace(
-        trajectories,
-        users=tuple(user for user, stay in zip(trajectories.users, stays.tolist(), strict=True) if stay),
-        first=np.concatenate([[0], np.cumsum(counts[stays])]).astype(np.int64),
-        **arrays,
-    )
+    kept = np.ones(len(trajectories), dtype=np.bool_)
+    kept[gone] = False
+    return some_users(trajectories, kept), names

@@ -1,6 +1,7 @@
 """Traffic for a scene from a user's files: trajectories, or SUMO's floating car data fitted to the road."""
 
 import math
+import os
 from collections import Counter
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -8,14 +9,17 @@ from pathlib import Path
 
 import numpy as np
 
+from ...arrays import Float
 from ...counts import counted
+from ...errors import SeipError
+from ...limits import MAP_COORDINATE
 from ...progress import Progress
 from ...site.scene_geometry import SceneGeometry, joined
+from ...storage.xml_stream import Attributes, read_tags
 from .floating_car_data import Extent, read_floating_car_data, read_trajectories
 from .overlaps import find_overlaps
 from .road_fit import fit_to_road
 from .site_traffic import load_trajectories
-from .sumo_files import read_net_offset
 from .trajectories import CATEGORIES, LoadedTraffic, Trajectories
 from .vehicle_types import read_vehicle_types
 
@@ -111,3 +115,28 @@ def describe_categories(trajectories: Trajectories) -> str:
     """Return the number of road users of each category, as text."""
     counts = Counter(user.category for user in trajectories.users)
     return ", ".join(f"{counts[category]} {category}" for category in CATEGORIES if counts[category])
+
+
+def read_net_offset(path: str | os.PathLike[str]) -> Float:
+    """Return the offset (2,) in metres of a SUMO network: its coordinates are the map's plus this.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be read, or is not a SUMO network.
+    """
+    found: list[str] = []
+
+    def take(tag: str, attributes: Attributes) -> None:
+        if tag == "location":
+            found.append(attributes.get("netOffset", ""))
+
+    for _ in read_tags(path, take):
+        if found:
+            break
+    try:
+        x, y = (float(number) for number in found[0].split(","))
+    except (IndexError, ValueError) as error:
+        raise SeipError(f"{Path(path).name} is not a SUMO network: it has no netOffset; name a .net.xml") from error
+    MAP_COORDINATE.require([x, y], Path(path).name, "netOffset", "name a .net.xml that netconvert wrote")
+    return np.array([x, y])

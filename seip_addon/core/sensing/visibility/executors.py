@@ -51,7 +51,7 @@ class VisibilityTask:
 
     def row_function(self, caster: RayCaster) -> Callable[[Integer], Rows]:
         """Return the function from pose indices (n,) to their rows of the grid."""
-        model = VisibilityModel(self.site, self.settings, caster)
+        model = VisibilityModel(self.site.targets.xyz, self.site.reflectivity, self.settings, caster)
         return lambda poses: compute_rows(model, self.site.candidates, self.models, poses)
 
 

@@ -175,7 +175,7 @@ def compute_visibility(  # noqa: PLR0913, PLR0917  # the inputs, and how to comp
     Returns
     -------
     VisibilityGrid
-        Identical to that of full scans (`seen_by_tilted_full_scan`), wherever it is computed.
+        Identical to that of full scans, which cast every ray, wherever it is computed.
 
     Raises
     ------

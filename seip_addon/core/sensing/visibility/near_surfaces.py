@@ -15,7 +15,6 @@ import shapely
 
 from ...arrays import Boolean, Float, Integer
 from ...geometry.orientation import rotated
-from ...site.scene_geometry import DEFAULT_REFLECTIVITY
 
 _TARGETS_AT_ONCE = 2048  # bounds the memory of the pairs of targets and triangles
 
@@ -155,9 +154,7 @@ class NearSurfaces:
     tolerance: float
 
 
-def near_surfaces(
-    triangles: Float, targets: Float, delta: float, reflectivity: Float | float = DEFAULT_REFLECTIVITY
-) -> NearSurfaces:
+def near_surfaces(triangles: Float, targets: Float, delta: float, reflectivity: Float) -> NearSurfaces:
     """Find the surfaces near targets.
 
     Parameters
@@ -168,14 +165,13 @@ def near_surfaces(
         Positions of the targets.
     delta : float, metres
         δ, the distance within which a return sees a target.
-    reflectivity : (n,) float64 or float, 0 to 1
+    reflectivity : (n,) float64, 0 to 1
         Reflectivity of the triangles.
 
     Returns
     -------
     NearSurfaces
     """
-    reflects = np.broadcast_to(np.asarray(reflectivity, dtype=np.float64), len(triangles))
     tolerance = caster_tolerance(triangles)
     radius = delta + tolerance
     # A spatial index of the triangles' boxes in plan gives the pairs of target and triangle that may meet; the exact
@@ -188,7 +184,7 @@ def near_surfaces(
         # sorted by target, on which the slices in `ScanPosition.counting_at_borders` rely
         order = np.argsort(near, kind="stable")
         target = near[order] + begin
-        parts.append(_cut(triangles[triangle[order]], targets[target], target, radius, reflects[triangle[order]]))
+        parts.append(_cut(triangles[triangle[order]], targets[target], target, radius, reflectivity[triangle[order]]))
     cuts = Cuts(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Cuts)))
     return _about(targets, radius, cuts.bounds(tolerance), tolerance)
 

@@ -145,7 +145,7 @@ def _first_gap(model: LidarModel, height: float, delta: float, reach: float, til
         return reach
     index = TargetIndex(np.column_stack([road, np.zeros(len(road))]), delta)
     missed = np.ones(len(road), dtype=bool)
-    missed[index.within_delta(hits)] = False
+    missed[index.pairs_within_delta(hits)[1]] = False
     return float(np.hypot(*road[missed].T).min(initial=reach))
 
 

@@ -1,4 +1,4 @@
-"""Scans of the sensors at one position, full or lazy.
+"""Scans of the sensors at one position.
 
 A target is seen if some return of the scan lies nearer than δ to it and is strong enough. Where surfaces meet within
 the tolerance of the ray caster, it is chance which of them stops the ray; the return must then be strong enough from
@@ -34,7 +34,7 @@ from .ray_culling import rays_near
 from .settings import VisibilitySettings
 from .target_index import TargetIndex, is_within, squared_length
 
-_RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
+_RAYS_AT_ONCE = 1 << 17  # bounds the memory of rays that are cast at once
 _PAIRS_AT_ONCE = 1 << 18  # of rays and surfaces: bounds the memory at borders of surfaces
 
 
@@ -143,7 +143,7 @@ def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
     Returns
     -------
     seen : (models, t) bool
-        Visibility, identical to that of `seen_by_all_rays`.
+        Visibility, identical to that of a full scan, which casts every ray.
     cast : int
         Number of rays.
     """
@@ -161,7 +161,7 @@ def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
     for number, model in enumerate(position.models):
         if model.rosette is not None:
             rays = rays_near(patches, position.yaw + model.azimuth_offsets, model.elevations, model.max_range)
-            seen[number] = _seen_by_rays(position, model, rays, surfaces, index)
+            seen[number] = seen_by_rays(position, model, rays, surfaces, index)
             cast += len(rays)
     return seen, cast
 
@@ -212,20 +212,10 @@ def _seen_by_channels(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
     return seen, returns.cast
 
 
-def seen_by_all_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
-    """Find the targets that are seen by casting every ray of every sensor: the reference."""
-    index = TargetIndex(surfaces.xyz, position.settings.delta)
-    rays = [np.arange(model.channels * model.azimuth_count) for model in position.models]
-    seen = [
-        _seen_by_rays(position, model, own, surfaces, index) for model, own in zip(position.models, rays, strict=True)
-    ]
-    return np.array(seen), sum(map(len, rays))
-
-
-def _seen_by_rays(
+def seen_by_rays(
     position: ScanPosition, model: LidarModel, rays: Integer, surfaces: NearSurfaces, index: TargetIndex
 ) -> Boolean:
-    """Return the targets that a sensor sees with the given rays, (t,) bool.
+    """Return the targets that a sensor sees with the given rays, all of which are cast, (t,) bool.
 
     Parameters
     ----------

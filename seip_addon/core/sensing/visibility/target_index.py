@@ -51,23 +51,6 @@ class TargetIndex:
         counts = np.bincount(cell, minlength=self._columns * self._rows)
         self._start = np.concatenate([[0], np.cumsum(counts)])
 
-    def within_delta(self, points: Float) -> Integer:
-        """Return the targets that are nearer than δ to some point.
-
-        Parameters
-        ----------
-        points : (n, 3) float64, metres
-
-        Returns
-        -------
-        (k,) int64
-            Indices of these targets, ascending.
-        """
-        near = np.zeros(len(self._order), dtype=bool)
-        for _, slot in self._near(points):
-            near[slot] = True
-        return np.sort(self._order[near])
-
     def pairs_within_delta(self, points: Float) -> tuple[Integer, Integer]:
         """Return each point with each target that is nearer than δ to it.
 

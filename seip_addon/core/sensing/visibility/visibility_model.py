@@ -9,55 +9,40 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
 from ...arrays import Boolean, Float, Integer
-from ...geometry.orientation import orientation as orientation_of
 from ...geometry.orientation import rotated
 from ...site.site import Site
-from ...site.targets import Targets
 from ..lidar.model import LidarModel
-from .near_surfaces import NearSurfaces, near_surfaces, rotated_surfaces
+from .near_surfaces import near_surfaces, rotated_surfaces
 from .ray_casting import Engine, RayCaster, engine_name, make_ray_caster
-from .scanning import Caster, ScanPosition, seen_by_all_rays, seen_by_near_rays
+from .scanning import Caster, ScanPosition, seen_by_near_rays
 from .settings import VisibilitySettings
 
 _MAX_LEVEL_ANGLE = 1e-6
 """Radians by which the axis of an upright sensor may deviate: Blender rotates objects in single precision."""
 
 
-class VisibleSite(Protocol):
-    """Targets, and the static surfaces that hide them: a `Site`, or less."""
-
-    @property
-    def targets(self) -> Targets:
-        """The targets."""
-
-    @property
-    def triangles(self) -> Float:
-        """Static surfaces, (n, 3, 3) float64, metres."""
-
-    @property
-    def reflectivity(self) -> Float:
-        """Reflectivity of each triangle, (n,) float64."""
-
-
 class VisibilityModel:
-    """Visibility of a site's targets from sensors of any model, position and orientation.
+    """Visibility of targets from sensors of any model, position and orientation.
 
     Every result is the same as a full scan's.
 
     Parameters
     ----------
+    targets : (t, 3) float64, metres
+        Positions of the targets.
+    reflectivity : (n,) float64, 0 to 1
+        Reflectivity of the caster's triangles.
     caster : RayCaster
-        Ray caster of the site's triangles.
+        Ray caster of the static surfaces that hide the targets.
     """
 
-    def __init__(self, site: VisibleSite, settings: VisibilitySettings, caster: RayCaster) -> None:
-        self._caster, self._settings, self._reflectivity = caster, settings, site.reflectivity
-        self._surfaces = near_surfaces(site.triangles, site.targets.xyz, settings.delta, site.reflectivity)
+    def __init__(self, targets: Float, reflectivity: Float, settings: VisibilitySettings, caster: RayCaster) -> None:
+        self._caster, self._settings, self._reflectivity = caster, settings, reflectivity
+        self._surfaces = near_surfaces(caster.triangles, targets, settings.delta, reflectivity)
 
     @property
     def targets(self) -> int:
@@ -101,18 +86,8 @@ class VisibilityModel:
 
 def visibility_model(site: Site, settings: VisibilitySettings, engine: Engine = "auto") -> VisibilityModel:
     """Return a visibility model with a ray caster of its own."""
-    return VisibilityModel(site, settings, make_ray_caster(site.triangles, engine_name(engine)))
-
-
-def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, surfaces: NearSurfaces) -> tuple[Boolean, int]:
-    """Find the targets that sensors tilted by an angle (radians) see, by casting every ray: the reference."""
-    if tilt == 0:
-        return seen_by_all_rays(position, surfaces)
-    orientation = orientation_of(position.yaw, tilt)
-    if is_upright(orientation):
-        return seen_by_all_rays(replace(position, yaw=yaw_of(orientation)), surfaces)
-    in_axes = rotated_surfaces(surfaces, position.origin, orientation)
-    return seen_by_all_rays(in_sensor_axes(position, orientation), in_axes)
+    caster = make_ray_caster(site.triangles, engine_name(engine))
+    return VisibilityModel(site.targets.xyz, site.reflectivity, settings, caster)
 
 
 def is_upright(orientation: Float) -> bool:

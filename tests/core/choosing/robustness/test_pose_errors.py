@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from headless.studies.stability.robustness_rows import pose_rows
+from headless.studies.stability.robustness_rows import pose_rows, poses_converged
 
 import numpy as np
 import pytest
@@ -24,6 +24,7 @@ from seip_addon.core.sensing.scans.sensor import level_orientation
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.surroundings import Surroundings
+from seip_addon.core.site.obstruction import inside_any
 from seip_addon.core.site.scene_geometry import Mesh
 from tests.builders.synthetic_junction import junction_site, prism
 from tests.engines import ANY
@@ -84,10 +85,10 @@ def test_a_sensor_leaves_the_object_that_it_would_be_in():
     shift = np.array([[[1.0, 0.0, 0.0]], [[0.2, 0.0, 0.0]]])
     draws = PoseDraws(shift, *(np.zeros((2, 1)) for _ in range(3)))
     where = np.array([[0.0, 0.0, 4.0]])
-    turned_about, blocked = out_of_objects(draws, where, [floor])
-    assert blocked.tolist() == [[True], [False]]
+    turned_about = out_of_objects(draws, where, [floor])
+    assert inside_any((where + shift).reshape(-1, 3), [floor]).tolist() == [True, False]
     assert turned_about.shift[:, 0, 0].tolist() == [-1.0, 0.2]
-    assert out_of_objects(draws, where, [post])[0].shift[:, 0, 0].tolist() == [0.0, 0.2]
+    assert out_of_objects(draws, where, [post]).shift[:, 0, 0].tolist() == [0.0, 0.2]
 
 
 def test_no_drawn_pose_of_a_site_is_inside_an_object(placed):
@@ -95,13 +96,13 @@ def test_no_drawn_pose_of_a_site_is_inside_an_object(placed):
     poses = np.array([0, 5])
     at = site.candidates.xyz[poses]
     walls = [Mesh("wall", prism((x + 0.6, y), 0.5, 9.0)) for x, y, _ in at]
-    free, _ = draws_for(around(site), poses, PoseErrors(), 50, 0)
-    kept_out, blocked = draws_for(replace(around(site), objects=walls), poses, PoseErrors(), 50, 0)
+    free = draws_for(around(site), poses, PoseErrors(), 50, 0)
+    kept_out = draws_for(replace(around(site), objects=walls), poses, PoseErrors(), 50, 0)
     away = np.hypot(*np.moveaxis((free.shift - [0.6, 0.0, 0.0])[..., :2], 2, 0))
-    assert blocked[away < 0.49].all()
-    assert not blocked[away > 0.5].any()
-    assert blocked.any()
-    assert (kept_out.shift[blocked] != free.shift[blocked]).any(axis=1).all()
+    moved = (kept_out.shift != free.shift).any(axis=2)
+    assert moved[away < 0.49].all()
+    assert not moved[away > 0.5].any()
+    assert moved.any()
 
 
 @pytest.mark.parametrize("wrong", [{"position": -1.0}, {"tilt": 2.0}, {"yaw": math.nan}])
@@ -163,9 +164,8 @@ def around(site):
 def test_without_errors_every_draw_covers_what_was_planned(placed):
     _, deployment = placed
     study = study_of(placed, errors=PoseErrors(0.0, 0.0, 0.0, 0.0), draws=2)
-    assert study.planned.whole.tolist() == [deployment.coverage]
-    assert study.planned.central.tolist() == [deployment.central]
-    assert (study.together.whole == deployment.coverage).all()
+    assert study.planned == deployment.coverage
+    assert (study.together == deployment.coverage).all()
     assert study.by_kind == {}
     assert not study.worst_sensor()[1]  # nothing is lost, so that no sensor's error stands out
     assert pose_warnings(study) == ()
@@ -175,12 +175,12 @@ def test_without_errors_every_draw_covers_what_was_planned(placed):
 def test_a_study_says_who_is_to_blame(placed):
     study = study_of(placed, errors=PoseErrors(tilt=math.radians(8)))
     assert set(study.by_kind) == set(ERROR_KINDS)
-    assert study.together.whole.shape == (40,)
+    assert study.together.shape == (40,)
     losses = dict(zip(study.labels, study.loss_by_sensor(), strict=True))
     assert study.worst_sensor()[0] == max(losses, key=lambda label: losses[label].value)
     assert pose_warnings(study)
     assert len(pose_rows(study)) == 3
-    assert study.is_converged()
+    assert poses_converged(study)
 
 
 @pytest.mark.slow
@@ -194,4 +194,4 @@ def test_sensor_alone_is_its_row_beside_the_planned_rows(placed):
     for name in ("shift", "yaw", "pitch", "roll"):
         getattr(still, name)[:, 1] = 0.0
     views = finish(visibility_under_errors(around(site), poses, still))
-    assert study.alone[0].whole.tolist() == [views.seen(draw).any(axis=0).mean() for draw in range(6)]
+    assert study.alone[0].tolist() == [views.seen(draw).any(axis=0).mean() for draw in range(6)]

@@ -53,7 +53,7 @@ def test_all_are_evaluated_by_draws_that_none_was_chosen_on(laid_out, study):
     assert nominal.placement.chosen.tolist() == finish(solve(problem)).chosen.tolist()
     for contender in (nominal, *study.robust):
         chosen = contender.placement.chosen
-        drawn, _ = draws_for(around, chosen, SCENARIOS.pose_errors, SCENARIOS.evaluated, SCENARIOS.seed + 1)
+        drawn = draws_for(around, chosen, SCENARIOS.pose_errors, SCENARIOS.evaluated, SCENARIOS.seed + 1)
         views = finish(visibility_under_errors(around, chosen, drawn))
         expected = [views.seen(draw).any(axis=0).mean() for draw in range(SCENARIOS.evaluated)]
         assert contender.unseen == pytest.approx(expected, abs=1e-12)
@@ -110,7 +110,7 @@ def test_who_was_chosen_for_a_loss_is_evaluated_by_that_loss_as_is_the_nominal_o
     @cache
     def looks(*chosen):
         poses = np.array(chosen)
-        drawn, _ = draws_for(around, poses, SCENARIOS.pose_errors, SCENARIOS.evaluated, SCENARIOS.seed + 1)
+        drawn = draws_for(around, poses, SCENARIOS.pose_errors, SCENARIOS.evaluated, SCENARIOS.seed + 1)
         return finish(visibility_under_errors(around, poses, drawn))
 
     for contender, risk in zip(study_of_losses.robust, LOSSES, strict=True):
@@ -148,10 +148,10 @@ def test_without_errors_robustness_is_free(laid_out):
 def test_poses_of_one_place_err_alike(laid_out):
     around, _ = laid_out
     poses = np.arange(len(around.site.candidates))
-    drawn, _ = draws_for(around, poses, PoseErrors(), 2, 0)
+    drawn = draws_for(around, poses, PoseErrors(), 2, 0)
     together = finish(visibility_under_errors(around, poses, drawn))
     some = np.array([3, 8])
-    alone, _ = draws_for(around, some, PoseErrors(), 2, 0)
+    alone = draws_for(around, some, PoseErrors(), 2, 0)
     assert (finish(visibility_under_errors(around, some, alone)).packed == together.packed[:, some]).all()
 
 

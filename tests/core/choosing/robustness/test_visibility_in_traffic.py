@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 
+from headless.studies.full_scan import beam_directions, seen_by_tilted_full_scan
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -24,7 +26,6 @@ from seip_addon.core.choosing.robustness.visibility_in_traffic import (
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import rotated
 from seip_addon.core.progress import finish
-from seip_addon.core.sensing.lidar.beams import beam_directions
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.lidar.rosette import Rosette
 from seip_addon.core.sensing.traffic.site_traffic import check_runs
@@ -35,7 +36,6 @@ from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.scanning import ScanPosition
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.surroundings import Surroundings
-from seip_addon.core.sensing.visibility.visibility_model import seen_by_tilted_full_scan
 from tests.builders.synthetic_junction import junction_site, make_candidates
 from tests.builders.traffic_by_hand import make_model, make_trajectories, parked
 from tests.engines import ANY, each_engine, needs_any

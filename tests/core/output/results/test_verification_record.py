@@ -9,7 +9,6 @@ import pytest
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.verification_record import (
     SCHEMA,
-    RecordedGain,
     VerificationRecord,
     load_verification,
 )
@@ -23,6 +22,7 @@ from seip_addon.core.output.results.verification_text import (
     signed_points,
     summary,
 )
+from seip_addon.core.sensing.recordings.unit_gain import Gain
 from seip_addon.core.storage.json_dataclass import as_json
 from tests.builders.verification_folder import CHANGES, STEPS, make_pose
 
@@ -91,7 +91,7 @@ def test_the_top_of_a_sensor_tilts_where_its_axis_goes(rotation, towards):
 
 def test_the_gain_is_what_it_does_to_the_range():
     assert gain_text(POSE).endswith("up to about 80% of the distance (70% to 90%).")
-    assert "as promised" in gain_text(replace(POSE, gain=RecordedGain(0.95, 0.9, 1.01)))
+    assert "as promised" in gain_text(replace(POSE, gain=Gain(0.95, 0.9, 1.01)))
     assert "does not determine" in gain_text(replace(POSE, gain=None))
 
 

@@ -6,13 +6,15 @@ import math
 from pathlib import Path
 from typing import Any
 
+from headless.studies.full_scan import beam_directions
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.sensing.lidar.beams import BeamPattern, beam_directions
+from seip_addon.core.sensing.lidar.beams import BeamPattern
 from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
 from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
 from seip_addon.core.sensing.lidar.model import LidarModel

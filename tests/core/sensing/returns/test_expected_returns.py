@@ -46,7 +46,6 @@ def users_at(points, bodies):
         np.zeros(count, bool),
         np.full(count, -1),
         (),
-        2.0,
     )
 
 

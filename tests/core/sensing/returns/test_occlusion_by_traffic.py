@@ -15,7 +15,7 @@ from seip_addon.core.sensing.returns.road_users import BODIES, RoadUsers
 def users_at(points, bodies):
     count = len(points)
     no = np.full(count, -1)
-    return RoadUsers(np.array(points, float), np.array(bodies), np.ones(count), no > 0, no, (), 2.0)
+    return RoadUsers(np.array(points, float), np.array(bodies), np.ones(count), no > 0, no, ())
 
 
 def clear_share(sensor, user, body, draws, random):

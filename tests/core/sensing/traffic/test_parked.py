@@ -1,9 +1,8 @@
-"""Who is parked, and where two runs have them in the same place."""
+"""Who is parked."""
 
 import numpy as np
-import pytest
 
-from seip_addon.core.sensing.traffic.parked import parked_users, shared_bays
+from seip_addon.core.sensing.traffic.parked import parked_users
 from tests.builders.traffic_by_hand import make_trajectories
 
 
@@ -22,10 +21,3 @@ def test_a_circle_is_no_standing():
     turn = np.linspace(0.0, 2.0 * np.pi, 9)
     circles = [(5.0 * n, 3 * np.cos(t), 3 * np.sin(t), 0.0, 0.0, 0.0) for n, t in enumerate(turn)]
     assert parked_users(make_trajectories(circles, standing(50.0))).tolist() == [False, True]
-
-
-def test_shared_bays_are_the_larger_share():
-    one, other = (make_trajectories(*map(standing, places)) for places in ((0.0, 10.0, 20.0), (0.5, 11.5)))
-    assert shared_bays(one, other, 1.0) == shared_bays(other, one, 1.0) == pytest.approx(1 / 2)
-    assert shared_bays(one, one, 1.0) == 1.0
-    assert shared_bays(one, make_trajectories([(0.0, 0, 0, 0, 0, 0), (9.0, 99, 0, 0, 0, 0)]), 1.0) == 0.0

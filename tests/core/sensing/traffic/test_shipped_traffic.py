@@ -3,13 +3,14 @@
 from itertools import combinations
 from pathlib import Path
 
+from headless.studies.detection.shared_bays import shared_bays
+
 import bpy
 import numpy as np
 import pytest
 
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.traffic.overlaps import find_overlaps
-from seip_addon.core.sensing.traffic.parked import shared_bays
 from seip_addon.core.sensing.traffic.road_fit import fit_to_road
 from seip_addon.core.sensing.traffic.trajectories import CATEGORIES, Trajectories
 from seip_addon.core.site.scene_geometry import joined

@@ -19,7 +19,7 @@ from seip_addon.core.sensing.traffic.floating_car_data import (
     read_trajectories,
     unwrapped,
 )
-from seip_addon.core.sensing.traffic.sumo_files import read_net_offset
+from seip_addon.core.sensing.traffic.source import read_net_offset
 from seip_addon.core.sensing.traffic.vehicle_types import BUILT_IN, CAR, VehicleType, read_vehicle_types
 from tests.builders.sumo_text import CONVERTED_CSV, FCD, NATIVE_CSV, NET, ROUTES
 

@@ -3,7 +3,6 @@
 import time
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from seip_addon.background import Background
@@ -97,12 +96,9 @@ def test_an_estimate_is_within_a_factor_of_two():
     for _ in range(3):  # other work on the machine may come between
         estimate = finish(estimate_visibility(SITE, MODELS, settings, ANY))
         began = time.perf_counter()
-        grid = finish(compute_visibility(SITE, MODELS, settings, ANY))
+        finish(compute_visibility(SITE, MODELS, settings, ANY))
         real = time.perf_counter() - began
-        if real / 2 < estimate.seconds < 2 * real:
+        if real / 2 < estimate < 2 * real:
             break
     else:
-        pytest.fail(f"{estimate.seconds} s for {real} s")
-    assert estimate.poses == len(SITE.candidates)
-    assert estimate.places == len(np.unique(SITE.candidates.xyz, axis=0))
-    assert grid.parameters["rays_cast"] / 2 < estimate.rays < 2 * grid.parameters["rays_cast"]
+        pytest.fail(f"{estimate} s for {real} s")

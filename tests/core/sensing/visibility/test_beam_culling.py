@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from headless.studies.full_scan import beam_directions
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.sensing.lidar.beams import beam_directions
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.beam_culling import (
@@ -21,8 +22,13 @@ from seip_addon.core.sensing.visibility.beam_culling import (
     near_rays,
     target_patches,
 )
-from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
+from seip_addon.core.sensing.visibility.near_surfaces import NearSurfaces, near_surfaces
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY
+
+
+def surfaces_near(triangles: np.ndarray, targets: np.ndarray, delta: float) -> NearSurfaces:
+    return near_surfaces(triangles, targets, delta, np.full(len(triangles), DEFAULT_REFLECTIVITY))
 
 
 def random_model(random: np.random.Generator, field_of_view: float = math.tau) -> LidarModel:
@@ -76,7 +82,7 @@ def test_every_ray_that_returns_from_near_a_target_is_kept(seed: int, delta: flo
     targets = (triangles[random.integers(0, 40, 30)] * inside[:, :, None]).sum(axis=1)
     targets += random.normal(0, 0.3 * delta, (30, 3))
     targets[0] = origin + random.normal(0, 0.3 * delta, 3)  # δ about it may hold the sensor
-    surfaces = near_surfaces(triangles, targets, delta)
+    surfaces = surfaces_near(triangles, targets, delta)
     beams = Beams.of([model], yaw, VisibilitySettings(delta))
     coarse = near_rays(beams, target_patches(origin, surfaces, all_of(surfaces)))
     patches, planes = disc_patches(origin, surfaces, np.ones(30, dtype=bool))
@@ -107,7 +113,7 @@ def test_hardly_a_ray_is_kept_that_passes_over_its_target() -> None:
     targets = np.column_stack([random.uniform(-60, 60, (400, 2)), np.zeros(400)])
     model = load_catalogue()["type3"]
     origin = np.array([0.0, 0.0, 5.0])
-    surfaces = near_surfaces(road(80.0), targets, 1.0)
+    surfaces = surfaces_near(road(80.0), targets, 1.0)
     near = near_rays(
         Beams.of([model], 0.3, VisibilitySettings()),
         target_patches(origin, surfaces, all_of(surfaces)),
@@ -127,7 +133,7 @@ def test_steep_surfaces_are_met_by_few_rays_more_than_needed() -> None:
     target = np.array([[10.0, 4.0, 0.0]])
     model = replace(load_catalogue()["type3"], min_range=0.0)
     origin = np.array([0.0, 0.0, 1.0])
-    surfaces = near_surfaces(wall, target, 1.0)
+    surfaces = surfaces_near(wall, target, 1.0)
     patches, planes = disc_patches(origin, surfaces, np.array([True]))
     kept = rays_by_target(near_rays(Beams.of([model], 0.0, VisibilitySettings()), patches, planes), model, 1)[0]
     points = hits(origin, beam_directions(model, 0.0).reshape(-1, 3), wall)
@@ -148,7 +154,7 @@ def test_targets_out_of_range_and_without_surface_need_no_ray() -> None:
 def test_least_range_is_measured_along_the_ray() -> None:
     """Straight below a sensor a return is near in plan and as far off as the sensor is high."""
     model = replace(random_model(np.random.default_rng(0)), elevations=np.full(1, -1.4), azimuth_offsets=np.zeros(1))
-    surfaces = near_surfaces(road(20.0), np.array([[0.5, 0.0, 0.0]]), 1.0)
+    surfaces = surfaces_near(road(20.0), np.array([[0.5, 0.0, 0.0]]), 1.0)
     patches = target_patches(np.array([0.0, 0.0, 6.0]), surfaces, all_of(surfaces))
     for least, some in ((5.0, True), (7.0, False)):
         beams = Beams.of([replace(model, min_range=least)], 0.0, VisibilitySettings())
@@ -157,7 +163,7 @@ def test_least_range_is_measured_along_the_ray() -> None:
 
 def test_the_sign_of_a_level_beam_does_not_matter() -> None:
     wall = np.array([[[10.0, -9, -1], [10, 9, -1], [10, 9, 3]]])
-    surfaces = near_surfaces(wall, np.array([[10.0, 4.0, 0.5]]), 1.0)
+    surfaces = surfaces_near(wall, np.array([[10.0, 4.0, 0.5]]), 1.0)
     patches, planes = disc_patches(np.array([0.0, 0.0, 0.5]), surfaces, np.array([True]))
     model = replace(random_model(np.random.default_rng(0)), points_per_second=10.0 * 360)
     one = {"azimuth_offsets": np.zeros(1)}
@@ -171,7 +177,7 @@ def test_the_sign_of_a_level_beam_does_not_matter() -> None:
 
 
 def test_a_sensor_as_far_above_a_face_as_returns_may_lie_off_it() -> None:
-    surfaces = near_surfaces(road(20.0), np.array([[0.2, 0.0, 0.0]]), 1.0)
+    surfaces = surfaces_near(road(20.0), np.array([[0.2, 0.0, 0.0]]), 1.0)
     patches, planes = disc_patches(np.array([0.0, 0.0, surfaces.tolerance]), surfaces, np.array([True]))
     model = replace(random_model(np.random.default_rng(0)), elevations=np.full(1, -1.2), azimuth_offsets=np.zeros(1))
     assert (near_rays(Beams.of([model], 0.0, VisibilitySettings()), patches, planes).width == model.azimuth_count).any()
@@ -193,7 +199,7 @@ def test_the_likeliest_ray_ends_at_the_target_on_a_level_road() -> None:
     radius = 4 / math.tan(math.radians(20))
     targets = np.array([[0.0, radius, 0.0], [30.0, 0.0, 0.0]])
     beams = Beams.of([model], 0.0, VisibilitySettings())
-    surfaces = near_surfaces(road(50.0), targets, 1.0)
+    surfaces = surfaces_near(road(50.0), targets, 1.0)
     near = near_rays(beams, target_patches(np.array([0.0, 0, 4]), surfaces, all_of(surfaces))).likeliest(beams.sensor)
     assert near.target.tolist() == [0]
     assert (near.channel.tolist(), near.middle.tolist()) == ([1], [90])

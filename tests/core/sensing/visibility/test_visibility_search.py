@@ -9,6 +9,7 @@ import pytest
 
 from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
 from seip_addon.core.sensing.visibility.ray_casting import Engine
+from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY
 from tests.engines import each_engine
 from tests.oracles.visibility_search import FAULTS, assess, draw_case, search, sentence
 
@@ -55,7 +56,7 @@ def test_a_level_face_lies_near_each_target_over_and_under_it(delta: float) -> N
     face = np.array([[[-9.0, -9, z], [9, -9, z], [0, 9, z]]])
     targets = np.zeros((200, 3))
     targets[:, 2] = np.round(np.linspace(z - 0.9 * delta, z + 0.9 * delta, 200), 6)
-    surfaces = near_surfaces(face, targets, delta)
+    surfaces = near_surfaces(face, targets, delta, np.full(len(face), DEFAULT_REFLECTIVITY))
     assert np.unique(surfaces.discs.target).tolist() == list(range(200))
     assert (surfaces.low < z).all()
     assert (surfaces.high > z).all()

@@ -1,0 +1,53 @@
+"""Full scans, which cast every ray: the reference for visibility."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.geometry.orientation import orientation as orientation_of
+from seip_addon.core.sensing.lidar.beams import BeamPattern
+from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.visibility.near_surfaces import NearSurfaces, rotated_surfaces
+from seip_addon.core.sensing.visibility.scanning import ScanPosition, seen_by_rays
+from seip_addon.core.sensing.visibility.target_index import TargetIndex
+from seip_addon.core.sensing.visibility.visibility_model import in_sensor_axes, is_upright, yaw_of
+
+
+def beam_directions(model: LidarModel, yaw: float = 0.0) -> Float:
+    """Return the unit directions of one revolution or frame.
+
+    Parameters
+    ----------
+    yaw : float, radians
+        Direction of azimuth zero, counter-clockwise from +x.
+
+    Returns
+    -------
+    (channels, azimuth_count, 3) float64
+    """
+    rays = np.arange(model.channels * model.azimuth_count)
+    return BeamPattern(model, yaw).directions(rays).reshape(model.channels, model.azimuth_count, 3)
+
+
+def seen_by_all_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
+    """Find the targets that are seen by casting every ray of every sensor: the reference."""
+    index = TargetIndex(surfaces.xyz, position.settings.delta)
+    rays = [np.arange(model.channels * model.azimuth_count) for model in position.models]
+    seen = [
+        seen_by_rays(position, model, own, surfaces, index) for model, own in zip(position.models, rays, strict=True)
+    ]
+    return np.array(seen), sum(map(len, rays))
+
+
+def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, surfaces: NearSurfaces) -> tuple[Boolean, int]:
+    """Find the targets that sensors tilted by an angle (radians) see, by casting every ray: the reference."""
+    if tilt == 0:
+        return seen_by_all_rays(position, surfaces)
+    orientation = orientation_of(position.yaw, tilt)
+    if is_upright(orientation):
+        return seen_by_all_rays(replace(position, yaw=yaw_of(orientation)), surfaces)
+    in_axes = rotated_surfaces(surfaces, position.origin, orientation)
+    return seen_by_all_rays(in_sensor_axes(position, orientation), in_axes)
