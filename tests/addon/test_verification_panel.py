@@ -15,6 +15,7 @@ from seip_addon.background import Background
 from seip_addon.core.output.results.verification_record import load_verification
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.site.scene_geometry import Mesh
+from seip_addon.core.workflows.verifying import verify
 from seip_addon.operators import verification as operators
 from seip_addon.operators.verification import SEIP_OT_verify
 from seip_addon.panels import verification as panel
@@ -72,9 +73,22 @@ def placed(junction, recording, tmp_path):
     return junction
 
 
+@pytest.fixture(scope="module")
+def computed():
+    """The verification of `placed`, computed once: many tests start from it, and it takes seconds."""
+    return []
+
+
 @pytest.fixture
-def verified(placed):
-    assert bpy.ops.seip.verify() == {"FINISHED"}
+def verified(placed, computed, monkeypatch):
+    def remembered(*given, **named):
+        if not computed:
+            computed.append((yield from verify(*given, **named)))
+        return computed[0]
+
+    with monkeypatch.context() as within:
+        within.setattr(operators, "verify", remembered)
+        assert bpy.ops.seip.verify() == {"FINISHED"}
     return placed
 
 

@@ -15,6 +15,7 @@ from seip_addon.core.choosing.network.frontier import Frontier, Options, SolvedB
 from seip_addon.core.choosing.network.network_search import Goal, search_allocations
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, finish
+from tests.few import few
 
 MOST = 3
 
@@ -85,7 +86,7 @@ def rounds(request, monkeypatch):
     monkeypatch.setattr(network_search, "MANY_SITES", 0 if request.param == "relaxed" else math.inf)
 
 
-@pytest.mark.parametrize("seed", range(15))
+@pytest.mark.parametrize("seed", few(range(15), 5))
 @pytest.mark.parametrize("looseness", [0.0, 0.05])
 @pytest.mark.usefixtures("rounds")
 def test_search_finds_the_best_of_all_allocations(seed, looseness):
@@ -103,7 +104,7 @@ def test_search_finds_the_best_of_all_allocations(seed, looseness):
     assert found.price == pytest.approx(math.fsum(one.price for one in found.taken))
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", few(range(5), 2))
 @pytest.mark.usefixtures("rounds")
 def test_budgets_that_are_searched_together_each_have_their_best_allocation(seed):
     rng = np.random.default_rng(3000 + seed)
@@ -120,7 +121,7 @@ def test_budgets_that_are_searched_together_each_have_their_best_allocation(seed
         assert found.price <= budget * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", few(range(8), 3))
 @pytest.mark.usefixtures("rounds")
 def test_a_search_that_ends_early_has_a_bound_that_holds(seed):
     rng = np.random.default_rng(1000 + seed)
@@ -134,7 +135,7 @@ def test_a_search_that_ends_early_has_a_bound_that_holds(seed):
     assert found.bound <= found.value * 1.2 * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", few(range(8), 3))
 @pytest.mark.usefixtures("rounds")
 def test_minimum_at_every_site_is_reached_or_proven_impossible(seed):
     rng = np.random.default_rng(2000 + seed)
@@ -190,6 +191,7 @@ def test_searches_of_a_goal_are_no_longer_than_its_limit_and_its_bound_holds():
     assert [one.bound for one in both] == pytest.approx([best, best])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("rounds")
 def test_search_needs_far_fewer_rounds_than_there_are_amounts():
     amounts = np.arange(257) * 1000.0

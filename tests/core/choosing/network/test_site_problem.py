@@ -11,6 +11,7 @@ from seip_addon.core.choosing.network.site_problem import SiteProblem, check_pro
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from tests.builders.random_site import random_problem
+from tests.few import few
 
 
 def best_by_enumeration(problem, budget, installed=()):
@@ -27,7 +28,7 @@ def best_by_enumeration(problem, budget, installed=()):
 
 
 @pytest.mark.parametrize("criterion", ["road", "returns"])
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", few(range(12), 4))
 def test_solved_budget_is_the_best_of_all_placements(criterion, seed):
     problem = random_problem(seed, criterion)
     for budget in (20_000.0, 34_000.0, 60_000.0):

@@ -19,6 +19,7 @@ from seip_addon.core.choosing.placement.returns_program import ReturnsProgram
 from seip_addon.core.choosing.placement.search_limits import Clock, SolverLimits
 from seip_addon.core.progress import finish
 from tests.core.choosing.placement.test_returns_placement import problem_of
+from tests.few import few
 
 NONE = np.zeros(0, dtype=np.int64)
 
@@ -95,7 +96,7 @@ def check_best_of_all(seed):
     assert best - 2 * TIE_TOLERANCE <= proof.bound <= best + (2 * TIE_TOLERANCE if proof.optimal else 1e-5 * (1 + best))
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", few(range(40), 12))
 def test_the_program_finds_the_best_of_all(seed):
     check_best_of_all(seed)
 
@@ -116,14 +117,14 @@ def test_its_first_bound_is_above_the_best_value_by_no_more_than_the_stated_erro
     assert best - 1e-5 <= bound <= best + error + 1e-5
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", few(range(10), 3))
 def test_with_cbc_it_finds_the_same(seed):
     instance = small_instance(seed)
     proofs = [finish(ReturnsProgram(instance).improve(NONE, one, Clock(math.inf))) for one in ("highs", "cbc")]
     assert proofs[0].value == pytest.approx(proofs[1].value, abs=2 * TIE_TOLERANCE)
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", few(range(30), 10))
 def test_one_return_that_is_enough_is_coverage(seed):
     problem, returns = problem_of(seed, mandatory=None)
     covering, scale = make_instance(problem)
@@ -143,7 +144,7 @@ def test_at_the_limit_the_bound_still_holds():
     assert (proof.optimal, proof.value, proof.bound) == (False, 0.0, math.inf)
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", few(range(30), 8))
 def test_a_named_solver_proves_what_branch_and_bound_leaves(seed, monkeypatch):
     monkeypatch.setattr(returns_solver, "BRANCHING_SHARE", 0.0)
     problem, returns = problem_of(seed)

@@ -16,6 +16,7 @@ from tests.builders.scanned_street import (
     street_meshes,
     surface_of,
 )
+from tests.few import few
 
 PLANNED = mounted()
 
@@ -31,7 +32,7 @@ def fitted(surface, seed, *, real=None, **how):
     return register(surface, PLANNED, street_background(real or surface, true, seed=seed, **how)), true, shift
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", few(range(3), 1))
 @pytest.mark.parametrize("vehicles", [0, 6])
 def test_the_pose_is_found(surface, seed, vehicles):
     found, true, shift = fitted(surface, seed, vehicles=vehicles)

@@ -259,12 +259,13 @@ def test_wrong_arrays(words, arrays, tmp_path):
 
 
 def test_an_npz_that_unpacks_to_more_than_any_sweep(tmp_path):
-    with zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as archive, archive.open("x.npy", "w") as file:
+    archive = zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1)
+    with archive, archive.open("x.npy", "w") as file:
         header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (150000000,), }".ljust(117) + b"\n"
         file.write(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header)
         for _ in range(1200):
             file.write(bytes(10**6))
-    assert (tmp_path / "a.npz").stat().st_size < 2e6
+    assert (tmp_path / "a.npz").stat().st_size < 1e7
     with pytest.raises(SeipError, match="more than 1,074 MB"):
         read_sweep(tmp_path / "a.npz")
 

@@ -9,6 +9,7 @@ from seip_addon.core.sensing.lidar.noisy_returns import return_chance
 from seip_addon.core.sensing.recordings.comparison import AGREES, NOTHING, compare_rays
 from seip_addon.core.sensing.recordings.unit_gain import RANGE_EDGES, fitted_gain, return_shares
 from tests.builders.scanned_street import ground_mesh, mounted, street_background, street_meshes, surface_of
+from tests.few import few
 
 PLANNED = mounted("os1_64_rev7")
 MESHES = (ground_mesh(), *street_meshes())
@@ -25,7 +26,7 @@ def compared(surface, gain, seed=0, **how):
     return compare_rays(surface, PLANNED, street_background(surface, real, seed=seed, **how))
 
 
-@pytest.mark.parametrize("gain", [0.3, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("gain", few([0.5, 2.0, 0.3, 1.0], 2))
 def test_the_gain_of_a_unit_is_found(surface, gain):
     found = [fitted_gain(compared(surface, gain, seed=seed, sweeps=15)) for seed in range(4)]
     assert np.mean([np.log(one.value) for one in found]) == pytest.approx(np.log(gain), abs=0.12)

@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[4]
 THREADS = """
 from concurrent.futures import ThreadPoolExecutor
@@ -26,6 +28,7 @@ with ThreadPoolExecutor(4) as pool:
 """
 
 
+@pytest.mark.slow
 def test_points_are_looked_for_in_a_region_from_threads():
     """Without the region's index, some runs of this end with a corrupt heap."""
     subprocess.run([sys.executable, "-c", THREADS], cwd=ROOT, check=True)  # noqa: S603
