@@ -6,7 +6,6 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from headless.detection.detection_area import DetectionArea
-from headless.detection.field_conditions import field_recording
 from headless.detection.frames import Recording
 from headless.detection.recordings import MountedSensors, SampledRun, Simulator
 from headless.studies.random_sites.companions import with_companions
@@ -19,6 +18,7 @@ from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.scene_geometry import SceneGeometry
 
+from .field_conditions import field_recording
 from .random_placements import random_placement
 
 SIZE_CHANGE = 0.15
