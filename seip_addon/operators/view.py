@@ -23,7 +23,7 @@ from ..session import SceneState, session
 from ..viewport import coverage, overlays
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
-from .base import LongWork, Outcome, attempt, started
+from .base import Conditional, LongWork, Outcome, attempt, started
 from .results import PLAN, ForPlacement, exported_files, not_evaluated
 
 LAID_OUT = 0.2
@@ -36,7 +36,7 @@ def why_no_coverage(scene: bpy.types.Scene) -> str:
     return NO_COVERAGE if coverage_of(scene) is None else ""
 
 
-class SEIP_OT_colour_coverage(bpy.types.Operator):
+class SEIP_OT_colour_coverage(Conditional, bpy.types.Operator):
     """Colour the coverage on the road, with a legend"""
 
     bl_idname = "seip.colour_coverage"
@@ -56,9 +56,9 @@ class SEIP_OT_colour_coverage(bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is coverage to colour."""
-        return _can(cls, why_no_coverage(context.scene))
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that there is no coverage to colour, where there is none."""
+        return why_no_coverage(context.scene)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Colour it."""
@@ -85,16 +85,16 @@ class SEIP_OT_show_coverage_colours(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_toggle_legend(bpy.types.Operator):
+class SEIP_OT_toggle_legend(Conditional, bpy.types.Operator):
     """Show or hide the legend of the coverage"""
 
     bl_idname = "seip.toggle_legend"
     bl_label = "Legend"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is coverage to explain."""
-        return _can(cls, why_no_coverage(context.scene))
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that there is no coverage to explain, where there is none."""
+        return why_no_coverage(context.scene)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Show it where it is hidden, and the other way round."""
@@ -170,9 +170,9 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operato
         return super().invoke(context, event)
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the operator is enabled; otherwise the tooltip says why not."""
-        return super().poll(context) and _can(cls, not_evaluated(context.scene))
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that there is no placement, or that sensors were moved since."""
+        return super().why_not(context) or not_evaluated(context.scene)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Restore the placement and render it if requested."""
@@ -317,12 +317,6 @@ def _free(path: Path) -> Path:
     """Return the name, with the first number that is free where there is a picture of that name."""
     numbered = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
     return next(name for name in chain([path], numbered) if not name.exists())
-
-
-def _can(operator: type[bpy.types.Operator], why_not: str) -> bool:
-    if why_not:
-        operator.poll_message_set(why_not)
-    return not why_not
 
 
 CLASSES = (
