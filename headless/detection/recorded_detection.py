@@ -13,13 +13,12 @@ from seip_addon.core.sensing.recordings.box_labels import BoxLabels
 from seip_addon.core.sensing.recordings.recorded_frames import RecordedFrames
 from seip_addon.core.sensing.scans.frame import Frame
 
-from .cloud_in_plan import CloudInPlan
 from .detection_area import DetectionArea
 from .detector import Detector
 from .frame_results import Detections, FrameResult, frame_result
 from .inference import detect
 from .pillars import grid_over
-from .settings import BOTTOM, CLASS_CATEGORIES, TOP
+from .settings import BOTTOM, TOP
 from .training import deterministic
 
 RECOMMENDED_SCORE = 0.5
@@ -102,9 +101,7 @@ def detect_in_recording(
                 detections = _inside(detect(detector, area, frame), frames)
         result = frame_result(
             frame,
-            CloudInPlan(frame.points),
             detections,
-            classes=tuple(CLASS_CATEGORIES.values()),
             region=frames.region,
             sensors=places,
             run=f"part {number * blocks // total + 1}" if blocks > 1 else "recording",

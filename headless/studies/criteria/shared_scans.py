@@ -3,14 +3,13 @@
 from collections.abc import Generator, Iterator, Sequence
 from pathlib import Path
 
-from headless.detection.cloud_in_plan import CloudInPlan
 from headless.detection.detector import Detector
 from headless.detection.frame_results import FrameResult, frame_result
 from headless.detection.inference import detect
 from headless.detection.recordings import MountedSensors, SampledRun, Simulator
-from headless.detection.settings import CLASS_CATEGORIES
 from headless.detection.training import deterministic
 from headless.studies.detection.sensor_configuration import SensorConfiguration
+from headless.studies.frame_points import some_points
 from headless.studies.stored_detections import load_frames, save_frames
 
 from seip_addon.core.progress import Progress, finish
@@ -110,10 +109,8 @@ def _detected(
     with deterministic(1):
         found = detect(detector, simulator.area(detector.settings.pillar), frame)
     return frame_result(
-        frame,
-        CloudInPlan(frame.points[frame.foreground]),
+        some_points(frame, frame.foreground),
         found,
-        classes=tuple(CLASS_CATEGORIES.values()),
         region=simulator.static.region,
         sensors=placement.places,
         run=run.name,
