@@ -6,10 +6,16 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from headless.charts.detection import BinnedFigure, save_parts_chart, save_precision_recall_chart, save_training_chart
+from headless.charts.detection import (
+    Bin,
+    BinnedFigure,
+    save_parts_chart,
+    save_precision_recall_chart,
+    save_training_chart,
+)
 from headless.charts.error_view import save_error_view
-from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, Bin, average_precision_by, recall_by
-from headless.detection.chart_data import curve, error_view, parts
+from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
+from headless.detection.chart_data import curve, error_view
 from headless.detection.recordings import Simulator
 from headless.detection.rules import MAIN_RULE, RULES
 from headless.detection.training import LearningCurve, TrainedDetector
@@ -96,7 +102,7 @@ def _parts(outcomes: Sequence[DetectorOutcome]) -> list[BinnedFigure]:
     """Return the panels of detected road users and false detections by distance, returns, visibility and density."""
 
     def panel(what: str, figure: str, bins: Callable[[DetectorOutcome], Sequence[Bin]]) -> BinnedFigure:
-        return parts(what, figure, {one.configuration.name: bins(one) for one in outcomes})
+        return what, figure, {one.configuration.name: bins(one) for one in outcomes}
 
     return [
         panel(
