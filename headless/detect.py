@@ -28,7 +28,6 @@ from headless.detection.recordings import MountedSensors, Simulator, sampled_run
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import deterministic
 from headless.detection_results import (
-    DetectionSite,
     print_precision,
     remove_detections,
     save_charts,
@@ -97,8 +96,8 @@ def main(argv: list[str]) -> None:
     runtime.warn(doubts)
     precisions = outcome.precisions
     with runtime.incomplete_if_interrupted(options.output):
-        site = DetectionSite(geometry.name, simulator.static.region, sensors, simulator.static.attribution)
-        save_charts(options.output, outcome, site)
+        static = simulator.static
+        save_charts(options.output, outcome, geometry.name, static.region, sensors, static.attribution)
         remove_detections(options.output)
         for number, one in enumerate(outcome.frames):
             found = one.detected

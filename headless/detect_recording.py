@@ -29,7 +29,7 @@ from headless.detection.rules import MAIN_RULE
 from headless.detection.settings import CLASS_CATEGORIES, CLASS_OF
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import deterministic
-from headless.detection_results import DetectionSite, print_precision, save_charts, save_detections
+from headless.detection_results import print_precision, save_charts, save_detections
 from headless.options import real_number
 from headless.video import save_video
 
@@ -190,8 +190,7 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
         "versions": versions(blender=bpy.app.version_string),
     }
     if outcome is not None:
-        named = DetectionSite(site, frames.region, [one.mounted for one in frames.sensors])
-        save_charts(folder, outcome, named)
+        save_charts(folder, outcome, site, frames.region, [one.mounted for one in frames.sensors])
         record["average_precision"] = {name: as_json(found) for name, found in outcome.precisions.items()}
         record["recall"] = {"score": outcome.score, "categories": outcome.recall}
         record["listed"] = _listed(results, options.score)
