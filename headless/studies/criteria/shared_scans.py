@@ -10,6 +10,7 @@ from headless.detection.recordings import MountedSensors, SampledRun, Simulator
 from headless.detection.training import deterministic
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 from headless.studies.frame_points import some_points
+from headless.studies.simulated_recordings import frames_key
 from headless.studies.stored_detections import load_frames, save_frames
 
 from seip_addon.core.progress import Progress, finish
@@ -59,7 +60,8 @@ class SharedScans:
     def key(self, run: SampledRun) -> str:
         """Return a digest of all that the frames of a run follow from."""
         return digest(
-            self._simulator.key(MountedSensors("", self._sensors), [run]), *(str(numbers) for numbers in self._parts)
+            frames_key(self._simulator, MountedSensors("", self._sensors), [run]),
+            *(str(numbers) for numbers in self._parts),
         )
 
     def _simulation(self, run: SampledRun) -> Simulation:

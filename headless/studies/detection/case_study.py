@@ -24,6 +24,7 @@ from headless.side_by_side import side_by_side
 from headless.studies.coverage.cells import COUNTS, Case, Cell, solve_cell
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 from headless.studies.false_positives import false_positives
+from headless.studies.simulated_recordings import recorded
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
@@ -271,7 +272,7 @@ def simulate_training_set(
     area = simulator.area(network.pillar)
 
     def recordings(placed: MountedSensors, runs: Sequence[SampledRun]) -> list[SampledRecording]:
-        return [SampledRecording(simulator.record(placed, run), area, network.most_points) for run in runs]
+        return [SampledRecording(recorded(simulator, placed, run), area, network.most_points) for run in runs]
 
     training_set = TrainingSet(
         {one.name: recordings(one, traffic.training) for one in configurations},

@@ -18,6 +18,7 @@ from headless.detection.run_detection import AT_ONCE
 from headless.detection.training import deterministic
 from headless.side_by_side import side_by_side
 from headless.studies.detection.sensor_configuration import SensorConfiguration
+from headless.studies.simulated_recordings import frames_key
 
 import numpy as np
 import shapely
@@ -84,7 +85,7 @@ class TrialSite:
 
     def key(self, configuration: SensorConfiguration) -> str:
         """Return a digest of all inputs of undisturbed frames."""
-        return self.simulator.key(configuration, self.runs)
+        return frames_key(self.simulator, configuration, self.runs)
 
 
 @dataclass(frozen=True, eq=False)
