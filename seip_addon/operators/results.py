@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from .. import live_coverage, preferences, scene_status, scene_survey, selection, traffic_coverage
+from .. import live_coverage, preferences, scene_status, scene_survey, traffic_coverage
 from ..core.choosing.placement.deployment import sensor_at
 from ..core.choosing.placement.objective import Objective, target_weights
 from ..core.choosing.robustness.visibility_in_traffic import PosesInTraffic, poses_in_traffic
@@ -40,7 +40,7 @@ from ..scene.pieces import tidy_pieces
 from ..scene.read import attribution_of
 from ..scene.render_elsewhere import render_elsewhere
 from ..scene.result_folder import result_files, write_pictures, write_tables
-from ..scene.sensors import labelled_sensors, read_sensors
+from ..scene.sensors import labelled_sensors, placed_sensors, read_sensors
 from ..scene.write import coverage_of, shown_legend, take_over
 from ..sensor_edits import position_names, sensor_edits
 from ..session import SceneState, session
@@ -100,7 +100,7 @@ class SEIP_OT_look_from_sensor(ForPlacement, bpy.types.Operator):
     def _look(self, context: bpy.types.Context) -> None:
         result = context.scene.seip.result
         label = result.sensors[result.active_sensor].name if result.sensors else ""
-        empty = selection.sensor_empties(context.scene).get(label)
+        empty = placed_sensors(context.scene).get(label)
         if empty is None:
             raise SeipError(f"the sensor {label} is no longer in the scene: undo, or place again")
         if context.space_data is None or context.space_data.type != "VIEW_3D":
