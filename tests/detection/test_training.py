@@ -273,9 +273,9 @@ def test_frames_in_files_are_read_when_they_are_asked_for(tmp_path):
         street_frame(number, users=2, rays=500, time=float(number)).save(path)
     files = LazyFrames(3, lambda number: Frame.load(paths[number]))
     paths[0].unlink()
-    assert [frame.time for frame in files[1:]] == [1.0, 2.0]
+    assert [files[number].time for number in (1, 2)] == [1.0, 2.0]
     assert isinstance(files[1], Frame)
-    recorded = sampled("files", "run 1", files[1:])
+    recorded = sampled("files", "run 1", LazyFrames(2, lambda number: files[number + 1]))
     assert len(spread([recorded], 1)) == 1
     assert recorded.get(1) is recorded.get(1)
 
