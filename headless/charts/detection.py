@@ -28,8 +28,6 @@ LINE_STYLES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
 
 PRECISION_LABEL = "average precision"
 
-Interval = tuple[float, float]
-
 
 @dataclass(frozen=True, eq=False)
 class PrecisionRecallLine:

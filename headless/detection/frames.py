@@ -49,7 +49,7 @@ class Recording:
     placement: str = ""
 
 
-def recording_of(folder: Path, site: str = "") -> Recording:
+def recording_of(folder: Path) -> Recording:
     """Return the recording in a folder of scans; frames are read on access.
 
     Raises
@@ -62,7 +62,7 @@ def recording_of(folder: Path, site: str = "") -> Recording:
         raise SeipError(f"the run in {folder} was stopped half-way: run the same simulation again to finish it")
     frames = LazyFrames(len(record["frames"]), lambda number: Frame.load(frame_path(folder, number)))
     sensors = tuple(str(sensor["sensor"]) for sensor in record["sensors"])
-    return Recording(str(folder), str(record["trajectories"]["source"]), frames, sensors, site)
+    return Recording(str(folder), str(record["trajectories"]["source"]), frames, sensors)
 
 
 class LazyFrames(Sequence[Frame]):
