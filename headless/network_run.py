@@ -114,7 +114,6 @@ class _Site:
     key: str
     message: str = ""
     attribution: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
     searches: StoredSearches = field(default_factory=lambda: StoredSearches(""))
 
     def problem(self) -> SiteProblem:
@@ -257,7 +256,7 @@ def _read_survey(site: _Site, version: str) -> bool:
         return False
     if header.get("key") != site.key:
         return False
-    site.attribution, site.warnings = tuple(header["attribution"]), tuple(header["warnings"])
+    site.attribution = tuple(header["attribution"])
     key = digest(site.key, version)
     try:
         stored = from_json(StoredSearches, json.loads((site.folder / SEARCHES).read_text(encoding="utf-8")))
