@@ -31,7 +31,7 @@ from seip_addon.core.estimates import SHARE, Interval
 from seip_addon.core.storage.csv_table import save_csv
 from seip_addon.core.storage.files import save_json
 
-from .case_study import DetectorOutcome, ModelConfiguration, Traffic
+from .case_study import DetectorOutcome, ModelConfiguration, Traffic, still_rises
 from .claims import SeedResult
 
 SCHEMA = "seip-evaluation/2"
@@ -54,7 +54,7 @@ class StudyResults:
     @property
     def seed_results(self) -> list[SeedResult]:
         """Figures of all types and numbers of sensors, each with whether its training was still improving."""
-        rising = {model.name: curve.still_rises for model, curve in zip(self.models, self.curves, strict=True)}
+        rising = {model.name: still_rises(curve) for model, curve in zip(self.models, self.curves, strict=True)}
         return [
             replace(one.seed_result, still_rising=rising[one.model.name])
             for one in self.outcomes
@@ -204,7 +204,7 @@ def save_record(
                     "network": asdict(one.network),
                     "training": asdict(one.training),
                     "validation": {str(step): value for step, value in curve.validation.items()},
-                    "still_rising": curve.still_rises,
+                    "still_rising": still_rises(curve),
                 }
                 for one, curve in zip(results.models, results.curves, strict=True)
             ],
