@@ -17,7 +17,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from headless.set_up import LOCK
+from headless.set_up import LOCK, requirements
 
 ROOT = Path(__file__).resolve().parent.parent
 WHEELS = ROOT / "wheels"
@@ -79,12 +79,6 @@ def build(name: str, platform: str, output: Path) -> Path:
     return target
 
 
-def pins() -> list[str]:
-    """Return the requirements whose wheels the extension carries."""
-    groups = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["dependency-groups"]
-    return list(groups["extension"])
-
-
 def manifest() -> dict[str, object]:
     """Return the manifest as it is kept, without platforms and wheels."""
     return tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
@@ -97,12 +91,13 @@ def fetch_wheels(python: str, platform: str) -> list[Path]:
     """
     folder = WHEELS / f"{platform}-python{python}"
     stamp = folder / "pins.json"
-    wanted = json.dumps({"pins": pins(), "tags": WHEEL_TAGS[platform]})
+    pins = requirements("extension")
+    wanted = json.dumps({"pins": pins, "tags": WHEEL_TAGS[platform]})
     if not stamp.is_file() or stamp.read_text(encoding="utf-8") != wanted:
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         tags = [f"--platform={tag}" for tag in WHEEL_TAGS[platform]]
-        compiled = [pin for pin in pins() if not download(folder, [pin], python, ["--platform=any", "--abi=none"])]
+        compiled = [pin for pin in pins if not download(folder, [pin], python, ["--platform=any", "--abi=none"])]
         if not download(folder, compiled, python, ["--implementation=cp", *tags]):
             sys.exit(f"cannot download the wheels for {platform}, Python {python}: see pip's message above")
         stamp.write_text(wanted, encoding="utf-8")

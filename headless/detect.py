@@ -11,7 +11,6 @@ ships with the project was trained on random placements at random sites (`seip s
 import argparse
 import os
 import sys
-from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -28,13 +27,13 @@ from headless.detection.recordings import MountedSensors, Simulator, sampled_run
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import deterministic
 from headless.detection_results import (
-    DetectionSite,
     print_precision,
     remove_detections,
     save_charts,
     save_detections,
 )
 from headless.options import add_optics, add_rolling_shutter, add_settings, new_parser, read_settings, real_number
+from headless.scanned_scene import read_scanned_scene
 
 import bpy
 
@@ -42,17 +41,13 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import TIME_STEP
 from seip_addon.core.output.results.detection_record import SCHEMA
 from seip_addon.core.output.results.versions import versions
-from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.run_overlap import require_independent, vehicle_positions
 from seip_addon.core.sensing.traffic.site_traffic import check_runs, require_own_traffic
-from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.files import digest, save_json
 from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.core.workflows.survey_settings import SurveySettings
-from seip_addon.scene.materials import set_reflectivity
-from seip_addon.scene.read import read_scene
-from seip_addon.scene.sensors import changed_beams, read_sensors
+from seip_addon.scene.sensors import changed_beams
 
 _OF_SCENES = ("traffic", "every", "seed", "rolling_shutter", "weather", "reflectivity", "engine")
 _OF_RECORDINGS = ("sensor", "poses", "site", "labels", "radius", "score")
@@ -70,13 +65,8 @@ def main(argv: list[str]) -> None:
         raise SeipError("name the runs of traffic to detect in with --traffic, or a recording in place of the scene")
     runtime.check_folder(options.output)
     runtime.open_scene(options.scene)
-    weather = weather_of(options.weather)
-    set_reflectivity(options.reflectivity)
-    geometry = weather.over(read_scene(bpy.context.scene).geometry)
-    sensors = [
-        replace(one, model=weather.through(one.model))
-        for one in read_sensors(bpy.context.scene, load_catalogue(options.catalogue))
-    ]
+    reading, sensors = read_scanned_scene(options)
+    geometry = reading.geometry
     changed = changed_beams(bpy.context.scene, sensors)
     runtime.warn(changed)
     runs = sampled_runs(options.traffic, geometry.origin, options.every)
@@ -97,8 +87,8 @@ def main(argv: list[str]) -> None:
     runtime.warn(doubts)
     precisions = outcome.precisions
     with runtime.incomplete_if_interrupted(options.output):
-        site = DetectionSite(geometry.name, simulator.static.region, sensors, simulator.static.attribution)
-        save_charts(options.output, outcome, site)
+        static = simulator.static
+        save_charts(options.output, outcome, geometry.name, static.region, sensors, static.attribution)
         remove_detections(options.output)
         for number, one in enumerate(outcome.frames):
             found = one.detected

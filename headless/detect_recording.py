@@ -10,7 +10,7 @@ import csv
 import io
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,20 +18,18 @@ from typing import Any
 from headless import runtime
 from headless.charts.birds_eye import draw_birds_eye
 from headless.detection.average_precision import balanced_score, evaluate
+from headless.detection.detection_area import DetectionArea
 from headless.detection.detector import Detector
 from headless.detection.detector_evaluation import DetectorEvaluation
-from headless.detection.frame_results import Detections, FrameResult
+from headless.detection.frame_results import Detections, FrameResult, frame_result
+from headless.detection.inference import detect
 from headless.detection.matching import Rule
-from headless.detection.recorded_detection import (
-    RECOMMENDED_SCORE,
-    DetectedFrame,
-    area_of_recording,
-    detect_in_recording,
-)
+from headless.detection.recorded_detection import RECOMMENDED_SCORE, area_of_recording
 from headless.detection.rules import MAIN_RULE
 from headless.detection.settings import CLASS_CATEGORIES, CLASS_OF
 from headless.detection.suitability import suitability_warnings
-from headless.detection_results import DetectionSite, print_precision, save_charts, save_detections
+from headless.detection.training import deterministic
+from headless.detection_results import print_precision, save_charts, save_detections
 from headless.options import real_number
 from headless.video import save_video
 
@@ -47,6 +45,7 @@ from seip_addon.core.limits import Limits
 from seip_addon.core.output.datasets.label_files import CLASSES, read_labels
 from seip_addon.core.output.results.detection_record import RECORDING_SCHEMA
 from seip_addon.core.output.results.versions import versions
+from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.recordings.box_labels import BoxLabels
@@ -70,6 +69,8 @@ RADIUS = 80.0
 
 RECORD = "detection.json"
 
+_BLOCKS = 8  # parts of a recording that intervals treat as independent
+_LEAST_PER_BLOCK = 2  # frames
 _LISTED_OVERLAP, _LISTED_RETURNS = 0.5, 10  # at which listed vehicles count as found
 
 _COLUMNS = (
@@ -147,22 +148,8 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
         runtime.LOG.info(sentence)
     folder = options.output
     _resume(folder, key)
-    results: list[FrameResult] = []
-    with runtime.incomplete_if_interrupted(folder, continues=True), runtime.progress_bar() as show:
-        steps = detect_in_recording(
-            frames,
-            detector,
-            area,
-            labels=labels,
-            known=lambda number: _stored(folder, number),
-            threads=os.cpu_count() or 1,
-        )
-        for step in steps:
-            if not isinstance(step, DetectedFrame):
-                show(step)
-                continue
-            results.append(step.result)
-            _save_frame(folder, step, frames, options.score, site)
+    with runtime.incomplete_if_interrupted(folder, continues=True):
+        results = runtime.finish_with_bar(_detected(options, frames, detector, area, labels))
     fullest = max(range(len(results)), key=lambda number: len(results[number].detected))
     scan = frames.frame(fullest)
     doubts = [sentence for name, background in backgrounds for sentence in background.warnings(name)]
@@ -203,8 +190,7 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
         "versions": versions(blender=bpy.app.version_string),
     }
     if outcome is not None:
-        named = DetectionSite(site, frames.region, [one.mounted for one in frames.sensors])
-        save_charts(folder, outcome, named)
+        save_charts(folder, outcome, site, frames.region, [one.mounted for one in frames.sensors])
         record["average_precision"] = {name: as_json(found) for name, found in outcome.precisions.items()}
         record["recall"] = {"score": outcome.score, "categories": outcome.recall}
         record["listed"] = _listed(results, options.score)
@@ -213,6 +199,41 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
     save_json(folder / RECORD, record)
     runtime.print_line(f"{listed:,} road users with a score of {options.score:g} or more in {len(frames):,} frames")
     runtime.print_line(f"written to {folder}/: detections.csv, video.mp4, frames/, kitti/, openpcdet/")
+
+
+def _detected(
+    options: argparse.Namespace,
+    frames: RecordedFrames,
+    detector: Detector,
+    area: DetectionArea,
+    labels: Sequence[BoxLabels] | None,
+) -> Generator[Progress, None, list[FrameResult]]:
+    """Detect in each frame that an interrupted run has not done, write detections and picture, and return the results.
+
+    Results have ground truth where the frames have labels.
+    """
+    total = len(frames)
+    blocks = _BLOCKS if total >= _BLOCKS * _LEAST_PER_BLOCK else 1
+    places = np.array([sensor.mounted.xyz for sensor in frames.sensors])
+    results = []
+    for number in range(total):
+        yield Progress(number, total, "detecting")
+        frame = frames.frame(number, None if labels is None else labels[number])
+        found = _stored(options.output, number)
+        if found is None:
+            with deterministic(os.cpu_count() or 1):
+                found = _inside(detect(detector, area, frame), frames)
+        run = f"part {number * blocks // total + 1}" if blocks > 1 else "recording"
+        results.append(frame_result(frame, found, region=frames.region, sensors=places, run=run))
+        _save_frame(options, number, frame, found, frames, area.site)
+    yield Progress(total, total, "detecting")
+    return results
+
+
+def _inside(found: Detections, frames: RecordedFrames) -> Detections:
+    """Return the detections in the region."""
+    inside = shapely.contains_xy(frames.region, found.boxes[:, 0], found.boxes[:, 1])
+    return Detections(found.boxes[inside], found.score[inside], found.category[inside])
 
 
 def _opened(options: argparse.Namespace) -> tuple[_Sensors, Recording]:
@@ -339,25 +360,27 @@ def _stored(folder: Path, number: int) -> Detections | None:
     return Detections(boxes, np.array(scores), np.array([category[name] for name in names], dtype=np.int64))
 
 
-def _save_frame(folder: Path, step: DetectedFrame, frames: RecordedFrames, score: float, site: str) -> None:
+def _save_frame(  # what was found where, and how it is shown
+    options: argparse.Namespace, number: int, frame: Frame, found: Detections, frames: RecordedFrames, site: str
+) -> None:
     """Write the detections and the picture of a frame; the detections last, as they mark the frame as done."""
-    found, first = step.detections, [members[0] for members in CLASS_CATEGORIES.values()]
-    categories = [first[number] for number in found.category.tolist()]
-    shown = found.score >= score
+    first = [members[0] for members in CLASS_CATEGORIES.values()]
+    categories = [first[category] for category in found.category.tolist()]
+    shown = found.score >= options.score
     west, south, east, north = frames.region.bounds
     picture = draw_birds_eye(
-        step.frame.points,
-        step.frame.foreground,
+        frame.points,
+        frame.foreground,
         (west, south, east, north),
         boxes=found.boxes[shown],
         categories=[name for name, chosen in zip(categories, shown, strict=True) if chosen],
         sensors=np.array([sensor.mounted.xyz for sensor in frames.sensors]),
         region=frames.region,
-        title=f"{site}, {step.frame.time:.1f} s",
+        title=f"{site}, {frame.time:.1f} s",
     )
-    with whole_file(folder / "frames" / f"{step.number:06d}.png") as temporary:
+    with whole_file(options.output / "frames" / f"{number:06d}.png") as temporary:
         picture.save(temporary, "PNG")
-    save_detections(folder, step.number, found.boxes, categories, found.score)
+    save_detections(options.output, number, found.boxes, categories, found.score)
 
 
 def _save_table(path: Path, results: Sequence[FrameResult], score: float, geometry: SceneGeometry | None) -> int:

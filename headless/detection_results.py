@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from headless import runtime
-from headless.charts.detection import PrecisionRecallLine, save_parts_chart, save_precision_recall_chart
+from headless.charts.detection import BinnedFigure, save_parts_chart, save_precision_recall_chart
 from headless.charts.error_view import save_error_view
-from headless.detection.average_precision import precision_recall
 from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
-from headless.detection.chart_data import error_view, parts
+from headless.detection.chart_data import curve, error_view
 from headless.detection.detector_evaluation import DetectorEvaluation
 from headless.detection.rules import MAIN_RULE
 
@@ -25,45 +23,42 @@ from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.storage.files import whole_file
 
 
-@dataclass(frozen=True, eq=False)
-class DetectionSite:
-    """Name, region of interest, sensors and credits of a site, for charts.
+def save_charts(
+    folder: Path,
+    outcome: DetectorEvaluation,
+    name: str,
+    region: BaseGeometry,
+    sensors: Sequence[MountedSensor],
+    attribution: Sequence[str] = (),
+) -> None:
+    """Write the charts of average precision and of the errors in the fullest frame.
 
     Parameters
     ----------
+    name : str
+        Name of the site, for titles.
     region : shapely geometry, metres
-    sensors : sequence of MountedSensor
-    attribution : tuple of str
+        Region of interest in plan.
+    attribution : sequence of str
         Credits that the sources of the scene require.
     """
-
-    name: str
-    region: BaseGeometry
-    sensors: Sequence[MountedSensor]
-    attribution: tuple[str, ...] = ()
-
-
-def save_charts(folder: Path, outcome: DetectorEvaluation, site: DetectionSite) -> None:
-    """Write the charts of average precision and of the errors in the fullest frame."""
-    evaluation, score, name = outcome.evaluation, outcome.score, site.name
+    evaluation, score = outcome.evaluation, outcome.score
     far = "distance to the nearest sensor (m)"
-    panels = [
-        parts(far, "average precision", {name: average_precision_by(evaluation, "distance", DISTANCE_EDGES)}),
-        parts(far, "recall", {name: recall_by(evaluation, "distance", DISTANCE_EDGES, score)}),
-        parts("returns from the road user", "recall", {name: recall_by(evaluation, "points", POINT_EDGES, score)}),
+    panels: list[BinnedFigure] = [
+        (far, "average precision", {name: average_precision_by(evaluation, "distance", DISTANCE_EDGES)}),
+        (far, "recall", {name: recall_by(evaluation, "distance", DISTANCE_EDGES, score)}),
+        ("returns from the road user", "recall", {name: recall_by(evaluation, "points", POINT_EDGES, score)}),
     ]
     save_parts_chart(folder / "where.png", panels, name)
-    found = precision_recall(evaluation)
-    types = " + ".join(sorted({sensor.model.key for sensor in site.sensors}))
-    count = len(site.sensors)
-    line = PrecisionRecallLine(types, count, found.recall, found.precision, evaluation.average_precision)
-    save_precision_recall_chart(folder / "precision_recall.png", [line], name)
+    types = " + ".join(sorted({sensor.model.key for sensor in sensors}))
+    count = len(sensors)
+    save_precision_recall_chart(folder / "precision_recall.png", [curve(types, count, evaluation)], name)
     frame = outcome.frames[outcome.fullest]
-    places = np.array([sensor.xyz for sensor in site.sensors])
+    places = np.array([sensor.xyz for sensor in sensors])
     title = f"{count} × {types}: AP {evaluation.average_precision:.2f} over all frames"
     cloud = outcome.scan.points
-    view = error_view(title, frame, MAIN_RULE, score=score, cloud=cloud, region=site.region, sensors=places)
-    save_error_view(folder / "errors.png", [view], f"{name}, {frame.run} at {frame.time:.1f} s", site.attribution)
+    view = error_view(title, frame, MAIN_RULE, score=score, cloud=cloud, region=region, sensors=places)
+    save_error_view(folder / "errors.png", [view], f"{name}, {frame.run} at {frame.time:.1f} s", attribution)
 
 
 def save_detections(folder: Path, number: int, boxes: Float, categories: Sequence[str], score: Float) -> None:

@@ -15,7 +15,7 @@ import tempfile
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from headless.build_extension import BUILDS, WHEEL_TAGS, pins
+from headless.build_extension import BUILDS, WHEEL_TAGS
 from headless.set_up import LOCK, SUPPORTED_PYTHONS, UNLOCKED, requirements
 
 from packaging.requirements import Requirement
@@ -33,11 +33,11 @@ def main() -> None:
     found: dict[str, str] = {}
     for version in SUPPORTED_PYTHONS:
         found |= wheels(everything, "{}.{}".format(*version), linux)
-    for pin in pins():  # the extension carries wheels without compiled code where there are any
+    for pin in requirements("extension"):  # the extension carries wheels without compiled code where there are any
         found |= wheels([pin], BUILDS["blender4.5"].python, ["any"], pure=True)
     for build in BUILDS.values():
         for platform in build.platforms:
-            found |= wheels(pins(), build.python, list(WHEEL_TAGS[platform]))
+            found |= wheels(requirements("extension"), build.python, list(WHEEL_TAGS[platform]))
     LOCK.write_text("".join(f"{found[name]}  {name}\n" for name in sorted(found)), encoding="utf-8")
     sys.stdout.write(f"{LOCK.name}: {len(found)} wheels\n")
 

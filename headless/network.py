@@ -18,7 +18,7 @@ from pathlib import Path
 
 from headless import runtime, survey
 from headless.network_run import NetworkRequest, run_network
-from headless.network_tasks import FORMAT, survey_version, workers
+from headless.network_tasks import FORMAT, survey_version
 from headless.options import add_settings, new_parser, real_number, whole_number
 
 import numpy as np
@@ -27,6 +27,7 @@ import shapely
 from seip_addon.core.arrays import Float
 from seip_addon.core.choosing.placement.objective import Objective, criterion_of
 from seip_addon.core.counts import counted
+from seip_addon.core.dask_client import connected
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import PRICE, SENSORS, SHARE, SITE_RADIUS, Limits
 from seip_addon.core.output.network.network_record import NetworkSensor, load_network
@@ -87,8 +88,8 @@ def main(argv: list[str]) -> None:
     number = options.workers or _usual_workers(options.memory)
     _confirm(options, len(places), number)
     source = _Sources(request)
-    with workers(options.scheduler, number) as cluster, runtime.progress_bar() as report:
-        record = finish(run_network(name, places, source, request, cluster, options.output), report)
+    with connected(options.scheduler, number) as client, runtime.progress_bar() as report:
+        record = finish(run_network(name, places, source, request, client, options.output), report)
     record = replace(record, created=datetime.now(UTC).date().isoformat())
     write_network(options.output, record, _streets(places))
     equipped = [site for site in record.sites if site.status == "equipped"]

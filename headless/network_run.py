@@ -11,12 +11,13 @@ from pathlib import Path
 from headless.network_tasks import (
     SURVEY_FILES,
     USAGE,
+    Client,
     Failure,
     Files,
     PlaceJob,
     SolveJob,
     SurveyJob,
-    Workers,
+    run_jobs,
     solve_budget,
     survey_site,
     write_placement,
@@ -113,7 +114,6 @@ class _Site:
     key: str
     message: str = ""
     attribution: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
     searches: StoredSearches = field(default_factory=lambda: StoredSearches(""))
 
     def problem(self) -> SiteProblem:
@@ -144,7 +144,7 @@ def run_network(
     places: Sequence[NetworkPlace],
     source: Callable[[NetworkPlace], tuple[str, bytes, str]],
     request: NetworkRequest,
-    workers: Workers,
+    workers: Client,
     folder: Path,
 ) -> Generator[Progress, None, NetworkRecord]:
     """Survey the sites of a network, allocate the budget, and write the files of each site.
@@ -202,7 +202,7 @@ def _surveyed(
     places: Sequence[NetworkPlace],
     source: Callable[[NetworkPlace], tuple[str, bytes, str]],
     request: NetworkRequest,
-    workers: Workers,
+    workers: Client,
     folder: Path,
 ) -> Generator[Progress, None, list[_Site]]:
     """Survey the sites whose inputs have changed; read the others."""
@@ -233,7 +233,7 @@ def _surveyed(
     jobs = [lambda number=number: job(number) for number in open_numbers]
     done = len(sites) - len(jobs)
     yield Progress(done, len(sites), "building and surveying sites")
-    for index, result in workers.run(survey_site, jobs):
+    for index, result in run_jobs(workers, survey_site, jobs):
         site = sites[open_numbers[index]]
         if isinstance(result, Failure):
             site.message = result.message
@@ -256,7 +256,7 @@ def _read_survey(site: _Site, version: str) -> bool:
         return False
     if header.get("key") != site.key:
         return False
-    site.attribution, site.warnings = tuple(header["attribution"]), tuple(header["warnings"])
+    site.attribution = tuple(header["attribution"])
     key = digest(site.key, version)
     try:
         stored = from_json(StoredSearches, json.loads((site.folder / SEARCHES).read_text(encoding="utf-8")))
@@ -282,7 +282,7 @@ def _write_files(folder: Path, files: Files, last: str) -> None:
 class _Network:
     """Sites whose surveys succeeded, and the allocation of money to them."""
 
-    def __init__(self, sites: Sequence[_Site], request: NetworkRequest, workers: Workers) -> None:
+    def __init__(self, sites: Sequence[_Site], request: NetworkRequest, workers: Client) -> None:
         self._sites, self._request, self._workers = sites, request, workers
         self.weights: Float = np.array([site.place.weight for site in sites])
         self.criterion = sites[0].problem().criterion
@@ -339,7 +339,7 @@ class _Network:
             )
             for site in self._sites
         ]
-        for number, result in self._workers.run(solve_budget, jobs):
+        for number, result in run_jobs(self._workers, solve_budget, jobs):
             if isinstance(result, Failure):
                 raise SeipError(f"{self._sites[number].place.name}: {result.message}")
             results[number] = result
@@ -425,7 +425,7 @@ class _Network:
                 return SolveJob(content, one.budget, one.effort, installed[one.site])
 
             jobs = [lambda number=number: job(number) for number in missing]
-            for done, (index, result) in enumerate(self._workers.run(solve_budget, jobs), start=1):
+            for done, (index, result) in enumerate(run_jobs(self._workers, solve_budget, jobs), start=1):
                 number = missing[index]
                 site = self._sites[requests[number].site]
                 if isinstance(result, Failure):
@@ -439,7 +439,7 @@ class _Network:
 
 
 def _placed(
-    sites: Sequence[_Site], taken: Sequence[SolvedBudget], request: NetworkRequest, workers: Workers
+    sites: Sequence[_Site], taken: Sequence[SolvedBudget], request: NetworkRequest, workers: Client
 ) -> Generator[Progress, None, None]:
     """Write the files of the placements that are taken, except those that an earlier run has written."""
     wanted: list[tuple[_Site, SolvedBudget, str]] = []
@@ -462,7 +462,7 @@ def _placed(
         return PlaceJob(files, request.settings, objective, one, request.memory)
 
     jobs = [lambda site=site, one=one: job(site, one) for site, one, _ in wanted]
-    for done, (number, result) in enumerate(workers.run(write_placement, jobs), start=1):
+    for done, (number, result) in enumerate(run_jobs(workers, write_placement, jobs), start=1):
         site, _, key = wanted[number]
         if isinstance(result, Failure):
             raise SeipError(f"{site.place.name}: {result.message}")

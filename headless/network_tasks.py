@@ -9,7 +9,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from typing import Any
 from seip_addon.core.choosing.network.frontier import SolvedBudget
 from seip_addon.core.choosing.network.site_problem import SiteProblem
 from seip_addon.core.choosing.placement.objective import Objective
-from seip_addon.core.dask_client import connected
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.storage.source_digest import source_digest
@@ -34,6 +32,8 @@ PLACED_FILES = "placed"
 """Folder of the files of a placement, below that of the request."""
 IN_FLIGHT = 3  # tasks for each worker that are submitted and not finished: enough to keep it busy
 
+Client = Any
+"""`distributed.Client`, which has no types."""
 Files = dict[str, bytes]
 """Content of files by their names."""
 
@@ -171,75 +171,54 @@ def _reason(text: str, status: int) -> str:
     return f"its process failed: {lines[-1] if lines else f'status {status}'}"
 
 
-class Workers:
-    """Workers of a cluster, on which functions run over many jobs.
+def run_jobs(
+    client: Client, function: Callable[[Any], Any], jobs: Sequence[Callable[[], Any]]
+) -> Iterator[tuple[int, Any]]:
+    """Run a function on jobs on the workers of a cluster; yield the number of each job with its result as they finish.
+
+    Only a few jobs for each worker are made and submitted at a time, so that many jobs need no more memory.
 
     Parameters
     ----------
     client : distributed.Client
-    """
-
-    def __init__(self, client: Any) -> None:  # noqa: ANN401 -- distributed has no types
-        self._client = client
-
-    def run(self, function: Callable[[Any], Any], jobs: Sequence[Callable[[], Any]]) -> Iterator[tuple[int, Any]]:
-        """Run a function on jobs; yield the number of each job with its result as they finish.
-
-        Only a few jobs for each worker are made and submitted at a time, so that many jobs need no more memory.
-
-        Parameters
-        ----------
-        jobs : sequence of callable
-            Each returns a job.
-
-        Raises
-        ------
-        SeipError
-            Several workers died on one job, or the scheduler is gone.
-        """
-        from distributed import CancelledError, KilledWorker, as_completed  # noqa: PLC0415 -- an extra
-
-        waiting = iter(range(len(jobs)))
-        numbers: dict[str, int] = {}
-        flying = as_completed(loop=self._client.loop)
-        threads = sum(self._client.nthreads().values())
-        try:
-            for _, number in zip(range(IN_FLIGHT * max(1, threads)), waiting, strict=False):
-                flying.add(self._submit(function, jobs[number], number, numbers))
-            while numbers:
-                future = next(flying)
-                number = numbers.pop(future.key)
-                result = future.result()
-                future.release()
-                following = next(waiting, None)
-                if following is not None:
-                    flying.add(self._submit(function, jobs[following], following, numbers))
-                yield number, result
-        except KilledWorker as error:
-            raise SeipError(
-                f"several workers died on one task ({error}): give them more memory, and run the command again to go on"
-            ) from error
-        except (CancelledError, OSError) as error:
-            raise SeipError("the Dask scheduler stopped: start it again, and run the same command to go on") from error
-        finally:
-            flying.clear()
-
-    def _submit(
-        self, function: Callable[[Any], Any], job: Callable[[], Any], number: int, numbers: dict[str, int]
-    ) -> Any:  # noqa: ANN401 -- as above
-        future = self._client.submit(function, job(), pure=False)
-        numbers[future.key] = number
-        return future
-
-
-@contextmanager
-def workers(address: str | None, number: int) -> Iterator[Workers]:
-    """Yield the workers of a scheduler, or of a cluster on this machine if no address is given.
+        Client of the scheduler, from `connected`.
+    jobs : sequence of callable
+        Each returns a job.
 
     Raises
     ------
     SeipError
-        Dask is not installed, or no scheduler answers.
+        Several workers died on one job, or the scheduler is gone.
     """
-    with connected(address, number) as client:
-        yield Workers(client)
+    from distributed import CancelledError, KilledWorker, as_completed  # noqa: PLC0415 -- an extra
+
+    waiting = iter(range(len(jobs)))
+    numbers: dict[str, int] = {}
+    flying = as_completed(loop=client.loop)
+
+    def submit(number: int) -> None:
+        future = client.submit(function, jobs[number](), pure=False)
+        numbers[future.key] = number
+        flying.add(future)
+
+    threads = sum(client.nthreads().values())
+    try:
+        for _, number in zip(range(IN_FLIGHT * max(1, threads)), waiting, strict=False):
+            submit(number)
+        while numbers:
+            future = next(flying)
+            number = numbers.pop(future.key)
+            result = future.result()
+            future.release()
+            following = next(waiting, None)
+            if following is not None:
+                submit(following)
+            yield number, result
+    except KilledWorker as error:
+        raise SeipError(
+            f"several workers died on one task ({error}): give them more memory, and run the command again to go on"
+        ) from error
+    except (CancelledError, OSError) as error:
+        raise SeipError("the Dask scheduler stopped: start it again, and run the same command to go on") from error
+    finally:
+        flying.clear()

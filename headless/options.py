@@ -193,14 +193,6 @@ def add_optics(group: argparse._ActionsContainer) -> None:
     )
 
 
-def name_only(group: argparse._ArgumentGroup, reference: str) -> None:
-    """Have help name the options of a group alone, and refer to where they are explained."""
-    names = (action.option_strings[-1] for action in group._group_actions)  # noqa: SLF001 -- argparse has no other way
-    group.description = f"{' '.join(names)} ({reference})"
-    for action in group._group_actions:  # noqa: SLF001 -- as above
-        action.help = argparse.SUPPRESS
-
-
 def read_settings(kind: type[Options], options: argparse.Namespace, **values: Any) -> Options:  # noqa: ANN401 -- of fields of any type
     """Return the settings that options name; ``values`` are of fields that have no option of their own."""
     for name, (about, _) in settings_of(kind).items():

@@ -9,7 +9,6 @@ that was stopped goes on where it was when it is started again.
 
 import argparse
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -17,6 +16,7 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime
 from headless.options import add_optics, add_settings, new_parser, read_settings
+from headless.scanned_scene import read_scanned_scene
 
 import bpy
 
@@ -24,17 +24,13 @@ from seip_addon.core.counts import counted
 from seip_addon.core.output.datasets.formats import FORMATS
 from seip_addon.core.output.datasets.sample import SPLITS
 from seip_addon.core.output.results.versions import versions
-from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.run_folder import Record, Run, check_run_folder
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.site_traffic import load_trajectories
-from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.folder_contents import check_no_placement
 from seip_addon.core.workflows.recording import RecordingSettings, dataset_folder, make_run, record, simulation_of
 from seip_addon.core.workflows.survey_settings import SurveySettings
-from seip_addon.scene.materials import set_reflectivity
-from seip_addon.scene.read import read_scene
-from seip_addon.scene.sensors import changed_beams, read_sensors
+from seip_addon.scene.sensors import changed_beams
 from seip_addon.scene.traffic import read_traffic
 
 
@@ -72,22 +68,14 @@ def _settings(options: argparse.Namespace) -> RecordingSettings:
 
 def _run(options: argparse.Namespace, settings: RecordingSettings) -> Run:
     """Read what the frames follow from: the scene, its sensors, and its traffic."""
-    weather = weather_of(options.weather)
-    set_reflectivity(options.reflectivity)
-    reading = read_scene(bpy.context.scene)
+    reading, sensors = read_scanned_scene(options)
     runtime.warn(reading.warnings)
-    sensors = [
-        replace(sensor, model=weather.through(sensor.model))
-        for sensor in read_sensors(bpy.context.scene, load_catalogue(options.catalogue))
-    ]
     runtime.warn(changed_beams(bpy.context.scene, sensors))
     if options.traffic is None:
         trajectories = runtime.finish_with_bar(read_traffic(bpy.context.scene))
     else:
         trajectories = load_trajectories(options.traffic, reading.geometry)
-    return make_run(
-        weather.over(reading.geometry), sensors, trajectories, settings, versions(blender=bpy.app.version_string)
-    )
+    return make_run(reading.geometry, sensors, trajectories, settings, versions(blender=bpy.app.version_string))
 
 
 def _describe(run: Run) -> str:

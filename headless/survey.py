@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from headless import runtime
 from headless.convergence import Convergence
-from headless.options import add_optics, add_settings, name_only, read_settings
+from headless.options import add_optics, add_settings, read_settings
 
 import bpy
 import numpy as np
@@ -27,7 +27,7 @@ from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.triangle_culling import culling_message
 from seip_addon.core.settings import settings_of
-from seip_addon.core.site.candidates import PAPER_TYPES, CandidateSettings
+from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
@@ -65,15 +65,8 @@ class Stopwatch:
             return self.time(step, lambda: finish(steps, report))
 
 
-def add_options(parser: argparse.ArgumentParser, *, study: bool = False) -> None:
-    """Add the scene, the folder of results and the options of a survey to a command.
-
-    Parameters
-    ----------
-    study : bool
-        Whether the command is a study. Studies use the sensor types of the paper by default, and their help only names
-        the options of a survey.
-    """
+def add_options(parser: argparse.ArgumentParser) -> tuple[argparse._ArgumentGroup, ...]:
+    """Add the scene, the folder of results and the options of a survey to a command; return the groups of options."""
     parser.add_argument("scene", nargs="?", type=Path, help="the .blend; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the results")
     groups = add_survey_settings(parser)
@@ -86,10 +79,7 @@ def add_options(parser: argparse.ArgumentParser, *, study: bool = False) -> None
     )
     add_settings(work, SurveySettings, "solver")
     add_settings(work, SurveySettings, "effort", "time_limit")
-    if study:
-        parser.set_defaults(sensor=PAPER_TYPES)
-        for group in (*groups, work):
-            name_only(group, "see: seip place --help")
+    return (*groups, work)
 
 
 def add_survey_settings(parser: argparse.ArgumentParser) -> tuple[argparse._ArgumentGroup, ...]:

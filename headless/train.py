@@ -12,7 +12,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -20,14 +19,13 @@ if not __package__:  # run as a file by `blender -P`
 from headless import runtime
 from headless.charts.detection import save_training_chart
 from headless.detection.average_precision import evaluate
-from headless.detection.cloud_in_plan import CloudInPlan
 from headless.detection.detection_area import DetectionArea, area_of
 from headless.detection.detector import Detector, check_device
 from headless.detection.frame_results import FrameResult, frame_result
 from headless.detection.frames import SampledRecording, recording_of, require_independent_splits, require_separate
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
-from headless.detection.settings import CLASS_CATEGORIES, NetworkSettings, TrainingSettings
+from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import train
 from headless.options import add_settings, new_parser, read_settings
@@ -102,15 +100,8 @@ def _results(detector: Detector, area: DetectionArea, folder: Path, region: Base
     """Return what is there and what is detected in each frame of a run."""
     recording = recording_of(folder)
     sensors = np.array([sensor["local_m"] for sensor in load_manifest(folder)["sensors"]])
-    common: dict[str, Any] = {"classes": tuple(CLASS_CATEGORIES.values()), "region": region, "sensors": sensors}
     return [
-        frame_result(
-            frame,
-            CloudInPlan(frame.points),
-            detect(detector, area, frame),
-            run=recording.traffic,
-            **common,
-        )
+        frame_result(frame, detect(detector, area, frame), region=region, sensors=sensors, run=recording.traffic)
         for frame in recording.frames
     ]
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -17,6 +16,7 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime
 from headless.options import add_optics, add_settings, new_parser, read_settings
+from headless.scanned_scene import read_scanned_scene
 
 import bpy
 
@@ -24,21 +24,16 @@ from seip_addon.core.counts import counted
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.pictures.verification import save_changes_picture, save_returns_chart
 from seip_addon.core.output.results.versions import versions
-from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.recordings.comparison import VEHICLE
 from seip_addon.core.sensing.recordings.recording import open_recording
 from seip_addon.core.sensing.recordings.verification import Verification
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
-from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.files import save_json
 from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.core.workflows.verification_record import CHANGES_FILE, save_changes, save_units, verification_record
 from seip_addon.core.workflows.verifying import verify
 from seip_addon.scene.blend_file import save_blend
 from seip_addon.scene.corrections import correct_scene
-from seip_addon.scene.materials import set_reflectivity
-from seip_addon.scene.read import read_scene
-from seip_addon.scene.sensors import read_sensors
 
 _LEAST_COST = 0.0005  # share of coverage that is shown as 0.1 points
 
@@ -50,13 +45,8 @@ def main(argv: list[str]) -> None:
         raise SeipError(f"{options.scene} is not a .blend: name the scene of the plan first, then the recording")
     runtime.check_folder(options.output)
     runtime.open_scene(options.scene)
-    weather = weather_of(options.weather)
-    set_reflectivity(options.reflectivity)
-    geometry = weather.over(read_scene(bpy.context.scene).geometry)
-    planned = [
-        replace(one, model=weather.through(one.model))
-        for one in read_sensors(bpy.context.scene, load_catalogue(options.catalogue))
-    ]
+    reading, planned = read_scanned_scene(options)
+    geometry = reading.geometry
     recording = open_recording(options.recording, min(one.model.rotation_rate for one in planned))
     survey = read_settings(SurveySettings, options, visibility=read_settings(VisibilitySettings, options))
     found = runtime.finish_with_bar(

@@ -4,7 +4,6 @@ A handler notes that something moved; a timer, a moment later, casts the rays of
 only those sensors and colours the road again. Nothing runs while this is off.
 """
 
-import time
 from collections.abc import Callable
 
 import bpy
@@ -51,13 +50,11 @@ def update() -> None:
     """Cast the rays of the sensors that moved and colour the road again."""
     if session.following is None:
         return
-    began = time.perf_counter()
     try:
         _update(session.following, scene_of(session.following.scene))
         session.following.problem = ""
     except SeipError as error:
         session.following.problem = str(error)
-    session.following.seconds = time.perf_counter() - began
 
 
 def _update(followed: FollowedSensors, scene: bpy.types.Scene) -> None:

@@ -24,9 +24,9 @@ NO_SITE = "There is no site yet."
 OLD_CHECK = "Checked before the file was opened: check again."
 
 
-def is_linked(scene: bpy.types.Scene) -> bool:
-    """Return whether a scene belongs to another file: nothing can be written into it."""
-    return scene.library is not None
+def not_own(scene: bpy.types.Scene) -> str:
+    """Return that a scene belongs to another file, so that nothing can be written into it; empty where it does not."""
+    return LINKED if scene.library is not None else ""
 
 
 def is_newer(scene: bpy.types.Scene) -> bool:
@@ -36,8 +36,8 @@ def is_newer(scene: bpy.types.Scene) -> bool:
 
 def obstacle(scene: bpy.types.Scene) -> str:
     """Return the reason why nothing can be computed for a scene, as a sentence for panels and buttons, or ""."""
-    if is_linked(scene):
-        return LINKED
+    if not_own(scene):
+        return not_own(scene)
     if is_newer(scene):
         return NEWER
     for name, what in ((contract.REGION, "region"), (contract.ROADS, "road")):
@@ -54,7 +54,7 @@ def has_nothing(scene: bpy.types.Scene) -> bool:
 def next_step(scene: bpy.types.Scene) -> str:
     """Return the operator, by its ``bl_idname``, that comes next on the way to placed sensors; empty at its end."""
     site = scene.seip.site
-    if is_linked(scene) or is_newer(scene):
+    if not_own(scene) or is_newer(scene):
         return ""
     if scene.seip.result.record:
         return "seip.solve_placement" if other_goal(scene) else ""

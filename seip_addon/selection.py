@@ -6,19 +6,13 @@ import bpy
 from mathutils import Vector
 
 from .scene import contract
+from .scene.sensors import placed_sensors
 from .session import session
-
-
-def sensor_empties(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
-    """Return the sensors that stand in a scene, by label."""
-    collection = contract.find(scene, contract.SENSORS)
-    objects = [] if collection is None else collection.all_objects
-    return {str(obj[contract.LABEL]): obj for obj in objects if contract.LABEL in obj}
 
 
 def select_sensor(result: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     """Select the sensor that was clicked on in the list, and nothing else."""
-    empty = sensor_empties(context.scene).get(result.sensors[result.active_sensor].name)
+    empty = placed_sensors(context.scene).get(result.sensors[result.active_sensor].name)
     if empty is None or empty.name not in context.view_layer.objects:
         return
     for obj in context.selected_objects:

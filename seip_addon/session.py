@@ -178,7 +178,6 @@ class FollowedSensors:
         Share of the targets that some sensor sees.
     moved : tuple of str
         Labels of those that are not where the placement put them.
-    seconds : float
     problem : str
         Why nothing is followed at the moment.
     """
@@ -189,7 +188,6 @@ class FollowedSensors:
     sensors: dict[str, tuple[MountedSensor, Boolean]] = field(default_factory=dict)
     coverage: float = 0.0
     moved: tuple[str, ...] = ()
-    seconds: float = 0.0
     problem: str = ""
 
 
@@ -207,7 +205,6 @@ class CoverageInTraffic:
         Aspect of the coverage that was shown before.
     coverage : float
         Share of the targets that some sensor sees at the current frame.
-    seconds : float
     problem : str
         Why nothing is shown at the moment.
     """
@@ -217,7 +214,6 @@ class CoverageInTraffic:
     visibility: PosesInTraffic
     aspect: Aspect | None = None
     coverage: float = 0.0
-    seconds: float = 0.0
     problem: str = ""
 
 

@@ -6,8 +6,6 @@ and colours the road again. Frames that come sooner than that is done are left o
 
 from __future__ import annotations
 
-import time
-
 import bpy
 import numpy as np
 
@@ -52,13 +50,11 @@ def update() -> None:
     shown = session.in_traffic
     if shown is None:
         return
-    began = time.perf_counter()
     try:
         _update(shown, scene_of(shown.scene))
         shown.problem = ""
     except SeipError as error:
         shown.problem = str(error)
-    shown.seconds = time.perf_counter() - began
 
 
 def _update(shown: CoverageInTraffic, scene: bpy.types.Scene) -> None:

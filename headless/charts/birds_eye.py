@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageColor, ImageDraw, ImageFont
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Boolean, Float
@@ -63,11 +63,11 @@ def draw_birds_eye(  # noqa: PLR0913  # all that a picture shows
         return np.column_stack([(xy[:, 0] - west) * scale, _HEADER + (north - xy[:, 1]) * scale])
 
     raster = np.empty((_SIDE, _SIDE, 3), dtype=np.uint8)
-    raster[:] = _rgb(PAPER)
+    raster[:] = ImageColor.getrgb(PAPER)
     for chosen, colour in ((~foreground, _STATIC), (foreground, _MOVING)):
         column, row = np.floor(pixels(points[chosen].astype(np.float64))).astype(np.int64).T
         inside = (column >= 0) & (column < _SIDE) & (row >= _HEADER) & (row < _SIDE)
-        raster[row[inside], column[inside]] = _rgb(colour)
+        raster[row[inside], column[inside]] = ImageColor.getrgb(colour)
     picture = Image.fromarray(raster)
     draw = ImageDraw.Draw(picture)
     for part in shapely.get_parts(region):
@@ -115,7 +115,3 @@ def _draw_key(draw: ImageDraw.ImageDraw, font: _Font) -> None:
         else:
             draw.ellipse((across + 2, middle - 4, across + 10, middle + 4), fill=colour)
         across -= 16
-
-
-def _rgb(colour: str) -> tuple[int, ...]:
-    return tuple(int(colour[at : at + 2], 16) for at in (1, 3, 5))

@@ -4,7 +4,6 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -29,8 +28,6 @@ LINE_STYLES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
 
 PRECISION_LABEL = "average precision"
 
-Interval = tuple[float, float]
-
 
 @dataclass(frozen=True, eq=False)
 class PrecisionRecallLine:
@@ -52,26 +49,27 @@ class PrecisionRecallLine:
 
 
 @dataclass(frozen=True)
-class BinnedFigure:
-    """A figure in bins of road users, with one line for each series.
+class Bin:
+    """Figures of the road users and detections in one bin.
 
     Parameters
     ----------
-    what, figure : str
-        Labels, with units, of the binned quantity and of the figure.
-    edges : sequence of float
-        Edges of the bins, lower ones inclusive; the last may be infinite.
-    lines : mapping of str to sequence of float
-        Values in each bin, NaN for a bin without a value.
-    road_users : sequence of int
-        Numbers of road users in each bin, drawn behind the lines; empty to leave them out.
+    low, high : float
+        What holds these together: from ``low`` to below ``high``.
+    wanted : int
+        Road users that had to be found.
+    value : float
+        NaN where there are none to take it of.
     """
 
-    what: str
-    figure: str
-    edges: Sequence[float]
-    lines: Mapping[str, Sequence[float]]
-    road_users: Sequence[int] = ()
+    low: float
+    high: float
+    wanted: int
+    value: float
+
+
+BinnedFigure = tuple[str, str, Mapping[str, Sequence[Bin]]]
+"""Labels, with units, of a binned quantity and of a figure, and the bins of each line by its name: all the same."""
 
 
 def save_precision_recall_chart(
@@ -93,21 +91,28 @@ def save_precision_recall_chart(
 
 
 def save_parts_chart(path: str | os.PathLike[str], panels: Sequence[BinnedFigure], title: str) -> None:
-    """Draw figures in bins of road users, with one panel for each binned quantity, as PNG."""
+    """Draw figures in bins of road users, with one panel for each binned quantity, as PNG.
+
+    Parameters
+    ----------
+    panels : sequence of BinnedFigure
+        Numbers of road users are drawn behind the lines where the bins of the first line have any.
+    """
     check_drawn(panels, "detection by parts of the road users")
     figure, axes = new_figure(PANEL_SIZE[0] * 0.85 * len(panels), PANEL_SIZE[1], len(panels))
-    for panel, parts in zip(axes, panels, strict=True):
-        places = range(len(parts.edges) - 1)
-        if parts.road_users:
-            _draw_road_users(panel, parts.road_users)
-        for row, (name, values) in enumerate(parts.lines.items()):
-            panel.plot(places, values, label=name, linewidth=1.6, **mark_style(row))
-        panel.set_xticks(places, _spans(parts.edges), fontsize=8)
+    for panel, (what, name_of_figure, lines) in zip(axes, panels, strict=True):
+        first = next(iter(lines.values()))
+        places, road_users = range(len(first)), [one.wanted for one in first]
+        if any(road_users):
+            _draw_road_users(panel, road_users)
+        for row, (name, bins) in enumerate(lines.items()):
+            panel.plot(places, [one.value for one in bins], label=name, linewidth=1.6, **mark_style(row))
+        panel.set_xticks(places, [_span(one) for one in first], fontsize=8)
         panel.set_xlim(-0.5, len(places) - 0.5)
         panel.set_ylim(bottom=0)
-        if parts.road_users:
+        if any(road_users):
             panel.set_ylim(0, 1.03)
-        style_axes(panel, parts.what, parts.figure, "y")
+        style_axes(panel, what, name_of_figure, "y")
     save_chart(path, figure, title, axes[:1])
 
 
@@ -177,9 +182,9 @@ def _draw_road_users(panel: Axes, counts: Sequence[int]) -> None:
         panel.text(place, height + 0.012, f"{count}", ha="center", va="bottom", size=6.5, color=SOFT_INK, zorder=1)
 
 
-def _spans(edges: Sequence[float]) -> list[str]:
-    """Return the label of each bin: ``0–10``, or ``60 +`` for the last one without an end."""
-    return [f"{low:g}–{high:g}" if math.isfinite(high) else f"{low:g} +" for low, high in pairwise(edges)]
+def _span(one: Bin) -> str:
+    """Return the label of a bin: ``0–10``, or ``60 +`` for one without an end."""
+    return f"{one.low:g}–{one.high:g}" if math.isfinite(one.high) else f"{one.low:g} +"
 
 
 def _smoothed(values: Float) -> Float:

@@ -30,4 +30,4 @@ def save_evaluation_charts(folder: Path, survey: Survey, solution: Solution) -> 
         title = f"{name}: share of time seen, {evaluation.road_users:.0f} road users at a time"
         save_time_map(time_seen, survey.geometry, survey.site, solution.deployment, evaluation.traffic, title)
         sensors = counted(len(solution.deployment.sensors), "sensor")
-        save_traffic_chart(traffic, [(sensors, evaluation)], f"{name}: empty road and traffic")
+        save_traffic_chart(traffic, evaluation, sensors, f"{name}: empty road and traffic")

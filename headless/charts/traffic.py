@@ -1,7 +1,6 @@
 """Charts of coverage in traffic, for nominal and for traffic-aware placements."""
 
 import os
-from collections.abc import Sequence
 
 import numpy as np
 import shapely
@@ -34,7 +33,7 @@ TIME_CMAP = LinearSegmentedColormap.from_list("time", (SEEN_COLOURS[0], "#f7e3ae
 OBSTACLE_COLOUR = "#8b9285"
 PICTURE_SIDE = 6.4  # inches
 MARGIN_SHARE = 0.04  # of the region's size, shown around it
-BAR_STEP = 0.26  # of the step from one group of bars to the next
+BAR_STEP = 0.26  # from one bar to the next, of the width of 1.2 that is shown
 
 
 def save_time_map(
@@ -68,27 +67,27 @@ def save_time_map(
     save_chart(path, figure, title)
 
 
-def save_traffic_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str, TrafficStudy]], title: str) -> None:
+def save_traffic_chart(path: str | os.PathLike[str], study: TrafficStudy, sensors: str, title: str) -> None:
     """Draw coverage on the empty road and in traffic, for placements optimised without and with traffic, as PNG.
 
     Parameters
     ----------
-    studies : sequence of (str, TrafficStudy)
-        With what tells one from another, like ``2 × type1``.
+    sensors : str
+        Number and types of the sensors, like ``2 × type1``.
     """
     figure, (shares, changes) = new_figure(11.5, 4.6, 2)
-    rows = [(study.empty.seen[study.layer], study.traffic.seen[study.layer]) for _, study in studies]
-    _bars(shares, -1, [IntervalEstimate(empty.empty, empty.empty, empty.empty) for empty, _ in rows], "empty road")
-    _bars(shares, 0, [empty.mean for empty, _ in rows], "in traffic")
-    _bars(shares, 1, [traffic.mean for _, traffic in rows], "in traffic, placed on traffic")
-    shares.set_ylabel(f"share of the {LAYER_NAMES[studies[0][1].layer]} seen", color=INK)
-    _dots(changes, -0.5, [negative(empty.loss) for empty, _ in rows], 1, "change by traffic")
-    _dots(changes, 0.5, [traffic.more_than(empty) for empty, traffic in rows], 2, "gain by placing on traffic")
+    empty, traffic = study.empty.seen[study.layer], study.traffic.seen[study.layer]
+    _bar(shares, -1, IntervalEstimate(empty.empty, empty.empty, empty.empty), "empty road")
+    _bar(shares, 0, empty.mean, "in traffic")
+    _bar(shares, 1, traffic.mean, "in traffic, placed on traffic")
+    shares.set_ylabel(f"share of the {LAYER_NAMES[study.layer]} seen", color=INK)
+    _dot(changes, -0.5, negative(empty.loss), 1, "change by traffic")
+    _dot(changes, 0.5, traffic.more_than(empty), 2, "gain by placing on traffic")
     changes.axhline(0.0, color=SOFT_INK, linewidth=0.8, zorder=0)
     changes.set_ylabel("change, 95 % interval", color=INK)
     for axes, decimals in ((shares, 0), (changes, 1)):
-        axes.set_xticks(range(len(studies)), [name for name, _ in studies])
-        axes.set_xlim(-0.6, len(studies) - 0.4)
+        axes.set_xticks([0], [sensors])
+        axes.set_xlim(-0.6, 0.6)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=decimals))
         style_axes(axes, grid="y")
         axes.legend(frameon=False, fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3)
@@ -108,22 +107,14 @@ def _draw_place(panel: Axes, geometry: SceneGeometry) -> None:
     draw_area(panel, closed(geometry.region, MAX_GAP), facecolor="none", edgecolor=INK, linewidth=1.0, zorder=3)
 
 
-def _bars(axes: Axes, place: int, estimates: Sequence[IntervalEstimate], label: str) -> None:
-    at = np.arange(len(estimates)) + place * BAR_STEP
-    values = np.array([estimate.value for estimate in estimates])
-    axes.bar(
-        at,
-        values,
-        width=0.9 * BAR_STEP,
-        color=(SEEN_COLOURS[1], SERIES_COLOURS[1], SERIES_COLOURS[2])[place + 1],
-        label=label,
-    )
-    for x, estimate in zip(at, estimates, strict=True):
-        axes.plot([x, x], interval_ends(estimate), color=INK, linewidth=1.4)
+def _bar(axes: Axes, place: int, estimate: IntervalEstimate, label: str) -> None:
+    x = place * BAR_STEP
+    colour = (SEEN_COLOURS[1], SERIES_COLOURS[1], SERIES_COLOURS[2])[place + 1]
+    axes.bar(x, estimate.value, width=0.9 * BAR_STEP, color=colour, label=label)
+    axes.plot([x, x], interval_ends(estimate), color=INK, linewidth=1.4)
 
 
-def _dots(axes: Axes, place: float, estimates: Sequence[IntervalEstimate], colour: int, label: str) -> None:
-    at = np.arange(len(estimates)) + place * BAR_STEP
-    for x, estimate in zip(at, estimates, strict=True):
-        axes.plot([x, x], interval_ends(estimate), color=SERIES_COLOURS[colour], linewidth=2.4)
-    axes.plot(at, [each.value for each in estimates], "o", color=SERIES_COLOURS[colour], label=label)
+def _dot(axes: Axes, place: float, estimate: IntervalEstimate, colour: int, label: str) -> None:
+    x = place * BAR_STEP
+    axes.plot([x, x], interval_ends(estimate), color=SERIES_COLOURS[colour], linewidth=2.4)
+    axes.plot(x, estimate.value, "o", color=SERIES_COLOURS[colour], label=label)

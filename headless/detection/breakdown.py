@@ -1,8 +1,9 @@
 """Average precision and recall by distance, returns, visibility and category."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
+
+from headless.charts.detection import Bin
 
 import numpy as np
 
@@ -12,26 +13,6 @@ from .average_precision import Evaluation, part
 
 DISTANCE_EDGES = (0.0, 10.0, 20.0, 30.0, 40.0, 60.0, np.inf)
 POINT_EDGES = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, np.inf)
-
-
-@dataclass(frozen=True)
-class Bin:
-    """Figures of the road users and detections in one bin.
-
-    Parameters
-    ----------
-    low, high : float
-        What holds these together: from ``low`` to below ``high``.
-    wanted : int
-        Road users that had to be found.
-    value : float
-        NaN where there are none to take it of.
-    """
-
-    low: float
-    high: float
-    wanted: int
-    value: float
 
 
 def average_precision_by(evaluation: Evaluation, quantity: str, edges: Sequence[float]) -> tuple[Bin, ...]:

@@ -1,9 +1,8 @@
 """Data of the detection charts, taken from evaluations."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from headless.charts.detection import BinnedFigure, PrecisionRecallLine
+from headless.charts.detection import PrecisionRecallLine
 from headless.charts.error_view import ErrorView
 
 import numpy as np
@@ -13,7 +12,6 @@ from shapely.geometry.base import BaseGeometry
 from seip_addon.core.arrays import Float
 
 from .average_precision import Evaluation, precision_recall
-from .breakdown import Bin
 from .frame_results import FrameResult
 from .matching import NO_MATCH, Rule, match
 
@@ -24,27 +22,6 @@ def curve(sensor: str, count: int, evaluation: Evaluation) -> PrecisionRecallLin
     """Return precision and recall of one type and number of sensors."""
     found = precision_recall(evaluation)
     return PrecisionRecallLine(sensor, count, found.recall, found.precision, evaluation.average_precision)
-
-
-def parts(what: str, figure: str, lines: Mapping[str, Sequence[Bin]]) -> BinnedFigure:
-    """Return a figure in parts, one line for each name.
-
-    Parameters
-    ----------
-    what, figure : str
-        As in `BinnedFigure`.
-    lines : mapping of str to sequence of Bin
-        With the same edges; road users are drawn as the first has them.
-    """
-    first = next(iter(lines.values()), ())
-    wanted = tuple(one.wanted for one in first)
-    return BinnedFigure(
-        what=what,
-        figure=figure,
-        edges=(*(one.low for one in first), *(one.high for one in first[-1:])),
-        lines={name: tuple(one.value for one in bins) for name, bins in lines.items()},
-        road_users=wanted if any(wanted) else (),
-    )
 
 
 def error_view(  # noqa: PLR0913 - a frame, how it is evaluated, and where it is

@@ -1,18 +1,19 @@
 """Ground truth and detections of one frame, with the attributes by which errors are broken down."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Boolean, Float, Integer, Text
 from seip_addon.core.sensing.scans.frame import Frame
 
-from .cloud_in_plan import CloudInPlan
+from .settings import CLASS_CATEGORIES
 
 DENSITY_RADIUS = 3.0  # radius in metres of the circle around a box in which the density of returns is taken
+_ROUNDING = 1e-3  # metres: points are sought so much farther than they can count, as coordinates are rounded
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,12 +128,10 @@ class FrameResult:
     detected: EvaluatedBoxes
 
 
-def frame_result(  # noqa: PLR0913  # frame, detections, and the attributes of errors
+def frame_result(
     frame: Frame,
-    cloud: CloudInPlan,
     detections: Detections,
     *,
-    classes: Sequence[Sequence[str]],
     region: BaseGeometry,
     sensors: Float,
     run: str,
@@ -142,10 +141,6 @@ def frame_result(  # noqa: PLR0913  # frame, detections, and the attributes of e
 
     Parameters
     ----------
-    cloud : CloudInPlan
-        Points of the frame, sorted once for all detectors that are evaluated on it.
-    classes : sequence of sequence of str
-        Categories of road users in each of the detector's classes.
     region : shapely geometry, metres
         Region of interest in plan, local site axes.
     sensors : (s, 3) float64, metres
@@ -156,8 +151,8 @@ def frame_result(  # noqa: PLR0913  # frame, detections, and the attributes of e
         Mask of the trajectories' road users that do not move during the run.
     """
     labels, boxes = frame.labels, detections.boxes
-    first = np.array([members[0] for members in classes], dtype=np.str_)
-    points, density = _returns_around(boxes, cloud)
+    first = np.array([members[0] for members in CLASS_CATEGORIES.values()], dtype=np.str_)
+    points, density = _returns_around(boxes, frame.points)
     return FrameResult(
         run=run,
         time=frame.time,
@@ -188,13 +183,16 @@ def _nearest(points: Float, sensors: Float) -> Float:
     return distance
 
 
-def _returns_around(boxes: Float, cloud: CloudInPlan) -> tuple[Integer, Float]:
+def _returns_around(boxes: Float, points: NDArray[np.float32]) -> tuple[Integer, Float]:
     """Return the number of returns in each box, and their density around it in plan (per square metre), (k,) each."""
     inside, near = np.zeros(len(boxes), dtype=np.int64), np.zeros(len(boxes), dtype=np.int64)
+    points = points[np.argsort(points[:, 0])]
+    # One query serves both: this circle contains the box, whose corners are half a diagonal from its middle.
+    reach = np.maximum(DENSITY_RADIUS, np.hypot(boxes[:, 3], boxes[:, 4]) / 2) + _ROUNDING
+    first, end = np.searchsorted(points[:, 0], [boxes[:, 0] - reach, boxes[:, 0] + reach])
     for row, (x, y, z, length, width, height, yaw) in enumerate(boxes):
-        # One query serves both: this circle contains the box, whose corners are half a diagonal from its middle.
-        reach = max(DENSITY_RADIUS, np.hypot(length, width) / 2)
-        here = cloud.about(x, y, reach) - (x, y, z)
+        strip = points[first[row] : end[row]]
+        here = strip[np.abs(strip[:, 1] - y) <= reach[row]] - (x, y, z)
         near[row] = np.count_nonzero(here[:, 0] ** 2 + here[:, 1] ** 2 <= DENSITY_RADIUS**2)
         # along the axes of the box, where it is an interval in each
         ahead = np.cos(yaw) * here[:, 0] + np.sin(yaw) * here[:, 1]

@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 from pathlib import Path
-from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +49,7 @@ class Recording:
     placement: str = ""
 
 
-def recording_of(folder: Path, site: str = "") -> Recording:
+def recording_of(folder: Path) -> Recording:
     """Return the recording in a folder of scans; frames are read on access.
 
     Raises
@@ -63,7 +62,7 @@ def recording_of(folder: Path, site: str = "") -> Recording:
         raise SeipError(f"the run in {folder} was stopped half-way: run the same simulation again to finish it")
     frames = LazyFrames(len(record["frames"]), lambda number: Frame.load(frame_path(folder, number)))
     sensors = tuple(str(sensor["sensor"]) for sensor in record["sensors"])
-    return Recording(str(folder), str(record["trajectories"]["source"]), frames, sensors, site)
+    return Recording(str(folder), str(record["trajectories"]["source"]), frames, sensors)
 
 
 class LazyFrames(Sequence[Frame]):
@@ -81,13 +80,7 @@ class LazyFrames(Sequence[Frame]):
     def __len__(self) -> int:
         return len(self._numbers)
 
-    @overload
-    def __getitem__(self, index: int) -> Frame: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Frame]: ...
-    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
-        if isinstance(index, slice):
-            return [self._load(number) for number in self._numbers[index]]
+    def __getitem__(self, index: int) -> Frame:  # type: ignore[override]  # nobody takes slices
         return self._load(self._numbers[index])
 
 
@@ -216,7 +209,7 @@ def require_independent_splits(splits: Mapping[str, Sequence[Recording]]) -> str
 
 
 def _positions(recording: Recording) -> VehiclePositions:
-    frames = recording.frames[:]
+    frames = list(recording.frames)
     return VehiclePositions(
         name=recording.name,
         time=np.array([frame.time for frame in frames]),

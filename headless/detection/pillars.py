@@ -78,18 +78,14 @@ class PillarGrid:
         return inside & (z >= self.bottom) & (z < self.top)
 
 
-def grid_over(
-    bounds: tuple[float, float, float, float], heights: tuple[float, float], pillar: float, stride: int = GRID_STRIDE
-) -> PillarGrid:
-    """Return the smallest grid about the middle of a rectangle that covers it.
+def grid_over(bounds: tuple[float, float, float, float], heights: tuple[float, float], pillar: float) -> PillarGrid:
+    """Return the smallest grid about the middle of a rectangle that covers it, of multiples of `GRID_STRIDE`.
 
     Parameters
     ----------
     bounds : west, south, east, north, metres
     heights : bottom and top, metres
     pillar : float, metres
-    stride : int
-        Columns and rows are multiples of it.
 
     Raises
     ------
@@ -99,7 +95,8 @@ def grid_over(
     west, south, east, north = bounds
     if not (west < east and south < north and heights[0] < heights[1]):
         raise SeipError("the extent of the detector is empty: give a region of interest with an area")
-    columns, rows = (stride * math.ceil(side / (pillar * stride) - 1e-9) for side in (east - west, north - south))
+    step = pillar * GRID_STRIDE
+    columns, rows = (GRID_STRIDE * math.ceil(side / step - 1e-9) for side in (east - west, north - south))
     if columns * rows > MAX_PILLARS:
         raise SeipError(f"{columns} × {rows} pillars are too many: choose larger ones or a smaller region")
     return PillarGrid(

@@ -1,4 +1,4 @@
-"""Simulated recordings of traffic for each sensor configuration, made on demand."""
+"""Simulated frames of runs of traffic for each sensor configuration, made on demand."""
 
 from __future__ import annotations
 
@@ -13,10 +13,8 @@ import numpy as np
 from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import FRAMES, TIME_STEP
-from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scans.frame import Frame
-from seip_addon.core.sensing.scans.run_folder import Run
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, prepare
 from seip_addon.core.sensing.scans.static_scene import static_scene
@@ -27,7 +25,6 @@ from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import digest
 
 from .detection_area import area_of
-from .frames import LazyFrames, Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,11 +70,6 @@ class MountedSensors:
     def types(self) -> tuple[str, ...]:
         """Catalogue keys of the sensors' types, in alphabetical order."""
         return tuple(sorted({sensor.model.key for sensor in self.sensors}))
-
-    @property
-    def key(self) -> str:
-        """Digest of the sensors' types and poses."""
-        return digest(*(part for one in self.sensors for part in (one.model.key, one.xyz, one.orientation)))
 
     @property
     def places(self) -> Float:
@@ -131,32 +123,9 @@ class Simulator:
         """Free the memory of what was cast."""
         self._simulation.cache_clear()
 
-    def record(self, configuration: MountedSensors, run: SampledRun) -> Recording:
-        """Return the frames of a run, simulated on access."""
-        frames = LazyFrames(len(run.times), lambda number: self.frame(configuration, run, number))
-        name = f"{configuration.name} in {run.name}"
-        return Recording(name, run.key, frames, configuration.types, self.site, configuration.key)
-
     def frame(self, configuration: MountedSensors, run: SampledRun, number: int) -> Frame:
         """Simulate a frame of a run."""
         return self._simulation(configuration, run).frame(number, float(run.times[number]))
-
-    def key(self, configuration: MountedSensors, runs: Sequence[SampledRun]) -> str:
-        """Return a digest of all that the frames of some runs follow from."""
-        scans = (
-            Run(
-                static=self.static,
-                origin=run.trajectories.origin,
-                sensors=configuration.sensors,
-                trajectories=run.trajectories,
-                bodies=[fitted_body(user) for user in run.trajectories.users],
-                times=run.times,
-                settings=self.settings,
-                versions=versions(),
-            )
-            for run in runs
-        )
-        return digest(*(scan.key for scan in scans))
 
     def _prepared(self, configuration: MountedSensors, run: SampledRun) -> Simulation:
         bodies = [fitted_body(user) for user in run.trajectories.users]

@@ -2,17 +2,14 @@
 
 import os
 from collections.abc import Generator, Sequence
-from typing import Any
 
 from seip_addon.core.progress import Progress
 
-from .cloud_in_plan import CloudInPlan
 from .detection_area import DetectionArea
 from .detector import Detector
 from .frame_results import FrameResult, frame_result
 from .inference import detect
 from .recordings import MountedSensors, SampledRun, Simulator
-from .settings import CLASS_CATEGORIES
 from .training import deterministic
 
 AT_ONCE = (os.cpu_count() or 1) + 1  # works in threads on the CPU: one more than cores, as each also waits
@@ -33,8 +30,7 @@ def detect_in_runs(  # what measures where, what looks at it, and how
     areas : sequence of DetectionArea, optional
         Where each detector looks, where that is not the scene's own.
     """
-    known: dict[str, Any] = {"region": simulator.static.region, "sensors": placed.places}
-    known["classes"] = tuple(CLASS_CATEGORIES.values())
+    region = simulator.static.region
     looking = areas or [simulator.area(detector.settings.pillar) for detector in detectors]
     results: list[list[FrameResult]] = [[] for _ in detectors]
     total = sum(len(run.times) for run in runs)
@@ -44,10 +40,11 @@ def detect_in_runs(  # what measures where, what looks at it, and how
             yield Progress(done, total, f"detect with {placed.name}")
             done += 1
             frame = simulator.frame(placed, run, number)
-            cloud = CloudInPlan(frame.points)
             for detector, area, own in zip(detectors, looking, results, strict=True):
                 with deterministic(threads):
                     found = detect(detector, area, frame)
-                own.append(frame_result(frame, cloud, found, run=run.name, parked=run.parked, **known))
+                own.append(
+                    frame_result(frame, found, region=region, sensors=placed.places, run=run.name, parked=run.parked)
+                )
     yield Progress(total, total, f"detect with {placed.name}")
     return results

@@ -39,7 +39,6 @@ from .recordings import SampledRun
 from .settings import BOTTOM, CLASS_CATEGORIES, TOP, NetworkSettings, TrainingSettings
 
 VALIDATION_FRAMES = 18  # frames of each validation, spread over the recordings set aside
-STILL_RISING = 0.02  # average precision by which the last validation beats all others where more steps would gain
 LOSS_MARGIN = 1.6  # metres at the border of a window for which no loss is computed: much of what is there lies outside
 MAX_CROP_SHIFT = 0.25  # share of a window that it lies beside its road user at most
 MAX_ROTATION, MAX_STRETCH = math.radians(8.0), 0.05  # of training samples; the rotation is in addition to quarter turns
@@ -66,12 +65,6 @@ class LearningCurve:
     def best(self) -> int:
         """Steps after which the average precision was highest for the first time."""
         return max(self.validation, key=lambda step: (self.validation[step], -step))
-
-    @property
-    def still_rises(self) -> bool:
-        """Whether the last validation beats all before it by more than `STILL_RISING`, or there is but one."""
-        *before, last = self.validation.values()
-        return last > max(before, default=-math.inf) + STILL_RISING
 
 
 @dataclass(frozen=True, eq=False)

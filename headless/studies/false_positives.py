@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from headless.charts.detection import Bin
 from headless.detection.average_precision import Evaluation
-from headless.detection.breakdown import Bin, in_bin
+from headless.detection.breakdown import in_bin
 
 import numpy as np
 

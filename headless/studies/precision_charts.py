@@ -10,7 +10,6 @@ from headless.charts.detection import (
     PANEL_SIZE,
     PRECISION_LABEL,
     RING_MARK,
-    Interval,
     check_drawn,
     mark_style,
     placement_name,
@@ -23,6 +22,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from seip_addon.core.arrays import Float
+from seip_addon.core.estimates import Interval
 from seip_addon.core.output.pictures.callouts import place_callouts
 from seip_addon.core.output.pictures.chart_style import (
     DASHED,

@@ -9,6 +9,7 @@ from headless.detection.detector import Detector
 from headless.detection.frame_results import EvaluatedBoxes, FrameResult, GroundTruth
 from headless.detection.recordings import MountedSensors, SampledRun, Simulator
 from headless.detection.run_detection import detect_in_runs
+from headless.studies.simulated_recordings import frames_key
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +59,7 @@ def stored_detections(
     folder : path
         Folder of the files, each named by a digest of everything that the results depend on.
     """
-    scene = digest(source_digest(detect_in_runs.__module__), simulator.key(placement, runs))
+    scene = digest(source_digest(detect_in_runs.__module__), frames_key(simulator, placement, runs))
     paths = [folder / f"{digest(scene, detector.key)[:32]}.npz" for detector in detectors]
     missing = [number for number, path in enumerate(paths) if not path.exists()]
     if missing:

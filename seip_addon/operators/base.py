@@ -42,16 +42,30 @@ def started(steps: Generator[Progress, None, Result]) -> Generator[Progress, Non
     return steps
 
 
-class ForReadyScene:
-    """Mixin that enables an operator only where the scene has all inputs of a computation."""
+class Conditional:
+    """Mixin that enables an operator only where nothing is in its way."""
+
+    @classmethod
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return why the operator is disabled, as a sentence; empty where it is enabled."""
+        raise NotImplementedError
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the operator is enabled; otherwise the tooltip says why not."""
-        obstacle = scene_status.obstacle(context.scene)
-        if obstacle:
-            cls.poll_message_set(obstacle)  # type: ignore[attr-defined]  # of Blender's operators
-        return not obstacle
+        reason = cls.why_not(context)
+        if reason:
+            cls.poll_message_set(reason)  # type: ignore[attr-defined]  # of Blender's operators
+        return not reason
+
+
+class ForReadyScene(Conditional):
+    """Mixin that enables an operator only where the scene has all inputs of a computation."""
+
+    @classmethod
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return which input is missing, or that the scene is not of this file or version."""
+        return scene_status.obstacle(context.scene)
 
 
 class LongWork(Generic[Result]):
@@ -161,18 +175,16 @@ def _redraw(context: bpy.types.Context) -> None:
                     region.tag_redraw()
 
 
-class SEIP_OT_stop(bpy.types.Operator):
+class SEIP_OT_stop(Conditional, bpy.types.Operator):
     """Stop the work that is under way"""
 
     bl_idname = "seip.stop"
     bl_label = "Stop"
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Return whether any work is running."""
-        if session.running is None:
-            cls.poll_message_set("nothing is under way")
-        return session.running is not None
+    def why_not(cls, _context: bpy.types.Context) -> str:
+        """Return that no work is running, where none is."""
+        return "nothing is under way" if session.running is None else ""
 
     def execute(self, _context: bpy.types.Context) -> Outcome:
         """Ask the work to stop."""
@@ -181,20 +193,18 @@ class SEIP_OT_stop(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_accept(bpy.types.Operator):
+class SEIP_OT_accept(Conditional, bpy.types.Operator):
     """End the search with the best placement found so far"""
 
     bl_idname = "seip.accept"
     bl_label = "Use Best So Far"
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Return whether a search for a placement is running."""
+    def why_not(cls, _context: bpy.types.Context) -> str:
+        """Return that no search for a placement is running, where none is."""
         running = session.running
         searching = running is not None and running.acceptance is not None and running.acceptance.searching
-        if not searching:
-            cls.poll_message_set("no search for a placement is running")
-        return searching
+        return "" if searching else "no search for a placement is running"
 
     def execute(self, _context: bpy.types.Context) -> Outcome:
         """Ask the search to end."""

@@ -20,7 +20,7 @@ from ..properties.conversion import absolute, output_folder, runs_folder
 from ..scene import contract
 from ..scene.blend_file import save_blend
 from ..scene.sensors import labelled_sensors, pose_of
-from .base import LongWork, started
+from .base import Conditional, LongWork, started
 
 NO_SENSORS = "There is no sensor to detect road users with: place sensors first."
 NO_PYTHON = f"Detection needs a Python with PyTorch: {INSTALL}, and name its Python in the extension's preferences."
@@ -42,7 +42,7 @@ def sensors_key(scene: bpy.types.Scene) -> str:
     return digest(*(part for parts in each for part in parts))
 
 
-class SEIP_OT_detect(LongWork[str], bpy.types.Operator):
+class SEIP_OT_detect(Conditional, LongWork[str], bpy.types.Operator):
     """Scan runs of traffic with the sensors of the scene and detect road users; runs in a separate Python with PyTorch"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.detect"
@@ -50,12 +50,9 @@ class SEIP_OT_detect(LongWork[str], bpy.types.Operator):
     stopped_message = "stopped; nothing was written"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there are sensors, and a Python with PyTorch."""
-        sentence = why_no_detection(context.scene)
-        if sentence:
-            cls.poll_message_set(sentence)
-        return not sentence
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that sensors or a Python with PyTorch are missing, where they are."""
+        return why_no_detection(context.scene)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, str]:
         """Save the scene as it is, for the process that detects."""

@@ -17,8 +17,8 @@ from ..scene import contract, network
 from ..scene.startup import remove_startup_objects
 from ..scene.views import frame_plan, frame_site
 from ..session import session
-from .base import Outcome, attempt
-from .site import EXTRACTS, ReadsMap, bring_to_front, is_own, list_junctions, missing_for_build
+from .base import Conditional, Outcome, attempt
+from .site import EXTRACTS, ReadsMap, bring_to_front, list_junctions, missing_for_build
 
 NO_JUNCTION = "Click a junction first"
 
@@ -49,21 +49,18 @@ class SEIP_OT_import_network(ReadsMap, bpy.types.Operator):
         self.report({"INFO"}, counted(len(result.places), "junction"))
 
 
-class SEIP_OT_open_junction(bpy.types.Operator):
+class SEIP_OT_open_junction(Conditional, bpy.types.Operator):
     """Open the site of the selected junction in a scene of its own, and build it if it is not there yet"""
 
     bl_idname = "seip.open_junction"
     bl_label = "Open Site"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a junction is selected and no other work is under way."""
-        reason = "" if selected_junction(context) is not None else NO_JUNCTION
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that other work is under way or no junction is selected, where it is so."""
         if session.running is not None:
-            reason = "Other work is under way"
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason and is_own(cls, context.scene)
+            return "Other work is under way"
+        return NO_JUNCTION if selected_junction(context) is None else scene_status.not_own(context.scene)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Bring the scene of the site to the front."""
@@ -84,18 +81,16 @@ class SEIP_OT_open_junction(bpy.types.Operator):
         bpy.ops.seip.build_site("INVOKE_DEFAULT")
 
 
-class SEIP_OT_show_network(bpy.types.Operator):
+class SEIP_OT_show_network(Conditional, bpy.types.Operator):
     """Go back to the scene of the network, where junctions are coloured by the coverage of their sites"""
 
     bl_idname = "seip.show_network"
     bl_label = "Back to Network"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the site is of a network."""
-        if context.scene.seip.site.network is None:
-            cls.poll_message_set("This site is not of a network")
-        return context.scene.seip.site.network is not None
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that the site is not of a network, where it is not."""
+        return "This site is not of a network" if context.scene.seip.site.network is None else ""
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Bring the scene of the network to the front."""

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from .. import live_coverage, preferences, scene_status, scene_survey, selection, traffic_coverage
+from .. import live_coverage, preferences, scene_status, scene_survey, traffic_coverage
 from ..core.choosing.placement.deployment import sensor_at
 from ..core.choosing.placement.objective import Objective, target_weights
 from ..core.choosing.robustness.visibility_in_traffic import PosesInTraffic, poses_in_traffic
@@ -40,11 +40,11 @@ from ..scene.pieces import tidy_pieces
 from ..scene.read import attribution_of
 from ..scene.render_elsewhere import render_elsewhere
 from ..scene.result_folder import result_files, write_pictures, write_tables
-from ..scene.sensors import labelled_sensors, read_sensors
+from ..scene.sensors import labelled_sensors, placed_sensors, read_sensors
 from ..scene.write import coverage_of, shown_legend, take_over
 from ..sensor_edits import position_names, sensor_edits
 from ..session import SceneState, session
-from .base import LongWork, Outcome, Result, attempt, started
+from .base import ForReadyScene, LongWork, Outcome, Result, attempt, started
 
 MOST_RANKED = 10
 """Number of candidates in the ranking: as many as the sidebar shows without scrolling the list."""
@@ -55,16 +55,13 @@ EYE_DISTANCE = 10.0
 """Metres from a sensor's eye to the point that the view turns about."""
 
 
-class ForPlacement:
+class ForPlacement(ForReadyScene):
     """Mixin that enables an operator only where the scene has a placement."""
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the operator is enabled; otherwise the tooltip says why not."""
-        sentence = scene_status.obstacle(context.scene) or no_placement(context.scene)
-        if sentence:
-            cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of Blender's operators
-        return not sentence
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return what is missing for a placement, or that there is none."""
+        return super().why_not(context) or no_placement(context.scene)
 
 
 def no_placement(scene: bpy.types.Scene) -> str:
@@ -103,7 +100,7 @@ class SEIP_OT_look_from_sensor(ForPlacement, bpy.types.Operator):
     def _look(self, context: bpy.types.Context) -> None:
         result = context.scene.seip.result
         label = result.sensors[result.active_sensor].name if result.sensors else ""
-        empty = selection.sensor_empties(context.scene).get(label)
+        empty = placed_sensors(context.scene).get(label)
         if empty is None:
             raise SeipError(f"the sensor {label} is no longer in the scene: undo, or place again")
         if context.space_data is None or context.space_data.type != "VIEW_3D":
@@ -171,14 +168,9 @@ class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
     name: bpy.props.StringProperty(name="Name", description="Under which it is kept; empty for a number")
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the operator is enabled; otherwise the tooltip says why not."""
-        if not super().poll(context):
-            return False
-        sentence = not_evaluated(context.scene)
-        if sentence:
-            cls.poll_message_set(sentence)
-        return not sentence
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that there is no placement, or that sensors were moved since."""
+        return super().why_not(context) or not_evaluated(context.scene)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Keep it, in place of another of that name."""
@@ -293,13 +285,10 @@ class SEIP_OT_show_in_traffic(ForPlacement, LongWork[tuple[SceneState, PosesInTr
     bl_options = {"REGISTER"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is a placement, and traffic."""
-        if not super().poll(context):
-            return False
-        if context.scene.session_uid not in session.traffic:
-            cls.poll_message_set("load the traffic first")
-        return context.scene.session_uid in session.traffic
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that there is no placement, or no traffic."""
+        no_traffic = "" if context.scene.session_uid in session.traffic else "load the traffic first"
+        return super().why_not(context) or no_traffic
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         """End it at once, or begin in a thread."""
@@ -408,14 +397,9 @@ class _Writes(ForPlacement, LongWork[Result]):
     """Mixin for operators that write the placement into the folder of the result."""
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the operator is enabled; otherwise the tooltip says why not."""
-        if not super().poll(context):
-            return False
-        sentence = no_folder(context.scene) or not_evaluated(context.scene)
-        if sentence:
-            cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of Blender's operators
-        return not sentence
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that there is no placement, no folder, or that sensors were moved since."""
+        return super().why_not(context) or no_folder(context.scene) or not_evaluated(context.scene)
 
 
 def _checked_folder(scene: bpy.types.Scene) -> Path:

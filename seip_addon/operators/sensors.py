@@ -13,7 +13,7 @@ from ..core.errors import SeipError
 from ..core.sensing.lidar.catalogue import load_catalogue
 from ..session import session
 from ..viewport import beam_preview
-from .base import Outcome, attempt
+from .base import Conditional, Outcome, attempt
 
 
 class SEIP_OT_list_sensor_types(bpy.types.Operator):
@@ -69,7 +69,16 @@ class SEIP_OT_about_sensor(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_add_catalogue(bpy.types.Operator):
+class _EditsCatalogues(Conditional):
+    """A mixin for operators on the list of catalogues, which preferences keep."""
+
+    @classmethod
+    def why_not(cls, _context: bpy.types.Context) -> str:
+        """Return that there are no preferences, where there are none."""
+        return "Install the add-on as an extension: only then it has preferences" if preferences.own() is None else ""
+
+
+class SEIP_OT_add_catalogue(_EditsCatalogues, bpy.types.Operator):
     """Add a catalogue of your own, or a unit's calibration file: docs/sensors.md describes both"""
 
     bl_idname = "seip.add_catalogue"
@@ -79,11 +88,6 @@ class SEIP_OT_add_catalogue(bpy.types.Operator):
         name="File", description="The catalogue", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}
     )
     filter_glob: bpy.props.StringProperty(default="*.toml;*.json;*.xml;*.yaml;*.yml;*.csv", options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Return whether there are preferences to keep it in."""
-        return _has_preferences(cls)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
         """Open the file browser."""
@@ -106,18 +110,13 @@ class SEIP_OT_add_catalogue(bpy.types.Operator):
         self.report({"INFO"}, f"{path.name}: {changed} sensor types added or replaced")
 
 
-class SEIP_OT_remove_catalogue(bpy.types.Operator):
+class SEIP_OT_remove_catalogue(_EditsCatalogues, bpy.types.Operator):
     """Forget a catalogue of your own; the file stays"""
 
     bl_idname = "seip.remove_catalogue"
     bl_label = "Remove Catalogue"
 
     index: bpy.props.IntProperty(name="Number", description="Of the catalogue, from 0", min=0)
-
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Return whether there are preferences."""
-        return _has_preferences(cls)
 
     def execute(self, _context: bpy.types.Context) -> Outcome:
         """Forget it."""
@@ -128,26 +127,16 @@ class SEIP_OT_remove_catalogue(bpy.types.Operator):
         sensor_types.refresh()
 
 
-def _has_preferences(operator: type[bpy.types.Operator]) -> bool:
-    if preferences.own() is None:
-        operator.poll_message_set("Install the add-on as an extension: only then it has preferences")
-        return False
-    return True
-
-
-class SEIP_OT_empty_cache(bpy.types.Operator):
+class SEIP_OT_empty_cache(Conditional, bpy.types.Operator):
     """Delete all visibility that was kept: it is computed again where it is needed"""
 
     bl_idname = "seip.empty_cache"
     bl_label = "Empty Cache"
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Return whether there is anything to delete, and nothing that needs it."""
-        reason = "Wait for the work under way" if session.running is not None else preferences.why_not_empty()
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
+    def why_not(cls, _context: bpy.types.Context) -> str:
+        """Return that there is nothing to delete, or work that needs it."""
+        return "Wait for the work under way" if session.running is not None else preferences.why_not_empty()
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         """Ask first."""

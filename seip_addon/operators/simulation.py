@@ -17,7 +17,7 @@ from ..core.workflows.traffic_simulation import SimulatedRuns, simulate_runs
 from ..properties.conversion import output_folder
 from ..scene.read import read_scene
 from ..session import SceneTraffic
-from .base import LongWork
+from .base import Conditional, LongWork
 from .traffic import show_traffic
 
 NO_MAP = "There is no map to simulate traffic on: name the OpenDRIVE map (.xodr) that this site was built from."
@@ -35,7 +35,7 @@ def why_no_simulation(scene: bpy.types.Scene) -> str:
     return "" if scene.seip.simulation.street_map() is not None else NO_MAP
 
 
-class SEIP_OT_simulate_traffic(LongWork[SimulatedRuns], bpy.types.Operator):
+class SEIP_OT_simulate_traffic(Conditional, LongWork[SimulatedRuns], bpy.types.Operator):
     """Simulate runs of traffic on the map of the site with SUMO, put the first on the road, and use all for Detection and for placements in traffic"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.simulate_traffic"
@@ -43,12 +43,9 @@ class SEIP_OT_simulate_traffic(LongWork[SimulatedRuns], bpy.types.Operator):
     stopped_message = "stopped; no run was written"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there are a road, a map of it, and SUMO."""
-        reason = why_no_simulation(context.scene)
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that the road, a map of it or SUMO is missing, where it is."""
+        return why_no_simulation(context.scene)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SimulatedRuns]:
         """Read the road and the map."""

@@ -37,7 +37,7 @@ from ..scene.startup import remove_startup_objects
 from ..scene.views import frame_site
 from ..session import CheckedScene, session
 from ..viewport import overlays
-from .base import LongWork, Outcome, attempt
+from .base import Conditional, LongWork, Outcome, attempt
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "scenes" / f"junction{DESCRIPTION_SUFFIX}"
 """The site that comes with SEIP: beside the package, in a checkout as in the extension."""
@@ -54,7 +54,16 @@ SHARE_OF_VIEW = 0.6
 AREA_ITEMS = tuple(item for item in ROLE_ITEMS if Role[item[0]] in roles.AREAS)
 
 
-class ReadsMap(LongWork[SitePlaces]):
+class _WritesScene(Conditional):
+    """A mixin for operators that write into the scene, which must belong to the open file."""
+
+    @classmethod
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that the scene is linked from another file, where it is."""
+        return scene_status.not_own(context.scene)
+
+
+class ReadsMap(_WritesScene, LongWork[SitePlaces]):
     """A mixin for operators that read the junctions of a file."""
 
     filepath: bpy.props.StringProperty(
@@ -64,11 +73,6 @@ class ReadsMap(LongWork[SitePlaces]):
         options={"SKIP_SAVE", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     by_hand = False
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the scene can be written into."""
-        return is_own(cls, context.scene)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event | None) -> Outcome:
         """Open the file browser, unless a file was dropped."""
@@ -98,12 +102,11 @@ class SEIP_OT_choose_map(ReadsMap, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the scene can be written into, and is of one site."""
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that the scene shows a network or is linked from another file, where it is so."""
         if is_network(context.scene):
-            cls.poll_message_set("This scene shows a network: open the site of a junction, or go to another scene")
-            return False
-        return super().poll(context)
+            return "This scene shows a network: open the site of a junction, or go to another scene"
+        return super().why_not(context)
 
     def conclude(self, scene: bpy.types.Scene, result: SitePlaces) -> None:
         """List the junctions in place of those of another file, and ask for the place."""
@@ -138,14 +141,7 @@ def list_junctions(site: SEIP_PG_site, source: str, found: SitePlaces) -> None:
         one.name, one.id = place.name, place.key
 
 
-def is_own(operator: type, scene: bpy.types.Scene) -> bool:
-    """Return whether a scene belongs to the open file; otherwise the tooltip of an operator says why not."""
-    if scene_status.is_linked(scene):
-        operator.poll_message_set(scene_status.LINKED)  # type: ignore[attr-defined]  # of Blender's operators
-    return not scene_status.is_linked(scene)
-
-
-class _BuildsSite(LongWork[BuiltSite]):
+class _BuildsSite(_WritesScene, LongWork[BuiltSite]):
     """A mixin for operators that build a site."""
 
     is_chosen = True
@@ -211,12 +207,9 @@ class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
     bl_label = "Build Site"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a place is chosen."""
-        missing = missing_for_build(context.scene)
-        if missing:
-            cls.poll_message_set(missing)
-        return not missing and is_own(cls, context.scene)
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that no place is chosen, or that the scene is linked from another file."""
+        return missing_for_build(context.scene) or super().why_not(context)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
         """Take what was chosen."""
@@ -231,11 +224,6 @@ class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
     bl_idname = "seip.load_example"
     bl_label = "Load Example"
     is_chosen = False
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the scene can be written into."""
-        return is_own(cls, context.scene)
 
     def prepare(self, _scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
         """Take the example's description, which says all."""
@@ -304,7 +292,7 @@ def has_site(scene: bpy.types.Scene) -> bool:
     return any(contract.base_name(collection) in contract.INPUTS for collection in scene.collection.children_recursive)
 
 
-class _RoleOperator:
+class _RoleOperator(Conditional):
     """A mixin for operators on the selected objects and a role."""
 
     bl_options = {"REGISTER", "UNDO"}
@@ -312,12 +300,9 @@ class _RoleOperator:
     role: bpy.props.EnumProperty(name="Role", description="What the objects mean to the placement", items=ROLE_ITEMS)
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether anything is selected."""
-        reason = why_no_role(context)
-        if reason:
-            cls.poll_message_set(reason)  # type: ignore[attr-defined]  # of Blender's operators
-        return not reason
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that nothing is selected, or that the scene is linked from another file."""
+        return why_no_role(context)
 
 
 NOTHING_SELECTED = "Select objects first"
@@ -325,9 +310,7 @@ NOTHING_SELECTED = "Select objects first"
 
 def why_no_role(context: bpy.types.Context) -> str:
     """Say why no role can be given or taken, or nothing."""
-    if scene_status.is_linked(context.scene):
-        return scene_status.LINKED
-    return "" if context.selected_objects else NOTHING_SELECTED
+    return scene_status.not_own(context.scene) or ("" if context.selected_objects else NOTHING_SELECTED)
 
 
 class SEIP_OT_assign_role(_RoleOperator, bpy.types.Operator):
@@ -360,7 +343,7 @@ class SEIP_OT_take_out_of_role(_RoleOperator, bpy.types.Operator):
         self.report({"INFO"}, f"{count} taken out of the {role.value}")
 
 
-class SEIP_OT_add_area(bpy.types.Operator):
+class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
     """Add a flat area in a role, at the 3D cursor or in the middle of the view; go into Edit Mode to shape it"""
 
     bl_idname = "seip.add_area"
@@ -390,14 +373,10 @@ class SEIP_OT_add_area(bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether objects can be added."""
-        reason = scene_status.LINKED if scene_status.is_linked(context.scene) else ""
-        if not reason and context.mode != "OBJECT":
-            reason = "Leave Edit Mode first"
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return why no object can be added, where none can."""
+        in_edit_mode = "" if context.mode == "OBJECT" else "Leave Edit Mode first"
+        return super().why_not(context) or in_edit_mode
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
         """Take the size from the view where the area is laid there."""

@@ -11,10 +11,10 @@ from ..core.errors import SeipError
 from ..core.progress import Progress
 from ..core.sumo_installation import install_sumo
 from ..core.sumo_programs import Sumo
-from .base import LongWork, Outcome
+from .base import Conditional, LongWork, Outcome
 
 
-class SEIP_OT_install_sumo(LongWork[Sumo], bpy.types.Operator):
+class SEIP_OT_install_sumo(Conditional, LongWork[Sumo], bpy.types.Operator):
     """Download Eclipse SUMO from PyPI into the extension's own folder, where it takes up to 470 MB. It lays out the streets of an extract of OpenStreetMap and simulates traffic"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.install_sumo"
@@ -23,12 +23,9 @@ class SEIP_OT_install_sumo(LongWork[Sumo], bpy.types.Operator):
     stopped_message = "stopped; SUMO was not installed"
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Return whether Blender may go online and has pip."""
-        reason = preferences.why_no_installation()
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
+    def why_not(cls, _context: bpy.types.Context) -> str:
+        """Return that Blender may not go online or has no pip, where it is so."""
+        return preferences.why_no_installation()
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event | None) -> Outcome:
         """Start in the main window: work ends with its window, and that of the preferences is soon closed."""

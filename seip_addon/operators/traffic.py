@@ -31,7 +31,7 @@ from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
 from ..session import LastScan, SceneState, SceneTraffic, session
-from .base import LongWork, Outcome, Result
+from .base import Conditional, LongWork, Outcome, Result
 from .results import no_placement, not_evaluated
 
 INSTANTS = 60
@@ -46,9 +46,7 @@ NO_SENSORS = "There is no sensor to scan with: place sensors first."
 
 def why_no_load(scene: bpy.types.Scene) -> str:
     """Return why no traffic can be loaded; nothing where it can."""
-    if scene_status.is_linked(scene):
-        return scene_status.LINKED
-    return "" if scene.seip.traffic.file else NO_FILE
+    return scene_status.not_own(scene) or ("" if scene.seip.traffic.file else NO_FILE)
 
 
 def why_no_scan(scene: bpy.types.Scene) -> str:
@@ -69,31 +67,25 @@ def why_no_trial(scene: bpy.types.Scene) -> str:
     return NOT_AT_CANDIDATES if elsewhere else not_evaluated(scene)
 
 
-class _Scanning(LongWork[Result]):
+class _Scanning(Conditional, LongWork[Result]):
     """A mixin: a button that works where there are sensors and traffic."""
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is anything to scan."""
-        sentence = why_no_scan(context.scene)
-        if sentence:
-            cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of Blender's operators
-        return not sentence
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that there is nothing to scan, or nothing to scan with."""
+        return why_no_scan(context.scene)
 
 
-class SEIP_OT_load_traffic(LongWork[LoadedTraffic], bpy.types.Operator):
+class SEIP_OT_load_traffic(Conditional, LongWork[LoadedTraffic], bpy.types.Operator):
     """Read the traffic file and put its road users on the road, to press play on"""
 
     bl_idname = "seip.load_traffic"
     bl_label = "Load Traffic"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is a file to read."""
-        reason = why_no_load(context.scene)
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that there is no file to read, where there is none."""
+        return why_no_load(context.scene)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, LoadedTraffic]:
         """Read the scene that the traffic is to stand on."""
@@ -117,7 +109,7 @@ def show_traffic(scene: bpy.types.Scene, traffic: SceneTraffic, warnings: Sequen
     scene.seip.traffic.loaded = "\n".join((*_facts(traffic.trajectories), *warnings))
 
 
-class SEIP_OT_clear_traffic(bpy.types.Operator):
+class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
     """Take the loaded road users out of the scene; objects of your own stay"""
 
     bl_idname = "seip.clear_traffic"
@@ -125,12 +117,9 @@ class SEIP_OT_clear_traffic(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is traffic."""
-        there = contract.find(context.scene, contract.TRAFFIC) is not None
-        if not there:
-            cls.poll_message_set("there is no traffic in the scene")
-        return there
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that there is no traffic, where there is none."""
+        return "there is no traffic in the scene" if contract.find(context.scene, contract.TRAFFIC) is None else ""
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Take it out."""
@@ -142,19 +131,16 @@ class SEIP_OT_clear_traffic(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_try_in_traffic(LongWork[tuple[SceneState, str]], bpy.types.Operator):
+class SEIP_OT_try_in_traffic(Conditional, LongWork[tuple[SceneState, str]], bpy.types.Operator):
     """Find what the placement sees of the road with the loaded traffic in the way, on average over time"""
 
     bl_idname = "seip.try_in_traffic"
     bl_label = "Test in Traffic"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there are a placement and traffic."""
-        reason = why_no_trial(context.scene)
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that a placement or traffic is missing, where it is."""
+        return why_no_trial(context.scene)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, str]]:
         """Find the placement again, and the traffic."""

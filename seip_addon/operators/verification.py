@@ -36,7 +36,7 @@ from ..scene.corrections import correct_scene
 from ..scene.read import read_scene
 from ..scene.sensors import labelled_sensors, read_sensors
 from ..session import LastVerification, session
-from .base import LongWork, Outcome, attempt
+from .base import Conditional, LongWork, Outcome, attempt
 from .detection import folder_of_result
 from .results import no_folder
 from .view import show_picture
@@ -83,7 +83,7 @@ def _folder_of(scene: bpy.types.Scene) -> Path:
     return output_folder(scene.seip.result.folder, "the verification") / VERIFICATION_FOLDER
 
 
-class SEIP_OT_verify(LongWork[_Verified], bpy.types.Operator):
+class SEIP_OT_verify(Conditional, LongWork[_Verified], bpy.types.Operator):
     """Compare the installed sensors with the plan by a recording: their poses, what has changed, and the coverage"""
 
     bl_idname = "seip.verify"
@@ -92,12 +92,9 @@ class SEIP_OT_verify(LongWork[_Verified], bpy.types.Operator):
     stopped_message = "stopped; nothing was written"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there are sensors and a recording."""
-        sentence = why_no_verification(context.scene)
-        if sentence:
-            cls.poll_message_set(sentence)
-        return not sentence
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that sensors or a recording are missing, where they are."""
+        return why_no_verification(context.scene)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, _Verified]:
         """Read the scene and its sensors, and open the recording."""
@@ -153,7 +150,7 @@ def _verified(
         return _Verified(found, sentences, {path.name: path.read_bytes() for path in sorted(drawn.iterdir())})
 
 
-class SEIP_OT_correct_scene(bpy.types.Operator):
+class SEIP_OT_correct_scene(Conditional, bpy.types.Operator):
     """Add the objects that were found as boxes, remove those that are gone, and move the sensors to where they are installed"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.correct_scene"
@@ -161,12 +158,9 @@ class SEIP_OT_correct_scene(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the scene is as it was when it was verified."""
-        sentence = why_no_correction(context.scene)
-        if sentence:
-            cls.poll_message_set(sentence)
-        return not sentence
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that the scene is not as it was when it was verified, where it is not."""
+        return why_no_correction(context.scene)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Correct the scene."""

@@ -15,15 +15,14 @@ from ..core.errors import SeipError
 from ..core.progress import Progress
 from ..core.sensing.visibility.sight_lines import pose_at, sight_lines
 from ..scene import contract
-from ..scene.blend_file import save_blend
 from ..scene.coverage_colours import colour_coverage
 from ..scene.sensors import placed_sensors, pose_of
-from ..scene.write import coverage_of, shown_legend
+from ..scene.write import coverage_of
 from ..session import SceneState, session
 from ..viewport import coverage, overlays
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
-from .base import LongWork, Outcome, attempt, started
+from .base import Conditional, LongWork, Outcome, attempt
 from .results import PLAN, ForPlacement, exported_files, not_evaluated
 
 LAID_OUT = 0.2
@@ -36,7 +35,7 @@ def why_no_coverage(scene: bpy.types.Scene) -> str:
     return NO_COVERAGE if coverage_of(scene) is None else ""
 
 
-class SEIP_OT_colour_coverage(bpy.types.Operator):
+class SEIP_OT_colour_coverage(Conditional, bpy.types.Operator):
     """Colour the coverage on the road, with a legend"""
 
     bl_idname = "seip.colour_coverage"
@@ -56,9 +55,9 @@ class SEIP_OT_colour_coverage(bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is coverage to colour."""
-        return _can(cls, why_no_coverage(context.scene))
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that there is no coverage to colour, where there is none."""
+        return why_no_coverage(context.scene)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Colour it."""
@@ -85,16 +84,16 @@ class SEIP_OT_show_coverage_colours(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_toggle_legend(bpy.types.Operator):
+class SEIP_OT_toggle_legend(Conditional, bpy.types.Operator):
     """Show or hide the legend of the coverage"""
 
     bl_idname = "seip.toggle_legend"
     bl_label = "Legend"
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether there is coverage to explain."""
-        return _can(cls, why_no_coverage(context.scene))
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that there is no coverage to explain, where there is none."""
+        return why_no_coverage(context.scene)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Show it where it is hidden, and the other way round."""
@@ -170,24 +169,25 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operato
         return super().invoke(context, event)
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the operator is enabled; otherwise the tooltip says why not."""
-        return super().poll(context) and _can(cls, not_evaluated(context.scene))
+    def why_not(cls, context: bpy.types.Context) -> str:
+        """Return that there is no placement, or that sensors were moved since."""
+        return super().why_not(context) or not_evaluated(context.scene)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-        """Restore the placement and render it if requested."""
+        """Return the job that restores the placement."""
         self._path = _free(_named(scene.seip.view.picture))
-        self._is_view = scene.seip.view.picture_of == "VIEW"
-        return scene_survey.with_placement(scene) if self._is_view else started(_rendered_sheet(self._path, scene))
+        return scene_survey.with_placement(scene)
 
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Take the picture of a viewport."""
         session.keep_state(scene, result)
-        if self._is_view:
-            area = getattr(self, "_area", None) or bpy.context.area
-            if bpy.app.background or area not in _viewports():
-                raise SeipError("there is no viewport here to take a picture of: choose the rendered view")
-            save_viewport_sheet(self._path, scene, area, result)
+        area = getattr(self, "_area", None) or bpy.context.area
+        if bpy.app.background or area not in _viewports():
+            raise SeipError(
+                "there is no viewport here to take a picture of: press this in the sidebar of one, or export the files "
+                "with the rendered view"
+            )
+        save_viewport_sheet(self._path, scene, area, result)
         self.report({"INFO"}, f"written {self._path}")
 
 
@@ -262,28 +262,6 @@ def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area
     _save_sheet(path, state, Image.fromarray(view_pixels(scene, area)))
 
 
-def _rendered_sheet(path: Path, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
-    """Write the rendered view that batch commands make, and the plan beside it; the scene is saved before the rest."""
-    from PIL import Image  # noqa: PLC0415  # as above
-
-    from ..core.output.pictures.labelled_view import save_labelled_view  # noqa: PLC0415  # as above
-    from ..scene.render_elsewhere import render_elsewhere  # noqa: PLC0415  # as above
-
-    finding, name, legend = scene_survey.with_placement(scene), scene.name, shown_legend(scene)
-    with TemporaryDirectory(prefix="seip-") as folder:
-        blend, view = (Path(folder) / file for file in ("scene.blend", "labelled.png"))
-        save_blend(blend)
-        yield Progress(0, 0, "reading the scene")
-        state = yield from finding
-        survey, solution = state.placed()
-        site, deployment = survey.site, solution.deployment
-        rendered = yield from render_elsewhere(Path(folder), blend, name, site, deployment, close_ups=False)
-        save_labelled_view(view, rendered.view, site, deployment, legend, rendered.sight)
-        with Image.open(view) as picture:
-            _save_sheet(path, state, picture)
-    return state
-
-
 def _save_sheet(path: Path, state: SceneState, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet
     from PIL import Image  # noqa: PLC0415  # as above
 
@@ -317,12 +295,6 @@ def _free(path: Path) -> Path:
     """Return the name, with the first number that is free where there is a picture of that name."""
     numbered = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
     return next(name for name in chain([path], numbered) if not name.exists())
-
-
-def _can(operator: type[bpy.types.Operator], why_not: str) -> bool:
-    if why_not:
-        operator.poll_message_set(why_not)
-    return not why_not
 
 
 CLASSES = (

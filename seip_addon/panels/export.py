@@ -27,11 +27,9 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     draw_run(layout, results.SEIP_OT_write_report.bl_idname, icon="FILE_TEXT")
     draw_run(layout, results.SEIP_OT_export_result.bl_idname, icon="EXPORT", text="Export Files")
     _draw_files(layout, results.exported_files(scene))
-    view = scene.seip.view
     column = layout.column(align=True)
     column.label(text="Picture")
-    column.row(align=True).prop(view, "picture_of", expand=True)
-    column.prop(view, "picture", text="")
+    column.prop(scene.seip.view, "picture", text="")
     draw_run(column, SEIP_OT_save_picture.bl_idname, icon="IMAGE_DATA")
 
 

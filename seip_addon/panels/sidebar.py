@@ -39,9 +39,9 @@ class RowList:
         raise NotImplementedError
 
 
-def settings_column(layout: bpy.types.UILayout, heading: str = "") -> bpy.types.UILayout:
+def settings_column(layout: bpy.types.UILayout) -> bpy.types.UILayout:
     """Return a column of settings: names on the left, values on the right; in a narrow sidebar names within fields."""
-    column = layout.column(heading=heading)
+    column = layout.column()
     column.use_property_split = not is_narrow(bpy.context)
     column.use_property_decorate = False
     return column

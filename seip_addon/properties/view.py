@@ -35,18 +35,6 @@ class SEIP_PG_view(bpy.types.PropertyGroup):
         default="//placement.png",
         options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
-    picture_of: EnumProperty(
-        name="View",
-        description="What stands beside the plan",
-        items=(
-            ("VIEW", "This View", "What this viewport shows, with all that is drawn in it and its legend"),
-            (
-                "RENDER",
-                "Rendered",
-                "The rendered view that the batch command makes, which takes up to half a minute",
-            ),
-        ),
-    )
 
 
 CLASSES = (SEIP_PG_view,)

@@ -11,8 +11,9 @@ from ..core.arrays import Float
 from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.site.check import Problem, SceneContents, Surface
+from ..core.site.roles import Role
 from ..core.site.scene_geometry import SceneGeometry
-from . import contract
+from . import contract, roles
 from .named_places import places_of
 from .read import (
     Shown,
@@ -30,16 +31,7 @@ from .read import (
     shown_parts,
 )
 
-ROLES = {
-    contract.REGION: "region",
-    contract.ROADS: "roads",
-    contract.GROUND: "ground",
-    contract.OCCLUDERS: "occluders",
-    contract.CANDIDATE_AREAS: "candidate_areas",
-    contract.WEIGHTED_REGIONS: "weighted_regions",
-    contract.FORBIDDEN_AREAS: "forbidden_areas",
-    contract.MANDATORY_AREAS: "mandatory_areas",
-}
+ROLES = {collection: role.name.lower() for role, collection in roles.ROLES.items() if role is not Role.POLES}
 """Collections of surfaces, and the role that they give."""
 NAMED_AREAS = (contract.WEIGHTED_REGIONS, contract.FORBIDDEN_AREAS, contract.MANDATORY_AREAS)
 NEVER_IN_THE_WAY = {contract.SENSORS, contract.COVERAGE, contract.TRAFFIC, "Dressing"}

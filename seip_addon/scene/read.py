@@ -33,7 +33,7 @@ MOST_NAMED = 3
 _KEEPING_OFF = {contract.ROADS, contract.GROUND, contract.FORBIDDEN_AREAS}
 """Collections of which an object may name a rule that keeps new posts off it."""
 
-_SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
+SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 """Types of object that Blender can turn into faces."""
 
 
@@ -215,7 +215,7 @@ class _Faces:
 
 def _local_faces(evaluated: bpy.types.Object) -> _Faces | None:
     """Return an object's triangles, or None where it has no faces to give."""
-    if evaluated.type not in _SURFACES:
+    if evaluated.type not in SURFACES:
         return None
     is_copied = evaluated.type != "MESH" or evaluated.data.is_editmode  # Edit Mode keeps its own mesh, and shows none
     mesh = evaluated.to_mesh() if is_copied else evaluated.data
@@ -481,14 +481,12 @@ def hidden_members(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Obje
     """Return by collection the names of the objects that the viewport does not show."""
     layer = scene.view_layers[0]
     hidden = {
-        name: sorted(item.name for item in objects if item.name in layer.objects and not _is_visible(item, layer))
+        name: sorted(
+            item.name for item in objects if item.name in layer.objects and not item.visible_get(view_layer=layer)
+        )
         for name, objects in members.items()
     }
     return {name: objects for name, objects in hidden.items() if objects}
-
-
-def _is_visible(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
-    return bool(obj.visible_get(view_layer=layer))
 
 
 def hidden_sentence(collection: str, hidden: list[str]) -> str:

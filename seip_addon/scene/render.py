@@ -121,9 +121,7 @@ class RenderedPictures:
     places: Mapping[str, tuple[float, float]]
 
 
-def rendered_pictures(
-    scene: bpy.types.Scene, site: Site, deployment: Deployment, folder: Path, *, close_ups: bool = True
-) -> RenderedPictures:
+def rendered_pictures(scene: bpy.types.Scene, site: Site, deployment: Deployment, folder: Path) -> RenderedPictures:
     """Render the scene from an oblique angle in the south, and close to each sensor, into a folder for raw pictures.
 
     The picture is taken in a scene of its own that shares the objects and is
@@ -137,10 +135,8 @@ def rendered_pictures(
         Holds the result of `write_result`.
     deployment : Deployment
         The chosen sensors and what they see.
-    close_ups : bool
-        Whether to render the surroundings of each sensor as well.
     """
-    shots = shots_of(site, deployment) if close_ups else shots_of(site, deployment)[:1]
+    shots = shots_of(site, deployment)
     raws = raw_files(folder, shots)
     with silenced():
         taken = take(shots, scene, raws)

@@ -24,7 +24,7 @@ SAMPLE = re.compile(r"Sample (\d+)/")
 
 
 def render_elsewhere(
-    folder: Path, blend: Path, scene: str, site: Site, deployment: Deployment, *, close_ups: bool = True
+    folder: Path, blend: Path, scene: str, site: Site, deployment: Deployment
 ) -> Generator[Progress, None, RenderedPictures]:
     """Render a scene as `rendered_pictures` does, in a Blender of its own: the one that asks goes on answering.
 
@@ -38,8 +38,6 @@ def render_elsewhere(
         Its name.
     deployment : Deployment
         The sensors and what they see.
-    close_ups : bool
-        Whether to render the surroundings of each sensor as well.
 
     Yields
     ------
@@ -51,7 +49,7 @@ def render_elsewhere(
     SeipError
         The other Blender failed.
     """
-    shots = shots_of(site, deployment) if close_ups else shots_of(site, deployment)[:1]
+    shots = shots_of(site, deployment)
     raws = raw_files(folder, shots)
     job, log, answer = (folder / name for name in ("job.json", "log", "taken.json"))
     request = {"path": sys.path, "blend": str(blend), "scene": scene, "answer": str(answer)}

@@ -13,6 +13,7 @@ from ..core.site.roles import AREA_OVERLAYS, Role
 from . import contract
 from .build import COLLECTIONS
 from .materials import material
+from .read import SURFACES
 
 ROLES = {role: collection for role, collection in COLLECTIONS.items() if collection in contract.INPUTS}
 """The collection of each role that a user may assign."""
@@ -31,8 +32,6 @@ WORDS = {
 """What each role means."""
 AREAS = tuple(role for role in ROLES if ROLES[role] in contract.AREAS)
 """Roles whose objects mean an area in plan."""
-
-SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 
 
 def roles_of(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[Role, ...]:

@@ -103,7 +103,7 @@ def _empties(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 def placed_sensors(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
     """Return the empties of sensors by their labels, S2 before S10; those without a label are not among them."""
     collection = contract.find(scene, contract.SENSORS)
-    objects = [] if collection is None else [obj for obj in collection.objects if contract.LABEL in obj]
+    objects = [] if collection is None else [obj for obj in collection.all_objects if contract.LABEL in obj]
     return {str(obj[contract.LABEL]): obj for obj in sorted(objects, key=lambda one: _natural(one[contract.LABEL]))}
 
 

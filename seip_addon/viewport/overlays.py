@@ -46,11 +46,6 @@ def overlays_of(scene: bpy.types.Scene) -> list[Overlay]:
     return [own[name] for name in sorted(own)]
 
 
-def handler_count() -> int:
-    """Return the number of registered draw handlers."""
-    return len(_handles)
-
-
 def draw_overlays(scene: bpy.types.Scene) -> None:
     """Draw a scene's overlays into the bound framebuffer, with depth test."""
     gpu.state.depth_test_set("LESS_EQUAL")

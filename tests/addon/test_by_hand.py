@@ -9,12 +9,13 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon import live_coverage, selection
+from seip_addon import live_coverage
 from seip_addon.core.choosing.placement.objective import MOVED, MOVED_MESSAGE
 from seip_addon.core.output.results.comparison import unpacked_counts
 from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
 from seip_addon.scene import result_folder
 from seip_addon.scene.result_folder import FILES
+from seip_addon.scene.sensors import placed_sensors
 from seip_addon.sensor_edits import sensor_edits
 from seip_addon.session import session
 from tests.oracles.json_schema import violations
@@ -33,7 +34,7 @@ def placed(junction, tmp_path):
 
 def move(scene: bpy.types.Scene) -> None:
     """Lower and turn S1 in all ways, and delete S3."""
-    sensors = selection.sensor_empties(scene)
+    sensors = placed_sensors(scene)
     sensors["S1"].location.z -= 3.0
     sensors["S1"].rotation_euler = (0.1, 0.2, 0.3)
     bpy.data.objects.remove(sensors["S3"])
@@ -45,7 +46,7 @@ def record(scene: bpy.types.Scene) -> dict:
 
 
 def test_the_post_of_a_deleted_sensor_is_not_exported(placed, tmp_path):
-    bodies = {label: empty.children[0].name for label, empty in selection.sensor_empties(placed).items()}
+    bodies = {label: empty.children[0].name for label, empty in placed_sensors(placed).items()}
     move(placed)
     bpy.ops.seip.evaluate_sensors()
     placed.seip.result.render = False
@@ -79,9 +80,9 @@ def test_moved_sensors_are_neither_exported_nor_kept_as_what_they_were(placed):
 def test_moved_sensors_are_evaluated_where_they_are_mounted(placed):
     before = record(placed)
     move(placed)
-    pose = selection.sensor_empties(placed)["S1"].matrix_world.copy()
+    pose = placed_sensors(placed)["S1"].matrix_world.copy()
     assert bpy.ops.seip.evaluate_sensors() == {"FINISHED"}
-    assert selection.sensor_empties(placed)["S1"].matrix_world == pose
+    assert placed_sensors(placed)["S1"].matrix_world == pose
     assert not sensor_edits(placed)
     now = record(placed)
     assert [line["id"] for line in now["sensors"]] == ["S1", "S2"]
@@ -119,9 +120,9 @@ def test_an_evaluated_deployment_is_kept_compared_ranked_and_exported(placed, tm
     placed.seip.active_kept = 0
     assert bpy.ops.seip.show_comparison() == {"FINISHED"}
     assert bpy.ops.seip.rank_candidates() == {"FINISHED"}
-    there = {name: obj.matrix_world.copy() for name, obj in selection.sensor_empties(placed).items()}
+    there = {name: obj.matrix_world.copy() for name, obj in placed_sensors(placed).items()}
     assert bpy.ops.seip.export_result() == {"FINISHED"}
-    assert {name: obj.matrix_world for name, obj in selection.sensor_empties(placed).items()} == there
+    assert {name: obj.matrix_world for name, obj in placed_sensors(placed).items()} == there
     out = tmp_path / "out"
     written = load_placement(out / "placement.json")
     assert comparable(written) == comparable(parsed_record(placed.seip.result.record))
@@ -135,7 +136,7 @@ def test_an_evaluated_deployment_is_kept_compared_ranked_and_exported(placed, tm
     assert spawned["rotation"]["pitch"] == pytest.approx(-math.degrees(0.2), abs=1e-4)
     bpy.ops.wm.open_mainfile(filepath=str(out / "placed.blend"))
     scene = bpy.context.scene
-    assert {name: obj.matrix_world for name, obj in selection.sensor_empties(scene).items()} == there
+    assert {name: obj.matrix_world for name, obj in placed_sensors(scene).items()} == there
     assert not sensor_edits(scene)
     assert bpy.ops.seip.export_result() == {"FINISHED"}  # found again from the file and the cache
     assert comparable(load_placement(out / "placement.json")) == comparable(written)
@@ -145,7 +146,7 @@ def test_an_evaluated_deployment_is_kept_compared_ranked_and_exported(placed, tm
 
 
 def test_an_added_sensor_counts_and_one_below_the_ground_has_its_sentence(placed):
-    first = selection.sensor_empties(placed)["S1"]
+    first = placed_sensors(placed)["S1"]
     copy = first.copy()
     copy.location.x += 5.0
     bpy.data.collections["SEIP Sensors"].objects.link(copy)

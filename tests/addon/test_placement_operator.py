@@ -12,7 +12,7 @@ from headless import place
 import bpy
 import pytest
 
-from seip_addon import scene_status, selection
+from seip_addon import scene_status
 from seip_addon import session as session_data
 from seip_addon.core.choosing.placement.returns_summary import ReturnsPoint, ReturnsSummary
 from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
@@ -24,6 +24,7 @@ from seip_addon.operators import results
 from seip_addon.panels import export as export_panel
 from seip_addon.panels import placement as placement_panel
 from seip_addon.scene.contract import WRITTEN
+from seip_addon.scene.sensors import placed_sensors
 from seip_addon.session import session
 from tests.builders.drawn_layout import DrawnLayout
 
@@ -31,7 +32,7 @@ OPTIONS = ["--heights", "8", "--grid", "4", "--spacing", "12", "--count", "2", "
 
 
 def labels(scene: bpy.types.Scene) -> list[str]:
-    return sorted(selection.sensor_empties(scene))
+    return sorted(placed_sensors(scene))
 
 
 def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scene):
@@ -328,17 +329,17 @@ def test_nothing_of_the_users_is_changed(junction):
 
 def test_rules_come_from_what_is_selected_and_hold(junction):
     bpy.ops.seip.solve_placement()
-    first = selection.sensor_empties(junction)["S1"]
+    first = placed_sensors(junction)["S1"]
     position = first["seip_position"]
     bpy.context.view_layer.objects.active = first
     assert bpy.ops.seip.add_rule(rule="FORBIDDEN") == {"FINISHED"}
     bpy.ops.seip.solve_placement()
-    assert position not in {obj["seip_position"] for obj in selection.sensor_empties(junction).values()}
+    assert position not in {obj["seip_position"] for obj in placed_sensors(junction).values()}
     junction.seip.goal.position = position
     bpy.ops.seip.add_rule(rule="MANDATORY")
     assert [(one.name, one.rule) for one in junction.seip.goal.rules] == [(position, "MANDATORY")]
     bpy.ops.seip.solve_placement()
-    assert position in {obj["seip_position"] for obj in selection.sensor_empties(junction).values()}
+    assert position in {obj["seip_position"] for obj in placed_sensors(junction).values()}
     assert bpy.ops.seip.remove_rule() == {"FINISHED"}
     assert not bpy.ops.seip.remove_rule.poll()
 

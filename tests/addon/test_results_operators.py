@@ -4,11 +4,12 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon import live_coverage, preferences, selection
+from seip_addon import live_coverage, preferences
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.comparison import unpacked_counts
 from seip_addon.core.output.results.placement_file import parsed_record
 from seip_addon.panels import results as results_panel
+from seip_addon.scene.sensors import placed_sensors
 from seip_addon.session import scene_of, session
 from seip_addon.viewport.coverage import legend_of_coverage
 from tests.builders.drawn_layout import DrawnLayout
@@ -129,7 +130,7 @@ def test_moved_sensors_are_followed(placed):
     assert (shown(placed) == before).all()
     assert session.following.moved == ()
 
-    first = selection.sensor_empties(placed)["S1"]
+    first = placed_sensors(placed)["S1"]
     there = first.location.copy()
     first.location.z -= 4.0
     bpy.context.view_layer.update()
@@ -155,7 +156,7 @@ def test_moved_sensors_are_followed(placed):
 def test_a_level_turn_of_a_whole_step_sees_the_same(placed):
     bpy.ops.seip.follow_sensors()
     before = shown(placed)
-    first = selection.sensor_empties(placed)["S1"]
+    first = placed_sensors(placed)["S1"]
     first.rotation_euler.z += np.pi
     live_coverage.update()
     assert session.following.moved == ("S1",)
@@ -203,7 +204,7 @@ def test_tilted_sensors_are_where_the_placement_put_them_until_a_hand_turns_them
     bpy.ops.seip.follow_sensors()
     assert session.following.moved == ()
     coverage = session.following.coverage
-    first = selection.sensor_empties(placed)["S1"]
+    first = placed_sensors(placed)["S1"]
     first.rotation_euler.y = 0.0
     live_coverage.update()
     assert session.following.moved == ("S1",)
@@ -248,7 +249,7 @@ def test_sensors_that_look_one_way_are_where_the_placement_put_them_until_a_hand
         assert session.following.moved == ()
 
         coverage = session.following.coverage
-        selection.sensor_empties(junction)["S1"].rotation_euler.z += np.pi
+        placed_sensors(junction)["S1"].rotation_euler.z += np.pi
         live_coverage.update()
         assert session.following.moved == ("S1",)
         assert session.following.coverage < coverage

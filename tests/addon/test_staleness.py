@@ -5,7 +5,8 @@ from pathlib import Path
 import bpy
 import pytest
 
-from seip_addon import scene_status, selection
+from seip_addon import scene_status
+from seip_addon.scene.sensors import placed_sensors
 from seip_addon.sensor_edits import sensor_edits
 from seip_addon.session import SceneState, session
 
@@ -194,7 +195,7 @@ def test_what_a_hand_did_to_the_sensors_is_said(known):
     bpy.data.collections["SEIP Sensors"].hide_viewport = True
     assert not sensor_edits(scene)
     bpy.data.collections["SEIP Sensors"].hide_viewport = False
-    sensors = selection.sensor_empties(scene)
+    sensors = placed_sensors(scene)
     sensors["S1"].location.z -= 2.0
     sensors["S2"].rotation_euler.x = 0.2
     sensors["S4"]["seip_sensor"] = "vlp16"

@@ -179,14 +179,14 @@ def test_a_package_that_is_gone_is_named(placed, tmp_path, monkeypatch):
     come = builtins.__import__
 
     def gone(name, *rest, **more):
-        if name.startswith("PIL"):
-            raise ModuleNotFoundError("No module named 'PIL'", name="PIL")
+        if name.startswith("osmium"):
+            raise ModuleNotFoundError("No module named 'osmium'", name="osmium")
         return come(name, *rest, **more)
 
     monkeypatch.setattr(builtins, "__import__", gone)
-    placed.seip.view.picture, placed.seip.view.picture_of = str(tmp_path / "picture"), "RENDER"
-    with pytest.raises(RuntimeError, match=r"No module named 'PIL'.*install its zip again"):
-        bpy.ops.seip.save_picture()
+    (tmp_path / "town.osm.pbf").write_bytes(bytes(100))
+    with pytest.raises(RuntimeError, match=r"No module named 'osmium'.*install its zip again"):
+        bpy.ops.seip.choose_map(filepath=str(tmp_path / "town.osm.pbf"))
 
 
 def test_a_linked_copy_of_a_scene_gets_sensors_of_its_own(placed):

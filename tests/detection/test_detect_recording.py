@@ -15,7 +15,6 @@ pytest.importorskip("torch", reason="torch is not installed: make detection")
 pytest.importorskip("bpy")
 
 from headless import detect, detect_recording
-from headless.detection import recorded_detection
 
 from PIL import Image
 
@@ -164,13 +163,13 @@ def test_labels_give_average_precision(results):
 def test_an_interrupted_run_goes_on_and_gives_the_same_bytes(folder, results, tmp_path, monkeypatch):
     save, detected = detect_recording._save_frame, []  # noqa: SLF001  # where a run may stop
 
-    def stop(where, step, *others):
-        if step.number == 3:
+    def stop(options, number, *others):
+        if number == 3:
             raise KeyboardInterrupt
-        save(where, step, *others)
+        save(options, number, *others)
 
-    run = recorded_detection.detect
-    monkeypatch.setattr(recorded_detection, "detect", lambda *given: detected.append(given) or run(*given))
+    run = detect_recording.detect
+    monkeypatch.setattr(detect_recording, "detect", lambda *given: detected.append(given) or run(*given))
     monkeypatch.setattr(detect_recording, "_save_frame", stop)
     named = arguments(folder, tmp_path / "out", "--labels", str(folder / "labels"), "--score", "0.3")
     with pytest.raises(KeyboardInterrupt, match="are incomplete; the same command continues from there"):
@@ -188,8 +187,8 @@ def test_an_interrupted_run_goes_on_and_gives_the_same_bytes(folder, results, tm
 
 
 def test_other_inputs_are_detected_anew(folder, tmp_path, monkeypatch):
-    detected, run = [], recorded_detection.detect
-    monkeypatch.setattr(recorded_detection, "detect", lambda *given: detected.append(given) or run(*given))
+    detected, run = [], detect_recording.detect
+    monkeypatch.setattr(detect_recording, "detect", lambda *given: detected.append(given) or run(*given))
     detect.main(arguments(folder, tmp_path / "out"))
     detect.main(arguments(folder, tmp_path / "out", "--score", "0.7"))
     assert len(detected) == 2 * SWEEPS

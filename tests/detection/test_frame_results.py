@@ -2,7 +2,6 @@
 
 import math
 
-from headless.detection.cloud_in_plan import CloudInPlan
 from headless.detection.frame_results import DENSITY_RADIUS, Detections, frame_result
 
 import numpy as np
@@ -11,7 +10,6 @@ import shapely
 
 from seip_addon.core.sensing.scans.frame import Frame, Labels
 
-CLASSES = (("car", "van"), ("truck", "bus"))
 REGION = shapely.box(-20, -20, 20, 20)
 SENSORS = np.array([[0.0, 0.0, 6.0], [30.0, 0.0, 6.0]])
 
@@ -46,8 +44,7 @@ def result(points, boxes):
     boxes = np.array(boxes, dtype=float).reshape(-1, 7)
     found = Detections(boxes, np.linspace(0.1, 0.9, len(boxes)), np.arange(len(boxes)) % 2)
     frame = simulated(points)
-    cloud = CloudInPlan(frame.points)
-    return frame_result(frame, cloud, found, classes=CLASSES, region=REGION, sensors=SENSORS, run="a")
+    return frame_result(frame, found, region=REGION, sensors=SENSORS, run="a")
 
 
 def test_road_users_are_those_of_the_frame():
@@ -62,13 +59,12 @@ def test_road_users_are_those_of_the_frame():
 
 def test_who_is_parked_goes_by_the_trajectories():
     frame = simulated([])
-    known = {"classes": CLASSES, "region": REGION, "sensors": SENSORS, "run": "a"}
+    known = {"region": REGION, "sensors": SENSORS, "run": "a"}
     nothing = Detections(np.empty((0, 7)), np.empty(0), np.empty(0, dtype=np.int64))
     parked = np.zeros(int(frame.labels.user.max()) + 1, dtype=bool)
     parked[frame.labels.user[1]] = True
-    cloud = CloudInPlan(frame.points)
-    assert frame_result(frame, cloud, nothing, parked=parked, **known).truth.parked.tolist() == [False, True]
-    assert frame_result(frame, cloud, nothing, **known).truth.parked.tolist() == [False, False]
+    assert frame_result(frame, nothing, parked=parked, **known).truth.parked.tolist() == [False, True]
+    assert frame_result(frame, nothing, **known).truth.parked.tolist() == [False, False]
 
 
 def test_detections_get_their_class_place_and_distance():

@@ -4,7 +4,7 @@ import math
 
 from headless.charts import error_view
 from headless.charts.detection import (
-    BinnedFigure,
+    Bin,
     PrecisionRecallLine,
     save_parts_chart,
     save_precision_recall_chart,
@@ -45,11 +45,13 @@ def test_precision_recall_chart(tmp_path, figures):
 
 
 def test_parts_chart(tmp_path, figures):
-    by_distance = BinnedFigure(
-        "distance (m)", "AP", (0, 10, 50, math.inf), {"1 × type1": (0.9, 0.5, math.nan)}, (10, 40, 0)
-    )
-    by_density = BinnedFigure("returns per m²", "false per frame", (0, 1, 5), {"1 × type1": (2.0, 0.5)})
-    save_parts_chart(tmp_path / "parts.png", [by_distance, by_density], "Junction")
+    by_distance = [Bin(0, 10, 10, 0.9), Bin(10, 50, 40, 0.5), Bin(50, math.inf, 0, math.nan)]
+    by_density = [Bin(0, 1, 0, 2.0), Bin(1, 5, 0, 0.5)]
+    panels = [
+        ("distance (m)", "AP", {"1 × type1": by_distance}),
+        ("returns per m²", "false per frame", {"1 × type1": by_density}),
+    ]
+    save_parts_chart(tmp_path / "parts.png", panels, "Junction")
     assert is_drawn(tmp_path / "parts.png")
     first, second = figures[0].axes
     assert [tick.get_text() for tick in first.get_xticklabels()] == ["0–10", "10–50", "50 +"]

@@ -10,8 +10,9 @@ import pytest
 
 pytest.importorskip("distributed", reason="Dask is not installed: make environment")
 
-from headless.network_tasks import workers
+from headless.network_tasks import run_jobs
 
+from seip_addon.core.dask_client import connected
 from seip_addon.core.errors import SeipError
 
 pytestmark = pytest.mark.slow
@@ -44,9 +45,9 @@ def crew_of(address):
     """Wait until both workers have come, and return a context with them."""
     for _ in range(60):
         try:
-            with workers(address, 2) as there:
-                if len(there._client.nthreads()) == 2:  # noqa: SLF001  # the client is nobody else's
-                    return workers(address, 2)
+            with connected(address, 2) as there:
+                if len(there.nthreads()) == 2:
+                    return connected(address, 2)
         except SeipError:
             pass
         time.sleep(0.5)
@@ -56,7 +57,7 @@ def crew_of(address):
 def test_jobs_of_a_killed_worker_are_done_by_another(cluster):
     address, _, crew = cluster
     with crew_of(address) as there:
-        results = there.run(time.sleep, [lambda: 0.5] * 12)
+        results = run_jobs(there, time.sleep, [lambda: 0.5] * 12)
         done = [next(results)[0] for _ in range(2)]
         crew[0].send_signal(signal.SIGKILL)
         done += [number for number, _ in results]
@@ -66,7 +67,7 @@ def test_jobs_of_a_killed_worker_are_done_by_another(cluster):
 def test_a_scheduler_that_stops_is_one_sentence(cluster, caplog, capfd):
     address, scheduler, _ = cluster
     with crew_of(address) as there:
-        results = there.run(time.sleep, [lambda: 1.0] * 30)
+        results = run_jobs(there, time.sleep, [lambda: 1.0] * 30)
         next(results)
         scheduler.send_signal(signal.SIGKILL)
         time.sleep(3.0)  # Dask tries to connect again meanwhile

@@ -17,7 +17,7 @@ from seip_addon.core.limits import Limits
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.settings import settings_of
-from seip_addon.core.site.candidates import DEFAULT_TYPE, PAPER_TYPES, CandidateSettings
+from seip_addon.core.site.candidates import DEFAULT_TYPE, CandidateSettings
 from seip_addon.core.workflows.survey_settings import SurveySettings
 
 ALL = (CandidateSettings, VisibilitySettings, SurveySettings, Objective, Scenarios, ScanSettings)
@@ -36,14 +36,9 @@ def test_options_left_alone_give_the_defaults(kind):
     assert read_settings(kind, parser.parse_args([])) == kind()
 
 
-def test_commands_start_from_a_product_and_studies_from_the_types_of_the_paper():
-    for study, types in ((False, (DEFAULT_TYPE,)), (True, PAPER_TYPES)):
-        parser = argparse.ArgumentParser()
-        add_options(parser, study=study)
-        assert read_settings(CandidateSettings, parser.parse_args(["-o", "out"])).sensors == types
-        assert read_settings(CandidateSettings, parser.parse_args(["-o", "out", "--sensor", "vlp16"])).sensors == (
-            "vlp16",
-        )
+def test_commands_start_from_a_product():
+    assert read_settings(CandidateSettings, surveyed()).sensors == (DEFAULT_TYPE,)
+    assert read_settings(CandidateSettings, surveyed("--sensor", "vlp16")).sensors == ("vlp16",)
 
 
 @pytest.mark.parametrize(
@@ -83,15 +78,6 @@ def test_help_has_a_line_for_each_option_and_names_its_default(monkeypatch):
     (assumed,) = (line for line in lines if "--assumed-poles" in line)
     assert "default" not in assumed
     assert len(lines) <= 41
-
-
-def test_help_names_the_options_of_a_survey_where_another_command_explains_them(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "120")
-    parser = new_parser("study coverage", "Study coverage.")
-    add_options(parser, study=True)
-    text = parser.format_help()
-    assert "--heights --tilts --yaws --assumed-poles --installed-cost (see: seip place --help)\n" in text
-    assert "types to choose from" not in text
 
 
 def test_weights_are_the_scene_s_or_one_for_all():

@@ -14,7 +14,7 @@ from packaging.utils import canonicalize_name, parse_wheel_filename
 pytest.importorskip("bpy", reason="Blender's extension tool comes with the bpy module")
 
 from headless import build_extension
-from headless.set_up import LOCK
+from headless.set_up import LOCK, requirements
 
 ROOT = Path(__file__).resolve().parents[2]
 FAKE_WHEEL = "thing-1.0-py3-none-any.whl"
@@ -88,7 +88,7 @@ def test_the_listing_has_tags_that_blender_s_platform_knows_and_no_address_that_
 
 
 def test_blender_brings_its_own_numpy():
-    assert not {Requirement(pin).name.lower() for pin in build_extension.pins()} & {"numpy", "bpy"}
+    assert not {Requirement(pin).name.lower() for pin in requirements("extension")} & {"numpy", "bpy"}
 
 
 def test_the_extension_tool_refuses_with_its_own_words(tmp_path):
@@ -126,7 +126,7 @@ def test_every_pin_has_one_wheel(name, platform, tmp_path, monkeypatch):
         monkeypatch.setattr(build_extension, "WHEELS", tmp_path)
     files = build_extension.fetch_wheels(build.python, platform)
     wheels = {name: (version, tags) for name, version, _, tags in (parse_wheel_filename(file.name) for file in files)}
-    pins = [Requirement(pin) for pin in build_extension.pins()]
+    pins = [Requirement(pin) for pin in requirements("extension")]
     assert len(files) == len(pins)
     for pin in pins:
         version, tags = wheels[canonicalize_name(pin.name)]

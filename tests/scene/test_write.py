@@ -158,9 +158,9 @@ def test_the_result_survives_saving_and_opening(example, scene, tmp_path):
 
 
 def save_rendered_view(path, scene, site, deployment):
-    """Render and label the view as `write_result_folder` does, without close-ups."""
+    """Render and label the view as `write_result_folder` does."""
     with TemporaryDirectory() as folder:
-        taken = rendered_pictures(scene, site, deployment, Path(folder), close_ups=False)
+        taken = rendered_pictures(scene, site, deployment, Path(folder))
         labelled_view.save_labelled_view(path, taken.view, site, deployment, shown_legend(scene), taken.sight)
 
 
@@ -168,6 +168,7 @@ def test_the_rendered_view_changes_nothing_in_the_file(example, scene, tmp_path,
     monkeypatch.setattr("seip_addon.scene.render.SAMPLES", 1)
     monkeypatch.setattr("seip_addon.scene.render.WIDTH", 480)
     monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 270)
+    monkeypatch.setattr("seip_addon.scene.render.TILE", (64, 48))
     write_result(scene, example.site, example.deployment)
     bpy.context.view_layer.update()
     everything = [bpy.data.objects, bpy.data.meshes, bpy.data.scenes, bpy.data.worlds, bpy.data.cameras]
@@ -188,6 +189,7 @@ def test_the_rendered_view_shows_traffic_where_it_is_now(example, scene, tmp_pat
     monkeypatch.setattr("seip_addon.scene.render.SAMPLES", 1)
     monkeypatch.setattr("seip_addon.scene.render.WIDTH", 160)
     monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 90)
+    monkeypatch.setattr("seip_addon.scene.render.TILE", (64, 48))
     monkeypatch.setattr(
         "seip_addon.core.output.pictures.labelled_view.save_labelled_view",
         lambda *given: pictures.append(plt.imread(given[1])),
@@ -211,6 +213,7 @@ def test_a_sensor_behind_a_building_is_marked_as_hidden(example, scene, tmp_path
     monkeypatch.setattr("seip_addon.scene.render.SAMPLES", 1)
     monkeypatch.setattr("seip_addon.scene.render.WIDTH", 64)
     monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 36)
+    monkeypatch.setattr("seip_addon.scene.render.TILE", (64, 48))
     monkeypatch.setattr(
         "seip_addon.core.output.pictures.labelled_view.save_labelled_view", lambda *given: seen.update(sight=given[-1])
     )
@@ -287,6 +290,7 @@ def test_the_rendered_view_explains_the_colours_that_are_shown(example, scene, t
     legends = []
     monkeypatch.setattr("seip_addon.scene.render.WIDTH", 64)
     monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 36)
+    monkeypatch.setattr("seip_addon.scene.render.TILE", (64, 48))
     monkeypatch.setattr(
         "seip_addon.core.output.pictures.labelled_view.save_labelled_view", lambda *given: legends.append(given[-2])
     )

@@ -71,7 +71,7 @@ def _watch_traffic(window: Window) -> Steps:
         _scene().frame_set(frame)
         yield from window.until(lambda before=before: session.in_traffic.coverage != before, 10)
         shares.append(session.in_traffic.coverage)
-        sys.stdout.write(f"coverage at frame {frame}: {shares[-1]:.2%}, in {session.in_traffic.seconds:.2f} s\n")
+        sys.stdout.write(f"coverage at frame {frame}: {shares[-1]:.2%}\n")
     yield from window.picture("4-traffic")
     _scene().seip.sections.traffic, _scene().seip.sections.numbers = False, True
     yield from window.picture("5-numbers")

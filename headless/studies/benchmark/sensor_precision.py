@@ -8,13 +8,12 @@ from functools import partial
 from pathlib import Path
 
 from headless.detection.average_precision import evaluate
-from headless.detection.cloud_in_plan import CloudInPlan
 from headless.detection.detection_area import area_of
 from headless.detection.frame_results import FrameResult, frame_result
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
 from headless.detection.recordings import SampledRun, Simulator
-from headless.detection.settings import CLASS_CATEGORIES, NetworkSettings, TrainingSettings
+from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import TrainedDetector, deterministic
 from headless.studies.benchmark.sensor_models import FINEST, SHIPPED, PrecisionFront, SensorModel
 from headless.studies.benchmark.visibility import Cost
@@ -134,9 +133,7 @@ def precision_front(
             results[model.name].append(
                 frame_result(
                     frame,
-                    CloudInPlan(frame.points),
                     found,
-                    classes=tuple(CLASS_CATEGORIES.values()),
                     region=static.region,
                     sensors=configuration.places,
                     run=run.name,

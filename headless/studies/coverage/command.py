@@ -13,6 +13,7 @@ from headless.studies.coverage.cells import CHARTED_WEIGHT, COUNTS, coverage_stu
 from headless.studies.coverage.charts import save_height_chart, save_weight_chart
 from headless.studies.coverage.claims import coverage_claims
 from headless.studies.coverage.tables import save_study_table
+from headless.studies.survey_options import add_survey_options
 
 from seip_addon.core.choosing.placement.objective import Objective, check_objective
 from seip_addon.core.output.pictures.plan_view import save_plan_view
@@ -51,5 +52,5 @@ def main(argv: list[str]) -> None:
 def _parser() -> argparse.ArgumentParser:
     what = "Reproduce the paper's coverage figures on a scene; name sensor types from the simplest to the best."
     parser = new_parser("study coverage", what)
-    survey.add_options(parser, study=True)
+    add_survey_options(parser)
     return parser

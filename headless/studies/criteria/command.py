@@ -25,6 +25,7 @@ from headless.studies.criteria.criteria_table import (
 )
 from headless.studies.criteria.site_criteria import CRITERIA
 from headless.studies.detection.case_study import split_untrained
+from headless.studies.survey_options import add_survey_options
 
 import bpy
 
@@ -132,7 +133,7 @@ def _study(options: argparse.Namespace, settings: CriteriaStudySettings) -> Mapp
 def _parser() -> argparse.ArgumentParser:
     what = "Compare the criteria by which sensors can be placed by what a detector finds with them."
     parser = new_parser("study criteria", what)
-    survey.add_options(parser, study=True)
+    add_survey_options(parser)
     parser.add_argument("scenes", nargs="*", type=Path, help="more scenes")
     study = parser.add_argument_group("study")
     study.add_argument("--count", nargs="+", type=whole_number(SENSORS), default=[1, 2, 4], metavar="N", help="sensors")

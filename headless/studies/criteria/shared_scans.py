@@ -3,14 +3,14 @@
 from collections.abc import Generator, Iterator, Sequence
 from pathlib import Path
 
-from headless.detection.cloud_in_plan import CloudInPlan
 from headless.detection.detector import Detector
 from headless.detection.frame_results import FrameResult, frame_result
 from headless.detection.inference import detect
 from headless.detection.recordings import MountedSensors, SampledRun, Simulator
-from headless.detection.settings import CLASS_CATEGORIES
 from headless.detection.training import deterministic
 from headless.studies.detection.sensor_configuration import SensorConfiguration
+from headless.studies.frame_points import some_points
+from headless.studies.simulated_recordings import frames_key
 from headless.studies.stored_detections import load_frames, save_frames
 
 from seip_addon.core.progress import Progress, finish
@@ -60,7 +60,8 @@ class SharedScans:
     def key(self, run: SampledRun) -> str:
         """Return a digest of all that the frames of a run follow from."""
         return digest(
-            self._simulator.key(MountedSensors("", self._sensors), [run]), *(str(numbers) for numbers in self._parts)
+            frames_key(self._simulator, MountedSensors("", self._sensors), [run]),
+            *(str(numbers) for numbers in self._parts),
         )
 
     def _simulation(self, run: SampledRun) -> Simulation:
@@ -110,10 +111,8 @@ def _detected(
     with deterministic(1):
         found = detect(detector, simulator.area(detector.settings.pillar), frame)
     return frame_result(
-        frame,
-        CloudInPlan(frame.points[frame.foreground]),
+        some_points(frame, frame.foreground),
         found,
-        classes=tuple(CLASS_CATEGORIES.values()),
         region=simulator.static.region,
         sensors=placement.places,
         run=run.name,

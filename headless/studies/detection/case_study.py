@@ -4,6 +4,7 @@ Placements come from the integer program, clouds from simulated traffic. A detec
 (or one detector on each), several times with different seeds, and evaluated with each placement on unseen traffic.
 """
 
+import math
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,11 +20,12 @@ from headless.detection.rules import MAIN_RULE, precisions
 from headless.detection.run_detection import AT_ONCE, detect_in_runs
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.suitability import suitability_warnings
-from headless.detection.training import TrainedDetector, deterministic, train
+from headless.detection.training import LearningCurve, TrainedDetector, deterministic, train
 from headless.side_by_side import side_by_side
 from headless.studies.coverage.cells import COUNTS, Case, Cell, solve_cell
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 from headless.studies.false_positives import false_positives
+from headless.studies.simulated_recordings import recorded
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
@@ -37,6 +39,7 @@ from .kitti_precision import Kitti, kitti
 from .shared_bays import shared_bays
 
 MIN_RUNS = 4  # one to learn from, one for validation, two for tests
+STILL_RISING = 0.02  # average precision by which the last validation beats all others where more steps would gain
 RUNS_PER_TEST, RUNS_PER_VALIDATION = 2, 8  # of all runs one half is for tests, and one eighth for validation
 RUNS_PER_CRITERIA = 4  # without training one quarter is for criteria that go by traffic, the others for tests
 
@@ -271,7 +274,7 @@ def simulate_training_set(
     area = simulator.area(network.pillar)
 
     def recordings(placed: MountedSensors, runs: Sequence[SampledRun]) -> list[SampledRecording]:
-        return [SampledRecording(simulator.record(placed, run), area, network.most_points) for run in runs]
+        return [SampledRecording(recorded(simulator, placed, run), area, network.most_points) for run in runs]
 
     training_set = TrainingSet(
         {one.name: recordings(one, traffic.training) for one in configurations},
@@ -318,6 +321,12 @@ def training(
         store=store,
         start=model.start,
     )
+
+
+def still_rises(curve: LearningCurve) -> bool:
+    """Return whether the last validation beats all before it by more than `STILL_RISING`, or there is but one."""
+    *before, last = curve.validation.values()
+    return last > max(before, default=-math.inf) + STILL_RISING
 
 
 def train_all(

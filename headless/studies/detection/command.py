@@ -29,6 +29,7 @@ from headless.studies.detection import results as study_results
 from headless.studies.detection.claims import detection_claims
 from headless.studies.detection.read_placements import read_placements, records_in
 from headless.studies.detection.sensor_configuration import SensorConfiguration
+from headless.studies.survey_options import add_survey_options
 
 import bpy
 
@@ -218,7 +219,7 @@ def check_every(seconds: float) -> None:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of a survey and of what detectors learn from to a command."""
-    survey.add_options(parser, study=True)
+    add_survey_options(parser)
     detection = parser.add_argument_group("detection")
     detection.add_argument(
         "--traffic",

@@ -6,10 +6,16 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from headless.charts.detection import BinnedFigure, save_parts_chart, save_precision_recall_chart, save_training_chart
+from headless.charts.detection import (
+    Bin,
+    BinnedFigure,
+    save_parts_chart,
+    save_precision_recall_chart,
+    save_training_chart,
+)
 from headless.charts.error_view import save_error_view
-from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, Bin, average_precision_by, recall_by
-from headless.detection.chart_data import curve, error_view, parts
+from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
+from headless.detection.chart_data import curve, error_view
 from headless.detection.recordings import Simulator
 from headless.detection.rules import MAIN_RULE, RULES
 from headless.detection.training import LearningCurve, TrainedDetector
@@ -25,7 +31,7 @@ from seip_addon.core.estimates import SHARE, Interval
 from seip_addon.core.storage.csv_table import save_csv
 from seip_addon.core.storage.files import save_json
 
-from .case_study import DetectorOutcome, ModelConfiguration, Traffic
+from .case_study import DetectorOutcome, ModelConfiguration, Traffic, still_rises
 from .claims import SeedResult
 
 SCHEMA = "seip-evaluation/2"
@@ -48,7 +54,7 @@ class StudyResults:
     @property
     def seed_results(self) -> list[SeedResult]:
         """Figures of all types and numbers of sensors, each with whether its training was still improving."""
-        rising = {model.name: curve.still_rises for model, curve in zip(self.models, self.curves, strict=True)}
+        rising = {model.name: still_rises(curve) for model, curve in zip(self.models, self.curves, strict=True)}
         return [
             replace(one.seed_result, still_rising=rising[one.model.name])
             for one in self.outcomes
@@ -96,7 +102,7 @@ def _parts(outcomes: Sequence[DetectorOutcome]) -> list[BinnedFigure]:
     """Return the panels of detected road users and false detections by distance, returns, visibility and density."""
 
     def panel(what: str, figure: str, bins: Callable[[DetectorOutcome], Sequence[Bin]]) -> BinnedFigure:
-        return parts(what, figure, {one.configuration.name: bins(one) for one in outcomes})
+        return what, figure, {one.configuration.name: bins(one) for one in outcomes}
 
     return [
         panel(
@@ -198,7 +204,7 @@ def save_record(
                     "network": asdict(one.network),
                     "training": asdict(one.training),
                     "validation": {str(step): value for step, value in curve.validation.items()},
-                    "still_rising": curve.still_rises,
+                    "still_rising": still_rises(curve),
                 }
                 for one, curve in zip(results.models, results.curves, strict=True)
             ],

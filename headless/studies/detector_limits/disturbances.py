@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from headless.detection.detector import Detector
-from headless.detection.frame_points import POINT_FIELDS, recounted, some_points
+from headless.studies.frame_points import POINT_FIELDS, recounted, some_points
 from headless.studies.random_sites.varied_bodies import resized
 
 import numpy as np

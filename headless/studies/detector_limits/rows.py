@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from headless.detection.breakdown import Bin
+from headless.charts.detection import Bin
 from headless.detection.suitability import MAX_OVERFULL_SHARE
 from headless.studies.stability.rows import Row
 

@@ -12,8 +12,9 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from headless.charts.detection import Bin
 from headless.detection.average_precision import Evaluation
-from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, Bin, recall_by
+from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, recall_by
 from headless.detection.detector import Detector
 from headless.detection.pillars import Filling, filling
 from headless.detection.settings import NetworkSettings, TrainingSettings

@@ -9,17 +9,16 @@ from functools import cached_property
 from pathlib import Path
 
 from headless.detection.average_precision import CountedTruth, EvaluatedDetections, Evaluation, evaluate
-from headless.detection.cloud_in_plan import CloudInPlan
 from headless.detection.detector import Detector
 from headless.detection.frame_results import FrameResult, frame_result
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
 from headless.detection.recordings import SampledRun, Simulator
 from headless.detection.run_detection import AT_ONCE
-from headless.detection.settings import CLASS_CATEGORIES
 from headless.detection.training import deterministic
 from headless.side_by_side import side_by_side
 from headless.studies.detection.sensor_configuration import SensorConfiguration
+from headless.studies.simulated_recordings import frames_key
 
 import numpy as np
 import shapely
@@ -86,7 +85,7 @@ class TrialSite:
 
     def key(self, configuration: SensorConfiguration) -> str:
         """Return a digest of all inputs of undisturbed frames."""
-        return self.simulator.key(configuration, self.runs)
+        return frames_key(self.simulator, configuration, self.runs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,15 +202,12 @@ def _results_of_run(
     region = site.simulator.static.region
     for number, frame in enumerate(disturbed_frames(site.simulator, run, configuration, disturbance)):
         yield Progress(number, len(run.times), f"{configuration.name}, {disturbance.name} {disturbance.size:g}")
-        cloud = CloudInPlan(frame.points)
         for detector, own in zip(detectors, results, strict=True):
             found = detect(detector, site.simulator.area(detector.settings.pillar), frame)
             own.append(
                 frame_result(
                     frame,
-                    cloud,
                     found,
-                    classes=tuple(CLASS_CATEGORIES.values()),
                     region=region,
                     sensors=configuration.places,
                     run=run.name,

@@ -15,6 +15,7 @@ from headless.detection.training import TrainedDetector, deterministic, train
 from headless.side_by_side import side_by_side
 from headless.studies.coverage.cells import Cell, solve_cell
 from headless.studies.detection.sensor_configuration import SensorConfiguration
+from headless.studies.simulated_recordings import recorded
 from headless.studies.site_training.training_site import TrainingSite
 
 import numpy as np
@@ -63,7 +64,7 @@ class TrainingSites:
                 recordings = replace(site, runs=runs).scans(len(self.training) // len(sites), self._random(number))
             else:
                 placement = yield from covering_most(site.geometry, self.store / f"visibility-{number}.npz")
-                recordings = [site.simulator.record(placement, run) for run in runs]
+                recordings = [recorded(site.simulator, placement, run) for run in runs]
             scans += [(site, recording) for recording in recordings]
         return scans
 

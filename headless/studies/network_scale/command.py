@@ -13,13 +13,14 @@ import time
 from pathlib import Path
 
 from headless import runtime
-from headless.network_tasks import USAGE, workers
+from headless.network_tasks import USAGE, run_jobs
 from headless.options import new_parser, whole_number
 from headless.studies.network_scale.random_network import TABLE, write_random_network
 from headless.studies.network_scale.schedule import simulated_network
 
 import numpy as np
 
+from seip_addon.core.dask_client import connected
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import SEED, Limits
 from seip_addon.core.storage.files import save_json
@@ -72,11 +73,11 @@ def main(argv: list[str]) -> None:
 
 def _overhead(number: int) -> float:
     """Return the wall-clock seconds that a task without work takes on a cluster of this machine."""
-    with workers(None, number) as cluster:
+    with connected(None, number) as client:
         jobs = [lambda: None] * EMPTY_TASKS
-        list(cluster.run(bool, jobs))  # starts the workers, which cannot import bpy: hence a built-in function
+        list(run_jobs(client, bool, jobs))  # starts the workers, which cannot import bpy: hence a built-in function
         began = time.perf_counter()
-        list(cluster.run(bool, jobs))
+        list(run_jobs(client, bool, jobs))
         return (time.perf_counter() - began) / EMPTY_TASKS
 
 

@@ -135,7 +135,7 @@ def _facts(
     bare = not geometry.occluders
     hidden = "nothing on it blocks the view" if bare else f"{len(geometry.occluders)} objects block the view"
     doubts = []
-    if any(curve.still_rises for curve in found.results.curves):
+    if any(case_study.still_rises(curve) for curve in found.results.curves):
         doubts.append(
             "Validation AP was still rising when a training ended: more --steps may change the figures of detection."
         )

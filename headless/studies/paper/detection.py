@@ -103,7 +103,7 @@ def detection_of_case(  # noqa: PLR0913  # a site, two kinds of traffic, and how
     results = StudyResults(simulator.site, simulator, traffic, tuple(models), tuple(outcomes), curves[: len(models)])
     placements = tuple(_figures(one, outcomes, on_copies) for one in configurations)
     return DetectionOfCase(
-        placements, results, detection_claims(results.seed_results), copies_rising=curves[-1].still_rises
+        placements, results, detection_claims(results.seed_results), copies_rising=case_study.still_rises(curves[-1])
     )
 
 

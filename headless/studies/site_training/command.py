@@ -113,8 +113,8 @@ class LearningSettings:
     seed : int
         Seed of random placements, and of the noise of scans.
     field_conditions : bool
-        Whether half of the frames are changed to be as recordings are (`headless.detection.field_conditions`), with
-        a rolling shutter, groups of pedestrians, and sizes changed by up to `SIZE_CHANGE` in half of the runs.
+        Whether half of the frames are changed to be as recordings are (`field_conditions.field_frame`), with a rolling
+        shutter, groups of pedestrians, and sizes changed by up to `SIZE_CHANGE` in half of the runs.
     """
 
     sensors: tuple[str, ...] = TYPES

@@ -6,11 +6,11 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from headless.detection.detection_area import DetectionArea
-from headless.detection.field_conditions import field_recording
 from headless.detection.frames import Recording
 from headless.detection.recordings import MountedSensors, SampledRun, Simulator
 from headless.studies.random_sites.companions import with_companions
 from headless.studies.random_sites.varied_bodies import resized
+from headless.studies.simulated_recordings import recorded
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.scene_geometry import SceneGeometry
 
+from .field_conditions import field_recording
 from .random_placements import random_placement
 
 SIZE_CHANGE = 0.15
@@ -54,14 +55,14 @@ class TrainingSite:
 
     def scans(self, placements: int, random: np.random.Generator) -> list[Recording]:
         """Return the scans of each run by `placements` random placements, different ones for each run."""
-        return [self.simulator.record(placed, run) for placed, run in self._drawn(placements, random)]
+        return [recorded(self.simulator, placed, run) for placed, run in self._drawn(placements, random)]
 
     def field_scans(
         self, placements: int, random: np.random.Generator, area: DetectionArea, seed: Sequence[int]
     ) -> list[Recording]:
         """Return the scans of `scans` with half of the frames as in field recordings; see `field_recording`."""
         return [
-            field_recording(self.simulator.record(placed, run), area, placed.sensors, [*seed, number])
+            field_recording(recorded(self.simulator, placed, run), area, placed.sensors, [*seed, number])
             for number, (placed, run) in enumerate(self._drawn(placements, random))
         ]
 

@@ -258,7 +258,7 @@ def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     traffic_charts.save_time_map(
         scene.charts / "time_seen.png", survey.geometry, survey.site, deployment, study.traffic, title
     )
-    traffic_charts.save_traffic_chart(scene.charts / "promise.png", [(scene.placed, study)], title)
+    traffic_charts.save_traffic_chart(scene.charts / "promise.png", study, scene.placed, title)
     return Chapter(
         f"Occlusion by traffic: {scene.placed}",
         traffic_rows(study),

@@ -14,6 +14,7 @@ from headless import runtime, survey
 from headless.options import new_parser
 from headless.studies.stability.chapters import CHAPTERS, StabilityScope, StudiedScene, chapters, introduction
 from headless.studies.stability.page import load_chapter, put_chapter, save_chapter, save_page
+from headless.studies.survey_options import add_survey_options
 
 from seip_addon.core.choosing.placement.objective import DEFAULT_COUNT, Objective, check_objective
 from seip_addon.core.errors import SeipError
@@ -80,7 +81,7 @@ def _check_other(scene: Path) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("study stability", "Find the limits of every method, and write a page with charts.")
-    survey.add_options(parser, study=True)
+    add_survey_options(parser)
     parser.add_argument(
         "--other", nargs="+", type=Path, default=[], metavar="BLEND", help="other scenes to test the detectors on"
     )

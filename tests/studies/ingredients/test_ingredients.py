@@ -23,6 +23,7 @@ from headless.studies.ingredients.variants import (
     ScanIngredients,
     with_bodies,
 )
+from headless.studies.simulated_recordings import poses_key
 from headless.studies.site_training.training_site import TrainingSite
 
 import numpy as np
@@ -176,10 +177,10 @@ def test_full_tests_have_other_sensors_and_other_sizes():
     (alone,) = unseen_tests(site, best, 1, full=False)
     same, drawn, others = unseen_tests(site, best, 1, full=True)
     assert [run.name for run, _ in alone.scanned] == [run.name for run, _ in same.scanned]
-    assert len({sensors.key for _, sensors in same.scanned}) == 1
-    assert len({sensors.key for _, sensors in drawn.scanned}) == 3
+    assert len({poses_key(sensors) for _, sensors in same.scanned}) == 1
+    assert len({poses_key(sensors) for _, sensors in drawn.scanned}) == 3
     for (before, _), (after, sensors) in zip(same.scanned, others.scanned, strict=True):
-        assert sensors.key == best.key
+        assert poses_key(sensors) == poses_key(best)
         ratios = [
             new.length / old.length
             for old, new in zip(before.trajectories.users, after.trajectories.users, strict=True)

@@ -226,7 +226,7 @@ def test_charts_are_drawn_and_the_same_twice(tmp_path, laid_out, study):
     deployment = deploy(around.site, MODELS, problem.visible[chosen], chosen)
     for name in ("one.png", "two.png"):
         save_time_map(tmp_path / name, make_geometry(80.0), around.site, deployment, found.traffic, "A title")
-        save_traffic_chart(tmp_path / f"chart {name}", [("1 × a", found), ("2 × a", found)], "A title")
+        save_traffic_chart(tmp_path / f"chart {name}", found, "2 × a", "A title")
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
     assert (tmp_path / "chart one.png").read_bytes() == (tmp_path / "chart two.png").read_bytes()
     assert imread(tmp_path / "one.png")[..., :3].std() > 0.05

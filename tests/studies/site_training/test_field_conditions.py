@@ -4,7 +4,8 @@ import math
 from dataclasses import replace
 
 from headless.detection.detection_area import area_of
-from headless.detection.field_conditions import (
+from headless.detection.frames import Recording
+from headless.studies.site_training.field_conditions import (
     ANGLE_ERROR,
     GROUND_ERROR,
     POSITION_ERROR,
@@ -18,7 +19,6 @@ from headless.detection.field_conditions import (
     with_spurious_points,
     with_uncertain_intensity,
 )
-from headless.detection.frames import Recording
 
 import numpy as np
 import pytest

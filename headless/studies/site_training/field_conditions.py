@@ -12,6 +12,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from headless.detection.detection_area import DetectionArea
+from headless.detection.frames import LazyFrames, Recording
+from headless.studies.frame_points import POINT_FIELDS, recounted, some_points
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,10 +26,6 @@ from seip_addon.core.sensing.recordings.recorded_frames import UNKNOWN_INTENSITY
 from seip_addon.core.sensing.recordings.registration import rotation_of
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame
 from seip_addon.core.sensing.scans.sensor import MountedSensor
-
-from .detection_area import DetectionArea
-from .frame_points import POINT_FIELDS, recounted, some_points
-from .frames import LazyFrames, Recording
 
 SHARE = 0.5
 """Share of the frames that are changed; detectors are also used on simulated scans."""
