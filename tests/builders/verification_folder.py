@@ -15,8 +15,7 @@ from seip_addon.core.output.results.verification_record import (
     RecordedPose,
     VerificationRecord,
 )
-from seip_addon.core.sensing.recordings.unit_gain import Gain, ReturnShare
-from seip_addon.core.sensing.recordings.verification import CoverageSteps
+from seip_addon.core.sensing.recordings.figures import CoverageSteps, Gain, ReturnShare
 from seip_addon.core.storage.files import save_json
 from seip_addon.core.storage.json_dataclass import as_json
 

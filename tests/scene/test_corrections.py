@@ -9,8 +9,9 @@ import pytest
 
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.recordings.comparison import Change
+from seip_addon.core.sensing.recordings.figures import CoverageSteps
 from seip_addon.core.sensing.recordings.registration import Registration
-from seip_addon.core.sensing.recordings.verification import CoverageSteps, Verification, VerifiedSensor
+from seip_addon.core.sensing.recordings.verification import Verification, VerifiedSensor
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.workflows.verification_record import save_changes

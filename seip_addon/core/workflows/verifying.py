@@ -25,11 +25,12 @@ from ..sensing.recordings.comparison import (
     gone_objects,
     new_objects,
 )
+from ..sensing.recordings.figures import CoverageSteps
 from ..sensing.recordings.recording import Recording
 from ..sensing.recordings.registration import Registration, register
 from ..sensing.recordings.sensor_recording import SensorRecording
 from ..sensing.recordings.unit_gain import fitted_gain, return_shares
-from ..sensing.recordings.verification import CoverageSteps, Verification, VerifiedSensor
+from ..sensing.recordings.verification import Verification, VerifiedSensor
 from ..sensing.scans.scanner import ReflectiveSurface
 from ..sensing.scans.sensor import MountedSensor
 from ..sensing.scans.static_scene import StaticScene, static_scene

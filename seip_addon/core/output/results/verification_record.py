@@ -9,8 +9,7 @@ from typing import Annotated, Literal
 
 from ... import limits
 from ...errors import SeipError
-from ...sensing.recordings.unit_gain import Gain, ReturnShare
-from ...sensing.recordings.verification import CoverageSteps
+from ...sensing.recordings.figures import CoverageSteps, Gain, ReturnShare
 from ...storage.files import read_small
 from ...storage.json_dataclass import from_json
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from ...counts import counted
-from ...sensing.recordings.verification import CoverageSteps
+from ...sensing.recordings.figures import CoverageSteps
 from ...site.locations import direction
 from .verification_record import RecordedChange, RecordedPose, VerificationRecord
 

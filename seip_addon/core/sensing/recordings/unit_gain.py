@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated
 
 import numpy as np
 
-from ... import limits
 from ...arrays import Boolean, Float, Integer
 from ...estimates import student_quantile
 from ..lidar.carla_dropoff import CarlaDropoff
@@ -18,6 +15,7 @@ from ..lidar.model import LidarModel
 from ..lidar.noisy_returns import return_chance
 from .azimuth_sectors import sector_of
 from .comparison import AGREES, NOTHING, RayComparison
+from .figures import Gain, ReturnShare
 
 RANGE_EDGES = (0.0, 10.0, 20.0, 30.0, 40.0, 60.0, 80.0, 120.0, 200.0)
 """Edges of the ranges, in metres, for which shares of returns are given."""
@@ -28,39 +26,6 @@ _STEP = 0.05  # of the logarithm of the gain, for derivatives
 _SECTORS = 12  # of azimuth
 _LEAST_RAYS = 500
 _LEAST_IN_BIN = 30
-
-
-@dataclass(frozen=True)
-class Gain:
-    """Received power of a unit as a multiple of that in its model's law, with its 95 % interval."""
-
-    value: Annotated[float, limits.GAIN]
-    low: Annotated[float, limits.GAIN]
-    high: Annotated[float, limits.GAIN]
-
-
-@dataclass(frozen=True)
-class ReturnShare:
-    """Shares of the rays that return from one kind of surface in one range.
-
-    Parameters
-    ----------
-    surface : str
-        ``road``, ``ground`` or ``objects``.
-    low, high : float, metres
-        Range.
-    rays : int
-    predicted, fitted, measured : float, 0 to 1
-        By the model's law, by the law with the unit's gain, and in the recording.
-    """
-
-    surface: str
-    low: Annotated[float, limits.DISTANCE]
-    high: Annotated[float, limits.DISTANCE]
-    rays: Annotated[int, limits.COUNT]
-    predicted: Annotated[float, limits.SHARE]
-    fitted: Annotated[float, limits.SHARE]
-    measured: Annotated[float, limits.SHARE]
 
 
 def fitted_gain(one: RayComparison) -> Gain | None:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
 
-from ... import limits
 from ...site.scene_geometry import SceneGeometry
 from .background import Background
 from .comparison import Change, RayComparison
+from .figures import CoverageSteps, Gain, ReturnShare
 from .registration import Registration
-from .unit_gain import Gain, ReturnShare
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,32 +34,6 @@ class VerifiedSensor:
     comparison: RayComparison
     gain: Gain | None
     shares: tuple[ReturnShare, ...]
-
-
-@dataclass(frozen=True)
-class CoverageSteps:
-    """Coverage of the same targets, 0 to 1, from the plan to the recording.
-
-    Parameters
-    ----------
-    promised : float
-        Planned poses, the scene, and the models.
-    pose : float
-        The same with the fitted poses.
-    obstacles : float
-        The same with the corrected scene.
-    installed : float
-        The same with the gain of each unit: what the installation covers.
-    returned : float
-        Targets with a background return within δ in the share of sweeps that detection demands. It exceeds coverage
-        where the surface differs from place to place, because one bright spot within δ is enough.
-    """
-
-    promised: Annotated[float, limits.SHARE]
-    pose: Annotated[float, limits.SHARE]
-    obstacles: Annotated[float, limits.SHARE]
-    installed: Annotated[float, limits.SHARE]
-    returned: Annotated[float, limits.SHARE]
 
 
 @dataclass(frozen=True, eq=False)

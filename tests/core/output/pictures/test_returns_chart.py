@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 from seip_addon.core.output.pictures import verification
-from seip_addon.core.sensing.recordings.unit_gain import ReturnShare
+from seip_addon.core.sensing.recordings.figures import ReturnShare
 
 
 def test_no_other_entry_of_the_key_has_the_mark_of_a_surface(monkeypatch):

@@ -22,7 +22,7 @@ from seip_addon.core.output.results.verification_text import (
     signed_points,
     summary,
 )
-from seip_addon.core.sensing.recordings.unit_gain import Gain
+from seip_addon.core.sensing.recordings.figures import Gain
 from seip_addon.core.storage.json_dataclass import as_json
 from tests.builders.verification_folder import CHANGES, STEPS, make_pose
 
