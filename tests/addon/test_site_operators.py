@@ -39,7 +39,9 @@ def test_a_map_s_junctions_are_listed(scene):
     assert scene.seip.site.radius == 30.0
 
 
-@pytest.mark.parametrize(("shape", "option"), [("APPROACHES", "--approaches"), ("CIRCLE", "--radius")])
+@pytest.mark.parametrize(
+    ("shape", "option"), [("APPROACHES", "--approaches"), pytest.param("CIRCLE", "--radius", marks=pytest.mark.slow)]
+)
 def test_the_panel_builds_what_the_batch_command_builds(scene, tmp_path, shape, option):
     site = choose(scene)
     site.junction = site.junctions[0].name

@@ -74,6 +74,7 @@ def shapes(scene):
     }
 
 
+@pytest.mark.slow
 def test_the_panel_builds_what_the_batch_command_builds_of_the_same_files(scene, street, files):
     chosen = choose(scene, street)
     chosen.osm, chosen.terrain = str(files / "around.osm"), str(files / "dem.tif")

@@ -213,6 +213,7 @@ price_usd = [2_000, 2_000]
 """
 
 
+@pytest.mark.slow
 def test_a_sensor_that_looks_one_way_is_turned_where_it_sees_most(tmp_path, run):
     (tmp_path / "mine.toml").write_text(CORNER, encoding="utf-8")
     mine = ["--catalogue", str(tmp_path / "mine.toml"), "--sensor", "corner", "--count", "2"]

@@ -59,6 +59,7 @@ def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, option
     assert any(note.startswith("this placement sees ") and note in said for note in notes)
 
 
+@pytest.mark.slow
 def test_a_risk_measure_over_traffic_is_named_and_evaluation_only_is_a_note(tmp_path, run):
     run(tmp_path / "worst", "--count", "2", "--risk", "worst")
     run(tmp_path / "none", "--count", "2", "--risk", "none")

@@ -37,6 +37,7 @@ def test_it_writes_a_result_with_the_objective_and_the_evaluation(tmp_path, caps
     assert not {*POSE_ERROR_PICTURES} & {path.name for path in tmp_path.iterdir()}
 
 
+@pytest.mark.slow
 def test_errors_that_are_only_evaluated_leave_the_placement_as_it_is(tmp_path, run):
     run(tmp_path / "nominal", "--count", "2")
     run(tmp_path / "evaluated", "--count", "2", *ERRORS, "--risk", "none")

@@ -20,6 +20,7 @@ from seip_addon.core.choosing.robustness.robust_search import BestUnderRisk
 from seip_addon.core.choosing.robustness.scenario_visibility import ScenarioVisibility
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
+from tests.few import few
 from tests.oracles.placement_oracle import all_placements, covered, small_problems
 from tests.oracles.random_cases import cases
 
@@ -117,7 +118,7 @@ def reached_at_most(problem, views, risk):
     return max(risk.of(risk.outcomes(seen[:, c], problem.weights, problem.count)) for c in apart)
 
 
-@pytest.mark.parametrize("risk", SEVERAL_LOOKS)
+@pytest.mark.parametrize("risk", few(SEVERAL_LOOKS, 3))
 @pytest.mark.parametrize("count", [4, 5])
 def test_no_placement_is_better_where_branches_are_many(risk, count):
     problem, views = crowd(3, count)
@@ -127,7 +128,7 @@ def test_no_placement_is_better_where_branches_are_many(risk, count):
     assert answer.gap == 0
 
 
-@pytest.mark.parametrize("risk", [risk for risk in RISKS if risk.seen_by == 1])
+@pytest.mark.parametrize("risk", few([risk for risk in RISKS if risk.seen_by == 1], 3))
 def test_without_time_the_bound_still_holds(risk, monkeypatch):
     monkeypatch.setattr("seip_addon.core.choosing.robustness.robust_placement.MIN_SECONDS", 1e-6)
     for seed in range(4):
@@ -139,7 +140,7 @@ def test_without_time_the_bound_still_holds(risk, monkeypatch):
         assert answer.status == "optimal" or any("search ended" in note for note in answer.notes)
 
 
-@pytest.mark.parametrize("risk", RISKS)
+@pytest.mark.parametrize("risk", few(RISKS, 5))
 def test_a_bound_that_is_lowered_goal_by_goal_still_holds(risk, monkeypatch):
     module = "seip_addon.core.choosing.robustness.robust_placement"
     monkeypatch.setattr(f"{module}.MIN_CLOSED_SHARE", 2.0)  # goals even where branching closes the gap

@@ -14,6 +14,7 @@ from seip_addon.core.world.opendrive.objects import placed_objects
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.opendrive.signals import placed_signals
 from tests.builders.opendrive_text import map_lanes
+from tests.few import few
 
 FOLDER = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[5] / "shared" / "opendrive")
 NAMES = ["Town01", "Town05", "crest-curve", "parking_demo", "stationary_objects"]
@@ -33,7 +34,7 @@ def map_file(name):
     return path
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", few(NAMES, 1))
 def test_a_real_map_has_sound_surfaces_objects_and_signals(name):
     road_map, surfaces = loaded(name)
     assert surfaces
