@@ -25,10 +25,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer
+from ...arrays import Boolean, Float, Integer, concatenated_ranges
 from ..lidar.beams import BeamPattern
 from ..lidar.model import LidarModel
-from ..visibility.beam_culling import counted
 from ..visibility.scanning import Caster
 from ..visibility.visibility_model import is_upright, yaw_of
 from .bodies import PANELS
@@ -207,7 +206,7 @@ def _channels_on(panels: PanelRows, tangent: Float) -> tuple[Integer, Integer]:
     first = np.searchsorted(tangent, panels.low, "left")
     count = np.maximum(np.searchsorted(tangent, panels.high, "right") - first, 0)
     item = np.repeat(np.arange(len(first)), count)
-    return item, counted(first, count)
+    return item, concatenated_ranges(first, count)
 
 
 def _wanted(row: Integer, first: Integer, count: Integer, rows: int, steps: int) -> Boolean:
@@ -249,7 +248,7 @@ def _at_least(values: Float, row: Integer, first: Integer, count: Integer, least
     partly = np.flatnonzero(smallest < least)
     if len(partly):
         own = count[partly]
-        place = counted(row[partly] * values.shape[1] + first[partly], own)
+        place = concatenated_ranges(row[partly] * values.shape[1] + first[partly], own)
         reaches = values.ravel()[place] >= np.repeat(least[partly], own)
         number[partly] = np.add.reduceat(reaches, np.cumsum(own) - own, dtype=np.int64)
     return number
@@ -272,7 +271,7 @@ def _rays_on(panels: PanelRows, azimuth: Float, rise: Float) -> tuple[Integer, I
     found = []
     for part in np.array_split(np.arange(len(first)), max(1, math.ceil(count.sum() / _PAIRS_AT_ONCE))):
         item = np.repeat(part, count[part])
-        ray = counted(first[part], count[part]) % len(azimuth)
+        ray = concatenated_ranges(first[part], count[part]) % len(azimuth)
         on = (rise[ray] >= panels.low[item]) & (rise[ray] <= panels.high[item])
         found.append((item[on], ray[on]))
     items, rays = zip(*found, strict=True)

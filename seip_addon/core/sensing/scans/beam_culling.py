@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 
-from ...arrays import Float, Integer
+from ...arrays import Float, Integer, concatenated_ranges
 from ..lidar.azimuth_steps import steps_in_arcs
 from ..lidar.model import LidarModel
-from ..visibility.beam_culling import counted
 
 
 class BeamWindows:
@@ -53,7 +52,7 @@ class BeamWindows:
         )
         # An arc may run over step 0 of an all-round channel: its steps wrap. The rows of a hull in a channel have no
         # step in common, so that no ray comes twice for a hull.
-        steps = counted(first, count) % self._steps
+        steps = concatenated_ranges(first, count) % self._steps
         return np.repeat(hull[arc], count), np.repeat(channel[arc] * self._steps, count) + steps
 
     def _channels_at(self, points: Float, near: Float) -> tuple[Integer, Integer]:
@@ -69,7 +68,7 @@ class BeamWindows:
         count = np.maximum(np.searchsorted(self._slope, most, side="right") - low, 0)
         # hulls out of range are left out: no ray towards them can hit anything in them
         count[near > self._reach] = 0
-        return np.repeat(np.arange(len(points)), count), self._channel[counted(low, count)]
+        return np.repeat(np.arange(len(points)), count), self._channel[concatenated_ranges(low, count)]
 
 
 def _azimuths(points: Float) -> tuple[Float, Float, Float]:

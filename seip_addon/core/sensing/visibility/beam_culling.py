@@ -30,7 +30,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer
+from ...arrays import Boolean, Float, Integer, concatenated_ranges
 from ..lidar.azimuth_steps import steps_in_arcs
 from ..lidar.model import DetectionLaw, LidarModel
 from .near_surfaces import NearSurfaces
@@ -374,7 +374,7 @@ def _channels_at(beams: Beams, patches: Patches) -> tuple[Integer, Integer]:
     low = np.searchsorted(slopes, least)
     count = np.searchsorted(slopes, most, side="right") - low
     count = np.where((patches.bottom <= patches.top) & (near <= beams.max_range.max()), np.maximum(count, 0), 0)
-    return np.repeat(np.arange(len(count)), count), order[counted(low, count)]
+    return np.repeat(np.arange(len(count)), count), order[concatenated_ranges(low, count)]
 
 
 def _between_heights(slope: Float, bottom: Float, top: Float) -> tuple[Float, Float]:
@@ -445,9 +445,3 @@ def _cut_by_planes(arcs: _Arcs, planes: Planes) -> _Arcs:
 def _polar(xyz: Float) -> tuple[Float, Float]:
     """Return azimuth and length in plan of vectors (n, 3)."""
     return np.arctan2(xyz[:, 1], xyz[:, 0]), np.hypot(xyz[:, 0], xyz[:, 1])
-
-
-def counted(first: Integer, count: Integer) -> Integer:
-    """Return the concatenated ranges of ``count`` whole numbers from each ``first`` on."""
-    numbers: Integer = np.arange(count.sum()) + np.repeat(first - (np.cumsum(count) - count), count)
-    return numbers

@@ -24,10 +24,10 @@ from typing import Protocol
 
 import numpy as np
 
-from ...arrays import Boolean, Float, Integer
+from ...arrays import Boolean, Float, Integer, concatenated_ranges
 from ..lidar.beams import BeamPattern
 from ..lidar.model import LidarModel
-from .beam_culling import Beams, NearRays, counted, disc_patches, may_return, near_rays, target_patches
+from .beam_culling import Beams, NearRays, disc_patches, may_return, near_rays, target_patches
 from .near_surfaces import NearSurfaces
 from .occlusion import stopped_by
 from .ray_culling import rays_near
@@ -122,7 +122,7 @@ class ScanPosition:
         count = np.searchsorted(cuts.target, target, side="right") - first
         turn = np.cumsum(count) // _PAIRS_AT_ONCE
         for rays in np.split(np.arange(len(target)), np.flatnonzero(np.diff(turn)) + 1):
-            ray, cut = np.repeat(rays, count[rays]), counted(first[rays], count[rays])
+            ray, cut = np.repeat(rays, count[rays]), concatenated_ranges(first[rays], count[rays])
             there = cuts.pick(cut).holds((self.origin + distance[:, None] * directions)[ray], surfaces.tolerance)
             ray, cut = ray[there], cut[there]
             # Where surfaces meet it is chance which of their triangles the caster reports. With the weakest of all
