@@ -2,6 +2,8 @@
 
 The same file runs as ``blender -b … -P headless/x.py -- arguments`` in the
 real program and as ``python -m headless.x arguments`` on the bpy module.
+
+`tests/headless/test_runtime.py` shows its use.
 """
 
 import logging

@@ -1,4 +1,7 @@
-"""Ground truth and detections of one frame, with the attributes by which errors are broken down."""
+"""Ground truth and detections of one frame, with the attributes by which errors are broken down.
+
+`tests/detection/test_frame_results.py` shows its use.
+"""
 
 from dataclasses import dataclass
 

@@ -57,6 +57,18 @@ class NetworkSettings:
         ``anchor``: anchor boxes at 0 and 90 degrees in each cell (Lang et al. 2019).
     padded : bool
         Whether pillars are filled up with zero points that are not masked, as an ablation.
+
+    Examples
+    --------
+    >>> network = NetworkSettings(pillar=0.4, head="anchor")
+    >>> round(network.pillar * GRID_STRIDE, 2)  # metres of road in a cell of the coarsest feature map
+    3.2
+    >>> [CLASSES[CLASS_OF[category]] for category in ("van", "bus", "bicycle")]
+    ['car', 'truck', 'cycle']
+    >>> NetworkSettings(pillar=5.0)
+    Traceback (most recent call last):
+    ...
+    seip_addon.core.errors.SeipError: detector: a pillar must be 0.05 to 2 m wide
     """
 
     pillar: float = setting(0.32, "side of a pillar in metres", unit="m", minimum=0.05, maximum=2.0, metavar="M")

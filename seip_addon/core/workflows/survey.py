@@ -61,6 +61,24 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
     ------
     SeipError
         Same as for `SurveySettings.models` and `make_site`.
+
+    Examples
+    --------
+    A street of 40 by 10 m with a lamp, and nothing that could hide a part of it:
+
+    >>> import shapely
+    >>> from seip_addon.core.site.candidates import CandidateSettings
+    >>> from seip_addon.core.site.scene_geometry import Mesh, Pole
+    >>> corners = np.array([[-20.0, -5.0, 0.0], [20.0, -5.0, 0.0], [20.0, 5.0, 0.0], [-20.0, 5.0, 0.0]])
+    >>> street = Mesh("street", corners[[[0, 1, 2], [0, 2, 3]]])
+    >>> lamp = Pole("lamp", np.array([0.0, 6.0, 0.0]))
+    >>> region = shapely.box(-20, -5, 20, 5)
+    >>> geometry = SceneGeometry("Mill Lane", np.zeros(3), (street,), (), (), region, poles=(lamp,))
+    >>> layout = lay_out(geometry, SurveySettings(CandidateSettings(sensors=("type3",), heights=(5.0, 8.0))))
+    >>> len(layout.site.targets), len(layout.site.candidates), list(layout.models)
+    (400, 2, ['type3'])
+    >>> layout.warnings[0].partition(":")[0]
+    'nothing in this scene can hide anything'
     """
     models = settings.models()
     reach = settings.reach(models)

@@ -41,7 +41,18 @@ class TrafficRuns:
 
 
 def split_runs(runs: Sequence[_Run]) -> tuple[list[_Run], list[_Run]]:
-    """Return the runs to optimise on, and those to evaluate on."""
+    """Return the runs to optimise on, and those to evaluate on.
+
+    Examples
+    --------
+    >>> folder = traffic_folder(Path("junction.blend"))
+    >>> folder.mkdir()
+    >>> for number in range(1, 11):
+    ...     (folder / f"run-{number}.npz").touch()
+    >>> optimisation, evaluation = split_runs(found_runs(folder))
+    >>> len(optimisation), [path.stem for path in evaluation]
+    (7, ['run-8', 'run-9', 'run-10'])
+    """
     last = max(1, round(EVALUATION_SHARE * len(runs)))
     return list(runs[:-last]), list(runs[-last:])
 

@@ -213,6 +213,15 @@ def criterion_of(objective: Objective, models: Mapping[str, LidarModel]) -> Lite
     Coverage of the road predicts detection where every return counts, as for the sensors of the SEIP paper. Sensors
     with a range law detect vehicles at several times the distance of asphalt: for these, the returns from road users
     are the better predictor.
+
+    Examples
+    --------
+    >>> from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
+    >>> models = find_models(load_catalogue(), ["os1_128"])
+    >>> criterion_of(Objective(count=4, forbidden=("Pole 7",)), models)
+    'returns'
+    >>> criterion_of(Objective(coverage=0.9), models)
+    'road'
     """
     if objective.criterion != "auto":
         return objective.criterion

@@ -143,6 +143,26 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
     ------
     SeipError
         No candidate sees any target of positive weight.
+
+    Examples
+    --------
+    A lamp, and a mast with two heights, of which the higher one sees nothing more and is left out. The same candidates
+    see the first two targets, which are merged. Weights become whole numbers.
+
+    >>> problem = PlacementProblem(
+    ...     visible=np.array([[1, 1, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1]], dtype=bool),
+    ...     weights=np.array([0.5, 0.5, 1.0, 2.0]),
+    ...     prices=np.full(3, 9000.0),
+    ...     positions=np.array([0, 1, 1]),
+    ...     xyz=np.array([[0.0, 6.0, 5.0], [30.0, 6.0, 5.0], [30.0, 6.0, 8.0]]),
+    ...     labels=np.array(["os1_128"] * 3),
+    ...     count=1,
+    ... )
+    >>> instance, factor = make_instance(problem)
+    >>> instance.visible.tolist(), instance.weight.tolist(), factor
+    ([[False, True], [True, False]], [6.0, 2.0], 2.0)
+    >>> instance.value(np.array([1])) / factor
+    3.0
     """
     order = canonical_order(problem)
     order = order[problem.allowed[order]]

@@ -32,6 +32,13 @@ class SolverLimits:
         result on every machine. Default: `DEFAULT_EFFORT`, or no limit where there is a time limit.
     acceptance : Acceptance, optional
         User's request to end the search early.
+
+    Examples
+    --------
+    >>> clock = SolverLimits(effort=2.0).clock()
+    >>> clock.spend(0.5 * OPERATIONS_PER_UNIT)
+    >>> round(clock.left, 1), round(clock.part(0.6).left, 1)
+    (1.5, 0.6)
     """
 
     solver: str = "highs"
