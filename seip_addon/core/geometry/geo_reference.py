@@ -121,6 +121,16 @@ class GeoReference:
         Projection as written in the map, or "".
     header_offset : (4,) float
         Offset from map coordinates x, y, z (metres) to projected ones, and a heading (radians).
+
+    Examples
+    --------
+    A point of a map of Munich whose zero is at 691 km east and 5,334 km north in UTM zone 32:
+
+    >>> reference = GeoReference("+proj=utm +zone=32 +datum=WGS84", (691_000.0, 5_334_000.0, 0.0, 0.0))
+    >>> reference.geographic(np.array([[1103.0, 605.0, 515.0]])).round(4).tolist()
+    [[11.5821, 48.1357, 515.0]]
+    >>> GeoReference("EPSG:31468").obstacle
+    "the projection of the scene's map, 'EPSG:31468', is not supported"
     """
 
     projection: str = ""

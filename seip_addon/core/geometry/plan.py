@@ -96,6 +96,17 @@ def surface_height(plan: Float, triangles: Float) -> Float:
     -------
     (n,) float64, metres
         Heights, NaN if no triangle lies above or below the point.
+
+    Examples
+    --------
+    A ramp that climbs from 0 to 1 m over 20 m, at a point halfway up and at one beside it:
+
+    >>> corners = np.array([[0.0, 0.0, 0.0], [20.0, 0.0, 1.0], [20.0, 4.0, 1.0], [0.0, 4.0, 0.0]])
+    >>> ramp = corners[[[0, 1, 2], [0, 2, 3]]]
+    >>> surface_height(np.array([[10.0, 3.0], [10.0, 6.0]]), ramp).tolist()
+    [0.5, nan]
+    >>> outline(ramp).area
+    80.0
     """
     point, heights = heights_over(plan, triangles)
     height = np.full(len(plan), -np.inf)

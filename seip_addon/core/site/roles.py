@@ -1,4 +1,7 @@
-"""Roles of objects in a scene: the collections of the scene contract."""
+"""Roles of objects in a scene: the collections of the scene contract.
+
+`tests/scene/test_roles.py` shows its use.
+"""
 
 from enum import Enum
 

@@ -43,6 +43,16 @@ def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, Li
     ------
     SeipError
         A file cannot be read, or a model in it is invalid.
+
+    Examples
+    --------
+    >>> model = find_models(load_catalogue(), ["os1_128"])["os1_128"]
+    >>> model.name, len(model.elevations), model.max_range
+    ('OS1-128', 128, 120.0)
+    >>> find_models(load_catalogue(), ["os1_218"])
+    Traceback (most recent call last):
+    ...
+    seip_addon.core.errors.SeipError: no LiDAR 'os1_218' in the catalogue; did you mean os1_128, os2_128, os0_128?
     """
     catalogue = dict(_shipped())
     for path in map(Path, extra):

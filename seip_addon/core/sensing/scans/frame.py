@@ -105,6 +105,37 @@ class Frame:
     foreground : (n,) bool
         Whether the point is nearer than the same ray's hit in the empty scene, by more than the noise: the points that
         remain after background subtraction.
+
+    Examples
+    --------
+    Three points, two of which are on a car:
+
+    >>> car = Labels(
+    ...     user=np.array([7]),
+    ...     category=np.array(["car"]),
+    ...     centre=np.array([[12.0, 3.0, 0.75]]),
+    ...     size=np.array([[4.5, 1.8, 1.5]]),
+    ...     yaw=np.zeros(1),
+    ...     pitch=np.zeros(1),
+    ...     speed=np.array([8.3]),
+    ...     points=np.array([[2]]),
+    ...     visibility=np.array([0.5]),
+    ...     inside=np.array([True]),
+    ... )
+    >>> frame = Frame(
+    ...     time=30.0,
+    ...     points=np.array([[9.75, 3.0, 0.5], [9.75, 3.25, 1.0], [20.0, 3.0, 0.0]], dtype=np.float32),
+    ...     sensor=np.zeros(3, dtype=np.int16),
+    ...     delay=np.zeros(3, dtype=np.float32),
+    ...     intensity=np.full(3, 0.5, dtype=np.float32),
+    ...     instance=np.array([7, 7, STATIC_INSTANCE], dtype=np.int32),
+    ...     foreground=np.array([True, True, False]),
+    ...     labels=car,
+    ... )
+    >>> frame.save("frame.npz")
+    >>> read = Frame.load("frame.npz")
+    >>> read.points[read.instance == read.labels.user[0]].tolist()
+    [[9.75, 3.0, 0.5], [9.75, 3.25, 1.0]]
     """
 
     time: float

@@ -137,6 +137,24 @@ class Trajectories:
         Speed at each sample.
     source : str
         Source for messages: the file, or the simulation and its seed.
+
+    Examples
+    --------
+    A car that drives east and a bus that drives west, with two samples each:
+
+    >>> run = Trajectories(
+    ...     users=(RoadUser("car 1", "car", 4.5, 1.8, 1.5), RoadUser("bus 1", "bus", 12.0, 2.5, 3.2)),
+    ...     origin=np.zeros(3),
+    ...     first=np.array([0, 2, 4]),
+    ...     time=np.array([0.0, 4.0, 3.0, 9.0]),
+    ...     position=np.array([[0.0, -2.0, 0.0], [40.0, -2.0, 0.0], [60.0, 2.0, 0.0], [0.0, 2.0, 0.0]]),
+    ...     yaw=np.array([0.0, 0.0, np.pi, np.pi]),
+    ...     pitch=np.zeros(4),
+    ...     speed=np.full(4, 10.0),
+    ... )
+    >>> present = run.at(3.0)
+    >>> [run.users[number].category for number in present.user], present.position[:, 0].tolist()
+    (['car', 'bus'], [30.0, 60.0])
     """
 
     users: tuple[RoadUser, ...]

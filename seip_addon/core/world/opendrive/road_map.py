@@ -275,6 +275,21 @@ class RoadMap:
         Junctions in the order of the file.
     attribution : tuple of str
         Credits in the header's ``<userData code="attribution">``.
+
+    Examples
+    --------
+    A road of 100 m along x that climbs by 5 %, and the point 3.5 m to the right of it after 40 m:
+
+    >>> from pathlib import Path
+    >>> from seip_addon.core.world.opendrive.read import read_map
+    >>> text = '''<OpenDRIVE><header name="Mill Lane"/><road id="1">
+    ... <planView><geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry></planView>
+    ... <elevationProfile><elevation s="0" a="2" b="0.05" c="0" d="0"/></elevationProfile>
+    ... <lanes><laneSection s="0"/></lanes></road></OpenDRIVE>'''
+    >>> _ = Path("lane.xodr").write_text(text, encoding="utf-8")
+    >>> (road,) = read_map("lane.xodr").roads
+    >>> road.length, road.place(np.array([40.0]), np.array([-3.5])).round(3).tolist()
+    (100.0, [[40.0, -3.5, 4.0]])
     """
 
     name: str

@@ -385,6 +385,21 @@ def describe_place(
     ------
     SeipError
         See `read_site_description`; or no map is named, or a number is invalid.
+
+    Examples
+    --------
+    >>> text = '''
+    ... map = "town.xodr"
+    ... junction = "Mill Lane"
+    ... [[tree]]
+    ... from = [0, 8]
+    ... to = [20, 8]
+    ... spacing = 10
+    ... '''
+    >>> _ = Path("site.toml").write_text(text, encoding="utf-8")
+    >>> map_path, description = describe_place(Path("site.toml"), approaches=60.0)
+    >>> map_path.name, description.along, description.trees[0].positions.tolist()
+    ('town.xodr', 60.0, [[0.0, 8.0], [10.0, 8.0], [20.0, 8.0]])
     """
     described = _described(source, site)
     map_path = described.map
