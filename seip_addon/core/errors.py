@@ -1,4 +1,7 @@
-"""`SeipError`, the exception for mistakes that a user can correct."""
+"""`SeipError`, the exception for mistakes that a user can correct.
+
+`tests/core/test_errors.py` shows its use.
+"""
 
 _MAX_LENGTH = 1000
 

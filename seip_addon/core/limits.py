@@ -30,6 +30,16 @@ class Limits:
     least, most : float
     unit : str
         Unit for messages, or "" for none.
+
+    Examples
+    --------
+    >>> height = Limits(0.01, 1_000.0, "m")
+    >>> height.allow([3.5, 8.0])
+    True
+    >>> height.require([3.5, -2.0], "site.toml", "height")
+    Traceback (most recent call last):
+    ...
+    seip_addon.core.errors.SeipError: site.toml: height is -2, not 0.01 to 1,000 m; correct it
     """
 
     least: float

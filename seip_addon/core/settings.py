@@ -42,7 +42,17 @@ def setting(default: Any, help: str, **about: Any) -> Any:  # noqa: A002, ANN401
 
 
 def settings_of(kind: type) -> dict[str, tuple[Setting, Any]]:
-    """Return the settings of a dataclass with their defaults, by field name."""
+    """Return the settings of a dataclass with their defaults, by field name.
+
+    Examples
+    --------
+    >>> @dataclass(frozen=True)
+    ... class GridSettings:
+    ...     spacing: float = setting(1.0, "distance between neighbouring targets", unit="m", minimum=0.1)
+    >>> about, default = settings_of(GridSettings)["spacing"]
+    >>> f"{about.help}, at least {about.minimum} {about.unit}", default
+    ('distance between neighbouring targets, at least 0.1 m', 1.0)
+    """
     return {
         each.name: (each.metadata[_KEY], None if each.default is MISSING else each.default)
         for each in fields(kind)

@@ -268,6 +268,14 @@ def save_json(path: str | os.PathLike[str], value: object) -> None:
         The value contains a number that is not finite, which JSON cannot represent.
     SeipError
         The folder or the file cannot be written.
+
+    Examples
+    --------
+    >>> save_json("out/run.json", {"coverage": 0.89, "sensors": ["type1", "type3"]})
+    >>> parse_json(Path("out/run.json").read_bytes())["coverage"]
+    0.89
+    >>> [path.name for path in Path("out").iterdir()]  # no unfinished file is left
+    ['run.json']
     """
     text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
     with whole_file(path) as temporary:

@@ -1,4 +1,7 @@
-"""``placement.json`` as a file, and as the text that a scene keeps."""
+"""``placement.json`` as a file, and as the text that a scene keeps.
+
+`tests/core/output/results/test_placement_record.py` shows its use.
+"""
 
 import json
 import math

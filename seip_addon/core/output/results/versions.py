@@ -11,7 +11,16 @@ MANIFEST = Path(__file__).parents[4] / "blender_manifest.toml"
 
 
 def versions(**more: str) -> dict[str, str]:
-    """Return the versions of this program, of Python and of the libraries that results stand on, and ``more``."""
+    """Return the versions of this program, of Python and of the libraries that results stand on, and ``more``.
+
+    Examples
+    --------
+    >>> stated = versions(blender="4.5.3")
+    >>> stated["python"] == platform.python_version(), stated["blender"]
+    (True, '4.5.3')
+    >>> {"seip", "numpy", "shapely"} <= stated.keys()
+    True
+    """
     if MANIFEST.is_file():
         program = tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"]
     else:  # installed by pip
