@@ -1,4 +1,7 @@
-"""Add-on preferences, for all files."""
+"""Add-on preferences, for all files.
+
+`tests/addon/test_sensor_types.py` shows its use.
+"""
 
 import sys
 from functools import lru_cache

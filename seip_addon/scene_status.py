@@ -1,4 +1,7 @@
-"""Status of a scene: what keeps it from being surveyed, and whether what is known of it is stale."""
+"""Status of a scene: what keeps it from being surveyed, and whether what is known of it is stale.
+
+`tests/addon/test_staleness.py` shows its use.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Base classes of operators: error reports, and modal operators whose work runs in a thread and can be stopped."""
+"""Base classes of operators: error reports, and modal operators whose work runs in a thread and can be stopped.
+
+`tests/addon/test_wrong_states.py` shows its use.
+"""
 
 from __future__ import annotations
 

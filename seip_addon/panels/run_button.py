@@ -1,4 +1,7 @@
-"""Button of a long operator, which shows its progress while it runs."""
+"""Button of a long operator, which shows its progress while it runs.
+
+`tests/window/tutorial.py` shows its use.
+"""
 
 from __future__ import annotations
 

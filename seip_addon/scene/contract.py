@@ -1,4 +1,7 @@
-"""Names of collections and custom properties in the scene contract, which docs/architecture.md describes."""
+"""Names of collections and custom properties in the scene contract, which docs/architecture.md describes.
+
+`tests/scene/test_read.py` shows its use.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Read a scene into arrays: evaluated meshes by collection."""
+"""Read a scene into arrays: evaluated meshes by collection.
+
+`tests/scene/test_read.py` shows its use.
+"""
 
 from __future__ import annotations
 
