@@ -1,4 +1,7 @@
-"""Command-line options, made from the settings that they set."""
+"""Command-line options, made from the settings that they set.
+
+`tests/headless/test_options.py` shows its use.
+"""
 
 from __future__ import annotations
 

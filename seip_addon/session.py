@@ -2,6 +2,8 @@
 
 None of it is needed to go on: the file keeps what was asked and found, and the cache keeps visibility. Scenes are named
 by their session number, as undo and redo put another Python object in place of each.
+
+`tests/addon/test_staleness.py` shows its use.
 """
 
 import time

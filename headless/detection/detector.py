@@ -66,6 +66,14 @@ class Detector(nn.Module):
         Seed of the initial weights.
     training_record : TrainingRecord
         Sensor types and sites in its training.
+
+    Examples
+    --------
+    >>> detector = Detector(NetworkSettings(width=8, blocks=(0, 0, 0)), training_record=TrainingRecord(("vlp16",)))
+    >>> detector.save("detector.pt")
+    >>> read = Detector.load("detector.pt")
+    >>> read.key == detector.key, read.settings.width, read.training_record.sensors
+    (True, 8, ('vlp16',))
     """
 
     def __init__(

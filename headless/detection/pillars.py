@@ -143,6 +143,16 @@ def fill_pillars(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Pi
         x, y, z (metres), intensity.
     most : int
         Points that a pillar keeps.
+
+    Examples
+    --------
+    >>> grid = grid_over((0.0, 0.0, 10.0, 5.0), heights=(-1.0, 4.5), pillar=0.5)
+    >>> cloud = [(9.0, 4.0, 1.0, 0.5), (0.125, 0.125, 0.5, 0.2), (0.25, 0.25, 1.0, 0.2), (99.0, 0.0, 0.0, 0.1)]
+    >>> pillars = fill_pillars(np.array(cloud, dtype=np.float32), grid, most=16)
+    >>> pillars.pillar.tolist(), pillars.features[:, 0].tolist()
+    ([74, 74, 284], [0.75, 1.0, 1.0])
+    >>> sorted(pillars.chosen.tolist())
+    [0, 1, 2]
     """
     chosen, pillar = _choose(points, grid, most)
     kept = points[chosen]

@@ -14,6 +14,11 @@ def counted(number: int, one: str, several: str = "") -> str:
         Singular, with all words that depend on the number: "outline that crosses itself".
     several : str, optional
         Plural, also used for zero; by default ``one`` with an "s".
+
+    Examples
+    --------
+    >>> counted(1, "sensor"), counted(1200, "crossing"), counted(0, "body", "bodies")
+    ('1 sensor', '1,200 crossings', '0 bodies')
     """
     return f"{number:,} {one if number == 1 else several or f'{one}s'}"
 

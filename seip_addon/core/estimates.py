@@ -64,6 +64,14 @@ def mean_of(values: Float) -> IntervalEstimate:
     ----------
     values : (n,) float64
         Independent draws.
+
+    Examples
+    --------
+    >>> coverage = mean_of(np.array([0.80, 0.82, 0.84, 0.82]))
+    >>> coverage.describe()
+    '82.00% [80.40%, 83.60%]'
+    >>> coverage.agrees_with(mean_of(np.array([0.70, 0.72, 0.74, 0.72])))
+    False
     """
     mean = math.fsum(values) / len(values)
     several = len(values) > 1

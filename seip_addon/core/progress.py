@@ -72,7 +72,19 @@ class Pace:
 
 
 def finish(steps: Generator[Progress, None, Result], report: Callable[[Progress], object] | None = None) -> Result:
-    """Run work to its end, calling ``report`` at each step, and return its result."""
+    """Run work to its end, calling ``report`` at each step, and return its result.
+
+    Examples
+    --------
+    >>> def total(prices):
+    ...     for done in range(len(prices)):
+    ...         yield Progress(done, len(prices), "adding")
+    ...     return sum(prices)
+    >>> finish(total([4_000, 8_000]), report=lambda progress: print(progress.done, "of", progress.total))
+    0 of 2
+    1 of 2
+    12000
+    """
     while True:
         try:
             progress = next(steps)

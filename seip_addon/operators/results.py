@@ -1,4 +1,7 @@
-"""Operators on results: inspect, compare, move sensors, export."""
+"""Operators on results: inspect, compare, move sensors, export.
+
+`tests/addon/test_results_operators.py` shows its use.
+"""
 
 from __future__ import annotations
 

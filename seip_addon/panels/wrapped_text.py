@@ -1,4 +1,7 @@
-"""Wrapped text for the sidebar."""
+"""Wrapped text for the sidebar.
+
+`tests/addon/test_front_door.py` shows its use.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Conversion between Blender's properties and the settings of the core."""
+"""Conversion between Blender's properties and the settings of the core.
+
+`tests/addon/test_sensor_types.py` shows its use.
+"""
 
 from __future__ import annotations
 

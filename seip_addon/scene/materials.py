@@ -1,4 +1,7 @@
-"""Sober materials for a street, its traffic and its sensors: one colour each, for renders and for the viewport."""
+"""Sober materials for a street, its traffic and its sensors: one colour each, for renders and for the viewport.
+
+`tests/scene/test_read.py` shows its use.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Sensors in the scene: empties in ``SEIP Sensors``."""
+"""Sensors in the scene: empties in ``SEIP Sensors``.
+
+`tests/scene/test_sensors.py` shows its use.
+"""
 
 from __future__ import annotations
 

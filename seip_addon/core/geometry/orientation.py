@@ -47,7 +47,16 @@ def orientations(yaw: Float, tilt: Float, roll: Float) -> Float:
 
 
 def orientation(yaw: float, tilt: float, roll: float = 0.0) -> Float:
-    """Return the rotation of one sensor, (3, 3) float64; see `orientations`."""
+    """Return the rotation of one sensor, (3, 3) float64; see `orientations`.
+
+    Examples
+    --------
+    >>> north = orientation(yaw=math.radians(90.0), tilt=math.radians(10.0))
+    >>> (north @ [1.0, 0.0, 0.0]).round(3).tolist()
+    [0.0, 0.985, -0.174]
+    >>> [round(math.degrees(angle), 6) for angle in angles_of(north)]
+    [90.0, 10.0, 0.0]
+    """
     return orientations(np.array(yaw), np.array(tilt), np.array(roll))
 
 

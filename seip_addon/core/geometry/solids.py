@@ -54,7 +54,17 @@ def prism(outline: Float, base: float, top: float, *, side: str) -> Solid:
 
 
 def block(base: Float, height: Float, *, side: str, cap: str | None = None) -> Solid:
-    """Return the solid between an outline (k, 3) and the same outline raised by (k,) metres."""
+    """Return the solid between an outline (k, 3) and the same outline raised by (k,) metres.
+
+    Examples
+    --------
+    >>> base = np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [8.0, 5.0, 0.0], [0.0, 5.0, 0.0]])
+    >>> house = block(base, height=np.full(4, 6.0), side="wall", cap="roof")
+    >>> house.materials
+    ('wall', 'wall', 'wall', 'wall', 'roof', 'wall')
+    >>> house.vertices[list(house.faces[4])].tolist()
+    [[0.0, 0.0, 6.0], [8.0, 0.0, 6.0], [8.0, 5.0, 6.0], [0.0, 5.0, 6.0]]
+    """
     turned = signed_area(base) < 0
     ring, tall = (base[::-1], height[::-1]) if turned else (base, height)
     count = len(ring)

@@ -278,6 +278,17 @@ def generate_candidates(geometry: SceneGeometry, settings: CandidateSettings) ->
     ------
     SeipError
         No candidate is left (with the reasons), or a mandatory pole or area has none.
+
+    Examples
+    --------
+    >>> from seip_addon.core.site.scene_geometry import Mesh
+    >>> road = np.array([[(0, 0, 0), (40, 0, 0), (40, 8, 0)], [(0, 0, 0), (40, 8, 0), (0, 8, 0)]], dtype=float)
+    >>> lamp = Pole("lamp 1", np.array([20.0, -1.0, 0.0]), height=8.0)
+    >>> region = shapely.box(0.0, 0.0, 40.0, 8.0)
+    >>> scene = SceneGeometry("street", np.zeros(3), (Mesh("road", road),), (), (), region, poles=(lamp,))
+    >>> candidates = generate_candidates(scene, CandidateSettings(sensors=("vlp16",), heights=(5.0, 12.0)))
+    >>> candidates.position_name.tolist(), candidates.xyz.round(6).tolist(), candidates.dropped
+    (['lamp 1'], [[20.0, -0.6, 5.0]], {'higher than the pole': 1})
     """
     dropped: dict[str, int] = {}
     foot, axis_offset, top, name, source, on_pole = _positions(geometry, settings, dropped)

@@ -157,6 +157,17 @@ class SceneGeometry:
         Streets and crossings of the map in plan; used only to name them in results.
     attribution : tuple of str
         Credits required by the sources of the scene, which results repeat.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> road = np.array([[(0, 0, 0), (40, 0, 0), (40, 8, 0)], [(0, 0, 0), (40, 8, 0), (0, 8, 0)]], dtype=float)
+    >>> lanes = Mesh("Lane 1", road, source=FROM_MAP), Mesh("Lane 2", road + [0.0, 8.0, 0.0], source=FROM_MAP)
+    >>> scene = SceneGeometry("street", np.zeros(3), lanes, (), (), region=shapely.box(0.0, 0.0, 40.0, 16.0))
+    >>> joined(scene.roads).shape
+    (4, 3, 3)
+    >>> [(each.kind, each.source, each.count) for each in scene.sources()]
+    [('Lane', 'map', 2)]
     """
 
     name: str

@@ -92,6 +92,15 @@ class ArrayFile:
         Whether arrays are deflated; noisy measurements hardly compress.
     undigested : bool
         Whether files of version 1 are read as well. Other versions are rejected.
+
+    Examples
+    --------
+    >>> rules = {"heights": ArrayRule("f8", ("n",), Limits(0.0, 100.0))}
+    >>> profile = ArrayFile("example.heights", 1, "profile of heights", "measure it again", rules)
+    >>> profile.save("heights.npz", {"spacing": 4.0}, {"heights": np.array([0.0, 3.5, 8.0])})
+    >>> with profile.reading("heights.npz") as (header, arrays):
+    ...     print(header["spacing"], arrays["heights"].tolist())
+    4.0 [0.0, 3.5, 8.0]
     """
 
     schema: str

@@ -43,6 +43,15 @@ def from_json(kind: type[Value], content: object, where: str = "") -> Value:
     ------
     ValueError
         A field without a default is missing, or a value is not of its field's type, not finite, or beyond its limits.
+
+    Examples
+    --------
+    >>> from seip_addon.core.choosing.placement.returns_summary import CrossingReturns
+    >>> from_json(CrossingReturns, {"name": "Main Street", "least": 12.5})
+    CrossingReturns(name='Main Street', least=12.5)
+    >>> from_json(CrossingReturns, {"name": "Main Street", "least": "many"}, "crossings[0]")
+    Traceback (most recent call last):
+    ValueError: crossings[0].least must be a number, not 'many'
     """
     read: Value = _read(kind, content, where)
     return read

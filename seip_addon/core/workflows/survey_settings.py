@@ -44,6 +44,16 @@ class SurveySettings:
         Cost of installation to include in every price; by default prices are those of sensors only.
     spacings_because : str
         Reason for the spacings of targets and candidates; empty if the user chose them.
+
+    Examples
+    --------
+    >>> candidates = CandidateSettings(sensors=("type1", "vlp16"), tilts=(math.radians(12.0),))
+    >>> settings = SurveySettings(candidates, grid_spacing=2.0)
+    >>> models = settings.models()
+    >>> list(models), settings.reach(models)
+    (['type1', 'vlp16'], 101.0)
+    >>> settings.as_record()["candidates"]["tilts_deg"]
+    [12.0]
     """
 
     candidates: CandidateSettings = field(default_factory=CandidateSettings)

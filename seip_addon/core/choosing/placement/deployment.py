@@ -225,6 +225,25 @@ def deploy(site: Site, models: Mapping[str, LidarModel], rows: Boolean, chosen: 
         Visibility of each target from each chosen pose.
     chosen : (k,) int
         Indices of the chosen poses; their order breaks ties between labels.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+    >>> from seip_addon.core.site.candidates import CandidateSettings
+    >>> from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
+    >>> from seip_addon.core.site.site import make_site
+    >>> road = np.array([[(0, 0, 0), (40, 0, 0), (40, 8, 0)], [(0, 0, 0), (40, 8, 0), (0, 8, 0)]], dtype=float)
+    >>> poles = Pole("west", np.array([5.0, -1.0, 0.0])), Pole("east", np.array([35.0, -1.0, 0.0]))
+    >>> region = shapely.box(0.0, 0.0, 40.0, 8.0)
+    >>> scene = SceneGeometry("street", np.zeros(3), (Mesh("road", road),), (), (), region, poles=poles)
+    >>> site = make_site(scene, CandidateSettings(sensors=("vlp16",), heights=(5.0,)), grid_spacing=8.0)
+    >>> rows = np.array([[True, True, False, False, False], [False, True, True, True, False]])
+    >>> deployment = deploy(site, load_catalogue(), rows, chosen=[0, 1])
+    >>> [(sensor.label, sensor.position_name, sensor.alone, sensor.added) for sensor in deployment.sensors]
+    [('S1', 'east', 0.6, 0.6), ('S2', 'west', 0.4, 0.2)]
+    >>> deployment.coverage, deployment.seen_twice
+    (0.8, 0.2)
     """
     order = _by_added_coverage(rows)
     poses = np.asarray(chosen, dtype=np.int64)[order]

@@ -150,6 +150,16 @@ class PlacementProblem(PlacementConstraints):
     ------
     SeipError
         The figures contradict themselves or leave nothing to choose.
+
+    Examples
+    --------
+    >>> problem = PlacementProblem(
+    ...     weights=np.ones(3), prices=np.array([4_000.0, 8_000.0]), positions=np.array([0, 1]),
+    ...     xyz=np.array([[0.0, 0.0, 5.0], [20.0, 0.0, 5.0]]), labels=np.array(["vlp16", "os1_128"]),
+    ...     visible=np.array([[True, False, False], [True, True, False]]), budget=10_000.0,
+    ... )
+    >>> problem.most_sensors, [problem.covered(np.array([pose])) for pose in (0, 1)]
+    (1, [1.0, 2.0])
     """
 
     visible: Boolean

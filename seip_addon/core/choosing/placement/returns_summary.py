@@ -87,6 +87,15 @@ class ReturnsSummary:
         Returns from a pedestrian at each crossing.
     front : tuple of ReturnsPoint
         Best placements found with fewer and more sensors, see `returns_front`. Empty if they were not searched for.
+
+    Examples
+    --------
+    >>> crossings = CrossingReturns("Rope Lane", 4.98), CrossingReturns("Main Street", 20.0)
+    >>> returns = ReturnsSummary(36.2, {"car": 494.0, "pedestrian": 3.61}, crossings)
+    >>> returns.describe()
+    '494 returns from a car and 3.6 from a pedestrian'
+    >>> returns.warnings()
+    ('fewer than 5 returns from a pedestrian at the worst point of: Rope Lane (4.9)',)
     """
 
     typical: Annotated[float, RETURNS]

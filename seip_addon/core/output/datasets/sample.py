@@ -116,6 +116,19 @@ def make_sample(
         The format's name of each category.
     min_points : int
         Returns of all sensors together that a label needs.
+
+    Examples
+    --------
+    >>> from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+    >>> sensor = MountedSensor("S1", load_catalogue()["vlp16"], np.array([0.0, 0.0, 5.0]), np.eye(3))
+    >>> run = TrafficRun("run-1", "train", "digest", (sensor,), origin=np.zeros(3))
+    >>> number, category, points = np.array([0, 1]), np.array(["car", "pedestrian"]), np.array([[120], [2]])
+    >>> boxes = np.zeros((2, 3)), np.ones((2, 3)), *np.zeros((3, 2))
+    >>> users = Labels(number, category, *boxes, points, visibility=np.ones(2), inside=np.ones(2, bool))
+    >>> frame = Frame(12.0, np.empty((0, 3)), *np.empty((5, 0)), labels=users)
+    >>> sample = make_sample((3, "000120"), run, frame, {"car": "Car", "pedestrian": "Pedestrian"}, min_points=5)
+    >>> sample.name, sample.fates, sample.classes
+    ('000003', ('written', 'too_few_points'), ('Car',))
     """
     labels = frame.labels
     returns = labels.points.sum(axis=1)

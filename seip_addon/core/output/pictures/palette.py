@@ -2,6 +2,8 @@
 
 Coverage is orange and blue, which colour-blind people tell apart, sensors are yellow, green and pink, and areas are red
 and violet. Within a group colours differ in lightness as well, so that they remain distinct in greyscale.
+
+`tests/core/output/pictures/test_palette.py` shows its use.
 """
 
 INK = "#1d2b36"

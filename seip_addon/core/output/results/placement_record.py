@@ -1,4 +1,7 @@
-"""Content of ``placement.json``: a placement with the data to read, check and repeat it."""
+"""Content of ``placement.json``: a placement with the data to read, check and repeat it.
+
+`tests/core/output/results/test_placement_record.py` shows its use.
+"""
 
 import json
 import math

@@ -74,6 +74,16 @@ class LidarModel:
         Assumptions about the beams and about the law that no document confirms; empty if all is published.
     rosette : Rosette, optional
         Prisms of a sensor whose pattern does not repeat.
+
+    Examples
+    --------
+    >>> four = LidarModel(
+    ...     key="own", name="Own 4 (prototype)", manufacturer="Example Optics", source="data sheet",
+    ...     elevations=np.radians([-15.0, -5.0, 5.0, 15.0]), min_range=0.5, max_range=100.0,
+    ...     points_per_second=28_800.0, rotation_rate=10.0, price_range=(3_000.0, 5_000.0),
+    ... )
+    >>> four.short_name, four.channels, four.azimuth_count, round(math.degrees(four.azimuth_step), 6), four.price
+    ('Own 4', 4, 720, 0.5, 4000.0)
     """
 
     key: str

@@ -26,6 +26,14 @@ class MountedSensor:
         Optical centre, local site axes.
     orientation : (3, 3) float64
         Rotation from the sensor's axes (x along azimuth zero, z up along its axis) to the site's.
+
+    Examples
+    --------
+    >>> from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+    >>> facing_north = level_orientation(np.pi / 2)
+    >>> sensor = MountedSensor("S1", load_catalogue()["vlp16"], np.array([4.0, 0.0, 5.0]), facing_north)
+    >>> (sensor.xyz + sensor.orientation @ [10.0, 0.0, 0.0]).round(6).tolist()
+    [4.0, 10.0, 5.0]
     """
 
     label: str

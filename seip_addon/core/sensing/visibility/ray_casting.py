@@ -102,6 +102,14 @@ def make_ray_caster(triangles: Float, engine: Engine = "auto", keep: Boolean | N
     ------
     SeipError
         A coordinate is not finite, or the engine is not available.
+
+    Examples
+    --------
+    >>> wall = np.array([[[10.0, -5.0, 0.0], [10.0, 5.0, 0.0], [10.0, 0.0, 6.0]]])
+    >>> caster = make_ray_caster(wall)
+    >>> distance, triangle = caster.cast(np.array([0.0, 0.0, 2.0]), np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), 100.0)
+    >>> distance.round(3).tolist(), triangle.tolist()
+    ([10.0, inf], [0, -1])
     """
     name = engine_name(engine)
     if name == "embree":

@@ -38,6 +38,16 @@ class VisibilityModel:
         Reflectivity of the caster's triangles.
     caster : RayCaster
         Ray caster of the static surfaces that hide the targets.
+
+    Examples
+    --------
+    >>> from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+    >>> road = np.array([[(0, -4, 0), (50, -4, 0), (50, 4, 0)], [(0, -4, 0), (50, 4, 0), (0, 4, 0)]], dtype=float)
+    >>> wall = np.array([[[20.0, -9.0, 0.0], [20.0, 9.0, 0.0], [20.0, 0.0, 9.0]]])
+    >>> caster, targets = make_ray_caster(np.concatenate([road, wall])), np.array([[15.0, 0.0, 0.0], [25.0, 0.0, 0.0]])
+    >>> model = VisibilityModel(targets, np.full(3, 0.3), VisibilitySettings(), caster)
+    >>> model.see(load_catalogue()["os1_128"], np.array([0.0, 0.0, 5.0]), np.eye(3)).tolist()
+    [True, False]
     """
 
     def __init__(self, targets: Float, reflectivity: Float, settings: VisibilitySettings, caster: RayCaster) -> None:

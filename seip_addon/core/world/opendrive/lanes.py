@@ -35,6 +35,13 @@ class LaneSurface:
         Stations of the edge points along the road.
     left, right : (n, 3) float64, metres
         Edges in map coordinates, as seen along the reference line.
+
+    Examples
+    --------
+    >>> left = np.array([[0.0, 0.0, 0.0], [50.0, 0.0, 1.0], [100.0, 0.0, 2.0]])
+    >>> lane = LaneSurface("1", None, 0, -1, "driving", False, left[:, 0], left, left - [0.0, 3.5, 0.0])
+    >>> lane.triangles.shape, round(lane.polygon.area)
+    ((4, 3, 3), 350)
     """
 
     road_id: str

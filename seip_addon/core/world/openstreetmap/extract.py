@@ -193,6 +193,17 @@ def read_extract(path: Path, within: Window | None = None) -> Generator[Progress
     SeipError
         The file cannot be read, has a different format, is damaged, declares entities, has ids that are not whole
         numbers, or has more than `MAX_ELEMENTS` elements.
+
+    Examples
+    --------
+    >>> from seip_addon.core.progress import finish
+    >>> nodes = '<node id="1" lat="48.000" lon="11.0"/><node id="2" lat="48.001" lon="11.0"/>'
+    >>> street = '<way id="5"><nd ref="1"/><nd ref="2"/><tag k="highway" v="residential"/></way>'
+    >>> Path("street.osm").write_text(f"<osm>{nodes}{street}</osm>", encoding="utf-8") > 0
+    True
+    >>> extract = finish(read_extract(Path("street.osm")))
+    >>> [(way.tags["highway"], [node.latitude for node in extract.line(way)]) for way in extract.ways.values()]
+    [('residential', [48.0, 48.001])]
     """
     start = _first_bytes(path)
     collected = _Collector(path.name, within)

@@ -88,7 +88,21 @@ class Roadside:
 
 
 def roadside(surfaces: Sequence[LaneSurface]) -> Roadside:
-    """Return the carriageway of lanes and its sides."""
+    """Return the carriageway of lanes and its sides.
+
+    Examples
+    --------
+    >>> def strip(number, kind, left, right):
+    ...     s, zero = np.array([0.0, 100.0]), np.zeros(2)
+    ...     edges = (np.column_stack([s, zero + y, zero]) for y in (left, right))
+    ...     return LaneSurface("1", None, 0, number, kind, False, s, *edges)
+    >>> lanes = strip(-1, "driving", 0.0, -3.5), strip(-2, "sidewalk", -3.5, -6.0)
+    >>> street = roadside(lanes)
+    >>> round(street.carriageway.area), round(street.sides().length)
+    (350, 200)
+    >>> round(bare_sides(street, pavement=lanes[1].polygon).length)
+    100
+    """
     paved = in_groups(surfaces, CARRIAGEWAY)
     carriageway = lane_outline(paved)
     junctions = sorted({lane.junction_id for lane in paved if lane.junction_id is not None})
