@@ -67,7 +67,7 @@ class PillarGrid:
         return (self.west + self.east) / 2, (self.south + self.north) / 2
 
     def window(self, x: float, y: float, pillars: int) -> PillarGrid:
-        """Return a square grid of ``side`` pillars centred at a point, which may extend beyond this grid."""
+        """Return a square grid of ``pillars`` pillars centred at a point, which may extend beyond this grid."""
         half = pillars * self.pillar / 2
         return replace(self, west=x - half, south=y - half, columns=pillars, rows=pillars)
 
