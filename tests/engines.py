@@ -6,7 +6,7 @@ import importlib.util
 
 import pytest
 
-from seip_addon.core.sensing.visibility.ray_casting import Engine
+from seip_addon.core.sensing.visibility.settings import Engine
 
 try:
     import bpy  # noqa: F401 - brings mathutils

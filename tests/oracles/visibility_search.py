@@ -26,8 +26,8 @@ from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.lidar.rosette import Rosette
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.near_surfaces import caster_tolerance
-from seip_addon.core.sensing.visibility.ray_casting import Engine, make_ray_caster
-from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+from seip_addon.core.sensing.visibility.settings import Engine, VisibilitySettings
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.site import Site, Targets
 from tests.oracles.full_scan import full_scan

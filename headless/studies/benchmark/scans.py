@@ -25,7 +25,8 @@ from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, p
 from seip_addon.core.sensing.scans.static_scene import StaticScene
 from seip_addon.core.sensing.traffic.bodies import Body, fitted_body
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Snapshot, Trajectories
-from seip_addon.core.sensing.visibility.ray_casting import Engine, make_ray_caster
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+from seip_addon.core.sensing.visibility.settings import Engine
 from seip_addon.core.site.site import Site
 
 SENSORS, ROAD_USERS = 4, 40

@@ -23,9 +23,9 @@ from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.chunks import compute_rows, sharing_rays
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
-from seip_addon.core.sensing.visibility.ray_casting import Engine, RayCaster, make_ray_caster
+from seip_addon.core.sensing.visibility.ray_casting import RayCaster, make_ray_caster
 from seip_addon.core.sensing.visibility.scanning import ScanPosition
-from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.sensing.visibility.settings import Engine, VisibilitySettings
 from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel
 from seip_addon.core.site.site import Site
 

@@ -21,8 +21,8 @@ from seip_addon.core.sensing.lidar.beams import BeamPattern
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.float32_precision import FLOAT32_STEP, MAX_STEP
 from seip_addon.core.sensing.visibility.grid import compute_visibility
-from seip_addon.core.sensing.visibility.ray_casting import Engine, make_ray_caster
-from seip_addon.core.sensing.visibility.settings import MAX_DELTA, VisibilitySettings
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+from seip_addon.core.sensing.visibility.settings import MAX_DELTA, Engine, VisibilitySettings
 from seip_addon.core.site.site import Candidates, Site, Targets
 
 from .float64_rays import FirstHits, first_hits

@@ -12,8 +12,7 @@ from ..choosing.placement.search_limits import DEFAULT_EFFORT, SolverLimits
 from ..choosing.placement.solvers import check_solver
 from ..sensing.lidar.catalogue import find_models, load_catalogue
 from ..sensing.lidar.model import LidarModel
-from ..sensing.visibility.ray_casting import Engine
-from ..sensing.visibility.settings import VisibilitySettings
+from ..sensing.visibility.settings import Engine, VisibilitySettings
 from ..settings import setting
 from ..site.candidates import CandidateSettings
 from ..site.installed_cost import InstalledCost

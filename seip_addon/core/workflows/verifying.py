@@ -34,8 +34,8 @@ from ..sensing.recordings.verification import Verification, VerifiedSensor
 from ..sensing.scans.scanner import ReflectiveSurface
 from ..sensing.scans.sensor import MountedSensor
 from ..sensing.scans.static_scene import StaticScene, static_scene
-from ..sensing.visibility.ray_casting import Engine, make_ray_caster
-from ..sensing.visibility.settings import VisibilitySettings
+from ..sensing.visibility.ray_casting import make_ray_caster
+from ..sensing.visibility.settings import Engine, VisibilitySettings
 from ..sensing.visibility.visibility_model import VisibilityModel
 from ..site.scene_geometry import FROM_SURVEY, Mesh, SceneGeometry, joined
 from ..site.targets import Targets, generate_targets

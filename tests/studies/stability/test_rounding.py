@@ -21,7 +21,7 @@ from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.static_scene import static_scene
 from seip_addon.core.sensing.visibility import ray_casting
 from seip_addon.core.sensing.visibility.float32_precision import rounding_warnings
-from seip_addon.core.sensing.visibility.ray_casting import Engine
+from seip_addon.core.sensing.visibility.settings import Engine
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
 from seip_addon.core.workflows.survey import grid_key, lay_out

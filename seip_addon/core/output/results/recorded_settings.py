@@ -8,8 +8,7 @@ from typing import Annotated
 from ... import limits
 from ...choosing.placement.objective import Objective
 from ...choosing.placement.search_limits import DEFAULT_EFFORT
-from ...sensing.visibility.ray_casting import Engine
-from ...sensing.visibility.settings import VisibilitySettings
+from ...sensing.visibility.settings import Engine, VisibilitySettings
 from ...site.candidates import CandidateSettings
 from ...site.installed_cost import InstalledCost
 from ...site.weather import Weather

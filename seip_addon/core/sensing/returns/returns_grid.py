@@ -22,7 +22,8 @@ from ...storage.source_digest import source_digest
 from ..lidar.catalogue import find_models
 from ..lidar.model import LidarModel
 from ..visibility.chunks import collect
-from ..visibility.ray_casting import Engine, engine_name, make_ray_caster
+from ..visibility.ray_casting import engine_name, make_ray_caster
+from ..visibility.settings import Engine
 from .expected_returns import expected_returns
 from .road_users import RoadUsers
 

@@ -20,7 +20,8 @@ from ...settings import setting
 from ..lidar.noisy_returns import measured_returns
 from ..traffic.bodies import Body
 from ..traffic.trajectories import Snapshot, Trajectories
-from ..visibility.ray_casting import Engine, make_ray_caster
+from ..visibility.ray_casting import make_ray_caster
+from ..visibility.settings import Engine
 from .frame import STATIC_INSTANCE, Frame, Labels
 from .motion import Motion, moving, still
 from .scanner import BodySurface, MovingTraffic, ReflectiveSurface, Scan, Scanner, returns_by_user

@@ -21,8 +21,8 @@ from ..lidar.catalogue import find_models
 from ..lidar.model import LidarModel
 from .chunks import Rows, sharing_rays
 from .executors import VisibilityTask, thread_executor
-from .ray_casting import Engine, engine_name
-from .settings import VisibilitySettings
+from .ray_casting import engine_name
+from .settings import Engine, VisibilitySettings
 from .triangle_culling import needed_triangles
 
 SAMPLING_SECONDS = 0.8

@@ -17,8 +17,8 @@ from ...errors import SeipError
 from ...site.site import Site
 from ..lidar.model import LidarModel
 from .chunks import Rows, compute_rows
-from .ray_casting import Engine, RayCaster, make_ray_caster
-from .settings import VisibilitySettings
+from .ray_casting import RayCaster, make_ray_caster
+from .settings import Engine, VisibilitySettings
 from .visibility_model import VisibilityModel
 
 Submit = Callable[[Integer], Future[Rows]]

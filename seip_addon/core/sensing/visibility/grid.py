@@ -28,8 +28,8 @@ from ..lidar.catalogue import find_models
 from ..lidar.model import LidarModel
 from .chunks import Checkpoint, chunks_of, compute_chunks
 from .executors import VisibilityTask, dask_executor, thread_executor
-from .ray_casting import Engine, engine_name
-from .settings import VisibilitySettings
+from .ray_casting import engine_name
+from .settings import Engine, VisibilitySettings
 from .triangle_culling import needed_triangles
 
 FILE = ArrayFile(

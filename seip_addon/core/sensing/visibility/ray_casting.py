@@ -14,14 +14,13 @@ import operator
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from ...arrays import Boolean, Float, Integer
 from ...errors import SeipError
-
-Engine = Literal["auto", "bvh", "embree"]
+from .settings import Engine
 
 # Rays are cast a little beyond their range and cut off afterwards, in float64: a hit at the very end of one ray is then
 # the same as on a longer ray.

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from ...errors import SeipError
 from ...settings import setting
 from ..lidar.model import LidarModel
+
+Engine = Literal["auto", "bvh", "embree"]
+"""Ray caster: Blender's BVH tree or Embree; ``auto`` takes Embree if it is installed."""
 
 MAX_DELTA = 100.0
 """Metres; a larger δ is assumed to be a typing error."""

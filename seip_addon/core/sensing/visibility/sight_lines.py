@@ -11,7 +11,8 @@ from ...site.candidates import Candidates
 from ...site.site import Site
 from ...site.target_squares import target_squares
 from ..lidar.model import LidarModel
-from .ray_casting import Engine, engine_name, make_ray_caster
+from .ray_casting import engine_name, make_ray_caster
+from .settings import Engine
 
 MAX_LINES = 1500
 """Largest number of lines; if there are more targets, a random sample is drawn."""

@@ -18,8 +18,8 @@ from ...storage.array_file import ArrayFile, ArrayRule
 from ..lidar.model import LidarModel
 from .chunks import Rows
 from .grid import VisibilityGrid, compute_visibility, visibility_key
-from .ray_casting import Engine, engine_name
-from .settings import VisibilitySettings
+from .ray_casting import engine_name
+from .settings import Engine, VisibilitySettings
 
 _CHUNK = ArrayFile(
     "seip.visibility-piece",

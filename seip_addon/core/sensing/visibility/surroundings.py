@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from ...site.scene_geometry import Mesh
 from ...site.site import Site
 from ..lidar.model import LidarModel
-from .ray_casting import Engine
-from .settings import VisibilitySettings
+from .settings import Engine, VisibilitySettings
 
 
 @dataclass(frozen=True, eq=False)

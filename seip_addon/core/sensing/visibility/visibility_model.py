@@ -17,9 +17,9 @@ from ...geometry.orientation import rotated
 from ...site.site import Site
 from ..lidar.model import LidarModel
 from .near_surfaces import near_surfaces, rotated_surfaces
-from .ray_casting import Engine, RayCaster, engine_name, make_ray_caster
+from .ray_casting import RayCaster, engine_name, make_ray_caster
 from .scanning import Caster, ScanPosition, seen_by_near_rays
-from .settings import VisibilitySettings
+from .settings import Engine, VisibilitySettings
 
 _MAX_LEVEL_ANGLE = 1e-6
 """Radians by which the axis of an upright sensor may deviate: Blender rotates objects in single precision."""

@@ -6,7 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.sensing.visibility.ray_casting import Engine, make_ray_caster
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+from seip_addon.core.sensing.visibility.settings import Engine
 from seip_addon.core.sensing.visibility.triangle_culling import culling_message, needed_triangles
 from tests.engines import each_engine
 from tests.oracles.random_cases import cases

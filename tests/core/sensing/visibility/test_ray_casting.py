@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.sensing.visibility.ray_casting import Engine, make_ray_caster
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+from seip_addon.core.sensing.visibility.settings import Engine
 from tests.engines import each_engine, needs_embree
 from tests.oracles.float64_rays import first_hits
 

@@ -28,8 +28,9 @@ from seip_addon.core.sensing.visibility.grid import (
     compute_visibility,
     visibility_key,
 )
-from seip_addon.core.sensing.visibility.ray_casting import Engine, make_ray_caster
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.ring_resolution import resolution_warnings, unresolved_from
+from seip_addon.core.sensing.visibility.settings import Engine
 from seip_addon.core.sensing.visibility.store import CheckpointFolder, stored_visibility
 from seip_addon.core.site.site import Site, Targets
 from tests.builders.synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity

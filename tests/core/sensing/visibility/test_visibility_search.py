@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
-from seip_addon.core.sensing.visibility.ray_casting import Engine
+from seip_addon.core.sensing.visibility.settings import Engine
 from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY
 from tests.engines import each_engine
 from tests.oracles.visibility_search import FAULTS, assess, draw_case, search, sentence
