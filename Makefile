@@ -99,7 +99,7 @@ detection: environment
 
 test-detection: detection
 	@$(PYTHON) -m headless.set_up "$(VENV)" second-opinion
-	$(PY) -m pytest tests/detection tests/core/storage/test_source_digest.py
+	$(PY) -m pytest tests/detection tests/core/storage/test_source_digest.py tests/package/test_examples.py
 
 # Two commands, which `make -j2 study` runs side by side.
 study: coverage-study detection-study

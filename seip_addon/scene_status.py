@@ -28,7 +28,7 @@ OLD_CHECK = "Checked before the file was opened: check again."
 
 
 def not_own(scene: bpy.types.Scene) -> str:
-    """Return that a scene belongs to another file, so that nothing can be written into it; empty where it does not."""
+    """Return a reason if a scene belongs to another file and cannot be changed; otherwise an empty text."""
     return LINKED if scene.library is not None else ""
 
 

@@ -55,11 +55,11 @@ class Bin:
     Parameters
     ----------
     low, high : float
-        What holds these together: from ``low`` to below ``high``.
+        Edges of the bin; the lower one is included.
     wanted : int
-        Road users that had to be found.
+        Number of road users to detect.
     value : float
-        NaN where there are none to take it of.
+        Value of the figure; NaN if the bin has no road users.
     """
 
     low: float
@@ -69,7 +69,7 @@ class Bin:
 
 
 BinnedFigure = tuple[str, str, Mapping[str, Sequence[Bin]]]
-"""Labels, with units, of a binned quantity and of a figure, and the bins of each line by its name: all the same."""
+"""Labels, with units, of the binned quantity and of the figure, and the bins of each line by name, with equal edges."""
 
 
 def save_precision_recall_chart(

@@ -414,16 +414,12 @@ def _copied(state: dict[str, Any]) -> dict[str, Tensor]:
     return {name: value.detach().clone() for name, value in state.items()}
 
 
-DETERMINISTIC = 2
-"""torch's mode in which operations that are not deterministic raise an error."""
-
-
 class _Torch:
     """Global settings of torch: set by the first user, restored after the last."""
 
     def __init__(self) -> None:
         self._lock, self._users = threading.Lock(), 0
-        self._before = (0, 0, False)
+        self._before = (0, 0, False)  # threads, mode of determinism, filling
 
     def enter(self, threads: int) -> None:
         # torch has one such setting for the whole process, and trainings run in several threads: only the first user
@@ -431,7 +427,7 @@ class _Torch:
         with self._lock:
             if not self._users:
                 self._before = (torch.get_num_threads(), torch.get_deterministic_debug_mode(), _fills())
-                self._set(threads, DETERMINISTIC, fill=False)  # filling is a debugging aid, and takes a tenth
+                self._set(threads, "error", fill=False)  # filling is a debugging aid, and takes a tenth
             self._users += 1
 
     def leave(self) -> None:
@@ -441,9 +437,9 @@ class _Torch:
                 threads, mode, fill = self._before
                 self._set(threads, mode, fill=fill)
 
-    def _set(self, threads: int, mode: int, *, fill: bool) -> None:
+    def _set(self, threads: int, mode: int | str, *, fill: bool) -> None:
         torch.set_num_threads(threads)
-        # `torch.use_deterministic_algorithms` sets the same, but imports torch's compiler first, for two seconds.
+        # `torch.use_deterministic_algorithms` sets the same, but first imports torch's compiler, which is slow.
         torch.set_deterministic_debug_mode(mode)
         torch.utils.deterministic.fill_uninitialized_memory = fill  # type: ignore[attr-defined]  # torch types lack it
 

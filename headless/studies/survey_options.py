@@ -19,7 +19,7 @@ def add_survey_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _name_only(group: argparse._ArgumentGroup, reference: str) -> None:
-    """Have help name the options of a group alone, and refer to where they are explained."""
+    """Replace the help of a group of options by their names and a reference."""
     names = (action.option_strings[-1] for action in group._group_actions)  # noqa: SLF001 -- argparse has no other way
     group.description = f"{' '.join(names)} ({reference})"
     for action in group._group_actions:  # noqa: SLF001 -- as above

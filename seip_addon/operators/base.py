@@ -46,11 +46,11 @@ def started(steps: Generator[Progress, None, Result]) -> Generator[Progress, Non
 
 
 class Conditional:
-    """Mixin that enables an operator only where nothing is in its way."""
+    """Mixin for operators that are disabled for a reason, which their tooltip states."""
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return why the operator is disabled, as a sentence; empty where it is enabled."""
+        """Return the reason why the operator is disabled, as a sentence; empty if it is enabled."""
         raise NotImplementedError
 
     @classmethod
@@ -67,7 +67,7 @@ class ForReadyScene(Conditional):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return which input is missing, or that the scene is not of this file or version."""
+        """Return a reason if an input is missing, or the scene belongs to another file or version."""
         return scene_status.obstacle(context.scene)
 
 
@@ -186,7 +186,7 @@ class SEIP_OT_stop(Conditional, bpy.types.Operator):
 
     @classmethod
     def why_not(cls, _context: bpy.types.Context) -> str:
-        """Return that no work is running, where none is."""
+        """Return a reason if no work is running."""
         return "nothing is under way" if session.running is None else ""
 
     def execute(self, _context: bpy.types.Context) -> Outcome:
@@ -204,7 +204,7 @@ class SEIP_OT_accept(Conditional, bpy.types.Operator):
 
     @classmethod
     def why_not(cls, _context: bpy.types.Context) -> str:
-        """Return that no search for a placement is running, where none is."""
+        """Return a reason if no search for a placement is running."""
         running = session.running
         searching = running is not None and running.acceptance is not None and running.acceptance.searching
         return "" if searching else "no search for a placement is running"

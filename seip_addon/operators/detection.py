@@ -51,7 +51,7 @@ class SEIP_OT_detect(Conditional, LongWork[str], bpy.types.Operator):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that sensors or a Python with PyTorch are missing, where they are."""
+        """Return a reason if sensors or a Python with PyTorch are missing."""
         return why_no_detection(context.scene)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, str]:

@@ -57,7 +57,7 @@ class SEIP_OT_open_junction(Conditional, bpy.types.Operator):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that other work is under way or no junction is selected, where it is so."""
+        """Return a reason if other work is running or no junction is selected."""
         if session.running is not None:
             return "Other work is under way"
         return NO_JUNCTION if selected_junction(context) is None else scene_status.not_own(context.scene)
@@ -89,7 +89,7 @@ class SEIP_OT_show_network(Conditional, bpy.types.Operator):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that the site is not of a network, where it is not."""
+        """Return a reason if the site does not belong to a network."""
         return "This site is not of a network" if context.scene.seip.site.network is None else ""
 
     def execute(self, context: bpy.types.Context) -> Outcome:

@@ -63,7 +63,7 @@ class ForPlacement(ForReadyScene):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return what is missing for a placement, or that there is none."""
+        """Return a reason if an input of a placement is missing, or there is no placement."""
         return super().why_not(context) or no_placement(context.scene)
 
 
@@ -172,7 +172,7 @@ class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that there is no placement, or that sensors were moved since."""
+        """Return a reason if there is no placement, or sensors were moved since."""
         return super().why_not(context) or not_evaluated(context.scene)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
@@ -289,7 +289,7 @@ class SEIP_OT_show_in_traffic(ForPlacement, LongWork[tuple[SceneState, PosesInTr
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that there is no placement, or no traffic."""
+        """Return a reason if there is no placement or no traffic."""
         no_traffic = "" if context.scene.session_uid in session.traffic else "load the traffic first"
         return super().why_not(context) or no_traffic
 
@@ -401,7 +401,7 @@ class _Writes(ForPlacement, LongWork[Result]):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that there is no placement, no folder, or that sensors were moved since."""
+        """Return a reason if there is no placement or no folder, or sensors were moved since."""
         return super().why_not(context) or no_folder(context.scene) or not_evaluated(context.scene)
 
 

@@ -74,7 +74,7 @@ class _EditsCatalogues(Conditional):
 
     @classmethod
     def why_not(cls, _context: bpy.types.Context) -> str:
-        """Return that there are no preferences, where there are none."""
+        """Return a reason if the add-on has no preferences."""
         return "Install the add-on as an extension: only then it has preferences" if preferences.own() is None else ""
 
 
@@ -135,7 +135,7 @@ class SEIP_OT_empty_cache(Conditional, bpy.types.Operator):
 
     @classmethod
     def why_not(cls, _context: bpy.types.Context) -> str:
-        """Return that there is nothing to delete, or work that needs it."""
+        """Return a reason if there is nothing to delete, or running work needs it."""
         return "Wait for the work under way" if session.running is not None else preferences.why_not_empty()
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:

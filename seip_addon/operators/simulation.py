@@ -44,7 +44,7 @@ class SEIP_OT_simulate_traffic(Conditional, LongWork[SimulatedRuns], bpy.types.O
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that the road, a map of it or SUMO is missing, where it is."""
+        """Return a reason if the road, a map of it or SUMO is missing."""
         return why_no_simulation(context.scene)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SimulatedRuns]:

@@ -59,7 +59,7 @@ class _WritesScene(Conditional):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that the scene is linked from another file, where it is."""
+        """Return a reason if the scene is linked from another file."""
         return scene_status.not_own(context.scene)
 
 
@@ -103,7 +103,7 @@ class SEIP_OT_choose_map(ReadsMap, bpy.types.Operator):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that the scene shows a network or is linked from another file, where it is so."""
+        """Return a reason if the scene shows a network or is linked from another file."""
         if is_network(context.scene):
             return "This scene shows a network: open the site of a junction, or go to another scene"
         return super().why_not(context)
@@ -208,7 +208,7 @@ class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that no place is chosen, or that the scene is linked from another file."""
+        """Return a reason if no place is chosen or the scene is linked from another file."""
         return missing_for_build(context.scene) or super().why_not(context)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
@@ -301,7 +301,7 @@ class _RoleOperator(Conditional):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that nothing is selected, or that the scene is linked from another file."""
+        """Return a reason if nothing is selected or the scene is linked from another file."""
         return why_no_role(context)
 
 
@@ -374,7 +374,7 @@ class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return why no object can be added, where none can."""
+        """Return a reason if no object can be added."""
         in_edit_mode = "" if context.mode == "OBJECT" else "Leave Edit Mode first"
         return super().why_not(context) or in_edit_mode
 

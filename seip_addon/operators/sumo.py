@@ -24,7 +24,7 @@ class SEIP_OT_install_sumo(Conditional, LongWork[Sumo], bpy.types.Operator):
 
     @classmethod
     def why_not(cls, _context: bpy.types.Context) -> str:
-        """Return that Blender may not go online or has no pip, where it is so."""
+        """Return a reason if Blender may not go online or has no pip."""
         return preferences.why_no_installation()
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event | None) -> Outcome:

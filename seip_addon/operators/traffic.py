@@ -72,7 +72,7 @@ class _Scanning(Conditional, LongWork[Result]):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that there is nothing to scan, or nothing to scan with."""
+        """Return a reason if there is no traffic to scan or no sensor to scan with."""
         return why_no_scan(context.scene)
 
 
@@ -84,7 +84,7 @@ class SEIP_OT_load_traffic(Conditional, LongWork[LoadedTraffic], bpy.types.Opera
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that there is no file to read, where there is none."""
+        """Return a reason if there is no file to read."""
         return why_no_load(context.scene)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, LoadedTraffic]:
@@ -118,7 +118,7 @@ class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that there is no traffic, where there is none."""
+        """Return a reason if there is no traffic."""
         return "there is no traffic in the scene" if contract.find(context.scene, contract.TRAFFIC) is None else ""
 
     def execute(self, context: bpy.types.Context) -> Outcome:
@@ -139,7 +139,7 @@ class SEIP_OT_try_in_traffic(Conditional, LongWork[tuple[SceneState, str]], bpy.
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that a placement or traffic is missing, where it is."""
+        """Return a reason if there is no placement or no traffic."""
         return why_no_trial(context.scene)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, str]]:

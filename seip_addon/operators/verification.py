@@ -93,7 +93,7 @@ class SEIP_OT_verify(Conditional, LongWork[_Verified], bpy.types.Operator):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that sensors or a recording are missing, where they are."""
+        """Return a reason if sensors or a recording are missing."""
         return why_no_verification(context.scene)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, _Verified]:
@@ -159,7 +159,7 @@ class SEIP_OT_correct_scene(Conditional, bpy.types.Operator):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that the scene is not as it was when it was verified, where it is not."""
+        """Return a reason if the scene was not verified or has changed since."""
         return why_no_correction(context.scene)
 
     def execute(self, context: bpy.types.Context) -> Outcome:

@@ -56,7 +56,7 @@ class SEIP_OT_colour_coverage(Conditional, bpy.types.Operator):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that there is no coverage to colour, where there is none."""
+        """Return a reason if there is no coverage to colour."""
         return why_no_coverage(context.scene)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
@@ -92,7 +92,7 @@ class SEIP_OT_toggle_legend(Conditional, bpy.types.Operator):
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that there is no coverage to explain, where there is none."""
+        """Return a reason if there is no coverage to explain."""
         return why_no_coverage(context.scene)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
@@ -170,7 +170,7 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operato
 
     @classmethod
     def why_not(cls, context: bpy.types.Context) -> str:
-        """Return that there is no placement, or that sensors were moved since."""
+        """Return a reason if there is no placement, or sensors were moved since."""
         return super().why_not(context) or not_evaluated(context.scene)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:

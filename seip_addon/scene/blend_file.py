@@ -31,7 +31,10 @@ def open_blend(path: Path) -> None:
     try:
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
     except RuntimeError as error:
-        raise SeipError(f"{path} is not a .blend that Blender {bpy.app.version_string} can open") from error
+        raise SeipError(
+            f"{path} is not a .blend that Blender {bpy.app.version_string} can open; build a scene from a map with "
+            "seip build-scene"
+        ) from error
     require_readable_names()
 
 

@@ -13,8 +13,8 @@ pytest.importorskip("bpy", reason="modules of the add-on import it")
 
 ROOT = Path(__file__).resolve().parents[2]
 MANY = 10  # modules that import another, from which on it shows its use
-PRODUCT = [path for folder in ("seip_addon", "headless") for path in (ROOT / folder).rglob("*.py")]
-PRODUCT = [path for path in PRODUCT if "studies" not in path.parts]
+SOURCES = [path for folder in ("seip_addon", "headless") for path in (ROOT / folder).rglob("*.py")]
+PRODUCT = [path for path in SOURCES if "studies" not in path.parts]
 
 
 def name_of(path: Path) -> str:

@@ -62,7 +62,7 @@ class KerbParking:
 
 @dataclass(frozen=True)
 class DrawnDemand(Demand):
-    """Demand with parking at kerbs as asked for, in which each road user has a size of its own.
+    """Demand with given parking at kerbs, in which each road user has its own size.
 
     Sizes are drawn as in `varied_bodies`, instead of taken from a model.
 

@@ -11,7 +11,7 @@ MANIFEST = Path(__file__).parents[4] / "blender_manifest.toml"
 
 
 def versions(**more: str) -> dict[str, str]:
-    """Return the versions of this program, of Python and of the libraries that results stand on, and ``more``.
+    """Return the versions of this program, of Python and of the libraries that results depend on, and ``more``.
 
     Examples
     --------

@@ -93,7 +93,7 @@ Bay = tuple[NetworkEdge, NetworkLane, float]
 
 
 class Departure(NamedTuple):
-    """An element of the route file: when it departs (seconds), its id, its type, and its text without that."""
+    """Departure of a road user: time (seconds), id, type, and text in the route file, with ``{type}`` for the type."""
 
     depart: float
     name: str
@@ -140,9 +140,9 @@ class Demand:
             )
 
     def own_types(self, departures: Sequence[Departure], seed: int) -> Mapping[str, str]:  # noqa: ARG002
-        """Return the elements of types that departures have instead of a model's, by the names of these.
+        """Return types of single road users, as elements of `type_line` by the name of the departure.
 
-        Here there are none; a demand whose road users differ returns those of `type_line`.
+        By default there are none, and each road user has the type of its model.
         """
         return {}
 
