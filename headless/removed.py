@@ -1,0 +1,38 @@
+"""Options and values of options that earlier versions had, with what replaces each."""
+
+from collections.abc import Sequence
+
+from seip_addon.core.errors import SeipError
+
+REMOVED: dict[str, str] = {}
+"""By option, or by option and value as in ``--format opv2v``: what to do instead, as the end of a sentence."""
+
+
+def check_removed(arguments: Sequence[str], options: Sequence[str]) -> None:
+    """Check that no argument is an option that an earlier version had.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Command line, without the program.
+    options : sequence of str
+        Options of the command; these are never refused.
+
+    Raises
+    ------
+    SeipError
+        An option, or a value of one, is gone. The message says what replaces it.
+
+    Examples
+    --------
+    >>> check_removed(["site.blend", "--count", "4"], ["--count"])
+    """
+    option = ""
+    for argument in arguments:
+        name, _, value = argument.partition("=")
+        if name.startswith("--"):
+            option = name
+        given = f"{option} {value or argument}"
+        gone = option if option not in options and option in REMOVED else given if given in REMOVED else None
+        if gone is not None:
+            raise SeipError(f"{gone} is no longer an option: {REMOVED[gone]}")
