@@ -1,17 +1,18 @@
 # make demo        set up, and place sensors at the shipped junction
 # make site        build a site from an OpenStreetMap extract, with sensors and a report (installs SUMO: 230 MB)
 # make network     spread one budget over the junctions of an invented town (installs SUMO)
-# make test        set up, and run the tests (the slow ones: make test-slow, the longest: make test-long; of the studies: make
-#                  test-studies)
+# make test        set up, and run the quick tests
+# make test-short  run those that depend on Blender's and Python's version
+# make test-slow   install PyTorch and SUMO, and run the slow tests, those of the detector and of the studies
+# make test-long   run searches with more random cases than CI has time for (an hour)
 # make lint        set up, and check style and types
 # make scenes      rebuild the shipped scenes from their sources
-# make detection   install PyTorch, for the detector; make test-detection tests it
+# make detection   install PyTorch, for the detector
+# make sumo        install Eclipse SUMO, for extracts and traffic (230 MB)
 # make study       redo the study on the shipped junction: coverage and detection (make -j2 study: ten minutes)
 # make recording   simulate the shipped recording of an installation again
 # make detector    train a detector as the shipped one, at 64 random sites (needs a GPU)
-# make ingredients what each ingredient of its training gains at sites not trained on (an hour)
-# make settings    chart what other settings of the detector cost and gain (an hour)
-# make stability   drive every method to where it fails, and write docs/stability.md (two hours)
+# make stability   drive every method to where it fails, and write docs/stability.md (an hour)
 # make traffic     simulate the shipped traffic again (installs Eclipse SUMO in the environment: 230 MB)
 # make benchmark   measure speed and error again, and write docs/benchmark.md (20 minutes; 40 with PyTorch)
 # make extension   build the Blender extension in dist/
@@ -28,7 +29,7 @@ SPREAD := -n auto --maxprocesses 4
 DEMO := scenes/junction.blend --sensor type1 type2 type3 -o out/junction
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo site network test test-slow test-long test-studies lint scenes sumo test-traffic traffic detection test-detection study coverage-study detection-study recording detector ingredients settings stability benchmark extension lock clean distclean
+.PHONY: help environment demo site network test test-short test-slow test-long lint scenes sumo traffic detection study coverage-study detection-study recording detector stability benchmark extension lock clean distclean
 
 help:
 	@sed -n '/^#/!q; s/^#\( \|$$\)//p' Makefile
@@ -51,17 +52,21 @@ network: sumo
 	@echo "map: out/town/network.html, report: out/town/report.html, report.pdf"
 
 test: environment
-	$(PY) -m pytest $(SPREAD) --ignore tests/studies -m "not slow and not long"
+	$(PY) -m pytest $(SPREAD) --ignore tests/studies --ignore tests/detection -m "not slow and not long"
 
-test-slow: environment
-	$(PY) -m pytest $(SPREAD) --ignore tests/studies -m "(slow or hypothesis) and not long"
+test-short: environment
+	$(PY) -m pytest $(SPREAD) -m "not slow and not long" tests/scene tests/package tests/headless/test_place.py
 
-# Random cases in numbers that CI has no time for.
+# What `make test` leaves out: slow tests, and those that need PyTorch.
+test-slow: detection sumo
+	@$(PYTHON) -m headless.set_up "$(VENV)" second-opinion
+	$(PY) -m pytest $(SPREAD) -m "slow and not long" --ignore tests/studies --ignore tests/detection
+	$(PY) -m pytest $(SPREAD) -m "not long" tests/studies tests/detection tests/package/test_examples.py \
+	  tests/core/storage/test_source_digest.py tests/headless/test_output_folders.py
+
+# Searches with more random cases than CI has time for; of all properties, hypothesis's hundred cases.
 test-long: environment
-	$(PY) -m pytest $(SPREAD) --ignore tests/studies -m long
-
-test-studies: detection sumo
-	$(PY) -m pytest $(SPREAD) -m "not long" tests/studies
+	$(PY) -m pytest $(SPREAD) -m "long or hypothesis"
 
 lint: environment
 	$(PY) -m ruff check
@@ -74,11 +79,6 @@ scenes: environment
 
 sumo: environment
 	@$(PYTHON) -m headless.set_up "$(VENV)" traffic
-
-test-traffic: sumo
-	$(PY) -m pytest $(SPREAD) -m "not long" tests/core/world/opendrive/test_shipped_maps.py tests/core/world/traffic_simulation \
-	  tests/headless/test_traffic.py tests/core/world/openstreetmap/test_sites.py tests/core/world/openstreetmap/test_bridges.py \
-	  tests/addon/test_network_scene.py tests/core/workflows/test_network_flows.py
 
 # Runs of one scene differ by their seed, and by the second of the signals' cycle of 60 s at which they begin; dense ones
 # have twice the vehicles. They are many and short, as whole runs alone are independent of each other.
@@ -97,10 +97,6 @@ traffic: sumo
 detection: environment
 	@$(PYTHON) -m headless.set_up "$(VENV)" detection
 
-test-detection: detection
-	@$(PYTHON) -m headless.set_up "$(VENV)" second-opinion
-	$(PY) -m pytest tests/detection tests/core/storage/test_source_digest.py tests/package/test_examples.py
-
 # Two commands, which `make -j2 study` runs side by side.
 study: coverage-study detection-study
 
@@ -114,8 +110,8 @@ detection-study: detection
 recording: detection
 	$(PY) -m headless place scenes/junction.blend --sensor vlp16 --count 1 --heights 5.4 --no-render -o out/recorded
 	cp out/recorded/placed.blend scenes/junction_recording/plan.blend
-	$(PY) -m headless study field-recordings scenes/junction_recording/plan.blend \
-	  --traffic scenes/junction_traffic/run-9.npz --example -o scenes/junction_recording/sweeps
+	$(PY) -m headless.studies.shipped_recording scenes/junction_recording/plan.blend \
+	  scenes/junction_traffic/run-9.npz scenes/junction_recording/sweeps
 
 detector: detection sumo
 	$(PY) -m headless study random-sites -o out/sites --sites 64 --seed 1
@@ -123,15 +119,8 @@ detector: detection sumo
 	  --steps 13381 --batch 64 --patience 50 --device cuda -o out/detector
 	cp out/detector/detector.pt headless/detection/shipped_detector.pt
 
-ingredients: detection sumo
-	$(PY) -m headless study random-sites -o out/sites --sites 20 --seed 1
-	$(PY) -m headless study ingredients out/sites/site-*/site.blend --unseen scenes/junction.blend scenes/corridor.blend -o out/ingredients
-
-settings: detection
-	$(PY) -m headless study detector-settings scenes/junction.blend -o out/detectors
-
-stability: detection
-	$(PY) -m headless study stability scenes/junction.blend --other scenes/corridor.blend -o docs
+stability: environment
+	$(PY) -m headless study stability scenes/junction.blend -o docs
 
 benchmark: environment
 	$(PY) -m pip install -qq --group benchmark

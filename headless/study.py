@@ -21,20 +21,24 @@ STUDIES = {
     "coverage": "coverage of sensor types × heights × numbers",
     "detection": "average precision of sensor types × numbers",
     "criteria": "placement criteria compared by what a detector finds",
-    "detector-settings": "precision against time of other settings of the detector",
-    "ingredients": "gain of each ingredient of the detector's training",
     "random-sites": "random sites with traffic, to train detectors on",
     "site-training": "training of a detector on several sites",
-    "calibration": "LiDAR models against measured sweeps",
-    "field-recordings": "verification of installations that differ from their plans",
-    "network-practice": "allocation of a network against common practice",
-    "network-scale": "processor time of networks, and of larger ones",
     "open-benchmark": "criteria and placements scored on ten junctions",
     "paper": "the paper's case study on its map and traffic",
     "stability": "limits of every method",
     "benchmark": "speed and error of every method",
 }
 """Studies by name: a folder each in `headless/studies`."""
+
+REMOVED = {
+    "calibration": "docs/sensors.md has its figures",
+    "detector-settings": "docs/detection.md has its figures",
+    "field-recordings": "docs/recordings.md has its figures; `make recording` writes the shipped recording again",
+    "ingredients": "docs/detection.md has its figures",
+    "network-practice": "docs/network.md has its figures",
+    "network-scale": "docs/network.md has its figures",
+}
+"""Studies of earlier versions, and where their figures are."""
 
 
 def main(argv: list[str]) -> None:
@@ -43,6 +47,8 @@ def main(argv: list[str]) -> None:
         runtime.print_line(_usage())
         return
     name = argv[0]
+    if name in REMOVED:
+        raise SeipError(f"there is no study {name!r} any more: {REMOVED[name]}")
     if name not in STUDIES:
         raise SeipError(f"there is no study {name!r}: seip study --help lists the studies")
     importlib.import_module(f"headless.studies.{name.replace('-', '_')}.command").main(argv[1:])

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import settings
 
 # Shared machines stall at random: speed is the benchmarks' business. The same random cases every time: a dozen of each
-# property in quick runs, hypothesis's hundred where `make test-slow` runs them all.
+# property, hypothesis's hundred where `make test-long` runs them all.
 settings.register_profile("quick", max_examples=12, deadline=None, derandomize=True)
 settings.register_profile("thorough", deadline=None, derandomize=True)
 
@@ -15,7 +15,7 @@ STATUS = pytest.StashKey[int]()
 
 
 def pytest_configure(config):
-    settings.load_profile("quick" if "not slow" in config.getoption("markexpr") else "thorough")
+    settings.load_profile("thorough" if "long or" in config.getoption("markexpr") else "quick")
 
 
 def pytest_sessionfinish(session, exitstatus):

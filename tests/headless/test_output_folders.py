@@ -23,7 +23,6 @@ TRAINERS = {
     "study detection": (),
     "detect": ("--traffic", "run.npz"),
     "study site-training": ("other.blend",),
-    "study detector-settings": (),
 }
 
 

@@ -162,7 +162,7 @@ def test_what_is_imported_is_pinned():
     }
 
     def allowed(path, name):
-        detector = {"torch"} if {"detection", "detector_limits"} & set(path.parts) else set()
+        detector = {"torch"} if {"detection"} & set(path.parts) else set()
         return top(name) in everywhere | detector | by_file.get(path.name, set())
 
     assert not offenders(["seip_addon", "headless"], allowed)

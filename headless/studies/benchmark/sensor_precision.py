@@ -20,7 +20,7 @@ from headless.studies.benchmark.visibility import Cost
 from headless.studies.coverage.cells import Cell, solve_cell
 from headless.studies.detection import case_study
 from headless.studies.detection.sensor_configuration import SensorConfiguration
-from headless.studies.detector_limits.paired_change import ResampledPrecision, change, level
+from headless.studies.paired_change import ResampledPrecision, change, level
 
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.sensing.scans.frame import Frame

@@ -1,24 +1,19 @@
-"""Comparison of a LiDAR model with a measured sensor: shares returned, beams, range noise, and fates."""
+"""Comparison of a LiDAR model with a measured sensor: shares returned, beams, and range noise."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.sensing.lidar.catalogue import find_models
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 
-from .fate import FateCorrelation, simulate_fates
 from .reference import MeasuredSensor, NoiseBin
 from .share_fit import Fits, fit
-
-CHART_LAGS = tuple(range(1, 11))
-"""Lags, in rays, for which charts show the correlation of fates."""
 
 
 @dataclass(frozen=True)
@@ -62,34 +57,6 @@ class Comparison:
     beams: BeamDifference
     ground_noise: tuple[NoiseRatio, ...]
     vertical_noise: tuple[NoiseRatio, ...]
-    fates: FateCorrelation
-
-
-def pair(
-    measured: Mapping[str, MeasuredSensor], catalogue: Mapping[str, LidarModel], pairs: Sequence[str]
-) -> dict[str, LidarModel]:
-    """Return the model that each measured sensor is compared with.
-
-    By default that is the model of the same key; ``pairs`` names others as ``MEASURED=KEY``.
-
-    Raises
-    ------
-    SeipError
-        A name is unknown, or there is nothing to compare.
-    """
-    keys = {name: name for name in measured if name in catalogue}
-    for one in pairs:
-        name, equals, key = one.partition("=")
-        if not equals or name not in measured:
-            raise SeipError(f"--sensor {one}: write MEASURED=KEY, where MEASURED is {' or '.join(measured)}")
-        keys[name] = key
-    if not keys:
-        raise SeipError(
-            f"no measured sensor ({', '.join(measured)}) is named like a catalogue key: name a pair, as in "
-            f"--sensor {next(iter(measured))}=vls128"
-        )
-    models = find_models(catalogue, list(keys.values()))
-    return {name: models[key] for name, key in keys.items()}
 
 
 def compare(name: str, sensor: MeasuredSensor, model: LidarModel) -> Comparison:
@@ -105,7 +72,6 @@ def compare(name: str, sensor: MeasuredSensor, model: LidarModel) -> Comparison:
         raise SeipError(
             f"LiDAR '{model.key}' uses the drop-off of CARLA instead of the range equation: name another model"
         )
-    lags = sorted({*sensor.fate_correlation, *CHART_LAGS})
     return Comparison(
         name=name,
         sensor=sensor,
@@ -114,7 +80,6 @@ def compare(name: str, sensor: MeasuredSensor, model: LidarModel) -> Comparison:
         beams=_beam_difference(sensor, model),
         ground_noise=_noise_ratios(sensor.range_noise_ground, model),
         vertical_noise=_noise_ratios(sensor.range_noise_vertical, model),
-        fates=simulate_fates(sensor, law.spread, lags),
     )
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -41,11 +40,7 @@ TAIL_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
 RISKS = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
 """Risks studied: failure of a sensor, and coverage by two sensors."""
 
-DETECTOR_RUNS = 3
-"""Number of runs of traffic that must be exceeded to train and test a detector."""
-
-
-CHAPTERS = ("criterion", "arithmetic", "solvers", "poses", "failures", "traffic", "detector", "weather")
+CHAPTERS = ("criterion", "arithmetic", "solvers", "poses", "failures", "traffic", "weather")
 """Names of the chapters, in the order of the page."""
 
 
@@ -63,8 +58,6 @@ class StabilityScope:
         Number of random placement problems of each kind.
     instants : tuple of int
         Numbers of instants of traffic for optimisation and for evaluation.
-    detector : mapping of str to int
-        See `detector_limits`: seeds and steps of trainings.
     """
 
     grids: int = 40
@@ -73,7 +66,6 @@ class StabilityScope:
     poses: PoseStudySettings = field(default_factory=PoseStudySettings)
     robust: Scenarios = Scenarios("pose-errors")
     instants: tuple[int, int] = (24, 120)
-    detector: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,19 +76,12 @@ class StudiedScene:
     ----------
     runs : list of Trajectories
         Runs of traffic next to the scene; may be empty.
-    path : path or None
-        File of the scene; None for the open one.
-    others : sequence of path
-        Other scenes, on which the detectors trained on this one are tested.
-    work, charts : path
-        Folders of finished work, from which a rerun resumes, and of the charts.
+    charts : path
+        Folder of the charts.
     """
 
     survey: Survey
     runs: list[Trajectories]
-    path: Path | None
-    others: Sequence[Path]
-    work: Path
     charts: Path
     scope: StabilityScope
 
@@ -135,8 +120,6 @@ def chapters(scene: StudiedScene) -> Iterator[tuple[str, Work]]:
     yield "failures", failures
     if len(scene.runs) > 1:
         yield "traffic", traffic
-    if importlib.util.find_spec("torch") and len(scene.runs) > DETECTOR_RUNS:
-        yield "detector", detector
     yield "weather", weather
 
 
@@ -271,23 +254,6 @@ def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     )
 
 
-def detector(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Train detectors, and evaluate them under growing disturbances."""
-    from headless.studies.detector_limits import charts as limit_charts  # noqa: PLC0415 -- torch need not be installed
-    from headless.studies.detector_limits import rows as limit_rows  # noqa: PLC0415 -- as above
-    from headless.studies.detector_limits.chapter import detector_limits  # noqa: PLC0415 -- as above
-
-    study = yield from detector_limits(scene.survey, scene.path, scene.others, scene.work, **scene.scope.detector)
-    limit_charts.save_limits_chart(scene.charts / "detector.png", study)
-    charts = [Chart("detector.png", "Average precision against the size of each disturbance, with 95 % intervals")]
-    if study.transfers:
-        limit_charts.save_transfer_chart(scene.charts / "detector_away.png", study)
-        charts.append(
-            Chart("detector_away.png", "Change of average precision on types, traffic and sites not in training")
-        )
-    return Chapter("The detector", limit_rows.limit_rows(study), tuple(charts))
-
-
 def weather(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study a fleet in rain and fog, and the effect of weather on the scene's own types."""
     survey = scene.survey
@@ -309,5 +275,5 @@ def introduction(scene: StudiedScene) -> str:
         f"it. Written by `seip study stability`: {site.name}, {len(site.targets):,} targets, "
         f"{len(site.candidates):,} poses. Brackets hold 95 % intervals. Warnings about a scene and a placement are "
         "shown in the panel and in the batch output, and stored in `placement.json`; the warning about occlusion by "
-        "traffic needs an evaluation in traffic. Warnings about detectors come from the commands that use them."
+        "traffic needs an evaluation in traffic."
     )

@@ -30,8 +30,6 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
     """Study the chapters that are not finished, and write the page; tests pass a small ``scope``."""
     options = _parser().parse_args(argv)
     charts = options.output / CHARTS
-    for other in options.other:
-        _check_other(other)
     if options.only and not (options.output / PAGE).is_file():
         raise SeipError(f"there is no page {options.output / PAGE} to add chapters to: leave out --only")
     runtime.check_folder(charts)
@@ -41,13 +39,12 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
     )
     origin = surveyed.geometry.origin
     runs = [Trajectories.load(path).moved_to(origin) for path in survey.runs_beside(options.scene)]
-    scene = StudiedScene(surveyed, runs, options.scene, options.other, options.work, charts, scope or StabilityScope())
+    scene = StudiedScene(surveyed, runs, charts, scope or StabilityScope())
     made_from = digest(
         grid_key(surveyed),
         repr(surveyed.settings),
         repr(scene.scope),
         *(run.key for run in runs),
-        *(other.name for other in options.other),
         source_digest("headless.studies.stability.command"),
     )
     done = []
@@ -68,23 +65,9 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
     runtime.print_line(f"written to {options.output / PAGE}")
 
 
-def _check_other(scene: Path) -> None:
-    """Raise SeipError, before hours of work, if detectors cannot be tested on a scene."""
-    if not scene.is_file():
-        raise SeipError(f"there is no file {scene}: --other takes scenes with traffic next to them")
-    if not survey.runs_beside(scene):
-        raise SeipError(
-            f"there is no traffic next to {scene}: put runs made by `seip traffic` into the folder "
-            f"{scene.stem}_traffic next to it"
-        )
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("study stability", "Find the limits of every method, and write a page with charts.")
     add_survey_options(parser)
-    parser.add_argument(
-        "--other", nargs="+", type=Path, default=[], metavar="BLEND", help="other scenes to test the detectors on"
-    )
     parser.add_argument(
         "--only",
         nargs="+",

@@ -58,8 +58,8 @@ import sys
 from seip_addon.core.storage.source_digest import _sources
 print(*_sources(sys.argv[1]))
 """
-    sources = output(script + "print('headless' in sys.modules)", "headless.studies.stability.command").split()
-    assert "headless.studies.detector_limits.study" in sources
+    sources = output(script + "print('headless' in sys.modules)", "headless.studies.criteria.command").split()
+    assert "headless.detection.average_precision" in sources
     assert sources[-1] == "False"
 
 

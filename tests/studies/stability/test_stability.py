@@ -11,7 +11,6 @@ import pytest
 
 from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.choosing.robustness.pose_study import PoseStudySettings
-from seip_addon.core.errors import SeipError
 
 SCENE = Path(__file__).resolve().parents[3] / "scenes" / "junction.blend"
 COARSE = [
@@ -42,7 +41,6 @@ def run(folder, *options):
     criterion = "headless.studies.stability.criterion"
     spacings = {"GRID_SPACINGS": (8.0, 6.0), "CANDIDATE_SPACINGS": (30.0, 25.0)}
     with (
-        patch.object(stability_chapters, "DETECTOR_RUNS", 99),  # test_detector_limits.py looks at that chapter
         patch.multiple(criterion, DELTAS=(4.0, 6.0), **spacings),
         patch.multiple("headless.convergence", COARSE_CANDIDATE_SPACING=25.0, EVALUATION_SPACING=4.0, **spacings),
     ):
@@ -77,11 +75,3 @@ def test_the_page_has_all_chapters_and_a_rerun_goes_on(tmp_path, capsys):
     with patch.object(stability, "source_digest", lambda module: f"another version of {module}"):
         run(tmp_path, "--only", "poses")
     assert "Pose errors" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(("name", "sentence"), [("none.blend", "no file"), ("alone.blend", "no traffic next to")])
-def test_another_scene_that_is_of_no_use_is_named_before_any_work(tmp_path, name, sentence):
-    (tmp_path / "alone.blend").write_bytes(b"a scene")
-    with pytest.raises(SeipError, match=sentence):
-        stability.main([str(SCENE), "-o", str(tmp_path / "docs"), "--other", str(tmp_path / name)])
-    assert not (tmp_path / "docs").exists()

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import replace
-from pathlib import Path
 from unittest.mock import patch
 
 from headless.studies.stability import command as stability
 from headless.studies.stability import weather as weather_limits
-from headless.studies.stability.chapters import CHAPTERS
 from headless.studies.stability.charts import save_weather_chart
 from headless.studies.stability.page import Chapter, Chart, put_chapter, save_page
 from headless.studies.stability.rows import Row
@@ -163,14 +161,3 @@ def test_one_chapter_is_studied_and_put_into_the_page(small_scene, tmp_path):
     assert "coverage, type1" in page
     assert {path.name for path in (tmp_path / "stability").iterdir()} == {"weather.png"}
     shutil.rmtree(tmp_path / "work")
-
-
-def test_remedies_name_what_users_have():
-    pytest.importorskip("torch", reason="make detection installs it")
-    from headless.studies.detector_limits.rows import REMEDIES  # noqa: PLC0415  # the detector's, which needs torch
-
-    assert "--weather" in REMEDIES["rain or fog"]
-    page = (Path(__file__).parents[3] / "docs" / "stability.md").read_text(encoding="utf-8")
-    assert REMEDIES["rain or fog"] in page
-    assert "attenuation_per_m" not in page
-    assert CHAPTERS[-1] == "weather"

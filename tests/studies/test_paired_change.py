@@ -4,7 +4,7 @@ import math
 
 from headless.detection.average_precision import evaluate
 from headless.detection.matching import Rule
-from headless.studies.detector_limits.paired_change import ResampledPrecision, change, level
+from headless.studies.paired_change import ResampledPrecision, change, level
 
 import numpy as np
 import pytest

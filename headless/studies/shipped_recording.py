@@ -1,4 +1,7 @@
-"""A scene after its plan: sensors mounted inexactly, a building gone, trees planted; and recordings of it."""
+"""Simulate the shipped recording: sensors mounted inexactly, a building gone, trees planted.
+
+python -m headless.studies.shipped_recording PLAN.blend RUN.npz SWEEPS
+"""
 
 from __future__ import annotations
 
@@ -6,20 +9,29 @@ import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from headless.detection.recordings import MountedSensors, SampledRun, Simulator
+from headless import runtime
+from headless.detection.recordings import MountedSensors, SampledRun, Simulator, sampled_runs
 
+import bpy
 import numpy as np
 import shapely
 
 from seip_addon.core.arrays import Float, Integer
 from seip_addon.core.geometry.plan import surface_height
 from seip_addon.core.geometry.solids import prism
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.scanner import ReflectiveSurface
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.scans.static_scene import static_scene
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry, joined
+from seip_addon.scene.read import read_scene
+from seip_addon.scene.sensors import read_sensors
+
+SEED = 1
+INTERVAL, SWEEPS = 1.5, 20
+"""Seconds between sweeps, and their number."""
 
 DISTANCE, ANGLE, GAIN = 0.4, math.radians(3.0), 0.5
 """Error of position (metres) and orientation, and received power as a multiple of the plan's."""
@@ -30,6 +42,19 @@ _NEAR, _FAR = 8.0, 35.0  # metres from a sensor to a new tree
 _OCCLUDED = 2.5  # metres from a new tree to other objects
 _RADIUS, _HEIGHT, _SIDES = 1.3, 6.0, 10
 RESOLUTION = 1 / 128  # metres: resolution of recorded coordinates, as sensors have it
+
+
+def main(argv: list[str]) -> None:
+    """Write the recording of one installation of a plan in a run of traffic."""
+    plan, run, output = map(Path, argv)
+    runtime.check_folder(output)
+    runtime.open_scene(plan)
+    geometry = read_scene(bpy.context.scene).geometry
+    planned = read_sensors(bpy.context.scene, load_catalogue(()))
+    site = changed_site(geometry, planned, np.random.default_rng(SEED))
+    (sampled,) = sampled_runs([run], geometry.origin, INTERVAL)
+    record_sweeps(output, site, replace(sampled, times=sampled.times[:SWEEPS]), SEED)
+    runtime.print_line(f"{site.gone} is gone, trees at {site.trees.round(1).tolist()}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +99,10 @@ def changed_site(
     return ChangedSite(replace(geometry, occluders=(*kept, *added)), sensors, trees, gone.name)
 
 
-def record_sweeps(folder: Path, site: ChangedSite, run: SampledRun, seed: int, *, compressed: bool = False) -> None:
+def record_sweeps(folder: Path, site: ChangedSite, run: SampledRun, seed: int) -> None:
     """Write a recording of a run of traffic: a folder of npz sweeps for each sensor, in the sensor's axes."""
     simulator = Simulator(site.geometry, ScanSettings(seed=seed, rolling_shutter=True), site.sensors)
     placed = MountedSensors("installed", site.sensors)
-    save = np.savez_compressed if compressed else np.savez
     for number in range(len(run.times)):
         frame = simulator.frame(placed, run, number)
         for index, sensor in enumerate(site.sensors):
@@ -88,7 +112,7 @@ def record_sweeps(folder: Path, site: ChangedSite, run: SampledRun, seed: int, *
             intensity = np.round(frame.intensity[own] * 255)
             path = folder / sensor.label / f"{number:06d}.npz"
             path.parent.mkdir(parents=True, exist_ok=True)
-            save(path, points=np.column_stack([rounded, intensity]).astype(np.float32))
+            np.savez_compressed(path, points=np.column_stack([rounded, intensity]).astype(np.float32))
     times = "".join(f"{time:.3f}\n" for time in run.times - run.times[0])
     for sensor in site.sensors:
         (folder / sensor.label / "timestamps.txt").write_text(times, encoding="utf-8")
@@ -158,3 +182,7 @@ def _off(sensor: MountedSensor, random: np.random.Generator) -> MountedSensor:
         orientation=rotation @ sensor.orientation,
         model=sensor.model.amplified(GAIN),
     )
+
+
+if __name__ == "__main__":
+    runtime.run(main)

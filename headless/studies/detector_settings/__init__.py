@@ -1,1 +1,0 @@
-"""Cost and gain of alternative settings of the detector."""

@@ -1,1 +1,0 @@
-"""Study of field recordings: verification and detection on recordings simulated from changed scenes."""

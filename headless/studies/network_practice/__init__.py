@@ -1,1 +1,0 @@
-"""Allocation of a budget over a network against common practice."""
