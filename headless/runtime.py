@@ -22,6 +22,7 @@ from typing import NoReturn, TypeVar
 # as long where other work is on the same cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from headless.process_end import end_without_freeing
 from headless.system_libraries import complaint, missing_libraries
 
 from seip_addon.core.acceptance import Acceptance
@@ -155,6 +156,16 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
         The command, called with its own arguments. Exceptions other than
         `SeipError` and `KeyboardInterrupt` are defects and show their traceback.
     """
+    try:
+        _run(main)
+    except BaseException as end:
+        code = end.code if isinstance(end, SystemExit) else 1
+        if not in_blender():
+            end_without_freeing(code if isinstance(code, int) else int(code is not None), Path(bpy.app.tempdir))
+        raise
+
+
+def _run(main: Callable[[list[str]], None]) -> NoReturn:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # Blender leaves SIGINT to the system
     for number in (signal.SIGTERM, signal.SIGHUP):  # end in good order: half-written files are removed on the way out
         signal.signal(number, lambda which, _frame: sys.exit(128 + which))

@@ -9,6 +9,7 @@ import bpy
 from PIL import Image
 
 from seip_addon.core.storage.files import whole_file
+from seip_addon.scene.interrupts import held_signals
 from seip_addon.scene.render import silenced
 
 
@@ -40,7 +41,7 @@ def save_video(path: Path, pictures: Sequence[Path], rate: float) -> None:
         render.ffmpeg.format, render.ffmpeg.codec = "MPEG4", "H264"
         render.ffmpeg.constant_rate_factor = "HIGH"
         render.use_file_extension = False
-        with whole_file(path) as temporary, silenced():
+        with whole_file(path) as temporary, silenced(), held_signals():
             render.filepath = str(temporary)
             bpy.ops.render.render(animation=True, scene=scene.name)
     finally:

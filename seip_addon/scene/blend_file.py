@@ -8,13 +8,14 @@ import bpy
 
 from ..core.errors import SeipError
 from ..core.storage.files import whole_file
-from .interrupts import held_interrupts
+from .interrupts import held_signals
 from .views import set_up_view
 
 
 def new_file() -> bpy.types.Scene:
     """Make a new file, in place of the open one, and return its only scene, which is empty."""
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with held_signals():
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     return bpy.context.scene
 
 
@@ -29,7 +30,8 @@ def open_blend(path: Path) -> None:
     if not path.is_file():
         raise SeipError(f"there is no file {path}; build one with seip build-scene or check the name")
     try:
-        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
+        with held_signals():
+            bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
     except RuntimeError as error:
         raise SeipError(
             f"{path} is not a .blend that Blender {bpy.app.version_string} can open; build a scene from a map with "
@@ -80,7 +82,7 @@ def save_blend(path: Path) -> None:
         temporary.unlink()  # Blender would keep a backup of a file that is there
         full = SeipError(f"cannot write {path} to its end; make room there or choose another folder")
         try:
-            with held_interrupts():
+            with held_signals():
                 bpy.ops.wm.save_as_mainfile(
                     filepath=str(temporary.resolve()), copy=True, compress=True, check_existing=False
                 )

@@ -11,6 +11,8 @@ from pathlib import Path
 import addon_utils
 import bpy
 
+from .interrupts import held_signals
+
 EXPORTER = "io_scene_gltf2"
 LOG = logging.getLogger(__name__)
 
@@ -28,7 +30,7 @@ def save_glb(path: Path, attribution: Sequence[str]) -> None:
     try:
         if "gltf" not in dir(bpy.ops.export_scene):
             addon_utils.enable(EXPORTER)
-        with contextlib.redirect_stdout(io.StringIO()):  # where it tells of every mesh
+        with held_signals(), contextlib.redirect_stdout(io.StringIO()):  # where it tells of every mesh
             bpy.ops.export_scene.gltf(
                 filepath=str(path),
                 export_format="GLB",

@@ -1,4 +1,4 @@
-"""Handling of Ctrl-C during Blender's own code."""
+"""Handling of signals during Blender's own code."""
 
 from __future__ import annotations
 
@@ -7,24 +7,29 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+
 
 @contextmanager
-def held_interrupts() -> Iterator[None]:
-    """Hold Ctrl-C back until the block ends, and raise it then.
+def held_signals() -> Iterator[None]:
+    """Hold Ctrl-C and termination back until the block ends, and deliver the first of them then.
 
-    Rendering and saving call back into Python and swallow an interrupt that is
-    raised there: the run would continue. Where
-    Blender itself has taken the signal, its handler stays: Python knows no way
-    to put it back.
+    Blender's operators call back into Python. An exception that a signal's handler raises there is printed and
+    forgotten, and the run continues, or Blender never ends. Signals that Blender itself has taken keep their handler,
+    because Python cannot restore it.
     """
-    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is None:
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
     caught: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _frame: caught.append(number))
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    ours = {number: handler for number, handler in before.items() if handler is not None}
+    for number in ours:
+        signal.signal(number, lambda which, _frame: caught.append(which))
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in ours.items():
+            signal.signal(number, handler)
     if caught:
-        raise KeyboardInterrupt
+        signal.raise_signal(caught[0])

@@ -27,7 +27,7 @@ from ..core.output.pictures.viewpoint import Viewpoint, frame
 from ..core.site.site import Site
 from . import contract
 from .daylight import add_daylight
-from .interrupts import held_interrupts
+from .interrupts import held_signals
 
 WIDTH, HEIGHT = 1440, 810  # pixels
 SAMPLES, DENOISED_SAMPLES = 12, 2  # without and with a denoiser, for as little noise or less
@@ -157,7 +157,7 @@ def take(shots: Sequence[Shot], scene: bpy.types.Scene, raws: Sequence[Path]) ->
             _aim(camera, shot.viewpoints[number], shot.reach)
             stage.render.resolution_x, stage.render.resolution_y = shot.size
             stage.render.filepath = str(raw)
-            with held_interrupts():
+            with held_signals():
                 bpy.ops.render.render(scene=stage.name, write_still=True)
     return taken
 

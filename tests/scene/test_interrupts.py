@@ -1,34 +1,38 @@
+"""Signals during Blender's own code."""
+
 import signal
 
 import pytest
 
-from seip_addon.scene.interrupts import held_interrupts
+from seip_addon.scene.interrupts import held_signals
 
 
-def test_ctrl_c_is_raised_when_the_block_ends():
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_are_delivered_when_the_block_ends(number):
     reached = []
 
-    def interrupted():
-        with held_interrupts():
-            signal.raise_signal(signal.SIGINT)
+    def held():
+        with held_signals():
+            signal.raise_signal(number)
             reached.append("the end")
 
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
+    def stop(_number, _frame):
+        raise SystemExit
+
+    before = signal.signal(number, stop)
+    try:
+        with pytest.raises(SystemExit):
+            held()
+        assert signal.getsignal(number) is stop
+    finally:
+        signal.signal(number, before)
     assert reached
 
 
-def test_a_handler_that_is_not_pythons_is_left_alone(monkeypatch):
+def test_handlers_that_are_not_of_python_are_left_alone(monkeypatch):
     given = []
     monkeypatch.setattr(signal, "getsignal", lambda _number: None)  # as in the real Blender
     monkeypatch.setattr(signal, "signal", lambda *arguments: given.append(arguments))
-    with held_interrupts():
+    with held_signals():
         pass
     assert not given
-
-
-def test_the_handler_is_put_back():
-    before = signal.getsignal(signal.SIGINT)
-    with held_interrupts():
-        assert signal.getsignal(signal.SIGINT) is not before
-    assert signal.getsignal(signal.SIGINT) is before
