@@ -3,7 +3,6 @@
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -12,13 +11,33 @@ pytest.importorskip("bpy")
 PLACE = ["--count", "1", "--heights", "5.4", "--spacing", "12", "--grid", "6", "--sensor", "type1", "--no-render"]
 
 
-def place(scene, out):
-    return subprocess.Popen(  # noqa: S603 -- our own command
-        [sys.executable, "-m", "headless.place", str(scene), *PLACE, "-o", str(out)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
+SIGNALLED = """
+import signal, sys
+import bpy
+import io_scene_gltf2
+from headless import place, runtime
+
+suffix, number = sys.argv[1], int(sys.argv[2])
+
+def send(*_):
+    signal.raise_signal(number)
+
+def export(self, context):
+    send()
+    return written(self, context)
+
+if suffix == ".blend":
+    bpy.app.handlers.save_pre.append(bpy.app.handlers.persistent(send))
+else:
+    written, io_scene_gltf2.ExportGLTF2.execute = io_scene_gltf2.ExportGLTF2.execute, export
+del sys.argv[1:3]
+runtime.run(place.main)
+"""
+
+
+def run(*command):
+    return subprocess.run(  # noqa: S603 -- our own commands
+        [sys.executable, *map(str, command)], capture_output=True, text=True, timeout=120, check=False
     )
 
 
@@ -26,14 +45,10 @@ def place(scene, out):
 @pytest.mark.parametrize("suffix", [".blend", ".glb"])
 def test_signals_while_blender_writes_end_the_command(small_scene, tmp_path, number, status, suffix):
     out = tmp_path / "out"
-    process = place(small_scene, out)
-    while process.poll() is None and not [*out.glob(f"*{suffix}"), *out.glob(f".*{suffix}")]:
-        time.sleep(0.002)
-    process.send_signal(number)
-    _, err = process.communicate(timeout=60)
-    assert process.returncode == status
-    assert "Traceback" not in err
-    assert {path.name for path in out.iterdir()} <= {"visibility.npz"}
+    done = run("-c", SIGNALLED, suffix, int(number), small_scene, *PLACE, "-o", out)
+    assert done.returncode == status, done.stderr
+    assert "Traceback" not in done.stderr
+    assert {path.name for path in out.iterdir()} == {"visibility.npz"}
 
 
 def test_commands_end_where_a_scene_has_python_drivers(small_scene, tmp_path):
@@ -47,9 +62,8 @@ def test_commands_end_where_a_scene_has_python_drivers(small_scene, tmp_path):
         f"bpy.ops.wm.save_as_mainfile(filepath={str(scene)!r})\n"
         "os._exit(0)\n"
     )
-    subprocess.run([sys.executable, "-c", script], check=True, capture_output=True)  # noqa: S603 -- as above
-    process = place(scene, tmp_path / "out")
-    out, err = process.communicate(timeout=60)
-    assert process.returncode == 0, err
-    assert "written to" in out
+    assert run("-c", script).returncode == 0
+    done = run("-m", "headless.place", scene, *PLACE, "-o", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "written to" in done.stdout
     assert (tmp_path / "out" / "scene.glb").exists()

@@ -97,11 +97,10 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     with _writing(target):
         made = _make_folder(target.parent)
         _remove_leftovers(target.parent.resolve())
-        handle, name = tempfile.mkstemp(prefix=_own_prefix(), suffix=target.suffix, dir=target.parent)
-    os.close(handle)
-    temporary = Path(name)
+    temporary = target.parent / f"{_own_prefix()}{secrets.token_hex(4)}{target.suffix}"
     try:
         with _writing(target):
+            temporary.touch(0o600, exist_ok=False)  # in here, so that a signal leaves no file
             yield temporary
             temporary.chmod(0o666 & ~_UMASK)
             temporary.replace(target)
