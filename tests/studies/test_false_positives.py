@@ -4,22 +4,15 @@ import math
 
 import pytest
 
-from tests.builders.labelled_frames import near_and_far, traffic, values
+from tests.builders.labelled_frames import near_and_far
 
 pytest.importorskip("torch", reason="the detector's torch is optional")
 
 from headless.detection.average_precision import evaluate
 from headless.detection.matching import Rule
-from headless.studies.false_positives import false_by, false_positives
+from headless.studies.false_positives import false_positives
 
 AT_07 = Rule()
-
-
-def test_false_detections_by_density_and_distance():
-    evaluation = evaluate([near_and_far(), near_and_far()], AT_07)
-    assert values(false_by(evaluation, "density", (0, 1, 20), 0.1)) == [1, 1]
-    assert values(false_by(evaluation, "density", (0, 1, 20), 0.75)) == [0, 1]
-    assert values(false_by(evaluation, "distance", (0, 20, 60), 0.1)) == [1, 1]
 
 
 def test_false_positives_and_how_many_are_in_sparse_places():
@@ -31,8 +24,3 @@ def test_false_positives_and_how_many_are_in_sparse_places():
     found = false_positives(evaluation, 0.9)
     assert found.per_frame == 0
     assert math.isnan(found.sparse)
-
-
-def test_density_that_says_nothing_gives_a_half():
-    frames = traffic(2, frames=200)
-    assert false_positives(evaluate(frames, AT_07), 0.2).sparse == pytest.approx(0.5, abs=0.06)

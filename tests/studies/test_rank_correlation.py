@@ -2,7 +2,7 @@
 
 import math
 
-from headless.studies.rank_correlation import rank_agreements, rank_correlation, rank_correlation_interval
+from headless.studies.rank_correlation import rank_correlation, rank_correlation_interval
 
 import numpy as np
 import pytest
@@ -40,21 +40,3 @@ def test_interval_of_rank_correlation(seed):
         rng=rng,
     ).confidence_interval
     assert (low, high) == pytest.approx(tuple(theirs), abs=0.25)
-
-
-def test_too_few_pairs_give_no_interval():
-    assert rank_correlation_interval([1, 2, 3], [1, 2, 3], seed=0) is None
-    assert rank_correlation_interval([1, 1, 1, 1], [1, 2, 3, 4], seed=0) is None
-
-
-@given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=3, max_size=20))
-def test_rank_agreements(pairs):
-    """Each row by itself, ties and all, is as scipy has it."""
-    x, y = np.array(pairs, dtype=float).T
-    spearman, kendall = rank_agreements(np.array([x, -x]), np.array([y, y]))
-    if len(set(x)) == 1 or len(set(y)) == 1:
-        assert np.isnan([spearman, kendall]).all()
-    else:
-        assert spearman[0] == pytest.approx(scipy.stats.spearmanr(x, y).statistic, abs=1e-12)
-        assert kendall[0] == pytest.approx(scipy.stats.kendalltau(x, y).statistic, abs=1e-12)
-        assert [spearman[1], kendall[1]] == pytest.approx([-spearman[0], -kendall[0]])

@@ -2,36 +2,24 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
-from pathlib import Path
 
-from headless.studies.benchmark import report
-from headless.studies.benchmark.resource_usage import Expense
 from headless.studies.benchmark.sensor_models import (
     FINEST,
     PLAIN,
     SHIPPED,
     SUB_RAYS,
     DivergentCaster,
-    PrecisionFront,
-    SensorModelFindings,
-    SiteFront,
-    best_placement,
-    random_placements,
     sensor_models,
     site_front,
 )
-from headless.studies.benchmark.sensor_report import differs, save_sensor_model_chart, sensor_model_parts
 from headless.studies.benchmark.visibility import Cost
 
 import bpy
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
@@ -44,7 +32,6 @@ from tests.builders.small_scene import make_run
 
 assert bpy.app.version  # the engine bvh needs Blender's module, which is there from here on
 
-DOCS = Path(__file__).parents[3] / "docs"
 LIDAR = replace(load_catalogue()["os1_128"], points_per_second=2_621_440 / 8)
 AHEAD = np.array([[1.0, 0.0, 0.0]])
 WALL = box_triangles((10, -20, -20), (11, 20, 20))
@@ -84,16 +71,6 @@ def test_beams_from_many_points_are_the_beams_of_each():
     np.testing.assert_allclose(together, (10.0, 6.0), atol=1e-4)
 
 
-def test_random_placements_have_different_positions_and_follow_the_seed():
-    candidates = make_example().site.candidates
-    drawn = random_placements(candidates, 4, 30, seed=3)
-    assert all(len(set(candidates.position_of[one])) == 4 for one in drawn)
-    assert len(np.unique(np.concatenate(drawn))) > 30
-    for one, again in zip(drawn, random_placements(candidates, 4, 30, seed=3), strict=True):
-        np.testing.assert_array_equal(one, again)
-    assert any((one != other).any() for one, other in zip(drawn, random_placements(candidates, 4, 30, 4), strict=True))
-
-
 def own_site():
     site = make_example(spacing=4.0, reach=36.0, heights=(5.4,)).site
     one = site.candidates.sensor == "type1"
@@ -119,99 +96,6 @@ def test_every_model_sees_the_same_placements(front):
     assert front.differing <= 0.01 * front.compared
     claimed, true = front.best[FINEST]["2"]
     assert claimed == true >= front.best[PLAIN]["2"][1]
-
-
-def test_more_sensors_than_positions_are_refused():
-    amount = {"placements": 1, "checked": 1, "seed": 0, "time_limit": 1.0}
-    with pytest.raises(SeipError, match="position"):
-        site_front(own_site(), sensor_models(LIDAR), counts=(1, 999), **amount)
-
-
-def test_the_best_placement_covers_most():
-    site, random = own_site(), np.random.default_rng(1)
-    visible = random.random((len(site.candidates), len(site.targets))) < 0.1
-    chosen = best_placement(site, {LIDAR.key: LIDAR}, visible, 2, 10.0)
-    pairs = [(a, b) for a in range(len(visible)) for b in range(a)]
-    assert visible[chosen].any(axis=0).sum() == max((visible[a] | visible[b]).sum() for a, b in pairs)
-
-
-def by_hand(site="a", shipped=(0.25, 0.35)):
-    coverage = {PLAIN: {"1": [0.5, 0.7]}, SHIPPED: {"1": list(shipped)}, FINEST: {"1": [0.2, 0.3]}}
-    costs = {
-        name: Cost(Expense(seconds, seconds), 10, 5) for name, seconds in zip(coverage, (1.0, 2.0, 4.0), strict=True)
-    }
-    best = {name: {"1": (0.5, 0.4)} for name in coverage}
-    return SiteFront(site, 100, 8, costs, coverage, best, 1, 900)
-
-
-def precision_by_hand():
-    estimates = {name: IntervalEstimate(0.8, 0.7, math.inf) for name in (PLAIN, SHIPPED, FINEST)}
-    changes = {PLAIN: IntervalEstimate(0.1, 0.05, 0.2), SHIPPED: IntervalEstimate(0.01, -0.02, 0.03)}
-    changes[FINEST] = IntervalEstimate(0.0, 0.0, 0.0)
-    return PrecisionFront("a", "4 × os1_128", 60, 1800, by_hand().costs, estimates, changes)
-
-
-def test_changes_are_paired():
-    change = by_hand().change(PLAIN)
-    assert change.value == pytest.approx(0.35)
-    assert 0.3 <= change.low <= change.value <= change.high <= 0.4 + 1e-12
-    assert differs(change)
-    same = by_hand(shipped=(0.25, 0.25)).change(SHIPPED, "1")  # once more, once less
-    assert same.value == pytest.approx(0.0)
-    assert not differs(same)
-    assert by_hand().change(FINEST) == IntervalEstimate(0.0, 0.0, 0.0)
-
-
-def test_sites_stay_until_they_are_measured_again():
-    earlier = SensorModelFindings("os1_128", 0.003, 16, (by_hand("a"), by_hand("b")), precision_by_hand())
-    again = by_hand("b", shipped=(0.9, 0.9))
-    joined = SensorModelFindings("os1_128", 0.003, 16, (again, by_hand("c"))).over(earlier)
-    assert [one.site for one in joined.sites] == ["a", "b", "c"]
-    assert joined.sites[1] is again
-    assert joined.precision is earlier.precision
-    other = SensorModelFindings("os0_128", 0.006, 16, (again,))
-    assert other.over(earlier) is other
-    assert other.over(None) is other
-
-
-def test_the_chapter_says_what_was_measured(tmp_path):
-    findings = SensorModelFindings("os1_128", math.radians(0.18), 2, (by_hand(),), precision_by_hand())
-    heading, text, picture, table, verdict = sensor_model_parts(findings, "benchmark")
-    assert heading == "## Models of the sensor"
-    assert "0.18°" in text
-    assert "1,800 steps" in text
-    assert "(benchmark/sensor_models.png)" in picture
-    assert "| a | plain range | 1 | 10 | 60.0% (+35.00 [" in table
-    assert "by 35.0 to 35.0 points" in verdict
-    assert "takes 2 times as long" in verdict
-    assert "is left out" not in verdict  # five points are not nothing
-    save_sensor_model_chart(tmp_path, findings)
-    assert (tmp_path / "sensor_models.png").read_bytes().startswith(b"\x89PNG")
-    quiet = replace(findings, sites=(by_hand(shipped=(0.2, 0.301)),))
-    assert "it is left out" in sensor_model_parts(quiet, "benchmark")[-1]
-
-
-def test_the_shipped_page_is_that_of_its_figures(tmp_path):
-    findings, checks = report.load_json(DOCS / "benchmark" / "benchmark.json")
-    report.save_page(tmp_path / "page.md", findings, checks, "benchmark")
-    assert (tmp_path / "page.md").read_text(encoding="utf-8") == (DOCS / "benchmark.md").read_text(encoding="utf-8")
-
-
-def test_figures_are_read_as_they_were_written(tmp_path):
-    findings, checks = report.load_json(DOCS / "benchmark" / "benchmark.json")
-    models = SensorModelFindings("os1_128", 0.003, 2, (by_hand(),), precision_by_hand())
-    report.save_json(tmp_path / "one.json", replace(findings, sensor_models=models), checks)
-    read, _ = report.load_json(tmp_path / "one.json")
-    assert read.sensor_models.precision.precision[PLAIN] == IntervalEstimate(0.8, 0.7, math.inf)
-    report.save_json(tmp_path / "two.json", read, checks)
-    assert (tmp_path / "two.json").read_bytes() == (tmp_path / "one.json").read_bytes()
-
-
-@pytest.mark.parametrize("text", ["", "{", "[]", json.dumps({"bars": []})])
-def test_what_is_no_benchmark_is_refused(tmp_path, text):
-    (tmp_path / "benchmark.json").write_text(text, encoding="utf-8")
-    with pytest.raises(SeipError, match="is not a benchmark"):
-        report.load_json(tmp_path / "benchmark.json")
 
 
 def test_frames_by_the_shipped_model_are_the_product_s_own():

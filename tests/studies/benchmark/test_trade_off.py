@@ -1,7 +1,6 @@
 """The front of ways to an answer, and how costs grow."""
 
 from headless.studies.benchmark.pareto_front import Method, front, growth_exponent
-from headless.studies.benchmark.pictures import save_growth_chart, save_trade_off_chart
 
 import numpy as np
 import pytest
@@ -18,11 +17,6 @@ def dominates(a, b):
     return a.seconds <= b.seconds and a.error <= b.error and (a.seconds, a.error) != (b.seconds, b.error)
 
 
-def test_a_front_by_hand():
-    slow, quick, worse = Method("slow", "", 9.0, 0.0), Method("quick", "", 1.0, 0.2), Method("worse", "", 2.0, 0.3)
-    assert front([slow, worse, quick]) == [quick, slow]
-
-
 @given(WAYS)
 def test_the_front_is_what_nothing_dominates(ways):
     found = {(way.seconds, way.error) for way in front(ways)}
@@ -33,15 +27,3 @@ def test_the_front_is_what_nothing_dominates(ways):
 def test_the_exponent_of_a_power_law_is_found(exponent, factor):
     size = np.array([1.0, 2.0, 5.0, 9.0])
     assert growth_exponent(size, factor * size**exponent) == pytest.approx(exponent, abs=1e-9)
-
-
-def test_charts_are_drawn(tmp_path):
-    ways = [
-        Method("exact", "full", 9.0, 0.0),
-        Method("lazy", "lazy", 1.0, 0.0, default=True),
-        Method("rough", "full", 0.5, 0.1),
-    ]
-    save_trade_off_chart(tmp_path / "a.png", {"error": ways}, "title", "subtitle", 1e-3)
-    save_growth_chart(tmp_path / "b.png", {"s": [("targets", (1.0, 2.0), (1.0, 4.0))]}, "title")
-    for name in ("a.png", "b.png"):
-        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")

@@ -8,8 +8,6 @@ from headless.studies.coverage.cells import CENTRAL_WEIGHTS, COUNTS
 import pytest
 from matplotlib.image import imread
 
-from seip_addon.core.errors import SeipError
-
 pytestmark = pytest.mark.slow  # a whole study; its parts are in test_coverage_study.py and test_study_claims.py
 
 TYPES, HEIGHTS = ("type1", "type2"), (3.5, 8.0)
@@ -53,17 +51,3 @@ def test_the_verdicts_stand_in_the_claims(folder):
     lines = (folder / "claims.md").read_text(encoding="utf-8").splitlines()
     assert [line.split("|")[1].strip() for line in lines[4:]] == ["1", "2", "3", "4", "10"]
     assert all(line.count("**") == 2 for line in lines[4:])
-
-
-@pytest.mark.slow
-def test_the_same_study_gives_the_same_bytes(folder, tmp_path, run):
-    (tmp_path / "visibility.npz").write_bytes((folder / "visibility.npz").read_bytes())
-    run(tmp_path)
-    for path in folder.iterdir():
-        assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
-
-
-def test_a_mistake_has_its_sentence(tmp_path, run):
-    with pytest.raises(SeipError, match="type1"):
-        run(tmp_path, "--sensor", "typ1")
-    assert list(tmp_path.iterdir()) == []

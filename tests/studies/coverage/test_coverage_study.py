@@ -4,7 +4,7 @@ import csv
 from dataclasses import replace
 
 from headless.studies.claims import save_claims
-from headless.studies.coverage.cells import CENTRAL_WEIGHTS, CHARTED_WEIGHT, COUNTS, EmptyCell, coverage_study
+from headless.studies.coverage.cells import CENTRAL_WEIGHTS, COUNTS, EmptyCell, coverage_study
 from headless.studies.coverage.charts import save_height_chart, save_weight_chart
 from headless.studies.coverage.claims import coverage_claims
 from headless.studies.coverage.tables import save_study_table
@@ -12,8 +12,6 @@ from headless.studies.coverage.tables import save_study_table
 import numpy as np
 import pytest
 
-from seip_addon.core.choosing.placement.search_limits import SolverLimits
-from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.site.site import Site
 from tests.builders.small_junction import make_example
@@ -48,20 +46,9 @@ def test_free_heights_are_no_worse_than_any_one_height(study):
                 assert free.bound >= study.find(sensor, count, height).placement.objective
 
 
-def test_the_objective_counts_targets(example, study):
-    case = study.find(study.sensors[0], 2)
-    seen = example.visible[case.placement.chosen].any(axis=0)
-    assert case.placement.objective == seen.sum()
-    assert case.deployment.coverage == seen.mean()
-
-
 def test_greedy_keeps_its_promise(study):
     claim = next(claim for claim in coverage_claims(study) if claim.number == 10)
     assert claim.verdict == "holds"
-
-
-def test_the_weight_shown_in_plans_is_one_that_is_solved(study):
-    assert all(study.find(sensor, COUNTS[-1], weight=CHARTED_WEIGHT) for sensor in study.sensors)
 
 
 def solved(example, site: Site | None = None, visible=None):
@@ -98,53 +85,6 @@ def test_more_sensors_than_positions_leave_those_cells_empty_and_the_rest_solved
     assert all((row["coverage"] == "") == (row["count"] == "4") for row in rows)
 
 
-@pytest.mark.slow
-def test_a_type_that_is_blind_from_one_height_leaves_that_height_empty(example, tmp_path):
-    candidates = example.site.candidates
-    visible = example.visible.copy()
-    visible[(candidates.sensor == "type1") & (candidates.height == 5.4)] = False
-    study = solved(example, visible=visible)
-    assert study.find("type1", 1, 5.4) is None
-    assert study.find("type1", 1) is not None
-    assert study.possible("type1", 1, 5.4) is None
-    heights = next(claim for claim in coverage_claims(study) if claim.number == 3)
-    assert heights.verdict != "holds"
-    write_all(tmp_path, study)
-
-
-def test_mandatory_places_that_one_sensor_cannot_serve_leave_that_number_empty(example):
-    candidates = example.site.candidates
-    mandatory = np.zeros((2, len(candidates.position)), bool)
-    mandatory[[0, 1], [0, 5]] = True
-    names = np.array(["pole A", "pole B"])
-    site = replace(example.site, candidates=replace(candidates, mandatory=mandatory, mandatory_name=names))
-    study = solved(example, site)
-    assert {cell.count for cell in study.cells if isinstance(cell, EmptyCell)} == {1}
-    assert all("pole A, pole B" in cell.note for cell in study.cells if isinstance(cell, EmptyCell))
-
-
-def test_a_mandatory_pole_without_pose_at_a_height_leaves_that_height_empty(example):
-    candidates = example.site.candidates
-    kept = (candidates.position_of != 0) | (candidates.height == 5.4)
-    mandatory = np.zeros((1, len(candidates.position)), bool)
-    mandatory[0, 0] = True
-    per_pose = {
-        name: getattr(candidates, name)[kept] for name in ("position_of", "sensor", "height", "xyz", "yaw", "tilt")
-    }
-    fewer = replace(candidates, **per_pose, mandatory=mandatory, mandatory_name=np.array(["pole A"]))
-    study = solved(example, replace(example.site, candidates=fewer), example.visible[kept])
-    empty = [cell for cell in study.cells if isinstance(cell, EmptyCell)]
-    assert {cell.height for cell in empty} == {3.5}
-    assert all("pole A must carry a sensor" in cell.note for cell in empty)
-
-
-def test_what_no_cell_can_do_is_an_error(example):
-    with pytest.raises(SeipError, match="no candidate sees"):
-        solved(example, visible=np.zeros_like(example.visible))
-    with pytest.raises(SeipError, match="cplex"):
-        finish(coverage_study(example.site, example.models, example.visible, SolverLimits("cplex")))
-
-
 def write_all(folder, study):
     save_height_chart(folder / "heights.png", study, "Small junction")
     save_weight_chart(folder / "weights.png", study, "Small junction")
@@ -163,26 +103,3 @@ def test_pictures_and_tables_are_the_same_bytes_each_time(study, tmp_path):
     for path in (tmp_path / "one").iterdir():
         assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes()
     assert len(read_table(tmp_path / "one" / "coverage.csv")) == len(study.cells)
-
-
-def test_the_table_gives_each_sensors_height(study, tmp_path):
-    save_study_table(tmp_path / "coverage.csv", study)
-    for row, case in zip(read_table(tmp_path / "coverage.csv"), study.cases, strict=True):
-        assert [float(height) for height in row["heights_used_m"].split()] == [
-            sensor.height for sensor in case.deployment.sensors
-        ]
-        assert row["tilts_used_deg"].split() == ["0"] * len(case.deployment.sensors)
-
-
-def test_a_name_with_a_bar_stays_in_its_markdown_cell(tmp_path, study):
-    claims = [replace(claim, text="a | b") for claim in coverage_claims(study)]
-    save_claims(tmp_path / "claims.md", claims, "Small junction")
-    assert "| a \\| b |" in (tmp_path / "claims.md").read_text(encoding="utf-8")
-
-
-@pytest.mark.slow
-def test_charts_take_more_types_than_there_are_colours(study, tmp_path):
-    keys = [f"type {index} for $1 and $2" for index in range(8)]
-    cells = [replace(cell, sensor=key) for key in keys for cell in study.cells if cell.sensor == study.sensors[0]]
-    write_all(tmp_path, replace(study, sensors=tuple(keys), cells=tuple(cells)))
-    assert (tmp_path / "heights.png").stat().st_size > 10_000

@@ -11,11 +11,10 @@ from headless.detection.average_precision import evaluate
 from headless.detection.matching import Rule
 from headless.studies.criteria import command as criteria_study
 from headless.studies.criteria import shared_scans
-from headless.studies.criteria.criteria_table import difference_of, precision_of
+from headless.studies.criteria.criteria_table import difference_of
 
 import numpy as np
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import student_quantile
 from tests.builders.labelled_frames import box, detected, frame, truth
 
@@ -68,33 +67,6 @@ def test_a_finished_study_is_read_and_a_stopped_one_goes_on(study, small_scene, 
     assert "2 × type1, PE-VGOP" in capsys.readouterr().out
 
 
-def test_best_placements_can_be_evaluated_alone(small_scene, tmp_path):
-    """Two criteria have two placements at most, which have no rank correlation."""
-    few = ["--placements", "0", "--criterion", "returns", "--count", "1"]
-    criteria_study.main([str(small_scene), "-o", str(tmp_path), *COARSE, *OPTIONS, *few])
-    (studied,) = json.loads((tmp_path / "criteria.json").read_text(encoding="utf-8"))["types"]
-    assert [row["criterion"] for row in studied["rows"]] == ["coverage", "returns"]
-    assert all(one["kind"].startswith("best by") for one in studied["placements"])
-    assert [row["spearman"] for row in studied["rows"]] == [None, None]
-
-
-@pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
-        (("--placements", "3"), "3 placements say nothing of a correlation"),
-        (("--count", "30"), "30 sensors are requested, but there are"),
-    ],
-)
-def test_what_cannot_be_studied_gets_a_sentence(small_scene, tmp_path, options, sentence):
-    with pytest.raises(SeipError, match=sentence):
-        criteria_study.main([str(small_scene), "-o", str(tmp_path), *COARSE, *OPTIONS, *options])
-
-
-def test_scenes_of_one_name_are_refused(small_scene, tmp_path):
-    with pytest.raises(SeipError, match="two scenes have files of one name"):
-        criteria_study.main([str(small_scene), str(tmp_path / small_scene.name), "-o", str(tmp_path), *OPTIONS])
-
-
 def found(counts):
     """Runs of a frame each with ten cars, of which so many are found."""
     frames = [
@@ -113,9 +85,3 @@ def test_difference_is_the_jackknife_of_pairs():
     reach = student_quantile(3) * np.sqrt(3 / 4 * ((left_out - left_out.mean()) ** 2).sum())
     assert change.value == pytest.approx(3 / 40)
     assert (change.low, change.high) == pytest.approx((3 / 40 - reach, 3 / 40 + reach))
-
-
-def test_too_few_runs_leave_intervals_open():
-    assert precision_of(found([9, 8, 7])).high == np.inf
-    assert difference_of(found([9, 8, 7]), found([9, 8, 7])).low == -np.inf
-    assert precision_of(found([9, 8, 7, 9])).low < 33 / 40 < precision_of(found([9, 8, 7, 9])).high

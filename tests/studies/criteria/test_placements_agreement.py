@@ -1,12 +1,9 @@
 """What agrees with average precision, how well anything could, and what is said of it, on placements that are told."""
 
 from dataclasses import dataclass, field
-from types import SimpleNamespace
 
 from headless.studies.criteria import agreement
 from headless.studies.criteria.criteria import Criterion
-from headless.studies.criteria.drawing import BETWEEN, OPTIMAL, RANDOM, PlacementsStudySettings
-from headless.studies.criteria.results import PlacementsStudy
 
 import numpy as np
 import pytest
@@ -58,14 +55,6 @@ def test_the_ceiling_is_what_the_true_quality_reaches(run_error, training_error)
     assert np.mean(ceilings) == pytest.approx(np.mean(reached), abs=0.03)
 
 
-def test_one_training_is_taken_to_agree():
-    told = Told(spread(), 0.1, 0.0, trainings=1)
-    found = agreement.noise_ceiling(told)
-    assert found.trainings is None
-    both = 2 * found.halves.value / (1 + found.halves.value)
-    assert found.ceiling.value == pytest.approx(np.sqrt(both))
-
-
 def test_intervals_hold_what_they_should():
     """Of a criterion whose correlation with what is measured is known from many placements."""
     rng = np.random.default_rng(5)
@@ -94,70 +83,3 @@ def test_a_criterion_is_paired_with_coverage():
     best, liked = np.argmax(told.quality), np.argmax(coverage.values)
     assert better.gain.value == pytest.approx(told.values[best] - told.values[liked])
     assert better.gain.low <= better.gain.value <= better.gain.high
-
-
-def test_few_placements_and_few_runs_have_no_interval():
-    told = Told(spread(), 0.05, 0.0)
-    coverage = Criterion("coverage", "coverage", told.quality)
-    three = np.arange(PLACEMENTS) < 3
-    assert agreement.correlate(coverage, told, three).spearman.low == -np.inf
-    none = agreement.correlate(coverage, told, np.zeros(PLACEMENTS, dtype=bool))
-    assert (none.placements, np.isnan(none.spearman.value)) == (0, True)
-    told.has_intervals = False
-    assert agreement.correlate(coverage, told).spearman.low == -np.inf
-    assert agreement.noise_ceiling(told).ceiling.low == -np.inf
-
-
-def test_placements_near_the_optimum():
-    coverage = Criterion("coverage", "coverage", np.array([0.80, 0.76, 0.749, 0.3]))
-    assert agreement.near_optimum(coverage).tolist() == [True, True, False, False]
-    assert agreement.upper_half(coverage).tolist() == [True, True, False, False]
-
-
-def study(told, *others):
-    coverage = Criterion("coverage", "coverage", np.where(np.arange(len(told.quality)) == 0, 1.0, told.quality))
-    kind = (OPTIMAL, *[RANDOM, BETWEEN] * (len(told.quality) // 2))[: len(told.quality)]
-    drawn = SimpleNamespace(kind=kind)
-    return PlacementsStudy("Site", PlacementsStudySettings(PLACEMENTS), "type2", drawn, told, (coverage, *others))
-
-
-def test_sentences_follow_from_the_figures():
-    told = Told(np.sort(spread())[::-1], 0.02, 0.0)
-    wrong = Criterion("wrong", "the wrong", -told.quality)
-    said = list(study(told, wrong).sentences())
-    assert any("the upper half" in line and "predicts detection here as well" in line for line in said)
-    assert said[-2].startswith("no criterion that can be had beforehand correlates better than coverage")
-    assert said[-1].startswith("no criterion that can be had beforehand gains anything")
-
-
-def test_a_gain_that_does_not_stand_is_told_with_its_interval():
-    told = Told(np.linspace(0.7, 0.71, PLACEMENTS), 0.3, 0.0)
-    best = Criterion("lucky", "the lucky", told.values)
-    assert list(study(told, best).sentences())[-1].startswith(
-        "no criterion that can be had beforehand gains a point of AP that its interval leaves standing; the most has "
-        "the lucky: +"
-    )
-
-
-def test_a_criterion_that_gains_is_named():
-    told = Told(spread(), 0.02, 0.0)
-    true = Criterion("true", "the truth", told.quality)
-    known_late = Criterion("late", "hindsight", told.quality, beforehand=False)
-    said = list(study(told, true, known_late).sentences())
-    assert said[-1].startswith("a point or more of AP that the interval leaves standing is gained by the truth (+")
-    assert "hindsight" not in said[-1]
-
-
-def test_a_detector_that_was_not_trained_says_nothing():
-    told = Told(np.linspace(0.0, 0.05, PLACEMENTS), 0.0, 0.0)
-    said = list(study(told, Criterion("true", "the truth", told.quality)).sentences())
-    assert said[-1].startswith("this supports no conclusion")
-
-
-def test_noise_hides_what_coverage_foretells_near_the_optimum():
-    quality = np.concatenate([[0.8], np.linspace(0.76, 0.8, 10), np.linspace(0.2, 0.6, 20)])
-    told = Told(quality, 0.3, 0.0)
-    coverage = Criterion("coverage", "coverage", quality)
-    near = agreement.correlate(coverage, told, agreement.near_optimum(coverage))
-    assert near.placements == 11
-    assert near.spearman.low < 0 < agreement.correlate(coverage, told).spearman.low

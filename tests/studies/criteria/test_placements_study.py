@@ -10,31 +10,24 @@ import pytest
 
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
-from headless.detection.frame_results import FrameResult
 from headless.detection.recordings import SampledRun
 from headless.studies.criteria.criteria import cars_at, criteria_of
 from headless.studies.criteria.drawing import (
     BETWEEN,
     NEAR,
     OPTIMAL,
-    OTHERWISE,
     RANDOM,
     PlacementsStudySettings,
     draw_placements,
 )
-from headless.studies.criteria.occupancy import require_vehicles, vehicle_occupancy
 from headless.studies.criteria.pose_criteria import SeenShare
-from headless.studies.criteria.precision import Precisions
 from headless.studies.criteria.site_criteria import best_of, problem_of
 from headless.studies.detection.sensor_configuration import SensorConfiguration
-from headless.studies.stored_detections import load_frames, save_frames
 
 import numpy as np
-import shapely
 
 from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.choosing.placement.search_limits import DEFAULT_LIMITS
-from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
@@ -47,7 +40,6 @@ from seip_addon.core.sensing.scans.static_scene import StaticScene
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.site.site import Targets
-from tests.builders.labelled_frames import box, detected, traffic, truth
 from tests.builders.small_junction import make_example
 
 SETTINGS = PlacementsStudySettings(placements=11, count=2, training_placements=6)
@@ -92,22 +84,6 @@ def test_placements_are_feasible_different_and_spread(survey):
     assert (coverage[6:] < coverage[0] - NEAR).sum() >= 2
 
 
-def test_the_optimal_placements_of_other_weights_are_evaluated_as_well(survey):
-    site, visible = survey.site, survey.grid.visible
-    central = site.targets.central.astype(float)
-    drawn = finish(draw_placements(survey, SETTINGS, {"regions": central, "alike": np.ones(len(site.targets))}))
-    assert drawn.kind[-1] == OTHERWISE
-    assert len(drawn.evaluated) == SETTINGS.placements + 1  # all alike is coverage itself
-    positions = site.candidates.position_of
-    best = max(
-        (visible[a] | visible[b]) @ central
-        for a in range(len(visible))
-        for b in range(a)
-        if positions[a] != positions[b]
-    )
-    assert (drawn.evaluated[-1].deployment.seen_by > 0) @ central == best
-
-
 @pytest.mark.parametrize("key", ["coverage", "occupancy_entropy"])
 def test_what_coverage_rates_best_is_proven_optimal(survey, key):
     """Of all pairs: a greedy choice would be another, worse one."""
@@ -122,14 +98,6 @@ def test_what_coverage_rates_best_is_proven_optimal(survey, key):
     assert criterion.value(found) == pytest.approx(best)
 
 
-def test_a_seed_draws_the_same_and_another_others(survey):
-    again = [finish(draw_placements(survey, replace(SETTINGS, seed=seed), {})) for seed in (0, 0, 1)]
-    first, same, other = [poses(one.evaluated) + poses(one.training) for one in again]
-    assert first == same
-    assert first[0] == other[0]
-    assert set(first[1:6]) != set(other[1:6])
-
-
 def test_random_placements_are_uniform(survey):
     """Each pose is in as many of them as chance has it."""
     number = len(survey.site.candidates)
@@ -140,25 +108,6 @@ def test_random_placements_are_uniform(survey):
             counts[list(some)] += 1
     expected = counts.sum() / number
     assert ((counts - expected) ** 2 / expected).sum() < number + 4 * math.sqrt(2 * number)
-
-
-@pytest.mark.parametrize(
-    ("changed", "sensors", "sentence"),
-    [
-        ({"placements": 3}, ["type2"], "3 placements say nothing of a correlation: ask for 4 or more"),
-        ({"training_placements": 0}, ["type2"], "must be trained on 1 placement or more, not 0"),
-        ({"seed": -1}, ["type2"], "seed of the placements must be 0 or more"),
-        ({}, ["type1", "type2"], "placements of one type are compared, not of type1 and type2"),
-    ],
-)
-def test_what_cannot_be_studied_is_refused(changed, sensors, sentence):
-    with pytest.raises(SeipError, match=sentence):
-        replace(SETTINGS, **changed).check(sensors)
-
-
-def test_more_placements_than_there_are_get_a_sentence(survey):
-    with pytest.raises(SeipError, match="ask for fewer placements"):
-        finish(draw_placements(survey, replace(SETTINGS, placements=400, count=1), {}))
 
 
 CAR = PANELS["car"]
@@ -215,26 +164,6 @@ def run_of(trajectories):
     return SampledRun("run", trajectories, np.arange(2.0, 12.0, 2.0))
 
 
-def test_occupancy_by_hand():
-    """Turned by a quarter, 4 m long: it stands over the target at y = 1.9 for 4 of 10 s, and then drives away."""
-    targets = np.array([[0.0, 1.9, 0.0], [0.0, 2.1, 0.0], [1.1, 0.0, 0.0], [-1.1, 0.0, 0.0]])
-    points = Targets(targets, np.ones(4), np.zeros(4, dtype=bool), 1e-3)
-    often = vehicle_occupancy(points, [run_of(one_car())])
-    assert often[0] == pytest.approx(0.4, abs=0.06)
-    assert often[1] == often[3] == 0
-    squares = vehicle_occupancy(replace(points, spacing=0.5), [run_of(one_car())])
-    assert (squares[1:] == often[0]).all()
-    assert not vehicle_occupancy(points, [run_of(one_car("pedestrian"))]).any()
-
-
-@pytest.mark.parametrize("far", ["training", "test"])
-def test_traffic_without_vehicles_in_the_region_is_refused(far):
-    site = SimpleNamespace(region=shapely.box(-9, -9, 9, 9))
-    runs = {what: (run_of(one_car(x=500.0 * (what == far))),) for what in ("training", "test")}
-    with pytest.raises(SeipError, match="no vehicle is ever in the region of interest in the runs"):
-        require_vehicles(SimpleNamespace(**runs), site)
-
-
 def test_criteria_by_hand():
     """Three targets of which one is central and one holds a car: each of three placements sees one of them."""
     models = load_catalogue()
@@ -265,61 +194,3 @@ def test_criteria_by_hand():
     flat = replace(site, targets=replace(targets, central=np.zeros(3, dtype=bool)))
     steps = criteria_of(SimpleNamespace(site=flat), simulator, placements, trained, precise)
     assert "weighted_coverage" not in {one.key for one in finish(steps)}
-
-
-def test_frames_are_kept_as_they_were(tmp_path):
-    frames = [
-        FrameResult("one", 2.0, truth([box(0), box(9)], category=["car", "truck"]), detected([box(1)], [0.5])),
-        FrameResult("two", 4.5, truth([]), detected([], [])),
-    ]
-    save_frames(tmp_path / "kept.npz", frames)
-    for kept, frame in zip(load_frames(tmp_path / "kept.npz"), frames, strict=True):
-        assert (kept.run, kept.time) == (frame.run, frame.time)
-        for table in ("truth", "detected"):
-            for name, values in vars(getattr(frame, table)).items():
-                assert np.array_equal(vars(getattr(kept, table))[name], values), name
-
-
-def test_a_damaged_file_of_frames_gets_a_sentence(tmp_path):
-    path = tmp_path / "kept.npz"
-    save_frames(path, [FrameResult("one", 2.0, truth([box(0)]), detected([box(1)], [0.5]))])
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 255
-    path.write_bytes(content)
-    with pytest.raises(SeipError, match=r"is damaged.*file of detections.*delete it"):
-        load_frames(path)
-
-
-def test_halves_and_trainings_of_told_frames():
-    """Two trainings on four runs: halves are of whole runs, each way once, and none is both."""
-    from headless.detection.average_precision import evaluate  # noqa: PLC0415 -- beside what it is compared with
-    from headless.studies.detection.case_study import MAIN_RULE  # noqa: PLC0415
-
-    told = [
-        [frame for run in "abcd" for frame in traffic(seed + ord(run), frames=6, noise=noise, run=run)]
-        for seed, noise in ((0, 0.1), (50, 0.3))
-    ]
-    runs = np.array([frame.run for frame in told[0]])
-    precise = Precisions(runs, (tuple(evaluate(frames, MAIN_RULE) for frames in told),))
-    assert precise.by_training.shape == (2, 1)
-    assert precise.halves.shape == (3, 2, 1)
-    expected = {
-        round(
-            float(
-                np.mean(
-                    [
-                        evaluate(
-                            [frame for frame in frames if (frame.run in half) == first], MAIN_RULE
-                        ).average_precision
-                        for frames in told
-                    ]
-                )
-            ),
-            9,
-        )
-        for half in ("ab", "ac", "ad")
-        for first in (True, False)
-    }
-    assert {round(float(value), 9) for value in precise.halves.ravel()} == expected
-    low, high = np.quantile(precise.resampled[0], (0.025, 0.975))
-    assert low < precise.values[0] < high

@@ -9,12 +9,10 @@ import pytest
 
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
-from headless.detection.recordings import SampledRun
-from headless.studies.criteria.vehicle_grid import CELLS, REFLECTIVITY, VIEW_CELLS, Vehicles, log_misses, vehicles_in
-from headless.studies.criteria.voxels import TrafficInstant, Voxels, seen_voxels, voxel_occupancy
+from headless.studies.criteria.vehicle_grid import CELLS, REFLECTIVITY, VIEW_CELLS, Vehicles, log_misses
+from headless.studies.criteria.voxels import Voxels, seen_voxels
 
 import numpy as np
-import shapely
 
 from seip_addon.core.geometry.orientation import orientation
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
@@ -53,11 +51,6 @@ def surface(triangles):
     return ReflectiveSurface(make_ray_caster(triangles), np.full(len(triangles), 0.5))
 
 
-def test_voxels_stand_on_targets():
-    voxels = Voxels.over(targets((1, 2), (3, 4)))
-    assert voxels.middle.tolist() == [[1, 2, 0.5], [3, 4, 0.5], [1, 2, 1.5], [3, 4, 1.5]]
-
-
 def test_a_car_is_in_voxels_that_it_reaches_into_by_half():
     """It is 4 m long and 1.5 m high; a voxel is 1 m wide, so that middles up to 2.5 m ahead are in."""
     voxels = Voxels.over(targets((0, 0), (2.4, 0), (2.6, 0), (0, 1.4), (0, 1.6)))
@@ -65,13 +58,6 @@ def test_a_car_is_in_voxels_that_it_reaches_into_by_half():
     assert voxels.occupant(trajectories, trajectories.at(1.0)).tolist() == [0, 0, -1, 0, -1] * 2
     across = car_at(0, 0, math.pi / 2)
     assert voxels.occupant(across, across.at(1.0)).tolist() == [0, -1, -1, 0, 0] * 2
-
-
-def test_occupancy_is_a_share_of_time():
-    """A car that is there in one of two runs of equal length."""
-    voxels = Voxels.over(targets((0, 0), (9, 9)))
-    runs = [SampledRun(str(x), car_at(x, 0), np.array([2.0])) for x in (0, 50)]
-    assert voxel_occupancy(voxels, runs) == pytest.approx([0.5, 0, 0.5, 0])
 
 
 def model(*degrees):
@@ -90,22 +76,6 @@ def test_beams_pass_the_voxels_in_their_way():
     assert seen.free.tolist() == [False, True, True, False, True, True, True, False]
     assert seen.covered.tolist() == [False, True, True, True, True, True, True, True]
     assert seen.unhidden.shape == (0, 8)
-
-
-def test_road_users_hide_what_is_behind_them_and_not_themselves():
-    voxels = Voxels.over(targets((10, 0), (13.5, 0), (30, 0)))
-    trajectories = car_at(10, 0)
-    instant = TrafficInstant.of(voxels, trajectories, trajectories.at(1.0))
-    seen = seen_voxels(voxels, surface(FLAT), [instant], model(-30, 0), np.array([0.0, 0.0, 2.0]), LEVEL)
-    assert seen.unhidden[0].tolist() == [True, False, False, True, True, True]
-
-
-def test_vehicles_are_those_in_the_region():
-    runs = [SampledRun(str(x), car_at(x, 0), np.array([2.0])) for x in (0, 50)]
-    vehicles = vehicles_in(runs, shapely.box(-5, -5, 5, 5), 100, interval=2.0)
-    assert len(vehicles) == 4
-    assert vehicles.size.tolist() == [[4.0, 2.0, 1.5]] * 4
-    assert len(vehicles_in(runs, shapely.box(-5, -5, 5, 5), 3, interval=2.0)) == 3
 
 
 @pytest.mark.parametrize("key", ["vlp16", "type1"])

@@ -61,41 +61,6 @@ def test_files_that_do_not_fit_are_one_sentence(run, tmp_path, changes, message)
 
 
 @needs_sumo
-def test_routes_elsewhere_are_one_sentence(run, network):
-    streets = read_network(network)
-    way = streets.arms[0].id  # one that no other follows
-    with pytest.raises(SeipError, match=r"no flow of a.rou.xml goes through the region of"):
-        run(net=network.read_text(encoding="utf-8"), edges=way)
-
-
-@needs_sumo
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--trainings", "0"], "--trainings must be 1 or more, not 0"),
-        (["--steps", "0"], "training must have 1 step or more"),
-        (["--runs", "3"], "--runs must be 4 to 999 runs of traffic, not 3"),
-        (["--every", "0"], r"--every must be 0\.001 to 86,400 s, not 0"),
-        (["--device", "abacus"], "abacus"),
-    ],
-)
-def test_odd_options_are_one_sentence_before_any_work(run, tmp_path, options, message):
-    with pytest.raises(SeipError, match=message):
-        run(*options)
-    assert not (tmp_path / "work").exists()
-
-
-def test_without_sumo_is_one_sentence(run, tmp_path, monkeypatch):
-    def missing():
-        raise SeipError("SUMO is not installed")
-
-    monkeypatch.setattr(paper_case, "find_sumo", missing)
-    with pytest.raises(SeipError, match="SUMO is not installed"):
-        run()
-    assert not (tmp_path / "work").exists()
-
-
-@needs_sumo
 @pytest.mark.slow
 def test_the_page_is_written_with_its_charts(run, network, tmp_path, capsys):
     streets = read_network(network)

@@ -5,12 +5,11 @@ from itertools import product
 
 from headless.studies.claims import FAILS, HOLDS, UNDECIDED, Claim
 from headless.studies.coverage.cells import CHARTED_WEIGHT, COUNTS, Case, CoverageStudy, EmptyCell
-from headless.studies.paper.figures import PlacementFigures, agreement, leaks, reversals
+from headless.studies.paper.figures import PlacementFigures, reversals
 from headless.studies.paper.page import CaseFacts, page
-from headless.studies.paper.published import PUBLISHED_CLAIMS, PUBLISHED_SENSORS
+from headless.studies.paper.published import PUBLISHED_CLAIMS
 
 import numpy as np
-import pytest
 
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 
@@ -98,17 +97,6 @@ def test_reversals_are_the_pairs_in_which_less_coverage_detects_more():
     assert [(one.stands, one.more_returns) for one in found] == [(False, False), (True, True)]
 
 
-def test_reversals_without_runs_have_no_interval():
-    (only,) = reversals([placement("type1", 2, 0.3, 0.8), placement("type1", 4, 0.5, 0.7)])
-    assert (only.interval, only.stands) == (None, False)
-
-
-def test_leak_and_agreement_are_of_the_placements():
-    np.testing.assert_allclose(leaks(PLACEMENTS), [0.2, 0.08, 0.2, 0.2])
-    assert agreement(PLACEMENTS, "coverage") == pytest.approx(1 - 6 * 8 / 60)  # ranks 1 2 3 4 and 1 4 3 2
-    assert agreement(PLACEMENTS, "returns") == pytest.approx(1 - 6 * 2 / 60)  # ranks 1 3 4 2 and 1 4 3 2
-
-
 CLAIMS = (
     Claim(1, "a", FAILS, "17.4% | 30.7%"),
     Claim(3, "b", HOLDS, "3.5 m"),
@@ -151,25 +139,3 @@ def test_figures_stand_beside_those_of_the_paper():
     assert second[5:] == ["60, 95.0%", "0.25", "98.0%", "90.0%"]
     (third,) = rows(text[: text.index("## Leak")], "4 × type1")
     assert third[3:5] == ["+ 7 %", "-10.0 points"]
-
-
-def test_sensors_of_the_catalogue_are_those_of_the_paper():
-    text = made()
-    for one in PUBLISHED_SENSORS:
-        row = next(row for row in rows(text, one.key) if len(row) == 3)
-        assert row[2] == "the same"
-
-
-def test_the_page_says_what_was_doubted_copied_and_bare():
-    text = made()
-    assert "**One training.**" in text
-    assert "2% to 15% (8% in the middle)" in text
-    assert "50% to 70% (60% in the middle)" in text
-    assert "+8.0 to +20.0 points, +17.0 on average" in text
-    assert "Nothing in this scene except vehicles" in text
-    assert "Nothing in this scene except vehicles" not in made(bare=False, scene="the map, 5 buildings")
-    assert "In 2 pairs the placement that covers less detects more (1 of them" in text
-    assert "on near copies it does in 2 pairs with the detector trained on them, and in 2 with the other" in text
-    assert "![A chart](pictures/a.png)" in text
-    assert "{" not in text
-    assert text.endswith("\n")

@@ -9,10 +9,6 @@ from headless.studies.paper.traffic_runs import (
     read_traffic_of_site,
 )
 
-import pytest
-import shapely
-
-from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.sumo_programs import find_sumo, run
@@ -46,46 +42,6 @@ def test_what_goes_through_is_counted(tmp_path):
     more = '<flow id="g" vehsPerHour="90"><route edges="e"/></flow>'
     found = finish(read_traffic_of_site(files(tmp_path, flows=FLOWS.format(360, more)), street(), "a.xodr"))
     assert (found.demand.rate, found.through) == (450.0, 360.0)
-
-
-@pytest.mark.parametrize(
-    ("net", "flows", "message"),
-    [
-        (network(y=200.0), None, r"a.net.xml is not a network of the map a.xodr at this site \(none of its streets"),
-        (network(y=-8.5).replace("200,", "300,"), None, r"is not a network of the map a.xodr"),
-        (network(joint=100.0), None, r"no flow of a.rou.xml goes through the region of street"),
-        (
-            None,
-            FLOWS.format(9, "").replace("w e", "w x"),
-            r"flow 'f' takes the edge 'x', which a.net.xml does not have",
-        ),
-        ("<net/>", None, r"a.net.xml is not a SUMO network"),
-    ],
-)
-def test_files_of_another_place_are_one_sentence(tmp_path, net, flows, message):
-    with pytest.raises(SeipError, match=message):
-        finish(read_traffic_of_site(files(tmp_path, net, flows), street(), "a.xodr"))
-
-
-def test_a_network_beside_the_road_is_told_by_its_share(tmp_path):
-    wide = street(region=shapely.box(-30, -20, 30, 7))
-    with pytest.raises(SeipError, match=r"\(0% of its lanes there are on the road\)"):
-        finish(read_traffic_of_site(files(tmp_path, network(y=-15.0)), wide, "a.xodr"))
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"runs": 3}, "4 to 999 runs"),
-        ({"duration": 1.0}, "a run lasts 3 to 3600 s"),
-        ({"duration": float("nan")}, "a run lasts 3 to 3600 s"),
-        ({"warm_up": -1.0}, "a run lasts 3 to 3600 s"),
-        ({"seed": 10_000}, "--seed must be a whole number"),
-    ],
-)
-def test_odd_settings_are_one_sentence(settings, message):
-    with pytest.raises(SeipError, match=message):
-        RunSettings(**settings)
 
 
 NODES = '<nodes><node id="a" x="-300" y="0"/><node id="b" x="0" y="0"/><node id="c" x="300" y="0"/></nodes>'

@@ -4,7 +4,7 @@ from collections import Counter
 from itertools import pairwise
 from xml.etree import ElementTree as ET
 
-from headless.studies.paper.route_file import MIN_GAP, read_demand, write_run
+from headless.studies.paper.route_file import read_demand, write_run
 
 import numpy as np
 import pytest
@@ -68,16 +68,6 @@ def test_routes_come_at_their_rates_and_departures_are_a_poisson_process(tmp_pat
     assert {vehicle.get("departSpeed") for vehicle in vehicles if "we" in vehicle.get("id")} == {"5"}
 
 
-def test_gaps_differ_where_the_type_leaves_them_open(tmp_path):
-    _, path = written(tmp_path, demand(tmp_path), duration=3600.0)
-    types = ET.parse(path).getroot().findall("vType")  # noqa: S314  # written just now
-    own = {one.get("minGap") for one in types if one.get("length") == "5.1"}
-    drawn = [float(one.get("minGap")) for one in types if one.get("length") == "3.6"]
-    assert own == {"2"}
-    assert MIN_GAP[0] <= min(drawn) < 1.5
-    assert 3.5 < max(drawn) <= MIN_GAP[1]
-
-
 def test_each_seed_is_another_run_and_the_same_seed_the_same_bytes(tmp_path):
     asked = demand(tmp_path)
     texts = [written(tmp_path, asked, seed, 600.0)[1].read_bytes() for seed in (1, 1, 2)]
@@ -97,13 +87,6 @@ def test_fixed_departures_are_even_and_the_same_for_all_seeds(tmp_path):
         assert departs[0] == 0.0
         assert all(b - a == pytest.approx(3600 / rate, abs=0.11) for a, b in pairwise(departs))
     assert b"departLane" not in text.replace(b'departLane="best"', b"")
-
-
-def test_without_types_sumo_drives_its_own_car(tmp_path):
-    routes = '<routes><flow id="a" perHour="60" route="r"/><route id="r" edges="w e"/></routes>'
-    _, path = written(tmp_path, demand(tmp_path, routes, ()), duration=600.0)
-    kinds = finish(read_vehicle_types([path]))
-    assert {(one.category, one.length) for name, one in kinds.items() if name.startswith("a")} == {("car", 5.0)}
 
 
 FLOW = '<routes><route id="r" edges="w e"/><flow id="a" {}/></routes>'
@@ -128,8 +111,3 @@ FLOW = '<routes><route id="r" edges="w e"/><flow id="a" {}/></routes>'
 def test_a_demand_that_cannot_be_drawn_is_one_sentence(tmp_path, routes, message):
     with pytest.raises(SeipError, match=message):
         demand(tmp_path, routes)
-
-
-def test_types_without_a_car_are_one_sentence(tmp_path):
-    with pytest.raises(SeipError, match=r"types0.xml has no vehicle type of class passenger"):
-        demand(tmp_path, types=('<routes><vType id="b" vClass="bicycle"/></routes>',))

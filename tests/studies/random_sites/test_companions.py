@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from headless.studies.random_sites.companions import MOST_COMPANIONS, with_companions
+from headless.studies.random_sites.companions import with_companions
 
 import numpy as np
 import pytest
@@ -24,17 +24,6 @@ def grouped(alone):
     return finish(with_companions(alone, 3))
 
 
-def test_road_users_stay_as_they_are_and_companions_follow(alone, grouped):
-    assert grouped.users[: len(alone)] == alone.users
-    samples = int(alone.first[-1])
-    np.testing.assert_array_equal(grouped.position[:samples], alone.position)
-    added = grouped.users[len(alone) :]
-    assert added
-    assert all(user.category == "pedestrian" for user in added)
-    pedestrians = sum(user.category == "pedestrian" for user in alone.users)
-    assert len(added) <= MOST_COMPANIONS * pedestrians
-
-
 def test_companions_keep_near_the_one_they_walk_with(alone, grouped):
     names = {user.name: number for number, user in enumerate(alone.users)}
     for number in range(len(alone), len(grouped)):
@@ -51,8 +40,3 @@ def test_companions_keep_near_the_one_they_walk_with(alone, grouped):
 def test_no_companion_overlaps_anyone(alone, grouped):
     before = {tuple(pair) for pair in finish(find_overlaps(alone)).pair.tolist()}
     assert {tuple(pair) for pair in finish(find_overlaps(grouped)).pair.tolist()} <= before
-
-
-def test_the_seed_decides(alone, grouped):
-    assert finish(with_companions(alone, 3)).key == grouped.key
-    assert finish(with_companions(alone, 4)).key != grouped.key

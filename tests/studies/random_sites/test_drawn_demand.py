@@ -2,7 +2,7 @@
 
 from xml.etree import ElementTree as ET
 
-from headless.studies.random_sites.demand_draw import DrawnDemand, KerbParking
+from headless.studies.random_sites.demand_draw import DrawnDemand
 
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.traffic.vehicle_types import read_vehicle_types
@@ -32,15 +32,3 @@ def test_own_sizes_are_drawn_for_each_road_user(tmp_path):
     _, plain = routes(tmp_path, Demand(flow=1500.0))
     drives = [line.partition('depart="')[2] for line in plain.decode().splitlines() if "<vehicle " in line]
     assert drives == [line.partition('depart="')[2] for line in text.decode().splitlines() if "<vehicle " in line]
-
-
-def test_rows_at_the_kerb_are_as_asked_for(tmp_path):
-    def stops(**kerb):
-        root, _ = routes(tmp_path, DrawnDemand(kerb=KerbParking(**kerb)))
-        return [vehicle.find("stop") for vehicle in root.iter("vehicle") if vehicle.get("id").startswith("parked")]
-
-    assert len({stop.get("lane") for stop in stops(streets=1.0)}) == 3
-    assert not stops(bays=0)
-    assert not stops(occupied=0.0)
-    assert 0 < len(stops(bays=8, occupied=0.5, streets=1.0)) < len(stops(bays=8, streets=1.0))
-    assert min(float(stop.get("endPos")) for stop in stops(first=10.0)) < 17.0

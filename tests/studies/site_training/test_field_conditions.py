@@ -4,27 +4,21 @@ import math
 from dataclasses import replace
 
 from headless.detection.detection_area import area_of
-from headless.detection.frames import Recording
 from headless.studies.site_training.field_conditions import (
     ANGLE_ERROR,
     GROUND_ERROR,
     POSITION_ERROR,
     field_frame,
-    field_recording,
     with_calibration_errors,
-    with_hidden_parts,
-    with_inexact_background,
     with_inexact_ground,
     with_lost_rows,
     with_spurious_points,
-    with_uncertain_intensity,
 )
 
 import numpy as np
 import pytest
 
 from seip_addon.core.progress import finish
-from seip_addon.core.sensing.recordings.recorded_frames import UNKNOWN_INTENSITY
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE
 from seip_addon.core.sensing.scans.simulation import ScanSettings, prepare
 from seip_addon.core.sensing.scans.static_scene import static_scene
@@ -47,12 +41,6 @@ PLACES = np.array([sensor.xyz for sensor in sensors()])
 
 def rows_of(points):
     return {row.tobytes() for row in np.ascontiguousarray(points)}
-
-
-def test_the_frame_has_what_the_changes_need():
-    assert len(sensors()) > 1
-    assert 0 < FRAME.foreground.sum() < len(FRAME)
-    assert (FRAME.instance != STATIC_INSTANCE).any()
 
 
 def test_whole_rows_are_lost_up_to_a_third():
@@ -84,46 +72,6 @@ def test_spurious_points_are_on_the_ways_of_rays_and_in_the_foreground():
         way = point - PLACES[number]
         cosine = (ways @ way) / np.linalg.norm(ways, axis=1) / np.linalg.norm(way)
         assert math.degrees(math.acos(min(float(cosine.max()), 1.0))) < 0.1
-
-
-def test_background_is_left_in_and_feet_are_lost():
-    left, lost = [], []
-    for seed in SEEDS:
-        after = with_inexact_background(FRAME, AREA, sensors(), np.random.default_rng(seed))
-        left.append(int(after.foreground.sum()) - int(FRAME.foreground.sum()) + len(FRAME) - len(after))
-        kept = rows_of(after.points)
-        gone = FRAME.points[[row.tobytes() not in kept for row in FRAME.points]]
-        lost.append(len(gone))
-        assert gone.size == 0 or np.abs(gone[:, 2]).max() < 0.6
-    assert min(left) >= 0
-    assert max(left) > 50
-    assert max(lost) > 0
-
-
-def test_hidden_parts_are_of_road_users():
-    lost = []
-    for seed in SEEDS:
-        after = with_hidden_parts(FRAME, np.random.default_rng(seed))
-        static = int((~FRAME.foreground).sum())
-        assert int((~after.foreground).sum()) == static
-        lost.append(len(FRAME) - len(after))
-    assert min(lost) == 0
-    assert max(lost) > 5
-
-
-def test_intensities_are_unknown_scaled_or_as_they_were():
-    kinds = set()
-    for seed in range(20):
-        after = with_uncertain_intensity(FRAME, np.random.default_rng(seed))
-        if (after.intensity == np.float32(UNKNOWN_INTENSITY)).all():
-            kinds.add("unknown")
-        else:
-            known = (FRAME.intensity > 0) & (after.intensity < 1)
-            ratio = after.intensity[known] / FRAME.intensity[known]
-            assert np.ptp(ratio) < 1e-5
-            assert 1 / 1.51 < ratio[0] < 1.51
-            kinds.add("same" if ratio[0] == 1 else "scaled")
-    assert kinds == {"unknown", "scaled", "same"}
 
 
 def test_each_sensor_is_moved_and_turned_as_a_whole_within_bounds():
@@ -160,14 +108,3 @@ def test_labels_count_the_points_that_are_left():
         for user, counted in zip(after.labels.user, after.labels.points, strict=True):
             own = after.sensor[after.instance == user]
             assert counted.tolist() == np.bincount(own, minlength=len(sensors())).tolist()
-
-
-def test_half_of_the_frames_of_a_recording_are_changed_and_always_alike():
-    recording = Recording("a", "b", [FRAME] * 30)
-    one, again, other = (field_recording(recording, AREA, sensors(), seed) for seed in ([1, 2], [1, 2], [1, 3]))
-    changed = [frame is not FRAME for frame in one.frames]
-    assert 8 < sum(changed) < 22
-    assert changed != [frame is not FRAME for frame in other.frames]
-    for before, after in zip(one.frames, again.frames, strict=True):
-        np.testing.assert_array_equal(before.points, after.points)
-        np.testing.assert_array_equal(before.foreground, after.foreground)

@@ -58,14 +58,6 @@ def test_a_detector_is_trained_and_the_same_again(sites, tmp_path):
     assert (weights == weights.half().float()).all()
 
 
-def test_a_finished_training_is_not_done_again(sites, tmp_path, capsys):
-    train_on_sites.main([*sites, *BRIEF, "type1", "-o", str(tmp_path)])
-    written = (tmp_path / "training.pt").stat().st_mtime_ns
-    train_on_sites.main([*sites, *BRIEF, "type1", "-o", str(tmp_path)])
-    assert (tmp_path / "training.pt").stat().st_mtime_ns == written
-    assert "best after 2 steps" in capsys.readouterr().out
-
-
 def test_field_conditions_change_the_training_and_it_continues_from_a_detector(sites, tmp_path):
     train_on_sites.main([*sites, *BRIEF, "type1", "-o", str(tmp_path / "plain")])
     plain = tmp_path / "plain" / "detector.pt"
@@ -81,15 +73,6 @@ def test_field_conditions_change_the_training_and_it_continues_from_a_detector(s
         train_on_sites.main(
             [*sites, *BRIEF, "type1", "--start", str(plain), "--width", "16", "-o", str(tmp_path / "x")]
         )
-
-
-def test_mistakes_are_named(sites, tmp_path):
-    with pytest.raises(SeipError, match="two sites or more"):
-        train_on_sites.main([sites[0], *BRIEF, "type1", "-o", str(tmp_path)])
-    copyfile(sites[0], tmp_path / "bare.blend")
-    with pytest.raises(SeipError, match="no runs of traffic in the folder"):
-        train_on_sites.main([sites[0], str(tmp_path / "bare.blend"), *BRIEF, "type1", "-o", str(tmp_path / "x")])
-    assert not (tmp_path / "x" / "detector.pt").exists()
 
 
 def test_random_placements_are_of_different_positions_and_all_poses():

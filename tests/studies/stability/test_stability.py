@@ -71,7 +71,3 @@ def test_the_page_has_all_chapters_and_a_rerun_goes_on(tmp_path, capsys):
     assert "Failures" in said
     assert "Arithmetic:" in said
     assert "Pose errors" not in said
-
-    with patch.object(stability, "source_digest", lambda module: f"another version of {module}"):
-        run(tmp_path, "--only", "poses")
-    assert "Pose errors" in capsys.readouterr().out

@@ -8,27 +8,21 @@ from unittest.mock import patch
 
 from headless.studies.stability import command as stability
 from headless.studies.stability import weather as weather_limits
-from headless.studies.stability.charts import save_weather_chart
-from headless.studies.stability.page import Chapter, Chart, put_chapter, save_page
+from headless.studies.stability.page import Chapter, Chart, save_page
 from headless.studies.stability.rows import Row
 from headless.studies.stability.weather import (
     UntouchedTypes,
     WeatherAnswer,
     WeatherStudy,
-    describe_weather,
-    untouched_types,
     weather_rows,
     weather_study,
 )
 
 import bpy
-import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.workflows.survey import lay_out, with_grid
@@ -85,18 +79,6 @@ def test_weather_is_what_a_survey_in_it_sees(study):
     assert study.answers[1].placed == pytest.approx(best)
 
 
-def test_types_of_carla_are_untouched_and_their_scans_are_not():
-    lidar = load_catalogue()["type1"]
-    sensor = MountedSensor("S1", lidar, np.array([9.0, -9.0, 5.4]), level_orientation(2.3))
-    found = untouched_types(surveyed(), "1 × type1", [sensor])
-    assert found.sensors == ("type1",)
-    assert set(found.returned) == {"clear", *weather_limits.WEATHERS}
-    assert 0 < found.returned["visibility=50"] < found.returned["visibility=500"] < found.returned["clear"] <= 1
-    assert found.returned["wet"] < found.returned["clear"]
-    both = replace(COARSE, candidates=replace(COARSE.candidates, sensors=("type1", "os1_128")))
-    assert untouched_types(surveyed(both), "1 × type1", [sensor]).sensors == ("type1",)
-
-
 def test_rows_say_where_it_fails_and_what_helps():
     holds, fails, untouched = weather_rows(STUDY, UNTOUCHED)
     assert holds.regime == "rain of 20 mm/h"
@@ -107,43 +89,6 @@ def test_rows_say_where_it_fails_and_what_helps():
     assert "90.0% of the hits" in untouched.begins
     assert "70.0% in the worst" in untouched.begins
     assert len(weather_rows(STUDY, replace(UNTOUCHED, sensors=()))) == 2
-
-
-@pytest.mark.parametrize(
-    ("words", "said"), [("wet", "wet road"), ("rain=5", "rain of 5 mm/h"), ("visibility=50", "fog, visibility 50 m")]
-)
-def test_weather_is_said_as_people_say_it(words, said):
-    assert describe_weather(words) == said
-
-
-def test_the_chart_is_drawn(tmp_path):
-    save_weather_chart(tmp_path / "weather.png", STUDY, "Weather")
-    assert (tmp_path / "weather.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_a_chapter_takes_the_place_of_its_older_self(tmp_path):
-    page = tmp_path / "stability.md"
-    first, last = replace(CHAPTER, title="First"), replace(CHAPTER, title="Last", charts=())
-    save_page(page, "The lead.", [first, CHAPTER, last], "stability")
-    whole = page.read_bytes()
-    put_chapter(page, CHAPTER, "stability")
-    assert page.read_bytes() == whole
-    put_chapter(page, replace(CHAPTER, rows=(replace(CHAPTER.rows[0], begins="holds"),)), "stability")
-    assert page.read_text(encoding="utf-8").count("| holds |") == 1
-    assert page.read_text(encoding="utf-8").count("## ") == 3
-    put_chapter(page, CHAPTER, "stability")
-    assert page.read_bytes() == whole
-
-
-def test_a_new_chapter_comes_last(tmp_path):
-    page, other = tmp_path / "stability.md", tmp_path / "other.md"
-    first = replace(CHAPTER, title="First")
-    save_page(page, "The lead.", [first], "stability")
-    put_chapter(page, CHAPTER, "stability")
-    save_page(other, "The lead.", [first, CHAPTER], "stability")
-    assert page.read_bytes() == other.read_bytes()
-    with pytest.raises(SeipError, match="there is no page"):
-        put_chapter(tmp_path / "none.md", CHAPTER, "stability")
 
 
 def test_one_chapter_is_studied_and_put_into_the_page(small_scene, tmp_path):

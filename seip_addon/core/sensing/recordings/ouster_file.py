@@ -11,7 +11,7 @@ import numpy as np
 
 from ...arrays import Float
 from ...errors import SeipError
-from ...storage.files import read_small
+from ...storage.files import parse_json, read_small
 from .sensor_recording import SensorRecording
 from .sweep import Sweep, sweep_of
 
@@ -63,6 +63,10 @@ def open_ouster(path: Path) -> SensorRecording:
     if not metadata.is_file():
         raise SeipError(f"{path.name} needs the sensor's metadata: put {metadata.name} into the same folder")
     text = read_small(metadata, _MAX_METADATA_BYTES, _CURE)
+    try:
+        parse_json(text)
+    except (ValueError, RecursionError) as error:
+        raise SeipError(f"{metadata.name} is not a sensor's metadata in JSON; {_CURE}") from error
     try:
         core, pcap = (importlib.import_module(f"ouster.sdk.{part}") for part in ("core", "pcap"))
     except ModuleNotFoundError as error:
