@@ -9,7 +9,6 @@ from typing import Any
 from headless.charts.detection import (
     PANEL_SIZE,
     PRECISION_LABEL,
-    RING_MARK,
     check_drawn,
     mark_style,
     placement_name,
@@ -76,32 +75,6 @@ class PrecisionCell:
     def name(self) -> str:
         """Name in charts."""
         return placement_name(self.count, self.sensor)
-
-
-@dataclass(frozen=True)
-class DetectorSetting:
-    """One setting of the detector with its cost.
-
-    Parameters
-    ----------
-    name : str
-        Difference from the default: ``pillars 0.32 m``.
-    family : str
-        Group of settings; settings of one family have the same colour.
-    training : float, seconds
-    inference : float, milliseconds
-        Time for one merged frame.
-    average_precision : float, 0 to 1
-    interval : (float, float) or None
-    """
-
-    name: str
-    family: str
-    training: float
-    inference: float
-    average_precision: float
-    interval: Interval | None = None
-    default: bool = False
 
 
 def save_count_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell], title: str) -> None:
@@ -183,34 +156,6 @@ def save_coverage_chart(
     add_legend(figure, [panel])
     set_title(figure, title)
     _name(figure, panel, [(cell.coverage, cell.mean, cell.name, False) for cell in cells])
-    save_png(path, figure)
-
-
-def save_setting_chart(path: str | os.PathLike[str], settings: Sequence[DetectorSetting], title: str) -> None:
-    """Draw average precision against training seconds and inference milliseconds, the default marked, as PNG."""
-    check_drawn(settings, "settings of the detector")
-    figure, axes = new_figure(PANEL_SIZE[0] * 2.2, PANEL_SIZE[1], 2)
-    families = list(dict.fromkeys(setting.family for setting in settings))
-    costs = [[one.training for one in settings], [one.inference for one in settings]]
-    for panel, cost, what in zip(
-        axes, costs, ("training, one core (s)", "inference on one merged frame, one core (ms)"), strict=True
-    ):
-        for row, family in enumerate(families):
-            own = [(x, one) for x, one in zip(cost, settings, strict=True) if one.family == family]
-            for x, one in own:
-                _bar(panel, x, one.interval, row)
-            values = [one.average_precision for _, one in own]
-            panel.plot([x for x, _ in own], values, label=family, linestyle="none", **mark_style(row))
-        chosen = [(x, one.average_precision) for x, one in zip(cost, settings, strict=True) if one.default]
-        panel.plot([x for x, _ in chosen], [y for _, y in chosen], label="default", markersize=14, mew=1.4, **RING_MARK)
-        panel.margins(x=0.15)
-        panel.set_xlim(left=0)
-        _precision_axis(panel, [v for one in settings for v in (one.average_precision, *(one.interval or ()))], what)
-    add_legend(figure, axes[:1])
-    set_title(figure, title)
-    for panel, cost in zip(axes, costs, strict=True):
-        named = [(x, one.average_precision, one.name, one.default) for x, one in zip(cost, settings, strict=True)]
-        _name(figure, panel, named)
     save_png(path, figure)
 
 

@@ -17,7 +17,7 @@ from headless.studies.detection.sensor_configuration import SensorConfiguration
 
 import numpy as np
 
-from seip_addon.core.arrays import Integer, Text
+from seip_addon.core.arrays import Float, Integer, Text
 from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import IntervalEstimate
@@ -25,7 +25,6 @@ from seip_addon.core.progress import Progress
 from seip_addon.core.workflows.survey import Survey
 
 from .agreement import correlate
-from .criteria import Criterion
 from .drawing import MIN_PLACEMENTS, draw_from_pool
 from .pose_criteria import PoseCriterion
 from .precision import CLASSES, Precisions
@@ -199,7 +198,7 @@ class StudiedType:
                     criterion.name,
                     road_users,
                     len(values),
-                    _spearman(Criterion(criterion.key, criterion.name, values), precise),
+                    _spearman(values, precise),
                     precision_of(best),
                     difference_of(best, reference),
                 )
@@ -247,10 +246,10 @@ def study_type(
     return StudiedType(survey.site.name, next(iter(survey.models)), criteria, placed, frames)
 
 
-def _spearman(criterion: Criterion, precise: Precisions) -> IntervalEstimate:
+def _spearman(values: Float, precise: Precisions) -> IntervalEstimate:
     """Return the rank correlation, NaN for fewer than `MIN_PLACEMENTS`: so few say nothing of it."""
-    few = len(criterion.values) < MIN_PLACEMENTS
-    return IntervalEstimate(math.nan, -math.inf, math.inf) if few else correlate(criterion, precise).spearman
+    few = len(values) < MIN_PLACEMENTS
+    return IntervalEstimate(math.nan, -math.inf, math.inf) if few else correlate(values, precise)
 
 
 def precision_of(evaluation: Evaluation) -> IntervalEstimate:

@@ -1,23 +1,14 @@
 """Placements of one type and number: the optimal one, random ones, and some in between."""
 
 import functools
-from collections.abc import Callable, Generator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from types import MappingProxyType
-
-from headless.studies.coverage.cells import Cell, solve_cell
-from headless.studies.detection.sensor_configuration import SensorConfiguration
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from seip_addon.core.arrays import Float, Integer
-from seip_addon.core.choosing.placement.deployment import deploy
-from seip_addon.core.choosing.placement.objective import Objective, placement_problem
+from seip_addon.core.arrays import Integer
 from seip_addon.core.choosing.placement.problem import PlacementProblem
-from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress, within
-from seip_addon.core.workflows.survey import Survey
 
 MIN_PLACEMENTS = 4
 MAX_TRIES = 20_000  # draws for one placement before an error states that there are no more
@@ -25,166 +16,7 @@ SWAPS_PER_PLACEMENT = 20  # draws from which those in between are taken
 
 NEAR = 0.05  # of the targets: how much less than the optimal placement one near it covers at most
 
-OPTIMAL, RANDOM, BETWEEN, OTHERWISE = "optimal", "random", "in between", "optimal by other criteria"
-
-
-@dataclass(frozen=True)
-class PlacementsStudySettings:
-    """Settings of a study of placements.
-
-    Parameters
-    ----------
-    placements : int
-        Evaluated ones, the optimal one included; the optimal ones of other weights come on top.
-    count : int
-        Sensors of each.
-    training_placements : int
-        Placements whose clouds the detector learns from; none of them is evaluated.
-    trainings : int
-        Number of trainings, each with its own seed; with 0 the shipped detector is evaluated, and there are no
-        training placements.
-    steps : int
-        Steps of each training.
-    seed : int
-        Seed of the drawn placements.
-    """
-
-    placements: int
-    count: int = 2
-    training_placements: int = 12
-    trainings: int = 2
-    steps: int = 1800
-    seed: int = 0
-
-    def check(self, sensors: Sequence[str]) -> None:
-        """Raise SeipError where this cannot be studied, before anything is computed.
-
-        Parameters
-        ----------
-        sensors : sequence of str
-            Types to choose from.
-        """
-        if self.placements < MIN_PLACEMENTS:
-            raise SeipError(
-                f"{self.placements} placements say nothing of a correlation: ask for {MIN_PLACEMENTS} or more"
-            )
-        if self.training_placements < 1 <= self.trainings:
-            raise SeipError(f"the detector must be trained on 1 placement or more, not {self.training_placements}")
-        if self.seed < 0:
-            raise SeipError(f"the seed of the placements must be 0 or more, not {self.seed}")
-        if len(sensors) != 1:
-            raise SeipError(f"placements of one type are compared, not of {' and '.join(sensors)}: name one (--sensor)")
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnPlacements:
-    """Placements to be evaluated, and others to learn from.
-
-    Parameters
-    ----------
-    evaluated : tuple of SensorConfiguration
-        The optimal one first.
-    kind : tuple of str
-        Of each: `OPTIMAL`, `RANDOM`, `BETWEEN`, or `OTHERWISE` for the best one by other weights of targets or by
-        another criterion.
-    training : tuple of SensorConfiguration
-        None of them is among the evaluated.
-    """
-
-    evaluated: tuple[SensorConfiguration, ...]
-    kind: tuple[str, ...]
-    training: tuple[SensorConfiguration, ...]
-
-
-def draw_placements(
-    survey: Survey,
-    settings: PlacementsStudySettings,
-    weights: Mapping[str, Float],
-    best: Mapping[str, Integer] = MappingProxyType({}),
-) -> Generator[Progress, None, DrawnPlacements]:
-    """Draw placements of a survey's one type.
-
-    The optimal placement is joined by those of other weights and by those that other criteria rate best: random
-    placements do not show what these are for.
-    Half of the others are drawn uniformly from all feasible sets of poses. Most of these cover about the same; the rest
-    are therefore the nearest to given steps of coverage, of many that differ in one sensor from the optimal or from the
-    worst placement (greedily, each sensor adds least): half of the steps are even between the two, and half within
-    `NEAR` of the optimal, where choices are made. Those to learn from are drawn in the same way, afterwards.
-
-    Parameters
-    ----------
-    weights : mapping of str to (t,) float64
-        Other weights of targets, by name.
-    best : mapping of str to (k,) int64
-        Poses that other criteria rate best, by name.
-
-    Raises
-    ------
-    SeipError
-        There are fewer placements.
-    """
-    (sensor,) = survey.models
-    site, visible, count = survey.site, survey.grid.visible, settings.count
-    yield Progress(0, 2, f"place {count} × {sensor}", counted=False)
-    case = yield from solve_cell(site, survey.models, visible, Cell(sensor, None, count, 1.0), survey.settings.limits)
-    problem = placement_problem(site, visible, survey.models, Objective(count=count))
-    otherwise: dict[frozenset[int], _Found] = {}
-    for name, weight in weights.items():
-        progress = Progress(1, 2, f"place {count} × {sensor} for {name}", counted=False)
-        yield progress
-        placement = yield from within(progress, solve(replace(problem, weights=weight), survey.settings.limits))
-        if set(placement.chosen.tolist()) != set(case.placement.chosen.tolist()):
-            found = _Found(name, placement.chosen, placement.status, placement.gap)
-            otherwise.setdefault(frozenset(placement.chosen.tolist()), found)
-    for name, poses in best.items():
-        if set(poses.tolist()) != set(case.placement.chosen.tolist()):
-            otherwise.setdefault(frozenset(poses.tolist()), _Found(name, poses))
-    yield Progress(1, 2, "draw placements", counted=False)
-    drawing = _Drawing(
-        problem,
-        count,
-        [case.placement.chosen, *(one.chosen for one in otherwise.values())],
-        np.random.default_rng(settings.seed),
-    )
-    random = drawing.random(settings.placements // 2)
-    between = drawing.between(settings.placements - 1 - len(random))
-    training = drawing.random((settings.training_placements + 1) // 2)
-    training += drawing.between(settings.training_placements - len(training))
-
-    def configurations(kind: str, chosen: Sequence[Integer]) -> tuple[SensorConfiguration, ...]:
-        return tuple(
-            SensorConfiguration(
-                f"{kind} {number}", deploy(site, survey.models, visible[poses], poses), sensor, count, kind, np.inf
-            )
-            for number, poses in enumerate(chosen, start=1)
-        )
-
-    optimal = SensorConfiguration.of_case(case)
-    others = [
-        SensorConfiguration(
-            f"optimal for {one.name}",
-            deploy(site, survey.models, visible[one.chosen], one.chosen),
-            sensor,
-            count,
-            one.status,
-            one.gap,
-        )
-        for one in otherwise.values()
-    ]
-    evaluated = (optimal, *configurations(RANDOM, random), *configurations(BETWEEN, between), *others)
-    kind = (OPTIMAL, *[RANDOM] * len(random), *[BETWEEN] * len(between), *[OTHERWISE] * len(others))
-    yield Progress(2, 2, "placements drawn", counted=False)
-    return DrawnPlacements(evaluated, kind, configurations("training", training))
-
-
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """Poses that a criterion rates best, as in `Placement`."""
-
-    name: str
-    chosen: Integer
-    status: str = "feasible"
-    gap: float = np.inf
+RANDOM, BETWEEN = "random", "in between"
 
 
 def draw_from_pool(

@@ -4,15 +4,11 @@ from collections.abc import Sequence
 
 from headless.detection.matching import VEHICLES
 from headless.detection.recordings import SampledRun
-from headless.studies.detection.case_study import Traffic
 
 import numpy as np
-import shapely
-from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Boolean, Float
-from seip_addon.core.errors import SeipError
-from seip_addon.core.site.site import Site, Targets
+from seip_addon.core.site.site import Targets
 
 INTERVAL = 0.5  # seconds between the instants that are looked at
 
@@ -37,24 +33,6 @@ def vehicle_occupancy(targets: Targets, runs: Sequence[SampledRun]) -> Float:
             held += ((np.abs(along) <= most[:, :1]) & (np.abs(across) <= most[:, 1:])).any(axis=0)
             instants += 1
     return held / instants
-
-
-def require_vehicles(traffic: Traffic, site: Site) -> None:
-    """Raise SeipError where no vehicle is ever in the region in the runs to learn from, or in those for tests."""
-    for what, runs in (("to learn from", traffic.training), ("for tests", traffic.test)):
-        if not any(_enters(run, site.region) for run in runs):
-            raise SeipError(
-                f"no vehicle is ever in the region of interest in the runs {what}: there is nothing to detect, so name "
-                "traffic of this scene"
-            )
-
-
-def _enters(run: SampledRun, region: BaseGeometry) -> bool:
-    """Return whether a vehicle is ever in a region."""
-    trajectories = run.trajectories
-    vehicle = np.repeat(_vehicles(run), np.diff(trajectories.first))
-    x, y, _ = trajectories.position[vehicle].T
-    return bool(shapely.contains_xy(region, x, y).any())
 
 
 def _vehicles(run: SampledRun) -> Boolean:

@@ -105,20 +105,6 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     return Traffic(*split_sampled(paths, origin, every))
 
 
-def read_untrained_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
-    """Read runs for a detector that was trained on none of them: the first quarter for criteria, the rest for tests.
-
-    Criteria that depend on traffic must not use that of the tests. Parameters are those of `read_traffic`.
-
-    Raises
-    ------
-    SeipError
-        There are too few, or one is too short.
-    """
-    known, tests = split_untrained(sampled_runs(paths, origin, every))
-    return Traffic(known, (), tuple(replace(run, times=run.times[::TEST_STRIDE]) for run in tests))
-
-
 def split_untrained(runs: Sequence[SampledRun]) -> tuple[tuple[SampledRun, ...], tuple[SampledRun, ...]]:
     """Return the first quarter of some runs (one at least), and the others.
 

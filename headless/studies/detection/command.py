@@ -18,16 +18,9 @@ from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.options import add_rolling_shutter, new_parser, real_number, whole_number
 from headless.studies.claims import save_claims
 from headless.studies.coverage.cells import COUNTS
-from headless.studies.criteria.criteria import WEIGHTED, criteria_of, weights_of_targets
-from headless.studies.criteria.drawing import PlacementsStudySettings, draw_placements
-from headless.studies.criteria.occupancy import require_vehicles
-from headless.studies.criteria.precision import detectors_of, precisions, training_clouds
-from headless.studies.criteria.results import PlacementsStudy, save_study
-from headless.studies.criteria.site_criteria import best_of, problem_of, site_criteria
 from headless.studies.detection import case_study
 from headless.studies.detection import results as study_results
 from headless.studies.detection.claims import detection_claims
-from headless.studies.detection.read_placements import read_placements, records_in
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 from headless.studies.survey_options import add_survey_options
 
@@ -35,13 +28,13 @@ import bpy
 
 from seip_addon.core.choosing.placement.objective import Objective, check_objective
 from seip_addon.core.errors import SeipError
-from seip_addon.core.limits import COUNT, SEED, SENSORS, TIME_STEP, Limits
+from seip_addon.core.limits import SEED, TIME_STEP, Limits
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.site_traffic import check_runs, require_own_traffic
 from seip_addon.core.workflows.survey import Survey
 
-STEPS, TRAININGS = Limits(1, 10_000_000), Limits(0, 1_000)
+STEPS, TRAININGS = Limits(1, 10_000_000), Limits(1, 1_000)
 
 FINE_TUNING = TrainingSettings(steps=450, learning_rate=2e-3, validate_every=75, patience=6)
 """Training of the shipped detector's weights on a site; not stopped early, because precision drops at first."""
@@ -50,11 +43,6 @@ FINE_TUNING = TrainingSettings(steps=450, learning_rate=2e-3, validate_every=75,
 def main(argv: list[str]) -> None:
     """Place, simulate, train, evaluate, and write charts and tables to a folder."""
     options = _parser().parse_args(argv)
-    if options.placements is not None:
-        _evaluate_placements(options)
-        return
-    if options.trainings < 1:
-        raise SeipError(f"--trainings must be 1 or more without --placements, not {options.trainings}")
     study = prepare_study(options)
     watch, simulator, folder = study.stopwatch, study.simulator, options.output
     network = NetworkSettings()
@@ -98,52 +86,6 @@ def _training(options: argparse.Namespace) -> tuple[TrainingSettings, Detector |
     return replace(begun, steps=steps), None if options.from_scratch else Detector.load(SHIPPED_DETECTOR)
 
 
-def _evaluate_placements(options: argparse.Namespace) -> None:
-    """Evaluate placements of one type and number, and write how well coverage and other criteria predict detection."""
-    if options.placement:
-        raise SeipError("name either --placements, to draw placements, or --placement, to evaluate some of your own")
-    training, start = _training(options)
-    settings = PlacementsStudySettings(
-        placements=options.placements,
-        count=options.count,
-        training_placements=options.training_placements if options.trainings else 0,
-        trainings=options.trainings,
-        steps=training.steps,
-        seed=options.placement_seed,
-    )
-    settings.check(options.sensor)
-    site = prepare_site(options, settings.count, trained=options.trainings > 0)
-    watch, folder = site.stopwatch, options.output
-    require_vehicles(site.traffic, site.surveyed.site)
-    known = watch.run("criteria of poses", site_criteria(site.surveyed, site.traffic.training))
-    others = [one for one in known if one.key not in {"coverage", *WEIGHTED.values()}]
-    problem = problem_of(site.surveyed, settings.count)
-    best = {one.name: watch.run("placements", best_of(one, site.surveyed, problem)) for one in others}
-    weights = weights_of_targets(site.surveyed, site.traffic)
-    drawn = watch.run("placements", draw_placements(site.surveyed, settings, weights, best))
-    simulator = site.simulator
-    if options.trainings:
-        models = detectors_of(drawn, settings, training, start)
-        training_set = watch.run("simulation", training_clouds(simulator, drawn, site.traffic))
-        trained = watch.run("training", case_study.train_all(models, training_set, folder, device=options.device))
-        detectors = [one.detector for one in trained]
-    else:
-        detectors = [Detector.load(SHIPPED_DETECTOR, options.device)]
-    precise = watch.run("evaluation", precisions(simulator, drawn.evaluated, detectors, site.traffic, folder))
-    criteria = watch.run(
-        "criteria", criteria_of(site.surveyed, simulator, drawn.evaluated, site.traffic, precise, others)
-    )
-    study = PlacementsStudy(site.surveyed.site.name, settings, options.sensor[0], drawn, precise, criteria)
-    with runtime.incomplete_if_interrupted(folder):
-        asked = site.surveyed.settings.as_record() | {"frames_every_s": options.every}
-        asked["from_scratch"] = options.from_scratch
-        save_study(folder, study, asked, site.traffic, versions(blender=bpy.app.version_string))
-    for line in study.sentences():
-        runtime.print_line(line)
-    runtime.print_line(", ".join(f"{what} {seconds:.0f} s" for what, seconds in watch.seconds.items()))
-    runtime.print_line(f"written to {folder}/")
-
-
 @dataclass(frozen=True, eq=False)
 class DetectionSite:
     """A scene with its traffic, ready for placements and detectors."""
@@ -161,7 +103,7 @@ class DetectionStudy(DetectionSite):
     Parameters
     ----------
     configurations : tuple of SensorConfiguration
-        1, 2 and 4 sensors of each type, and the placements that were named.
+        1, 2 and 4 sensors of each type.
     """
 
     configurations: tuple[SensorConfiguration, ...]
@@ -169,37 +111,20 @@ class DetectionStudy(DetectionSite):
 
 def prepare_study(options: argparse.Namespace) -> DetectionStudy:
     """Survey the scene, read its traffic and place the sensors; the options are those of `add_options`."""
-    records = records_in(options.placement)
-    if options.only_placement and not records:
-        raise SeipError("--only-placement leaves nothing to evaluate: name folders with --placement")
-    site = prepare_site(options, 1 if options.only_placement else COUNTS[-1])
-    alike = sorted(set(records) & set(site.surveyed.models))
-    if alike:
-        raise SeipError(f"the folder {alike[0]!r} is called as a sensor type is: rename it")
-    configurations: tuple[SensorConfiguration, ...] = ()
-    if not options.only_placement:
-        configurations = site.stopwatch.run("placements", case_study.place_all(site.surveyed))
-    if records:
-        configurations += site.stopwatch.run("named placements", read_placements(site.surveyed, records))
+    site = prepare_site(options, COUNTS[-1])
+    configurations = site.stopwatch.run("placements", case_study.place_all(site.surveyed))
     return DetectionStudy(**vars(site), configurations=configurations)
 
 
-def prepare_site(options: argparse.Namespace, count: int, *, trained: bool = True) -> DetectionSite:
-    """Survey a scene that can carry so many sensors, and read its traffic.
-
-    Parameters
-    ----------
-    trained : bool
-        Whether detectors are to be trained on some of the traffic.
-    """
+def prepare_site(options: argparse.Namespace, count: int) -> DetectionSite:
+    """Survey a scene that can carry that number of sensors, and read its traffic."""
     check_device(options.device)
     check_every(options.every)
     surveyed, watch = survey.survey(
         options, lambda layout: check_objective(layout.site, layout.models, Objective(count=count))
     )
     paths = options.traffic or survey.runs_beside(options.scene)
-    read = case_study.read_traffic if trained else case_study.read_untrained_traffic
-    traffic = read(paths, surveyed.geometry.origin, options.every)
+    traffic = case_study.read_traffic(paths, surveyed.geometry.origin, options.every)
     runs = [run for runs in vars(traffic).values() for run in runs]
     check_runs([run.trajectories for run in runs], surveyed.site.region)
     for run in runs:
@@ -240,15 +165,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     detection.add_argument("--scan-seed", type=whole_number(SEED), default=0, help="of noise and lost returns")
     add_rolling_shutter(detection)
     detection.add_argument("--device", default="cpu", help="of torch: cpu or cuda")
-    detection.add_argument(
-        "--placement",
-        nargs="+",
-        type=Path,
-        default=[],
-        metavar="FOLDER",
-        help="evaluate the placements that `seip place` wrote into these folders beside numbers and types",
-    )
-    detection.add_argument("--only-placement", action="store_true", help="evaluate those of --placement alone")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -260,7 +176,7 @@ def _parser() -> argparse.ArgumentParser:
         type=whole_number(TRAININGS),
         default=3,
         metavar="N",
-        help="each with a seed of its own; 0 with --placements: evaluate with the detector that ships",
+        help="each with a seed of its own",
     )
     parser.add_argument(
         "--from-scratch",
@@ -270,13 +186,4 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--separate", action="store_true", help="a detector for each placement, not one for all")
     parser.add_argument("--ablation", action="store_true", help="claim 9: also train with zero-padded pillars")
-    drawn = parser.add_argument_group("does coverage predict detection? Placements of one type and number")
-    drawn.add_argument(
-        "--placements", type=whole_number(COUNT), metavar="N", help="evaluate the optimal one and others that are drawn"
-    )
-    drawn.add_argument("--count", type=whole_number(SENSORS), default=2, metavar="N", help="sensors of each")
-    drawn.add_argument(
-        "--training-placements", type=whole_number(COUNT), default=12, metavar="N", help="placements to train on"
-    )
-    drawn.add_argument("--placement-seed", type=whole_number(SEED), default=0, metavar="SEED", help="of what is drawn")
     return parser

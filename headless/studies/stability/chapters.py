@@ -10,12 +10,10 @@ from headless.charts import pose_errors as pose_error_charts
 from headless.charts import traffic as traffic_charts
 
 from seip_addon.core.choosing.placement.deployment import deploy
-from seip_addon.core.choosing.placement.near_optimal import NearOptimalSet, near_optimal_set
 from seip_addon.core.choosing.placement.objective import DEFAULT_COUNT, Objective, placement_problem
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.scenarios import Scenarios
-from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.choosing.robustness.pose_study import PoseStudySettings, pose_study
 from seip_addon.core.choosing.robustness.robust_study import robust_study
@@ -31,7 +29,6 @@ from .arithmetic import arithmetic_rows, arithmetic_study
 from .criterion import criterion_rows, criterion_study
 from .page import Chapter, Chart
 from .robustness_rows import pose_rows, robust_rows, traffic_rows
-from .solver_limits import solver_rows, solver_study
 from .weather import untouched_types, weather_rows, weather_study
 
 TAIL_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
@@ -40,7 +37,7 @@ TAIL_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
 RISKS = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
 """Risks studied: failure of a sensor, and coverage by two sensors."""
 
-CHAPTERS = ("criterion", "arithmetic", "solvers", "poses", "failures", "traffic", "weather")
+CHAPTERS = ("criterion", "arithmetic", "poses", "failures", "traffic", "weather")
 """Names of the chapters, in the order of the page."""
 
 
@@ -54,15 +51,12 @@ class StabilityScope:
         Number of random grids of targets, and of random azimuths.
     rays : int
         Number of rays compared with float64 on each scene.
-    instances : int
-        Number of random placement problems of each kind.
     instants : tuple of int
         Numbers of instants of traffic for optimisation and for evaluation.
     """
 
     grids: int = 40
     rays: int = 20_000
-    instances: int = 60
     poses: PoseStudySettings = field(default_factory=PoseStudySettings)
     robust: Scenarios = Scenarios("pose-errors")
     instants: tuple[int, int] = (24, 120)
@@ -115,7 +109,6 @@ def chapters(scene: StudiedScene) -> Iterator[tuple[str, Work]]:
     """Yield the chapters that are possible for a scene, with the names of their files."""
     yield "criterion", criterion
     yield "arithmetic", arithmetic
-    yield "solvers", solvers
     yield "poses", poses
     yield "failures", failures
     if len(scene.runs) > 1:
@@ -160,28 +153,6 @@ def arithmetic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
             Chart(
                 "rounding.png", "Error of hits against the distance of the scene, or of a stray mesh, from the origin"
             ),
-        ),
-    )
-
-
-def solvers(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Find the limits of the solvers, and the size of the near-optimal set."""
-    study = yield from solver_study(scene.scope.instances)
-    tops: list[tuple[str, NearOptimalSet]] = []
-    for sensor in scene.survey.models:
-        problem = scene.problem(sensor)
-        best = yield from solve(problem, SolverLimits(scene.survey.settings.solver))
-        top = yield from near_optimal_set(problem, best.chosen)
-        if top is not None:
-            tops.append((f"{DEFAULT_COUNT} × {sensor}", top))
-    limits_charts.save_solver_chart(scene.charts / "solvers.png", study, "Solvers at their limits")
-    limits_charts.save_near_optimal_chart(scene.charts / "flat_top.png", tops, f"{scene.name}: how flat the top is")
-    return Chapter(
-        "Solvers",
-        tuple(solver_rows(study, tops)),
-        (
-            Chart("solvers.png", "Loss of solutions on random and adversarial instances"),
-            Chart("flat_top.png", "Placements within 1 % of the best, by the number of positions they share with it"),
         ),
     )
 

@@ -1,4 +1,4 @@
-"""Charts of the limits of criterion, arithmetic and solvers."""
+"""Charts of the limits of criterion and arithmetic."""
 
 from __future__ import annotations
 
@@ -11,15 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from seip_addon.core.choosing.placement.near_optimal import NearOptimalSet
-from seip_addon.core.choosing.placement.problem import TIE_TOLERANCE
 from seip_addon.core.output.pictures.chart_style import DASHED, MARKERS, new_figure, save_chart, style_axes
 from seip_addon.core.output.pictures.palette import INK, SOFT_INK
 from seip_addon.core.sensing.visibility.float32_precision import FLOAT32_STEP, MAX_STEP
 
 from .arithmetic import ArithmeticStudy
 from .criterion import CriterionStudy
-from .solver_limits import SolverStudy
 from .weather import FAILS_BELOW, WeatherStudy, describe_weather
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
@@ -145,58 +142,6 @@ def save_rounding_chart(path: str | os.PathLike[str], study: ArithmeticStudy, ti
     panel.set_yscale("log")
     style_axes(panel, "distance (m); dashed: where the tool warns", "hits off at most, across the surface (m)")
     panel.legend(frameon=False, fontsize=8.5)
-    save_chart(path, figure, title)
-
-
-def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: str) -> None:
-    """Draw losses with extreme weights and prices, choices changed by near-ties, and greedy on its worst case."""
-    figure, panels = _figure(3)
-    for number, (what, method) in enumerate(dict.fromkeys((c.what, c.method) for c in study.spans)):
-        own = [c for c in study.spans if (c.what, c.method) == (what, method)]
-        style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKERS[number], "markersize": 5}
-        panels[0].plot([c.decades for c in own], [c.lost for c in own], label=f"{what}, {method}", **style)
-    panels[0].axhline(TIE_TOLERANCE, **LIMIT_LINE)
-    panels[0].set_yscale("symlog", linthresh=1e-13)
-    panels[0].set_ylim(0, 10 * TIE_TOLERANCE)
-    panels[0].set_xticks(sorted({check.decades for check in study.spans}))
-    style_axes(panels[0], "powers of ten that they span", "largest loss; dashed: counts as equal")
-    by = [check.by for check in study.ties]
-    shares = np.array([(c.changed.value, *c.changed.interval) for c in study.ties]).T
-    panels[1].errorbar(
-        by, shares[0], np.maximum([shares[0] - shares[1], shares[2] - shares[0]], 0), color=COLOURS[0], marker="o"
-    )
-    panels[1].axvline(TIE_TOLERANCE, **LIMIT_LINE)
-    panels[1].set_xscale("log")
-    _share_axis(panels[1])
-    style_axes(panels[1], "share by which equal weights are disturbed", "choices that change")
-    counts = [check.count for check in study.greedy]
-    for number, (name, values) in enumerate(
-        (
-            ("exact", [c.best for c in study.greedy]),
-            ("greedy", [c.greedy for c in study.greedy]),
-            ("greedy's bound", [c.least for c in study.greedy]),
-        )
-    ):
-        dash = "--" if number == 2 else "-"
-        panels[2].plot(counts, values, color=COLOURS[number], marker=MARKERS[number], linestyle=dash, label=name)
-    panels[2].set_ylim(0.5, 1.03)
-    _share_axis(panels[2])
-    style_axes(panels[2], "sensors", "coverage on the worst instance")
-    for panel in (panels[0], panels[2]):
-        panel.legend(frameon=False, fontsize=8)
-    save_chart(path, figure, title)
-
-
-def save_near_optimal_chart(
-    path: str | os.PathLike[str], tops: Sequence[tuple[str, NearOptimalSet]], title: str
-) -> None:
-    """Draw the number of placements near the best by the number of positions that they share with it."""
-    figure, panels = _figure(len(tops))
-    for panel, (name, top) in zip(panels, tops, strict=True):
-        panel.bar_label(panel.bar(range(len(top.in_common)), top.in_common, color=COLOURS[0]), fontsize=9)
-        panel.set_xticks(range(len(top.in_common)))
-        panel.set_title(f"{name}: {len(top):,}{'' if top.complete else ' and more'}", fontsize=10, color=INK)
-        style_axes(panel, "positions in common with the best", f"placements within {top.share:.0%} of the best")
     save_chart(path, figure, title)
 
 

@@ -30,7 +30,6 @@ COARSE = [
 LITTLE = stability_chapters.StabilityScope(
     grids=8,
     rays=200,
-    instances=2,
     poses=PoseStudySettings(draws=20, draws_of_kind=5),
     robust=Scenarios("pose-errors", count=3, held_out=20),
     instants=(2, 12),
