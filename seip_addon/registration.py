@@ -12,7 +12,7 @@ PARTS = (
     "properties.sections", "properties.scene",
     "session", "scene_survey", "sensor_types", "live_scan", "loose_pieces",
     "viewport.beam_preview", "viewport.overlays", "viewport.coverage",
-    "operators.base", "operators.sumo", "operators.site", "operators.street_map", "operators.network",
+    "operators.base", "operators.sumo", "operators.site", "operators.street_map",
     "operators.sensors", "operators.visibility", "operators.placement", "live_coverage", "traffic_coverage",
     "operators.results", "operators.view", "operators.traffic", "operators.simulation", "operators.detection",
     "operators.verification",

@@ -58,7 +58,7 @@ def drawn(draw):
 
 
 def test_import_is_in_the_file_menu_and_takes_dropped_files(scene):
-    assert drawn(front_door.draw_import) == ["seip.choose_map", "seip.choose_map", "seip.import_network"]
+    assert drawn(front_door.draw_import) == ["seip.choose_map", "seip.choose_map"]
     handlers = [bpy.types.SEIP_FH_opendrive, bpy.types.SEIP_FH_openstreetmap]
     assert [one.bl_import_operator for one in handlers] == ["seip.choose_map"] * 2
     assert [one.bl_file_extensions for one in handlers] == [".xodr", ".osm;.gz"]
