@@ -81,11 +81,11 @@ def main(argv: list[str]) -> None:
     try:
         with connected(options.scheduler, number) as client, runtime.progress_bar() as report:
             record = finish(run_network(name, places, source, request, client, options.output), report)
+        record = replace(record, created=datetime.now(UTC).date().isoformat())
+        write_network(options.output, record, _streets(places))
     except KeyboardInterrupt as stop:
         kept = f"stopped: finished surveys and searches are kept in {options.output}; the same command resumes"
         raise KeyboardInterrupt(kept) from stop
-    record = replace(record, created=datetime.now(UTC).date().isoformat())
-    write_network(options.output, record, _streets(places))
     equipped = [site for site in record.sites if site.status == "equipped"]
     failed = [site for site in record.sites if site.status == "failed"]
     runtime.warn(f"{site.name} failed: {site.message}" for site in failed)
