@@ -183,13 +183,12 @@ def _confirm(options: argparse.Namespace, sites: int, number: int) -> None:
     if options.scheduler is not None:
         needs = f"about {_duration(sites * SECONDS_PER_SITE)} of one worker, {MEMORY_PER_WORKER:g} GiB for each worker"
     needs = f"{counted(sites, 'site')}: {needs} and {disk:.2g} GB on the disk if none is finished"
-    runtime.LOG.info(needs)
     large = seconds > LONG or memory * 2**30 > _memory()
-    if not large or options.yes or options.scheduler is not None:
-        return
-    if not (sys.stdin and sys.stdin.isatty()):
+    asks = large and not options.yes and options.scheduler is None
+    if asks and not (sys.stdin and sys.stdin.isatty()):
         raise SeipError(f"{needs}: choose fewer sites, or confirm by --yes")
-    if input("go on? [y/N] ").strip().casefold() not in {"y", "yes"}:
+    runtime.LOG.info(needs)
+    if asks and input("go on? [y/N] ").strip().casefold() not in {"y", "yes"}:
         raise SeipError("not started: choose fewer sites, or a cluster by --scheduler")
 
 

@@ -8,7 +8,7 @@ from ..core.errors import SeipError
 from ..operators.base import Outcome, SEIP_OT_stop, attempt
 from ..operators.detection import SEIP_OT_detect
 from ..operators.placement import SEIP_OT_solve_placement
-from ..operators.results import SEIP_OT_evaluate_sensors, SEIP_OT_export_result, SEIP_OT_rank_candidates
+from ..operators.results import SEIP_OT_evaluate_sensors, SEIP_OT_export_result
 from ..operators.sensors import SEIP_OT_add_catalogue, SEIP_OT_preview_beams
 from ..operators.simulation import SEIP_OT_simulate_traffic
 from ..operators.site import (
@@ -107,7 +107,7 @@ class SEIP_MT_main(bpy.types.Menu):
 STEPS: tuple[tuple[type[bpy.types.Operator], ...], ...] = (
     (SEIP_OT_load_example, SEIP_OT_choose_map, SEIP_OT_build_site, SEIP_OT_check_site),
     (SEIP_OT_add_catalogue, SEIP_OT_preview_beams, SEIP_OT_compute_visibility, SEIP_OT_solve_placement),
-    (SEIP_OT_evaluate_sensors, SEIP_OT_rank_candidates, SEIP_OT_export_result),
+    (SEIP_OT_evaluate_sensors, SEIP_OT_export_result),
     (SEIP_OT_colour_coverage, SEIP_OT_save_picture),
     (SEIP_OT_load_traffic, SEIP_OT_simulate_traffic, SEIP_OT_scan_frame, SEIP_OT_write_dataset, SEIP_OT_detect),
     (SEIP_OT_stop,),
