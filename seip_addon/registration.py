@@ -6,7 +6,7 @@ from types import ModuleType
 import bpy
 
 PARTS = (
-    "preferences",
+    "panels.preferences",
     "properties.site", "properties.survey", "properties.placement", "properties.results", "properties.view",
     "properties.traffic", "properties.simulation", "properties.detection", "properties.verification",
     "properties.sections", "properties.scene",
