@@ -196,6 +196,11 @@ class SiteProblem:
 
 
 def check_problem(problem: SiteProblem) -> None:
-    """Raise SeipError if no pose adds anything to the value of a site."""
+    """Raise SeipError if a sensor costs nothing, or no pose adds anything to the value of a site."""
+    if not problem.prices.all():
+        raise SeipError(
+            f"{problem.labels[problem.prices == 0][0]} costs nothing, so that no budget limits its number: give its "
+            "model a price"
+        )
     if problem.frontier(math.inf).ceiling <= 0.0:
         raise SeipError("no candidate sees anything here: try other heights or sensor types, or remove obstacles")

@@ -67,7 +67,14 @@ def test_damaged_file_is_refused(tmp_path):
         SiteProblem.load(path)
 
 
-def test_site_where_nothing_is_seen_is_refused():
+@pytest.mark.parametrize(
+    ("changed", "fault"),
+    [
+        (lambda problem: {"visible": np.zeros_like(problem.visible)}, "no candidate sees anything"),
+        (lambda problem: {"prices": np.where(np.arange(9) == 4, 0.0, problem.prices)}, "os1_128 costs nothing"),
+    ],
+)
+def test_sites_without_a_frontier_are_refused(changed, fault):
     problem = random_problem(1, "road")
-    with pytest.raises(SeipError, match="no candidate sees anything"):
-        check_problem(replace(problem, visible=np.zeros_like(problem.visible)))
+    with pytest.raises(SeipError, match=fault):
+        check_problem(replace(problem, **changed(problem)))
