@@ -1,7 +1,7 @@
 """Spread one budget over the junctions of a network, with a proven gap.
 
 seip network city.osm.pbf --junctions signals --budget 2_000_000 --sensor os1_128 -o city/
-seip network sites.csv --budget 500_000 300_000 --scheduler tcp://HOST:8786 -o city/
+seip network sites.csv --budget 500_000 --scheduler tcp://HOST:8786 -o city/
 """
 
 import argparse
@@ -18,25 +18,23 @@ from pathlib import Path
 
 from headless import runtime, survey
 from headless.network_run import NetworkRequest, run_network
-from headless.network_tasks import FORMAT, survey_version
+from headless.network_tasks import FORMAT, MEMORY, survey_version
 from headless.options import add_settings, new_parser, real_number, whole_number
 
 import numpy as np
 import shapely
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.choosing.placement.objective import Objective, criterion_of
+from seip_addon.core.choosing.placement.objective import Objective
 from seip_addon.core.counts import counted
 from seip_addon.core.dask_client import connected
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import PRICE, SENSORS, SHARE, SITE_RADIUS, Limits
-from seip_addon.core.output.network.network_record import NetworkSensor, load_network
 from seip_addon.core.output.network.write import write_network
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.visibility.ray_casting import engine_name
 from seip_addon.core.site.installed_cost import DEFAULTS
 from seip_addon.core.storage.files import read_small
-from seip_addon.core.workflows.network_flows import with_flows
 from seip_addon.core.workflows.network_sites import (
     APPROACHES,
     NetworkPlace,
@@ -45,7 +43,6 @@ from seip_addon.core.workflows.network_sites import (
     site_source,
     table_places,
 )
-from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.core.world.openstreetmap.extract import Extract, read_extract
 from seip_addon.core.world.openstreetmap.network_junctions import RULES
 from seip_addon.core.world.openstreetmap.site import is_extract
@@ -54,44 +51,41 @@ from seip_addon.core.world.openstreetmap.streets import importance, is_street
 MOST_SENSORS = 8
 SECONDS_PER_SITE, MEMORY_PER_WORKER, DISK_PER_SITE = 190.0, 1.5, 6.0
 """Seconds of a worker, GiB and MB for a typical site; the seconds are those of `make network` on two workers."""
-LONG = 3600.0  # seconds from which the estimate must be confirmed
+LONG = 7200.0  # seconds from which a run must be confirmed
 _MOST_BYTES = 1 << 26
 
 
 def main(argv: list[str]) -> None:
     """Choose the sites, allocate the budget, and write the network."""
     options = _parser().parse_args(argv)
-    if (options.coverage is None) == (not options.budget):
-        raise SeipError("give either --budget, the money of each phase, or --coverage, to be reached at every site")
-    if options.sensors_only and options.installed_cost is not None:
-        raise SeipError("--sensors-only leaves the cost of installation out: leave out --installed-cost")
-    if not options.sensors_only and options.installed_cost is None:
+    if (options.coverage is None) == (options.budget is None):
+        raise SeipError("give either --budget, or --coverage, to be reached at every site")
+    if options.installed_cost is None:
         options.installed_cost = DEFAULTS
     settings = survey.read_survey_settings(options)
     settings.models()  # refuses unknown types before anything is built
     objective = Objective(count=options.count, criterion=options.criterion, shares=tuple(options.shares))
     runtime.check_folder(options.output)
     places, name = _places(options)
-    if options.flows is not None:
-        places = runtime.finish_with_bar(with_flows(places, *options.flows))
     request = NetworkRequest(
-        budgets=tuple(options.budget),
+        budget=options.budget or 0.0,
         tolerance=options.gap,
-        minimum=_minimum(options, settings, objective),
         coverage=options.coverage,
         approaches=options.approaches,
         settings=settings,
         objective=objective,
-        memory=round(options.memory * 2**30),
-        installed={} if options.installed is None else _installed(options.installed, places),
     )
-    number = options.workers or _usual_workers(options.memory)
+    number = options.workers or _usual_workers()
     _confirm(options, len(places), number)
     source = _Sources(request)
-    with connected(options.scheduler, number) as client, runtime.progress_bar() as report:
-        record = finish(run_network(name, places, source, request, client, options.output), report)
-    record = replace(record, created=datetime.now(UTC).date().isoformat())
-    write_network(options.output, record, _streets(places))
+    try:
+        with connected(options.scheduler, number) as client, runtime.progress_bar() as report:
+            record = finish(run_network(name, places, source, request, client, options.output), report)
+        record = replace(record, created=datetime.now(UTC).date().isoformat())
+        write_network(options.output, record, _streets(places))
+    except KeyboardInterrupt as stop:
+        kept = f"stopped: finished surveys and searches are kept in {options.output}; the same command resumes"
+        raise KeyboardInterrupt(kept) from stop
     equipped = [site for site in record.sites if site.status == "equipped"]
     failed = [site for site in record.sites if site.status == "failed"]
     runtime.warn(f"{site.name} failed: {site.message}" for site in failed)
@@ -164,56 +158,42 @@ def _area(path: Path) -> shapely.Geometry:
     return area
 
 
-def _installed(folder: Path, places: Sequence[NetworkPlace]) -> dict[str, tuple[NetworkSensor, ...]]:
-    """Return the sensors of an earlier network by the names of their sites."""
-    record = load_network(folder / "network.json")
-    names = {place.name for place in places}
-    lost = next((site.name for site in record.sites if site.sensors and site.name not in names), None)
-    if lost is not None:
-        raise SeipError(f"{folder} has sensors at {lost}, which is not a site of this network: add it")
-    return {site.name: site.sensors for site in record.sites if site.sensors}
+def _memory() -> float:
+    """Return the memory of this machine, bytes; infinite where it is unknown."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):  # not on Windows
+        return math.inf
 
 
-def _minimum(options: argparse.Namespace, settings: SurveySettings, objective: Objective) -> float:
-    """Return the least value of the criterion at each site."""
-    if options.minimum is None:
-        return 0.0
-    if criterion_of(objective, settings.models()) == "returns":
-        return math.log1p(options.minimum)
-    if options.minimum > 1.0:
-        raise SeipError("--minimum is a share of the road for these sensors: give a number from 0 to 1")
-    return float(options.minimum)
-
-
-def _usual_workers(memory: float) -> int:
+def _usual_workers() -> int:
     """Return the number of workers for which this machine has cores and memory."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    try:
-        whole = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
-    except (AttributeError, ValueError, OSError):  # not on Windows
-        return cores
-    return max(1, min(cores, int(whole // (memory or MEMORY_PER_WORKER))))
+    return max(1, math.floor(min(cores, _memory() / MEMORY)))
 
 
 def _confirm(options: argparse.Namespace, sites: int, number: int) -> None:
-    """State what a run needs at most; ask before a long one, and refuse what the disk cannot hold."""
-    seconds = sites * SECONDS_PER_SITE / number
+    """State what a run needs at most; ask before a large one, and refuse it where nobody can answer."""
     disk = sites * DISK_PER_SITE / 1000.0
-    spread = f" on {counted(number, 'worker')}" if options.scheduler is None else ""
-    runtime.LOG.info(
-        f"{counted(sites, 'site')}: about {_duration(seconds)}{spread} if none is finished, {MEMORY_PER_WORKER:g} GiB "
-        f"for each worker, {disk:.2g} GB on the disk"
-    )
     free = shutil.disk_usage(options.output).free / 1e9
     if free < disk:
         raise SeipError(f"{options.output} needs about {disk:.1f} GB, and its disk has {free:.1f} GB: free some space")
-    asks = seconds > LONG and options.scheduler is None and not options.yes and sys.stdin.isatty()
+    seconds, memory = sites * SECONDS_PER_SITE / number, number * MEMORY_PER_WORKER
+    needs = f"about {_duration(seconds)} on {counted(number, 'worker')}, {memory:g} GiB of memory"
+    if options.scheduler is not None:
+        needs = f"about {_duration(sites * SECONDS_PER_SITE)} of one worker, {MEMORY_PER_WORKER:g} GiB for each worker"
+    needs = f"{counted(sites, 'site')}: {needs} and {disk:.2g} GB on the disk if none is finished"
+    large = seconds > LONG or memory * 2**30 > _memory()
+    asks = large and not options.yes and options.scheduler is None
+    if asks and not (sys.stdin and sys.stdin.isatty()):
+        raise SeipError(f"{needs}: choose fewer sites, or confirm by --yes")
+    runtime.LOG.info(needs)
     if asks and input("go on? [y/N] ").strip().casefold() not in {"y", "yes"}:
         raise SeipError("not started: choose fewer sites, or a cluster by --scheduler")
 
 
 def _duration(seconds: float) -> str:
-    return f"{seconds / 3600.0:.1f} h" if seconds > LONG else f"{math.ceil(seconds / 60.0)} min"
+    return f"{seconds / 3600.0:.1f} h" if seconds > 3600.0 else f"{math.ceil(seconds / 60.0)} min"
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -236,22 +216,8 @@ def _parser() -> argparse.ArgumentParser:
         metavar="M",
         help="length of the approaches of each junction, metres",
     )
-    chosen.add_argument(
-        "--flows",
-        nargs=2,
-        type=Path,
-        metavar=("NET", "EDGES"),
-        help="weights from traffic: network of SUMO (.net.xml) and its edgeData output, in place of those of a table",
-    )
     money = parser.add_argument_group("money")
-    money.add_argument(
-        "--budget",
-        nargs="+",
-        type=real_number(PRICE),
-        default=[],
-        metavar="USD",
-        help="money of each phase; sensors of earlier phases remain",
-    )
+    money.add_argument("--budget", type=real_number(PRICE), metavar="USD", help="money for all sites together")
     money.add_argument(
         "--coverage",
         type=real_number(SHARE),
@@ -259,23 +225,11 @@ def _parser() -> argparse.ArgumentParser:
         help="share of the road to see at every site at the least price, in place of a budget",
     )
     money.add_argument(
-        "--minimum",
-        type=real_number(Limits(0.0, 1e6)),
-        metavar="VALUE",
-        help="least value at each site: returns from a typical road user, or share of the road for types 1 to 3",
-    )
-    money.add_argument(
         "--count",
         type=whole_number(SENSORS),
         default=MOST_SENSORS,
         metavar="N",
         help="largest number of sensors at a site",
-    )
-    money.add_argument(
-        "--installed", type=Path, metavar="FOLDER", help="result of an earlier network whose sensors stand and remain"
-    )
-    money.add_argument(
-        "--sensors-only", action="store_true", help="prices of sensors alone, without posts, power and data lines"
     )
     money.add_argument(
         "--gap",
@@ -287,17 +241,9 @@ def _parser() -> argparse.ArgumentParser:
     survey.add_survey_settings(parser)
     add_settings(parser.add_argument_group("criterion"), Objective, "criterion", "shares")
     work = parser.add_argument_group("work")
-    add_settings(work, SurveySettings, "engine")
     work.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler: tcp://host:8786 or tls://host:8786")
     work.add_argument("--workers", type=whole_number(Limits(1, 1024)), metavar="N", help="processes on this machine")
-    work.add_argument(
-        "--memory",
-        type=real_number(Limits(0.0, 1024.0)),
-        default=4.0,
-        metavar="GIB",
-        help="largest memory of the process of a site, 0 for no limit",
-    )
-    work.add_argument("--yes", action="store_true", help="do not ask before long runs")
+    work.add_argument("--yes", action="store_true", help="start long runs without asking")
     return parser
 
 

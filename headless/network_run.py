@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -50,7 +50,6 @@ PROBLEM, SEARCHES = SURVEY_FILES[3], "searches.json"
 CURVE = (0.25, 0.5, 0.75, 1.5, 2.0)
 """Shares of the money, besides the whole, at which the curve of value against money is computed."""
 OWN_SITE = "each sensor counts for its own site: what it sees of a neighbouring site is left out"
-SAME_HEIGHT = 0.01  # metres
 CURVE_TOLERANCE = 0.02
 """Gap up to which the curve is refined, by short searches: long ones for points beyond the budget took longer than the
 search for the budget itself."""
@@ -62,47 +61,29 @@ class NetworkRequest:
 
     Parameters
     ----------
-    budgets : tuple of float, dollars
-        Money of each phase.
+    budget : float, dollars
     tolerance : float
         Gap at which the search ends, as a share of the value.
-    minimum : float
-        Least value of the criterion at each site.
     coverage : float, optional
-        Share of the road to be seen at each site at the least price, in place of budgets.
+        Share of the road to be seen at each site at the least price, in place of the budget.
     objective : Objective
         Criterion and largest number of sensors at each site.
-    memory : int, bytes
-        Limit of the processes of a site; 0 for none.
-    installed : mapping of str to tuple of NetworkSensor
-        Sensors that stand at sites already, by the names of the sites; they remain and cost nothing.
     """
 
-    budgets: tuple[float, ...]
+    budget: float
     tolerance: float
-    minimum: float
     coverage: float | None
     approaches: float
     settings: SurveySettings
     objective: Objective
-    memory: int = 0
-    installed: Mapping[str, tuple[NetworkSensor, ...]] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class StoredSearch:
-    """Search at a site that an earlier run has made: sensors installed before, and its result."""
-
-    installed: tuple[int, ...]
-    solved: SolvedBudget
 
 
 @dataclass(frozen=True)
 class StoredSearches:
-    """Content of ``searches.json``."""
+    """Content of ``searches.json``: budgets that earlier runs have solved."""
 
     key: str
-    searches: tuple[StoredSearch, ...] = ()
+    searches: tuple[SolvedBudget, ...] = ()
 
 
 @dataclass
@@ -120,21 +101,14 @@ class _Site:
         """Read the placement problem."""
         return SiteProblem.load(self.folder / PROBLEM)[0]
 
-    def found(self, installed: tuple[int, ...], budget: float, effort: float) -> SolvedBudget | None:
+    def found(self, budget: float, effort: float) -> SolvedBudget | None:
         """Return a search of an earlier run, if it was made."""
-        return next(
-            (
-                one.solved
-                for one in self.searches.searches
-                if one.installed == installed and one.solved.budget == budget and one.solved.effort == effort
-            ),
-            None,
-        )
+        same = (one for one in self.searches.searches if one.budget == budget and one.effort == effort)
+        return next(same, None)
 
-    def store(self, installed: tuple[int, ...], solved: SolvedBudget) -> None:
+    def store(self, solved: SolvedBudget) -> None:
         """Add a search to those of the site, and write them in an order that does not depend on when they ended."""
-        searches = (*self.searches.searches, StoredSearch(installed, solved))
-        order = sorted(searches, key=lambda one: (one.installed, one.solved.budget, one.solved.effort))
+        order = sorted((*self.searches.searches, solved), key=lambda one: (one.budget, one.effort))
         self.searches = replace(self.searches, searches=tuple(order))
         save_json(self.folder / SEARCHES, as_json(self.searches))
 
@@ -164,7 +138,7 @@ def run_network(
     Raises
     ------
     SeipError
-        Every site failed, the minimum cannot be reached, or a file cannot be written.
+        Every site failed, the coverage cannot be reached, or a file cannot be written.
     """
     sites = yield from _surveyed(places, source, request, workers, folder)
     good = [site for site in sites if not site.message]
@@ -172,19 +146,19 @@ def run_network(
         raise SeipError(f"all {len(sites)} sites failed; the first one: {sites[0].place.name}: {sites[0].message}")
     network = _Network(good, request, workers)
     if request.coverage is not None:
-        taken, allocation, phases = yield from network.cheapest()
+        allocation = yield from network.cheapest()
         curve: tuple[NetworkPoint, ...] = ()
     else:
-        taken, allocation, phases, curve = yield from network.allocated()
-    yield from _placed(good, taken, request, workers)
-    rows = network.rows(taken, allocation, phases)
+        allocation, curve = yield from network.allocated()
+    yield from _placed(good, allocation.taken, request, workers)
+    rows = network.rows(allocation)
     numbers = {id(site): row for site, row in zip(good, rows, strict=True)}
     everything = tuple(numbers.get(id(site)) or _failed(site) for site in sites)
     weight = float(network.weights.sum())
     return NetworkRecord(
         name=name,
         criterion=network.criterion,
-        budgets_usd=request.budgets or (allocation.price,),
+        budget_usd=allocation.budget,
         price_usd=sum(row.price_usd for row in rows),
         value=allocation.value / weight,
         bound=allocation.bound / weight,
@@ -219,16 +193,7 @@ def _surveyed(
 
     def job(number: int) -> SurveyJob:
         suffix, content, key = source(places[number])
-        return SurveyJob(
-            key,
-            places[number],
-            suffix,
-            content,
-            request.approaches,
-            request.settings,
-            request.objective,
-            request.memory,
-        )
+        return SurveyJob(key, places[number], suffix, content, request.approaches, request.settings, request.objective)
 
     jobs = [lambda number=number: job(number) for number in open_numbers]
     done = len(sites) - len(jobs)
@@ -288,54 +253,21 @@ class _Network:
         self.criterion = sites[0].problem().criterion
         self.least = 0.0
 
-    def allocated(
-        self,
-    ) -> Generator[
-        Progress, None, tuple[list[SolvedBudget], NetworkAllocation, list[list[int]], tuple[NetworkPoint, ...]]
-    ]:
-        """Allocate the budget of each phase; sensors of earlier phases remain."""
+    def allocated(self) -> Generator[Progress, None, tuple[NetworkAllocation, tuple[NetworkPoint, ...]]]:
+        """Allocate the budget; return the allocation with the curve of value against money."""
         request = self._request
-        names = [site.place.name for site in self._sites]
-        installed = [
-            poses_of(name, site.problem(), request.installed.get(name, ()))
-            for name, site in zip(names, self._sites, strict=True)
-        ]
-        phases = [[0] * len(standing) for standing in installed]
-        curve: tuple[NetworkPoint, ...] = ()
-        most = max(sum(request.budgets), CURVE[-1] * sum(request.budgets))
-        for number, budget in enumerate(request.budgets, start=1):
-            frontiers = [
-                site.problem().frontier(most, standing) for site, standing in zip(self._sites, installed, strict=True)
-            ]
-            goals = [
-                Goal(budget, request.tolerance, request.minimum if number == len(request.budgets) else 0.0),
-                *(self._curve_goals() if number == 1 else ()),
-            ]
-            found = yield from search_allocations(
-                frontiers, self.weights, goals, self._solver(installed), gap=self._gap
-            )
-            allocation = found[0]
-            if number == 1:
-                curve = self._curve(found[1:])
-            for site, one in enumerate(allocation.taken):
-                phases[site] += [number] * (len(one.chosen) - len(installed[site]))
-            # New sensors follow those that were installed before, so that labels and phases keep their order.
-            installed = [
-                (*standing, *(pose for pose in one.chosen if pose not in standing))
-                for standing, one in zip(installed, allocation.taken, strict=True)
-            ]
-        taken = [replace(one, chosen=poses) for one, poses in zip(allocation.taken, installed, strict=True)]
-        return taken, allocation, phases, curve
+        frontiers = [site.problem().frontier(CURVE[-1] * request.budget) for site in self._sites]
+        goals = [Goal(request.budget, request.tolerance), *self._curve_goals()]
+        allocation, *others = yield from search_allocations(frontiers, self.weights, goals, self._solve, gap=self._gap)
+        return allocation, self._curve(others)
 
-    def cheapest(
-        self,
-    ) -> Generator[Progress, None, tuple[list[SolvedBudget], NetworkAllocation, list[list[int]]]]:
+    def cheapest(self) -> Generator[Progress, None, NetworkAllocation]:
         """Find the cheapest placement of a coverage at each site."""
         request = self._request
         results: dict[int, tuple[SolvedBudget, float]] = {}
         jobs = [
             lambda site=site: SolveJob(
-                (site.folder / PROBLEM).read_bytes(), 0.0, network_search.LAST_EFFORT, (), request.coverage
+                (site.folder / PROBLEM).read_bytes(), 0.0, network_search.LAST_EFFORT, request.coverage
             )
             for site in self._sites
         ]
@@ -351,15 +283,12 @@ class _Network:
         frontiers = tuple(
             site.problem().frontier(price).with_solved(one) for site, one in zip(self._sites, taken, strict=True)
         )
-        allocation = NetworkAllocation(price, tuple(taken), price, value, value, frontiers)
-        return taken, allocation, [[1] * len(one.chosen) for one in taken]
+        return NetworkAllocation(price, tuple(taken), price, value, value, frontiers)
 
-    def rows(
-        self, taken: Sequence[SolvedBudget], allocation: NetworkAllocation, phases: Sequence[Sequence[int]]
-    ) -> list[NetworkSite]:
+    def rows(self, allocation: NetworkAllocation) -> list[NetworkSite]:
         """Return the sites of the record."""
         rows = []
-        for site, one, frontier, phase in zip(self._sites, taken, allocation.frontiers, phases, strict=True):
+        for site, one, frontier in zip(self._sites, allocation.taken, allocation.frontiers, strict=True):
             problem, place = site.problem(), site.place
             sensors = tuple(
                 NetworkSensor(
@@ -370,9 +299,8 @@ class _Network:
                     height_m=round(float(problem.heights[pose]), 3),
                     position=str(problem.names[pose]),
                     price_usd=float(problem.prices[pose]),
-                    phase=of_phase,
                 )
-                for number, (pose, of_phase) in enumerate(zip(one.chosen, phase, strict=True), start=1)
+                for number, pose in enumerate(one.chosen, start=1)
             )
             rows.append(
                 NetworkSite(
@@ -382,7 +310,7 @@ class _Network:
                     longitude=place.longitude,
                     weight=place.weight,
                     status="equipped" if sensors else "without sensor",
-                    price_usd=sum(sensor.price_usd for sensor in sensors if sensor.phase),
+                    price_usd=sum(sensor.price_usd for sensor in sensors),
                     value=one.value,
                     bound=_bound_for(frontier, one),
                     coverage=problem.coverage(one.chosen),
@@ -393,49 +321,41 @@ class _Network:
         return rows
 
     def _curve_goals(self) -> list[Goal]:
-        """Return the amounts of money, in one phase, at which the value of the network is computed."""
+        """Return the amounts of money at which the value of the network is computed."""
         tolerance = max(CURVE_TOLERANCE, self._request.tolerance)
-        budgets = [share * sum(self._request.budgets) for share in sorted((*CURVE, 1.0))]
+        budgets = [share * self._request.budget for share in sorted((*CURVE, 1.0))]
         return [Goal(budget, tolerance, effort=network_search.FIRST_EFFORT) for budget in budgets]
 
     def _curve(self, allocations: Sequence[NetworkAllocation]) -> tuple[NetworkPoint, ...]:
         """Return the value of the network for amounts of money, with bounds."""
         weight = float(self.weights.sum())
-        least = float(self.weights @ [one.floor.value for one in allocations[0].frontiers]) / weight
         points = [NetworkPoint(one.budget, one.value / weight, one.bound / weight) for one in allocations]
-        return _monotone([NetworkPoint(0.0, least, least), *points])
+        return _monotone([NetworkPoint(0.0, 0.0, 0.0), *points])
 
     def _gap(self, value: float, bound: float) -> float:
         """Return the gap of weighted sums of values, as `NetworkRecord.gap` states it."""
         weight = float(self.weights.sum())
         return network_gap(self.criterion, value / weight, bound / weight)
 
-    def _solver(
-        self, installed: Sequence[tuple[int, ...]]
-    ) -> Callable[[Sequence[Request]], Generator[Progress, None, list[SolvedBudget]]]:
-        """Return the function that solves budgets at the sites, on the workers or from earlier runs."""
+    def _solve(self, requests: Sequence[Request]) -> Generator[Progress, None, list[SolvedBudget]]:
+        """Solve budgets at the sites, on the workers or from earlier runs."""
+        results = [self._sites[one.site].found(one.budget, one.effort) for one in requests]
+        missing = [number for number, result in enumerate(results) if result is None]
 
-        def solve(requests: Sequence[Request]) -> Generator[Progress, None, list[SolvedBudget]]:
-            results = [self._sites[one.site].found(installed[one.site], one.budget, one.effort) for one in requests]
-            missing = [number for number, result in enumerate(results) if result is None]
+        def job(number: int) -> SolveJob:
+            one = requests[number]
+            return SolveJob((self._sites[one.site].folder / PROBLEM).read_bytes(), one.budget, one.effort)
 
-            def job(number: int) -> SolveJob:
-                one = requests[number]
-                content = (self._sites[one.site].folder / PROBLEM).read_bytes()
-                return SolveJob(content, one.budget, one.effort, installed[one.site])
-
-            jobs = [lambda number=number: job(number) for number in missing]
-            for done, (index, result) in enumerate(run_jobs(self._workers, solve_budget, jobs), start=1):
-                number = missing[index]
-                site = self._sites[requests[number].site]
-                if isinstance(result, Failure):
-                    raise SeipError(f"{site.place.name}: {result.message}")
-                results[number] = result[0]
-                site.store(installed[requests[number].site], result[0])
-                yield Progress(done, len(jobs), "searching placements for amounts of money", counted=False)
-            return [one for one in results if one is not None]
-
-        return solve
+        jobs = [lambda number=number: job(number) for number in missing]
+        for done, (index, result) in enumerate(run_jobs(self._workers, solve_budget, jobs), start=1):
+            number = missing[index]
+            site = self._sites[requests[number].site]
+            if isinstance(result, Failure):
+                raise SeipError(f"{site.place.name}: {result.message}")
+            results[number] = result[0]
+            site.store(result[0])
+            yield Progress(done, len(jobs), "searching placements for amounts of money", counted=False)
+        return [one for one in results if one is not None]
 
 
 def _placed(
@@ -459,7 +379,7 @@ def _placed(
     def job(site: _Site, one: SolvedBudget) -> PlaceJob:
         files = {name: (site.folder / name).read_bytes() for name in SURVEY_FILES if (site.folder / name).exists()}
         objective = replace(request.objective, budget=one.price)
-        return PlaceJob(files, request.settings, objective, one, request.memory)
+        return PlaceJob(files, request.settings, objective, one)
 
     jobs = [lambda site=site, one=one: job(site, one) for site, one, _ in wanted]
     for done, (number, result) in enumerate(run_jobs(workers, write_placement, jobs), start=1):
@@ -470,32 +390,6 @@ def _placed(
         with whole_file(site.folder / "placed.key") as temporary:
             temporary.write_text(key, encoding="ascii")
         yield Progress(done, len(jobs), "writing placements")
-
-
-def poses_of(name: str, problem: SiteProblem, sensors: Sequence[NetworkSensor]) -> tuple[int, ...]:
-    """Return the poses of the sensors that an earlier network placed at a site.
-
-    Parameters
-    ----------
-    name : str
-        Name of the site, for messages.
-
-    Raises
-    ------
-    SeipError
-        A sensor is no candidate of the problem.
-    """
-    poses = []
-    for sensor in sensors:
-        same = (problem.labels == sensor.sensor) & (problem.names == sensor.position)
-        same &= np.abs(problem.heights - sensor.height_m) < SAME_HEIGHT
-        if not same.any():
-            raise SeipError(
-                f"{name}: {sensor.id}, {sensor.sensor} at {sensor.height_m:g} m on {sensor.position}, is no "
-                "candidate any more: name the same sensor types, heights and site as when it was installed"
-            )
-        poses.append(int(np.argmax(same)))
-    return tuple(poses)
 
 
 def _failed(site: _Site) -> NetworkSite:

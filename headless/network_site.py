@@ -4,12 +4,13 @@
 """
 
 import pickle
+import sys
 from collections.abc import Generator
 from datetime import UTC, datetime
 from pathlib import Path
 
 from headless import runtime
-from headless.network_tasks import FORMAT, PLACED_FILES, REQUEST, SURVEY_FILES, PlaceJob, SurveyJob
+from headless.network_tasks import FORMAT, MEMORY, PLACED_FILES, REQUEST, SURVEY_FILES, PlaceJob, SurveyJob
 
 import bpy
 
@@ -38,15 +39,15 @@ def main(argv: list[str]) -> None:
     (name,) = argv
     folder = Path(name)
     job: SurveyJob | PlaceJob = pickle.loads((folder / REQUEST).read_bytes())  # noqa: S301 -- written by the caller
-    if job.memory:
+    if sys.platform != "win32":
         import resource  # noqa: PLC0415 -- not on Windows
 
-        resource.setrlimit(resource.RLIMIT_DATA, (job.memory, job.memory))
+        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     try:
         finish(_survey(folder, job) if isinstance(job, SurveyJob) else _place(folder, job))
     except MemoryError as error:
         raise SeipError(
-            f"the site needs more than {job.memory / 2**30:.1f} GiB: raise --memory, or shorten the approaches"
+            f"the site needs more than {MEMORY / 2**30:.0f} GiB: shorten the approaches by --approaches"
         ) from error
 
 

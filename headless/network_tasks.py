@@ -30,6 +30,8 @@ USAGE = "usage.json"
 """Processor time and memory of the survey of a site, kept apart from results."""
 PLACED_FILES = "placed"
 """Folder of the files of a placement, below that of the request."""
+MEMORY = 4 << 30
+"""Bytes that the process of a site may use: ten times what a typical site needs."""
 IN_FLIGHT = 3  # tasks for each worker that are submitted and not finished: enough to keep it busy
 
 Client = Any
@@ -48,8 +50,6 @@ class SurveyJob:
         Digest of everything that the result depends on.
     suffix, content : str and bytes
         Suffix and content of the file that the site is built from.
-    memory : int, bytes
-        Limit of the process; 0 for none.
     """
 
     key: str
@@ -59,7 +59,6 @@ class SurveyJob:
     approaches: float
     settings: SurveySettings
     objective: Objective
-    memory: int
 
     @property
     def file(self) -> str:
@@ -74,7 +73,6 @@ class SolveJob:
     problem: bytes
     budget: float
     effort: float
-    installed: tuple[int, ...]
     coverage: float | None = None
 
 
@@ -86,7 +84,6 @@ class PlaceJob:
     settings: SurveySettings
     objective: Objective
     taken: SolvedBudget
-    memory: int
 
 
 @dataclass(frozen=True)
@@ -119,8 +116,8 @@ def solve_budget(job: SolveJob) -> tuple[SolvedBudget, float] | Failure:
         problem, _ = SiteProblem.load(path)
     try:
         if job.coverage is not None:
-            return finish(problem.cheapest(job.coverage, job.effort, job.installed))
-        return finish(problem.solve(job.budget, job.effort, job.installed)), 0.0
+            return finish(problem.cheapest(job.coverage, job.effort))
+        return finish(problem.solve(job.budget, job.effort)), 0.0
     except SeipError as error:
         return Failure(str(error))
 
@@ -167,7 +164,7 @@ def _reason(text: str, status: int) -> str:
     if lines and lines[-1].startswith("error: "):
         return lines[-1].removeprefix("error: ")
     if status < 0:
-        return f"its process was ended by signal {-status}, as when memory runs out: use fewer workers or --memory"
+        return f"its process was ended by signal {-status}, as when memory runs out: use fewer --workers"
     return f"its process failed: {lines[-1] if lines else f'status {status}'}"
 
 

@@ -4,7 +4,13 @@ from collections.abc import Sequence
 
 from seip_addon.core.errors import SeipError
 
-REMOVED: dict[str, str] = {}
+REMOVED: dict[str, str] = {
+    "--flows": "write the vehicles per hour of each site into the column weight of a table of sites",
+    "--installed": "give the whole budget at once",
+    "--memory": "each process may use 4 GiB; use fewer --workers where the machine has less",
+    "--minimum": "use --coverage for a share of the road at every site",
+    "--sensors-only": "give --installed-cost a TOML file whose costs are 0",
+}
 """By option, or by option and value as in ``--format opv2v``: what to do instead, as the end of a sentence."""
 
 

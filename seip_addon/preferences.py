@@ -13,7 +13,6 @@ import bpy
 from .core.errors import SeipError
 from .core.sensing.lidar.catalogue import load_catalogue
 from .core.sensing.lidar.model import LidarModel
-from .core.sensing.visibility.ray_casting import MAX_THREADS
 from .core.sensing.visibility.store import GridFolder
 from .core.sumo_installation import BY_HAND, installed_sumo
 from .core.sumo_programs import Sumo, find_sumo, sumo_version
@@ -24,70 +23,6 @@ ADDON_ID = (__package__ or "").removesuffix(".seip_addon")
 NO_SUMO = "SUMO is missing, which lays out the streets of an extract and simulates traffic"
 OFFLINE = f"Blender may not go online: switch on Allow Online Access in Preferences, System, or {BY_HAND}"
 NO_PIP = f"This Blender has no pip to install SUMO with: {BY_HAND}"
-
-
-class SEIP_PG_catalogue_file(bpy.types.PropertyGroup):
-    """A catalogue of the user's own."""
-
-    path: bpy.props.StringProperty(
-        name="Catalogue", subtype="FILE_PATH", description="A TOML file of LiDAR models, as docs/sensors.md describes"
-    )
-
-
-class SEIP_AP_preferences(bpy.types.AddonPreferences):
-    """Preferences of the add-on."""
-
-    bl_idname = ADDON_ID
-
-    cores: bpy.props.IntProperty(
-        name="Cores",
-        description="Processor cores that compute visibility at once; more than four rarely help",
-        default=MAX_THREADS,
-        min=1,
-        max=MAX_THREADS,
-    )
-    cache: bpy.props.StringProperty(
-        name="Cache",
-        subtype="DIR_PATH",
-        description="Where visibility is kept from run to run; empty for the extension's own folder",
-    )
-    python: bpy.props.StringProperty(
-        name="Python with PyTorch",
-        subtype="FILE_PATH",
-        description="In which Detect runs: .venv/bin/python of a checkout of this project after `make detection`, "
-        "or one of your own after `pip install '.[detection]'` there",
-    )
-    sumo: bpy.props.StringProperty(
-        name="SUMO",
-        subtype="DIR_PATH",
-        description="Folder of Eclipse SUMO, which lays out the streets of an extract of OpenStreetMap and simulates "
-        "traffic: the one with bin and data in it. Empty for the SUMO that was installed here, on the PATH or in "
-        "SUMO_HOME",
-    )
-    catalogues: bpy.props.CollectionProperty(type=SEIP_PG_catalogue_file)
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        """Draw the preferences."""
-        from .panels.sumo import draw_status  # noqa: PLC0415  # panels import this module
-
-        layout = self.layout
-        layout.use_property_split = True
-        layout.prop(self, "cores")
-        layout.prop(self, "cache")
-        row = layout.row()
-        row.label(text=f"Kept visibility: {_kept().megabytes():,.1f} MB")
-        row.operator("seip.empty_cache", icon="TRASH")
-        layout.prop(self, "python")
-        layout.prop(self, "sumo")
-        draw_status(layout)
-        layout.label(text="Catalogues of sensor types")
-        for number, file in enumerate(self.catalogues):
-            row = layout.row(align=True)
-            row.prop(file, "path", text="")
-            row.operator("seip.remove_catalogue", text="", icon="X").index = number
-        row = layout.row(align=True)
-        row.operator("seip.add_catalogue", icon="ADD")
-        row.operator("seip.list_sensor_types", icon="FILE_REFRESH")
 
 
 def cache_folder() -> Path:
@@ -216,24 +151,22 @@ def _files() -> bpy.types.bpy_prop_collection:
     return preferences.catalogues
 
 
-def _kept() -> GridFolder:
+def kept_visibility() -> GridFolder:
+    """Return the visibility that is kept from run to run."""
     return GridFolder(cache_folder())
 
 
 def empty_cache() -> int:
     """Delete all visibility that is kept, and return how many files there were."""
-    return _kept().empty()
+    return kept_visibility().empty()
 
 
 def why_not_empty() -> str:
     """Say why the cache cannot be emptied, or nothing."""
-    return "" if _kept().megabytes() else "The cache is empty"
+    return "" if kept_visibility().megabytes() else "The cache is empty"
 
 
-def own() -> SEIP_AP_preferences | None:
+def own() -> bpy.types.AddonPreferences | None:
     """Return the add-on's preferences; None where it was not enabled as an add-on."""
     add_on = bpy.context.preferences.addons.get(ADDON_ID)
     return None if add_on is None else add_on.preferences
-
-
-CLASSES = (SEIP_PG_catalogue_file, SEIP_AP_preferences)

@@ -6,14 +6,14 @@ from types import ModuleType
 import bpy
 
 PARTS = (
-    "preferences",
+    "panels.preferences",
     "properties.site", "properties.survey", "properties.placement", "properties.results", "properties.view",
     "properties.traffic", "properties.simulation", "properties.detection", "properties.verification",
     "properties.sections", "properties.scene",
-    "session", "scene_survey", "sensor_types", "live_scan", "loose_pieces",
+    "session", "scene_survey", "sensor_types", "loose_pieces",
     "viewport.beam_preview", "viewport.overlays", "viewport.coverage",
-    "operators.base", "operators.sumo", "operators.site", "operators.street_map", "operators.network",
-    "operators.sensors", "operators.visibility", "operators.placement", "live_coverage", "traffic_coverage",
+    "operators.base", "operators.sumo", "operators.site", "operators.street_map",
+    "operators.sensors", "operators.visibility", "operators.placement", "live_coverage",
     "operators.results", "operators.view", "operators.traffic", "operators.simulation", "operators.detection",
     "operators.verification",
     "panels.sensor_table", "panels.placement", "panels.results", "panels.steps", "panels.front_door",

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import bpy
-from mathutils import Vector
 
 from .scene import contract
 from .scene.sensors import placed_sensors
@@ -19,14 +18,6 @@ def select_sensor(result: bpy.types.PropertyGroup, context: bpy.types.Context) -
         obj.select_set(state=False)
     empty.select_set(state=True)
     context.view_layer.objects.active = empty
-
-
-def show_candidate(result: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    """Put the 3D cursor at the candidate that was clicked on in the ranking."""
-    state = session.state_of(context.scene)
-    pose = result.ranking[result.active_ranked].pose
-    if state is not None and pose < len(state.layout.site.candidates):
-        context.scene.cursor.location = Vector(state.layout.site.candidates.xyz[pose])
 
 
 def search_positions(_goal: bpy.types.PropertyGroup, context: bpy.types.Context, text: str) -> Iterator[str]:

@@ -19,9 +19,7 @@ from .background import Background
 from .core.acceptance import Acceptance
 from .core.arrays import Boolean
 from .core.choosing.placement.objective import Solution
-from .core.choosing.robustness.visibility_in_traffic import PosesInTraffic
 from .core.errors import SeipError
-from .core.output.pictures.coverage_colours import Aspect
 from .core.sensing.lidar.model import LidarModel
 from .core.sensing.recordings.verification import Verification
 from .core.sensing.scans.frame import Frame
@@ -193,32 +191,6 @@ class FollowedSensors:
     problem: str = ""
 
 
-@dataclass
-class CoverageInTraffic:
-    """Coverage that follows the timeline of a scene with traffic.
-
-    Parameters
-    ----------
-    scene : int
-        The scene's session number.
-    visibility : PosesInTraffic
-        Visibility of the placement's sensors at any instant.
-    aspect : Aspect or None
-        Aspect of the coverage that was shown before.
-    coverage : float
-        Share of the targets that some sensor sees at the current frame.
-    problem : str
-        Why nothing is shown at the moment.
-    """
-
-    scene: int
-    state: SceneState
-    visibility: PosesInTraffic
-    aspect: Aspect | None = None
-    coverage: float = 0.0
-    problem: str = ""
-
-
 @dataclass(frozen=True, eq=False)
 class SceneTraffic:
     """Traffic that was read from files.
@@ -296,8 +268,6 @@ class Session:
         There is one piece of work at a time.
     following : FollowedSensors or None
         One scene is followed at a time.
-    in_traffic : CoverageInTraffic or None
-        One scene is shown in traffic at a time.
     places : SitePlaces or None
         Junctions of the file that was read last, to choose from.
     """
@@ -312,7 +282,6 @@ class Session:
     catalogue_error: str = ""
     running: RunningWork | None = None
     following: FollowedSensors | None = None
-    in_traffic: CoverageInTraffic | None = None
     places: SitePlaces | None = None
 
     def state_of(self, scene: bpy.types.Scene) -> SceneState | None:

@@ -12,6 +12,9 @@ from typing import Any
 from .errors import SeipError
 
 _CONNECT_TIMEOUT = 20  # seconds
+_IGNORE_CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
+"""Run by each worker of a cluster on this machine: Ctrl-C reaches all processes of a terminal, and the command ends its
+workers itself."""
 
 
 @contextmanager
@@ -50,6 +53,7 @@ def connected(address: str | None, workers: int = 1) -> Iterator[Any]:
                     host="127.0.0.1",
                     dashboard_address="127.0.0.1:0",
                     silence_logs=50,
+                    preload=[_IGNORE_CTRL_C],
                 ) as cluster,
                 Client(cluster, set_as_default=False) as client,
             ):

@@ -13,13 +13,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import bpy
-import numpy as np
 from mathutils import Vector
 
-from .. import live_coverage, preferences, scene_status, scene_survey, traffic_coverage
-from ..core.choosing.placement.deployment import sensor_at
-from ..core.choosing.placement.objective import Objective, target_weights
-from ..core.choosing.robustness.visibility_in_traffic import PosesInTraffic, poses_in_traffic
+from .. import live_coverage, preferences, scene_status, scene_survey
+from ..core.choosing.placement.objective import Objective
 from ..core.errors import SeipError
 from ..core.output.report.write import write_report
 from ..core.output.results.answer import change_text
@@ -27,7 +24,6 @@ from ..core.output.results.comparison import compare, packed_counts, unpacked_co
 from ..core.output.results.file_names import REPORT_FILES
 from ..core.output.results.placement_file import load_placement, parsed_record
 from ..core.output.results.placement_record import PlacementRecord, Provenance
-from ..core.output.results.ranking import Ranked, rank_added, rank_alone
 from ..core.output.results.versions import versions
 from ..core.progress import Progress
 from ..core.sensing.scans.sensor import MountedSensor
@@ -35,7 +31,7 @@ from ..core.sensing.visibility.visibility_model import VisibilityModel, visibili
 from ..core.storage.files import check_folder, digest
 from ..core.workflows.moved_sensors import evaluate_moved_sensors
 from ..core.workflows.records import record_of
-from ..core.workflows.survey import Survey, surroundings
+from ..core.workflows.survey import Survey
 from ..scene.blend_file import save_blend
 from ..scene.coverage_colours import recolour, show_seen_by
 from ..scene.gltf import save_glb
@@ -49,8 +45,6 @@ from ..sensor_edits import position_names, sensor_edits
 from ..session import SceneState, session
 from .base import ForReadyScene, LongWork, Outcome, Result, attempt, started
 
-MOST_RANKED = 10
-"""Number of candidates in the ranking: as many as the sidebar shows without scrolling the list."""
 OTHER_TARGETS = "The two placements were made on different targets: only their figures can be compared."
 PLAN, REPORT = "plan.png", REPORT_FILES[0]
 _RECORD = "placement.json"
@@ -122,43 +116,6 @@ def _middle_of_road(scene: bpy.types.Scene) -> Vector:
     coverage = coverage_of(scene)
     corners = [] if coverage is None else [coverage.matrix_world @ Vector(corner) for corner in coverage.bound_box]
     return sum(corners, Vector()) / len(corners) if corners else Vector()
-
-
-class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[SceneState, list[Ranked]]], bpy.types.Operator):
-    """List the candidates that are worth most, alone or in addition to the placement"""
-
-    bl_idname = "seip.rank_candidates"
-    bl_label = "Rank Candidates"
-
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, list[Ranked]]]:
-        """Return the job that restores the placement."""
-        return _ranked(scene_survey.with_placement(scene), scene.seip.result.order)
-
-    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, list[Ranked]]) -> None:
-        """Fill the list."""
-        state, lines = result
-        session.keep_state(scene, state)
-        layout = state.layout
-        ranking = scene.seip.result.ranking
-        ranking.clear()
-        for one in lines:
-            line = ranking.add()
-            line.pose, line.share = one.pose, one.share
-            sensor = sensor_at(layout.site, layout.models, "", one.pose)
-            line.name = f"{sensor.model.name} {sensor.height:g} m{sensor.turned} {sensor.position_name}"
-
-
-def _ranked(
-    finding: Generator[Progress, None, SceneState], order: str
-) -> Generator[Progress, None, tuple[SceneState, list[Ranked]]]:
-    state = yield from finding
-    survey, solution = state.placed()
-    site, visible = survey.site, survey.grid.visible
-    weight = target_weights(site, solution.objective)
-    if order == "ALONE":
-        return state, rank_alone(visible, weight, MOST_RANKED)
-    free = ~np.isin(site.candidates.position_of, site.candidates.position_of[solution.placement.chosen])
-    return state, rank_added(visible, weight, solution.deployment.seen_by > 0, free, MOST_RANKED)
 
 
 class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
@@ -276,56 +233,7 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneState, Visibility
         """Begin to follow."""
         state, model = result
         session.keep_state(scene, state)
-        traffic_coverage.stop()
         live_coverage.start(scene, state, model)
-
-
-class SEIP_OT_show_in_traffic(ForPlacement, LongWork[tuple[SceneState, PosesInTraffic]], bpy.types.Operator):
-    """Show the coverage among the vehicles of the current frame as the timeline moves; press again to end it"""
-
-    bl_idname = "seip.show_in_traffic"
-    bl_label = "Coverage in Traffic"
-    bl_options = {"REGISTER"}
-
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no placement or no traffic."""
-        no_traffic = "" if context.scene.session_uid in session.traffic else "load the traffic first"
-        return super().why_not(context) or no_traffic
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
-        """End it at once, or begin in a thread."""
-        return self.execute(context) if session.in_traffic is not None else super().invoke(context, event)
-
-    def execute(self, context: bpy.types.Context) -> Outcome:
-        """End it, or begin."""
-        if session.in_traffic is not None:
-            traffic_coverage.stop()
-            return {"FINISHED"}
-        return super().execute(context)
-
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, PosesInTraffic]]:
-        """Return the job that restores the placement and casts its rays on the empty road."""
-        return _cast(scene_survey.with_placement(scene))
-
-    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, PosesInTraffic]) -> None:
-        """Begin to follow the timeline."""
-        state, visibility = result
-        session.keep_state(scene, state)
-        live_coverage.stop()
-        traffic_coverage.start(scene, state, visibility)
-
-
-def _cast(
-    finding: Generator[Progress, None, SceneState],
-) -> Generator[Progress, None, tuple[SceneState, PosesInTraffic]]:
-    state = yield from finding
-    survey, solution = state.placed()
-    poses = [sensor.pose for sensor in solution.deployment.sensors]
-    if None in poses:
-        raise SeipError("sensors were moved by hand: place them again to see them in traffic")
-    visibility = yield from poses_in_traffic(surroundings(survey), np.array(poses, dtype=np.int64))
-    return state, visibility
 
 
 def _set_up(
@@ -385,7 +293,6 @@ def keep_result(scene: bpy.types.Scene, state: SceneState, record: PlacementReco
     kept.sensors.clear()
     for sensor in solution.deployment.sensors:
         kept.sensors.add().name = sensor.label
-    kept.ranking.clear()
     scene.seip.sections.follow_steps()
     session.keep_state(scene, replace(state, record=kept.record))
 
@@ -520,12 +427,10 @@ def _holds(folder: Path, record: str, _written: int | None) -> bool:
 
 CLASSES = (
     SEIP_OT_look_from_sensor,
-    SEIP_OT_rank_candidates,
     SEIP_OT_keep_placement,
     SEIP_OT_drop_placement,
     SEIP_OT_show_comparison,
     SEIP_OT_follow_sensors,
-    SEIP_OT_show_in_traffic,
     SEIP_OT_evaluate_sensors,
     SEIP_OT_export_result,
     SEIP_OT_write_report,

@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from .. import live_scan, preferences, scene_status
+from .. import last_scan, preferences, scene_status
 from ..core.errors import SeipError
 from ..core.progress import Progress
 from ..core.sensing.traffic.source import TrafficFiles
@@ -68,7 +68,7 @@ class SEIP_OT_simulate_traffic(Conditional, LongWork[SimulatedRuns], bpy.types.O
         seip.detection.runs = seip.goal.runs = self._named
         seip.simulation.facts, seip.simulation.made_with = result.summary, self._key
         files = TrafficFiles(result.paths[0])
-        show_traffic(scene, SceneTraffic(files, live_scan.changes(files), result.first), result.warnings[0])
+        show_traffic(scene, SceneTraffic(files, last_scan.changes(files), result.first), result.warnings[0])
         for sentence in result.messages:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"{result.summary}; press play")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Generator, Iterable
 from pathlib import Path
 
 import bpy
@@ -32,7 +32,6 @@ from ..scene.build import build_scene, remove_site
 from ..scene.changes import watch
 from ..scene.check import contents_of
 from ..scene.imported import MeshFiles, import_mesh
-from ..scene.network import is_network
 from ..scene.startup import remove_startup_objects
 from ..scene.views import frame_site
 from ..session import CheckedScene, session
@@ -46,7 +45,7 @@ EXTRACTS = "*.osm;*.osm.gz;*.osm.pbf"
 NO_PLACE = "Choose a junction, or give latitude and longitude"
 COPIED = (
     *("source", "position", "region_shape", "radius", "osm", "buildings", "buildings_epsg", "buildings_origin"),
-    *("terrain", "terrain_epsg", "meshes", "mesh_origin", "mesh_up", "network"),
+    *("terrain", "terrain_epsg", "meshes", "mesh_origin", "mesh_up"),
 )
 """Properties of a choice that a site in a new scene takes over."""
 SHARE_OF_VIEW = 0.6
@@ -63,14 +62,20 @@ class _WritesScene(Conditional):
         return scene_status.not_own(context.scene)
 
 
-class ReadsMap(_WritesScene, LongWork[SitePlaces]):
-    """A mixin for operators that read the junctions of a file."""
+class SEIP_OT_choose_map(_WritesScene, LongWork[SitePlaces], bpy.types.Operator):
+    """Choose an OpenDRIVE map (.xodr), an extract of OpenStreetMap (.osm, .osm.gz, .osm.pbf) or a site description (.toml), and choose among its junctions"""  # noqa: E501  # a tooltip is one line
+
+    bl_idname = "seip.choose_map"
+    bl_label = "Choose Map"
 
     filepath: bpy.props.StringProperty(
         name="File",
         description="The map, extract or site description",
         subtype="FILE_PATH",
         options={"SKIP_SAVE", "PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    filter_glob: bpy.props.StringProperty(
+        default=f"*.xodr;*{DESCRIPTION_SUFFIX};{EXTRACTS}", options={"HIDDEN", "SKIP_SAVE"}
     )
     by_hand = False
 
@@ -90,24 +95,6 @@ class ReadsMap(_WritesScene, LongWork[SitePlaces]):
         """Return the reading of the file."""
         return site_places(Path(bpy.path.abspath(self.filepath)))
 
-
-class SEIP_OT_choose_map(ReadsMap, bpy.types.Operator):
-    """Choose an OpenDRIVE map (.xodr), an extract of OpenStreetMap (.osm, .osm.gz, .osm.pbf) or a site description (.toml), and choose among its junctions"""  # noqa: E501  # a tooltip is one line
-
-    bl_idname = "seip.choose_map"
-    bl_label = "Choose Map"
-
-    filter_glob: bpy.props.StringProperty(
-        default=f"*.xodr;*{DESCRIPTION_SUFFIX};{EXTRACTS}", options={"HIDDEN", "SKIP_SAVE"}
-    )
-
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if the scene shows a network or is linked from another file."""
-        if is_network(context.scene):
-            return "This scene shows a network: open the site of a junction, or go to another scene"
-        return super().why_not(context)
-
     def conclude(self, scene: bpy.types.Scene, result: SitePlaces) -> None:
         """List the junctions in place of those of another file, and ask for the place."""
         site, before = scene.seip.site, ""
@@ -115,7 +102,11 @@ class SEIP_OT_choose_map(ReadsMap, bpy.types.Operator):
             before = site.junction  # it stays until another one is chosen
         else:
             site.radius, site.position = result.radius, ""
-        list_junctions(site, self.filepath, result)
+        site.source, site.junction = self.filepath, ""
+        site.junctions.clear()
+        for place in result.places:
+            one = site.junctions.add()
+            one.name, one.id = place.name, place.key
         site.junction = before if before in site.junctions else ""
         self.report({"INFO"}, counted(len(site.junctions), "junction"))
         session.places = result
@@ -130,15 +121,6 @@ class SEIP_OT_choose_map(ReadsMap, bpy.types.Operator):
             bpy.ops.seip.pick_junction("INVOKE_DEFAULT")
             return
         bpy.ops.seip.choose_place("INVOKE_DEFAULT")
-
-
-def list_junctions(site: SEIP_PG_site, source: str, found: SitePlaces) -> None:
-    """List the junctions of a file, of which none is chosen yet."""
-    site.source, site.junction = source, ""
-    site.junctions.clear()
-    for place in found.places:
-        one = site.junctions.add()
-        one.name, one.id = place.name, place.key
 
 
 class _BuildsSite(_WritesScene, LongWork[BuiltSite]):
@@ -161,7 +143,7 @@ class _BuildsSite(_WritesScene, LongWork[BuiltSite]):
         added = self._add_meshes(built, dict(zip(paths, places, strict=True)))
         if not self.is_chosen:
             built.seip.traffic.file = built.seip.simulation.map = traffic.EXAMPLE
-        bring_to_front(built, lambda area: frame_site(area, built))
+        _bring_to_front(built)
         for note in result.model.notes:
             report({"INFO"}, note)
         for warning in result.model.warnings:
@@ -176,12 +158,10 @@ class _BuildsSite(_WritesScene, LongWork[BuiltSite]):
         if self.is_chosen and is_of_choice(scene):
             remove_site(scene)
             return scene
-        if has_site(scene) or is_network(scene):
+        if has_site(scene):
             new = bpy.data.scenes.new(name)
             if self.is_chosen:
                 _copy_choice(scene.seip.site, new.seip.site)
-                if is_network(scene):
-                    new.seip.site.network = scene
             sensor_types.list_types(new)
             return new
         if remove_startup_objects(scene):
@@ -254,21 +234,15 @@ def _keep_map(scene: bpy.types.Scene, built: BuiltSite) -> None:
         simulation.map = text.name
 
 
-def bring_to_front(scene: bpy.types.Scene, frame: Callable[[bpy.types.Area], None]) -> None:
-    """Show a scene in the window, with the sidebar beside it.
-
-    Parameters
-    ----------
-    frame : callable
-        Has a 3D view look at the scene.
-    """
+def _bring_to_front(scene: bpy.types.Scene) -> None:
+    """Show the site of a scene in the window, with the sidebar beside it."""
     window = bpy.context.window
     if window is None:
         return
     window.scene = scene
     for area in window.screen.areas:
         if area.type == "VIEW_3D":
-            frame(area)
+            frame_site(area, scene)
     overlays.open_sidebar(window)
 
 

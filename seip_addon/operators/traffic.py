@@ -4,42 +4,29 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Generator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import bpy
 
-from .. import live_scan, preferences, scene_status, scene_survey
-from ..core.choosing.placement.objective import target_weights
-from ..core.choosing.robustness.traffic_instants import spread_instants
-from ..core.choosing.robustness.traffic_study import IN_TRAFFIC, traffic_message
+from .. import last_scan, preferences, scene_status
 from ..core.counts import counted
-from ..core.output.results.placement_file import parsed_record
 from ..core.output.results.versions import versions
 from ..core.progress import Progress, finish
 from ..core.sensing.scans.run_folder import Record, Run, check_run_folder
 from ..core.sensing.scans.sensor import MountedSensor
-from ..core.sensing.traffic.site_traffic import check_runs
 from ..core.sensing.traffic.source import TrafficFiles, load_traffic
 from ..core.sensing.traffic.trajectories import CATEGORIES, LoadedTraffic, Trajectories
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.workflows.recording import RecordingSettings, make_run, record, simulation_of
-from ..core.workflows.survey import surroundings
 from ..properties.conversion import output_folder
 from ..scene import contract
 from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
-from ..session import LastScan, SceneState, SceneTraffic, session
+from ..session import LastScan, SceneTraffic, session
 from .base import Conditional, LongWork, Outcome, Result
-from .results import no_placement, not_evaluated
-
-INSTANTS = 60
-"""Of traffic at which a placement is tried."""
 
 NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
-NO_LOADED = "There is no loaded traffic: load a traffic file first."
-NOT_AT_CANDIDATES = "Sensors were moved by hand: a placement in traffic is evaluated at candidate poses only."
 NO_TRAFFIC = "There is nothing to scan: name a traffic file, or animate objects in SEIP Traffic."
 NO_SENSORS = "There is no sensor to scan with: place sensors first."
 
@@ -56,15 +43,6 @@ def why_no_scan(scene: bpy.types.Scene) -> str:
         return NO_SENSORS
     there = scene.seip.traffic.file or contract.find(scene, contract.TRAFFIC) is not None
     return "" if there else NO_TRAFFIC
-
-
-def why_no_trial(scene: bpy.types.Scene) -> str:
-    """Return why the placement cannot be tried in traffic; nothing where it can."""
-    if no_placement(scene) or scene.session_uid not in session.traffic:
-        return no_placement(scene) or NO_LOADED
-    record = parsed_record(scene.seip.result.record)
-    elsewhere = any(sensor.pose is None for sensor in record.sensors)
-    return NOT_AT_CANDIDATES if elsewhere else not_evaluated(scene)
 
 
 class _Scanning(Conditional, LongWork[Result]):
@@ -90,7 +68,7 @@ class SEIP_OT_load_traffic(Conditional, LongWork[LoadedTraffic], bpy.types.Opera
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, LoadedTraffic]:
         """Read the scene that the traffic is to stand on."""
         self._files = scene.seip.traffic.files()
-        self._changed = live_scan.changes(self._files)
+        self._changed = last_scan.changes(self._files)
         return load_traffic(self._files, read_scene(scene).geometry)
 
     def conclude(self, scene: bpy.types.Scene, result: LoadedTraffic) -> None:
@@ -104,7 +82,7 @@ class SEIP_OT_load_traffic(Conditional, LongWork[LoadedTraffic], bpy.types.Opera
 def show_traffic(scene: bpy.types.Scene, traffic: SceneTraffic, warnings: Sequence[str]) -> None:
     """Animate road users read from files, in place of earlier ones and of their scan, and note what there is."""
     animate(scene, traffic.trajectories)
-    live_scan.hide_cloud(scene)
+    last_scan.hide_cloud(scene)
     session.traffic[scene.session_uid] = traffic
     scene.seip.traffic.loaded = "\n".join((*_facts(traffic.trajectories), *warnings))
 
@@ -126,52 +104,9 @@ class SEIP_OT_clear_traffic(Conditional, bpy.types.Operator):
         scene = context.scene
         clear_traffic(scene)
         session.traffic.pop(scene.session_uid, None)
-        live_scan.hide_cloud(scene)
+        last_scan.hide_cloud(scene)
         scene.seip.traffic.loaded = ""
         return {"FINISHED"}
-
-
-class SEIP_OT_try_in_traffic(Conditional, LongWork[tuple[SceneState, str]], bpy.types.Operator):
-    """Find what the placement sees of the road with the loaded traffic in the way, on average over time"""
-
-    bl_idname = "seip.try_in_traffic"
-    bl_label = "Test in Traffic"
-
-    @classmethod
-    def why_not(cls, context: bpy.types.Context) -> str:
-        """Return a reason if there is no placement or no traffic."""
-        return why_no_trial(context.scene)
-
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, str]]:
-        """Find the placement again, and the traffic."""
-        return _tried(scene_survey.with_placement(scene), session.traffic[scene.session_uid].trajectories)
-
-    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, str]) -> None:
-        """Note it with the placement."""
-        state, sentence = result
-        kept = scene.seip.result
-        record = parsed_record(kept.record)
-        notes = (*(note for note in record.notes if not note.startswith(IN_TRAFFIC)), sentence)
-        solution = state.solution
-        if solution is not None:
-            solution = replace(solution, placement=replace(solution.placement, notes=notes))
-        kept.record = replace(record, notes=notes).text()
-        session.keep_state(scene, replace(state, solution=solution, record=kept.record))
-        self.report({"INFO"}, sentence)
-
-
-def _tried(
-    finding: Generator[Progress, None, SceneState], traffic: Trajectories
-) -> Generator[Progress, None, tuple[SceneState, str]]:
-    state = yield from finding
-    if state.solution is None:
-        raise RuntimeError("the work ended without a placement")
-    layout, chosen = state.layout, state.solution.placement.chosen
-    check_runs([traffic], layout.site.region)
-    instants = spread_instants([traffic], INSTANTS, seed=0)
-    weight = target_weights(layout.site, state.solution.objective)
-    sentence = yield from traffic_message(surroundings(layout), chosen, weight, instants)
-    return state, sentence
 
 
 class SEIP_OT_scan_frame(_Scanning[LastScan], bpy.types.Operator):
@@ -184,12 +119,12 @@ class SEIP_OT_scan_frame(_Scanning[LastScan], bpy.types.Operator):
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, LastScan]:
         """Read what is scanned."""
         self._scene_read = _SceneRead(scene)
-        return _scanned(self._scene_read, live_scan.now(scene), session.scan_of(scene))
+        return _scanned(self._scene_read, last_scan.now(scene), session.scan_of(scene))
 
     def conclude(self, scene: bpy.types.Scene, result: LastScan) -> None:
         """Show the points."""
         self._scene_read.keep_traffic(scene)
-        live_scan.keep(scene, result)
+        last_scan.keep(scene, result)
         for sentence in result.simulation.warnings:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"{counted(len(result.frame), 'point')} in {1e3 * result.seconds:.0f} ms")
@@ -202,7 +137,7 @@ def _scanned(read: _SceneRead, at: float, before: LastScan | None) -> Generator[
     else:
         simulation = yield from simulation_of(run)
     yield Progress(0, 0, "scan")
-    return live_scan.measure(run, simulation, at)
+    return last_scan.measure(run, simulation, at)
 
 
 class SEIP_OT_hide_scan(bpy.types.Operator):
@@ -213,7 +148,7 @@ class SEIP_OT_hide_scan(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Hide it."""
-        live_scan.hide_cloud(context.scene)
+        last_scan.hide_cloud(context.scene)
         return {"FINISHED"}
 
 
@@ -260,8 +195,8 @@ class _SceneRead:
         if self._files is None:
             self._trajectories = finish(read_traffic(scene))
         else:
-            self._changed = live_scan.changes(self._files)
-            self._trajectories = live_scan.known_traffic(scene, self._files, self._geometry.origin)
+            self._changed = last_scan.changes(self._files)
+            self._trajectories = last_scan.known_traffic(scene, self._files, self._geometry.origin)
 
     def run(self) -> Generator[Progress, None, Run]:
         """Read the traffic, where that is still to be done, and gather everything."""
@@ -287,7 +222,6 @@ def _facts(trajectories: Trajectories) -> list[str]:
 CLASSES = (
     SEIP_OT_load_traffic,
     SEIP_OT_clear_traffic,
-    SEIP_OT_try_in_traffic,
     SEIP_OT_scan_frame,
     SEIP_OT_hide_scan,
     SEIP_OT_write_dataset,

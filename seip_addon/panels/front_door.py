@@ -7,9 +7,8 @@ import bpy
 from ..core.errors import SeipError
 from ..operators.base import Outcome, SEIP_OT_stop, attempt
 from ..operators.detection import SEIP_OT_detect
-from ..operators.network import SEIP_OT_import_network
 from ..operators.placement import SEIP_OT_solve_placement
-from ..operators.results import SEIP_OT_evaluate_sensors, SEIP_OT_export_result, SEIP_OT_rank_candidates
+from ..operators.results import SEIP_OT_evaluate_sensors, SEIP_OT_export_result
 from ..operators.sensors import SEIP_OT_add_catalogue, SEIP_OT_preview_beams
 from ..operators.simulation import SEIP_OT_simulate_traffic
 from ..operators.site import (
@@ -106,9 +105,9 @@ class SEIP_MT_main(bpy.types.Menu):
 
 
 STEPS: tuple[tuple[type[bpy.types.Operator], ...], ...] = (
-    (SEIP_OT_load_example, SEIP_OT_choose_map, SEIP_OT_import_network, SEIP_OT_build_site, SEIP_OT_check_site),
+    (SEIP_OT_load_example, SEIP_OT_choose_map, SEIP_OT_build_site, SEIP_OT_check_site),
     (SEIP_OT_add_catalogue, SEIP_OT_preview_beams, SEIP_OT_compute_visibility, SEIP_OT_solve_placement),
-    (SEIP_OT_evaluate_sensors, SEIP_OT_rank_candidates, SEIP_OT_export_result),
+    (SEIP_OT_evaluate_sensors, SEIP_OT_export_result),
     (SEIP_OT_colour_coverage, SEIP_OT_save_picture),
     (SEIP_OT_load_traffic, SEIP_OT_simulate_traffic, SEIP_OT_scan_frame, SEIP_OT_write_dataset, SEIP_OT_detect),
     (SEIP_OT_stop,),
@@ -120,7 +119,6 @@ def draw_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """Draw what File ▸ Import gets."""
     for text, pattern in (("OpenDRIVE (.xodr)", OPENDRIVE), ("OpenStreetMap (.osm)", EXTRACTS)):
         menu.layout.operator(SEIP_OT_choose_map.bl_idname, text=text).filter_glob = pattern
-    menu.layout.operator(SEIP_OT_import_network.bl_idname, text="Whole Extract (.osm)")
 
 
 def draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:

@@ -1,4 +1,4 @@
-"""The section "Results": placed sensors, coverage colours, candidates, comparison."""
+"""The section "Results": placed sensors, coverage colours, comparison."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..session import FollowedSensors, session
 from . import view
 from .run_button import draw_run
 from .sections import draw_sections
-from .sidebar import RowList, is_narrow
+from .sidebar import RowList
 from .wrapped_text import draw_sentence
 
 SENSOR_SHARE = 0.72
@@ -39,18 +39,6 @@ class SEIP_UL_chosen(RowList, bpy.types.UIList):
         words = [item.name, f"{sensor.height_m:g} m", *product, sensor.position]
         row.label(text="  ".join(words), translate=False)
         row.label(text=f"{sensor.coverage_alone:.1%}")
-
-
-class SEIP_UL_ranked(RowList, bpy.types.UIList):
-    """Candidates by their worth."""
-
-    bl_idname = "SEIP_UL_ranked"
-
-    def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
-        """Draw a candidate and its worth."""
-        row = layout.split(factor=0.55 if is_narrow(bpy.context) else 0.75)
-        row.label(text=item.name)
-        row.label(text=f"{item.share:.2%}")
 
 
 class SEIP_UL_kept(RowList, bpy.types.UIList):
@@ -82,7 +70,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     else:
         layout.operator("seip.follow_sensors", text="Stop Following", icon="PAUSE", depress=True)
         _draw_followed(layout, session.following)
-    draw_sections(layout, {"view": view.draw, "ranking": _draw_ranking, "comparison": _draw_comparison}, context)
+    draw_sections(layout, {"view": view.draw, "comparison": _draw_comparison}, context)
 
 
 def _draw_list(
@@ -100,15 +88,6 @@ def _draw_followed(layout: bpy.types.UILayout, following: FollowedSensors) -> No
     layout.label(text=f"Coverage now {following.coverage:.2%}", icon="HIDE_OFF")
     if following.moved:
         draw_sentence(layout, f"Moved by hand: {', '.join(following.moved)}.")
-
-
-def _draw_ranking(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the order, the button and the list of candidates."""
-    result = context.scene.seip.result
-    layout.row().prop(result, "order", expand=True)
-    draw_run(layout, results.SEIP_OT_rank_candidates.bl_idname)
-    if result.ranking:
-        _draw_list(layout, SEIP_UL_ranked, result, "ranking", "active_ranked")
 
 
 def _draw_comparison(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -165,4 +144,4 @@ def _share(value: float | None) -> str:
     return "–" if value is None else f"{value:.2%}"
 
 
-CLASSES = (SEIP_UL_chosen, SEIP_UL_ranked, SEIP_UL_kept)
+CLASSES = (SEIP_UL_chosen, SEIP_UL_kept)

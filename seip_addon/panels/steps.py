@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.network import is_network
-from . import export, network, placement, results, sensors, site, traffic
+from . import export, placement, results, sensors, site, traffic
 from .sections import draw_sections
 from .sidebar import Sidebar
 
@@ -18,11 +17,7 @@ class SEIP_PT_steps(Sidebar, bpy.types.Panel):
     bl_options = {"HIDE_HEADER"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the sections; of a network, its junctions."""
-        if is_network(context.scene):
-            network.draw(self.layout, context)
-            return
-        network.draw_back(self.layout, context.scene)
+        """Draw the sections."""
         steps = {"site": site, "sensors": sensors, "placement": placement}
         status = {name: step.status(context.scene) for name, step in steps.items()}
         draw_sections(self.layout, {name: step.draw for name, step in steps.items()}, context, status)

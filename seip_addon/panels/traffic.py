@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import bpy
 
-from ..operators.results import SEIP_OT_show_in_traffic, no_placement
 from ..operators.traffic import (
     SEIP_OT_clear_traffic,
     SEIP_OT_load_traffic,
     SEIP_OT_scan_frame,
-    SEIP_OT_try_in_traffic,
     SEIP_OT_write_dataset,
     why_no_load,
     why_no_scan,
-    why_no_trial,
 )
 from ..session import session
 from . import detection, simulation, verification
@@ -41,10 +38,6 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     row.operator("screen.animation_play", text="", icon="PLAY")
     for line in traffic.loaded.splitlines():
         draw_sentence(layout, line)
-    if not why_no_trial(context.scene):
-        draw_run(layout, SEIP_OT_try_in_traffic.bl_idname)
-    if context.scene.session_uid in session.traffic and not no_placement(context.scene):
-        _draw_coverage(layout)
     draw_sections(
         layout,
         {
@@ -58,19 +51,6 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     )
 
 
-def _draw_coverage(layout: bpy.types.UILayout) -> None:
-    """Draw the button that shows the coverage of the current frame, and that coverage."""
-    shown = session.in_traffic
-    if shown is None:
-        draw_run(layout, SEIP_OT_show_in_traffic.bl_idname, icon="ORIENTATION_GLOBAL")
-        return
-    layout.operator(SEIP_OT_show_in_traffic.bl_idname, text="Coverage of Empty Road", icon="PAUSE", depress=True)
-    if shown.problem:
-        draw_sentence(layout, shown.problem, icon="ERROR", alert=True)
-    else:
-        layout.label(text=f"Coverage at this frame {shown.coverage:.2%}", icon="HIDE_OFF")
-
-
 def _draw_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw how scans are made, and the last."""
     traffic = context.scene.seip.traffic
@@ -82,7 +62,6 @@ def _draw_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     column.prop(traffic, "noise")
     column.prop(traffic, "seed")
     column.prop(traffic, "rolling_shutter")
-    column.prop(traffic, "follow")
     draw_run(layout, SEIP_OT_scan_frame.bl_idname)
     scan = session.scan_of(context.scene)
     for line in scan.facts if scan is not None else ():

@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, IntProperty, StringProperty
 
 from .. import selection
 
 
 class SEIP_PG_chosen(bpy.types.PropertyGroup):
     """A sensor of the placement; its name is its label."""
-
-
-class SEIP_PG_ranked(bpy.types.PropertyGroup):
-    """A candidate pose in a ranking; its name says where it is."""
-
-    pose: IntProperty(name="Pose", description="Number of the candidate pose")
-    share: FloatProperty(name="Share", description="Of the targets' weight that it sees, or adds", subtype="FACTOR")
 
 
 class SEIP_PG_placement(bpy.types.PropertyGroup):
@@ -37,20 +30,6 @@ class SEIP_PG_result(SEIP_PG_placement):
         description="Click to select the sensor in the scene",
         update=selection.select_sensor,
     )
-    order: EnumProperty(
-        name="Order",
-        description="By what candidates are ranked",
-        items=(
-            ("ADDED", "Added", "What a pose would add to the placement, at positions that are free"),
-            ("ALONE", "Alone", "What a pose sees by itself"),
-        ),
-    )
-    ranking: CollectionProperty(type=SEIP_PG_ranked)
-    active_ranked: IntProperty(
-        name="Candidate",
-        description="Click to put the 3D cursor at the candidate",
-        update=selection.show_candidate,
-    )
     folder: StringProperty(
         name="Folder",
         description="Where the result is written; // is the folder of the .blend",
@@ -65,4 +44,4 @@ class SEIP_PG_result(SEIP_PG_placement):
     )
 
 
-CLASSES = (SEIP_PG_chosen, SEIP_PG_ranked, SEIP_PG_placement, SEIP_PG_result)
+CLASSES = (SEIP_PG_chosen, SEIP_PG_placement, SEIP_PG_result)

@@ -58,7 +58,6 @@ class SEIP_PG_sections(bpy.types.PropertyGroup):
     search: _section("Search")
     results: _section("Results")
     view: _section("Coverage and Sight Lines")
-    ranking: _section("Candidate Ranking")
     comparison: _section("Compare")
     traffic: _section("Traffic and Detection")
     simulation: _section("Traffic Simulation")

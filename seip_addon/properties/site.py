@@ -11,7 +11,6 @@ from bpy.props import (
     CollectionProperty,
     EnumProperty,
     FloatProperty,
-    PointerProperty,
     StringProperty,
 )
 
@@ -116,9 +115,6 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
             *((axis, axis.upper(), f"The {axis} axis points up") for axis in UP_AXES),
         ),
     )
-    network: PointerProperty(
-        name="Network", description="Scene of the network that this site is a junction of", type=bpy.types.Scene
-    )
     role: EnumProperty(name="Role", description="What objects mean to the placement", items=ROLE_ITEMS)
     checked: BoolProperty(name="Checked", description="Whether the check has looked at this scene")
     counts: CollectionProperty(type=SEIP_PG_count)
@@ -144,9 +140,9 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
         """Return whether enough is chosen to build a site: a map has a middle, an extract none."""
         return bool(self.source and (self.junction or self.position or not self.is_extract()))
 
-    def place(self, junction: str = "") -> str:
-        """Return a junction of the chosen map, or the chosen place on it, as one text."""
-        return "|".join((self.source, junction or self.junction or self.position))
+    def place(self) -> str:
+        """Return the chosen junction or place with its map, as one text."""
+        return "|".join((self.source, self.junction or self.position))
 
     def follows_approaches(self) -> bool:
         """Return whether the region follows the approaches of a junction."""

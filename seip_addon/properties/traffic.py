@@ -7,7 +7,6 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
-from .. import live_scan
 from ..core.output.datasets.formats import FORMATS
 from ..core.output.datasets.sample import SPLITS
 from ..core.sensing.scans.simulation import ScanSettings
@@ -20,10 +19,6 @@ EXAMPLE = "Example"
 EXAMPLES = Path(__file__).resolve().parents[2] / "scenes"
 """Folder of the example: beside the package, in a checkout as in the extension."""
 EXAMPLE_RUN = EXAMPLES / "junction_traffic" / "run-1.npz"
-
-
-def _follow(_own: object, _context: bpy.types.Context) -> None:
-    live_scan.keep_following()
 
 
 class SEIP_PG_traffic(bpy.types.PropertyGroup):
@@ -54,12 +49,6 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
         name="Noise", description="Ranges are noisy and returns get lost, as in the sensors' data sheets", default=True
     )
     rolling_shutter: of_setting(ScanSettings, "rolling_shutter", "Rolling Shutter")
-    follow: BoolProperty(
-        name="Follow the Timeline",
-        description="Scan again whenever the frame changes",
-        default=False,
-        update=_follow,
-    )
     whole: BoolProperty(name="Whole Run", description="From its first moment to its last", default=True)
     start: FloatProperty(
         name="Start",

@@ -5,11 +5,11 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from .. import live_scan
+from .. import last_scan
 
 
 def _recolour(_own: object, context: bpy.types.Context) -> None:
-    live_scan.show_cloud(context.scene)
+    last_scan.show_cloud(context.scene)
 
 
 class SEIP_PG_view(bpy.types.PropertyGroup):

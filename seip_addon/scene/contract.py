@@ -21,13 +21,11 @@ MANDATORY_AREAS = "SEIP Mandatory Areas"
 SENSORS = "SEIP Sensors"
 COVERAGE = "SEIP Coverage"
 TRAFFIC = "SEIP Traffic"
-NETWORK = "SEIP Network"
 
 AREAS = (REGION, CANDIDATE_AREAS, WEIGHTED_REGIONS, FORBIDDEN_AREAS, MANDATORY_AREAS)
 """Collections whose objects outline areas in plan."""
 INPUTS = (*AREAS, ROADS, GROUND, OCCLUDERS, POLES)
-"""Collections that a site is read from. `SENSORS` and `COVERAGE` are written; `TRAFFIC` is read and written.
-`NETWORK` is the streets and junctions of an extract, from which sites are built in scenes of their own."""
+"""Collections that a site is read from. `SENSORS` and `COVERAGE` are written; `TRAFFIC` is read and written."""
 
 WEIGHT = "seip_weight"
 FORBIDDEN = "seip_forbidden"
@@ -52,8 +50,6 @@ ATTRIBUTION = "seip_attribution"
 CATEGORY = "seip_category"
 PAINT = "seip_paint"
 SHAPE = "seip_shape"
-JUNCTION = "seip_junction"
-"""Mark of the objects that stand for the junctions of a network: the name of the junction."""
 BUILT = "seip_built"
 """Mark of every object that was built from a map; on a scene, the place on that map."""
 WRITTEN = "seip_result"

@@ -7,7 +7,6 @@ import math
 import bpy
 import numpy as np
 from mathutils import Vector
-from shapely.geometry.base import BaseGeometry
 
 from . import contract
 
@@ -15,10 +14,6 @@ CLIP_START, CLIP_END = 0.5, 5000.0
 """Metres before the eye between which a 3D view shows objects: a site, without flicker of what lies close together."""
 VIEW_SENSOR = 72.0
 """Millimetres of the longer side of a 3D view's sensor; a camera's is 36 unless it is set."""
-PLAN_MARGIN = 1.5
-"""Of the distance from which a plan fills a view: no junction is to lie under the sidebar."""
-LEAST_PLAN = 200.0
-"""Metres of a plan that a view shows at least."""
 MARGIN = 1.15
 """Of the distance from which a site fills a view: the sidebar takes a part of it."""
 
@@ -30,31 +25,6 @@ def set_up_view(view: bpy.types.SpaceView3D) -> None:
     shading.type, shading.light, shading.color_type = "SOLID", "STUDIO", "MATERIAL"
     shading.show_cavity, shading.cavity_type = True, "SCREEN"
     shading.show_shadows, shading.shadow_intensity = True, 0.25
-
-
-def frame_plan(area: bpy.types.Area, plan: BaseGeometry) -> None:
-    """Look at a plan from above, north up, in the colours of its objects.
-
-    Parameters
-    ----------
-    area : bpy.types.Area
-        With a 3D view.
-    plan : BaseGeometry
-        What is to be seen, metres.
-    """
-    view = area.spaces.active
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    left, bottom, right, top = plan.bounds
-    wide = max(region.width, 1) / max(region.height, 1)
-    side = max(right - left, (top - bottom) * wide, LEAST_PLAN) / min(1.0, wide)
-    view.shading.type, view.shading.light, view.shading.color_type = "SOLID", "FLAT", "OBJECT"
-    view.shading.show_cavity = view.shading.show_shadows = False
-    look = view.region_3d
-    look.view_perspective = "ORTHO"
-    look.view_rotation = (1.0, 0.0, 0.0, 0.0)
-    look.view_location = ((left + right) / 2, (bottom + top) / 2, 0.0)
-    look.view_distance = PLAN_MARGIN * side * view.lens / (VIEW_SENSOR / 2)  # without perspective half of it counts
-    view.clip_start, view.clip_end = CLIP_START, max(CLIP_END, 4.0 * look.view_distance)
 
 
 def frame_site(area: bpy.types.Area, scene: bpy.types.Scene) -> None:

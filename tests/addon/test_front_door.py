@@ -58,7 +58,7 @@ def drawn(draw):
 
 
 def test_import_is_in_the_file_menu_and_takes_dropped_files(scene):
-    assert drawn(front_door.draw_import) == ["seip.choose_map", "seip.choose_map", "seip.import_network"]
+    assert drawn(front_door.draw_import) == ["seip.choose_map", "seip.choose_map"]
     handlers = [bpy.types.SEIP_FH_opendrive, bpy.types.SEIP_FH_openstreetmap]
     assert [one.bl_import_operator for one in handlers] == ["seip.choose_map"] * 2
     assert [one.bl_file_extensions for one in handlers] == [".xodr", ".osm;.gz"]
@@ -292,17 +292,16 @@ def test_all_sections_open_without_and_with_a_placement(junction, monkeypatch):
     panel.layout = DrawnLayout()
     bpy.types.SEIP_PT_steps.draw(panel, bpy.context)
     drawn = {name for name, _ in panel.layout.operators}
-    assert {"seip.check_site", "seip.choose_sensors", "seip.solve_placement", "seip.rank_candidates"} <= drawn
+    assert {"seip.check_site", "seip.choose_sensors", "seip.solve_placement"} <= drawn
     assert {"seip.write_report", "seip.save_picture", "seip.show_comparison"} <= drawn
 
 
 def test_no_list_scrolls_since_it_would_take_the_mouse_wheel(junction):
     bpy.ops.seip.solve_placement()
-    bpy.ops.seip.rank_candidates()
     for number in range(3):
         bpy.ops.seip.keep_placement(name=f"kept {number}")
     sections = junction.seip.sections
-    sections.results = sections.ranking = sections.comparison = True
+    sections.results = sections.comparison = True
     panel = SimpleNamespace(layout=DrawnLayout())
     bpy.types.SEIP_PT_steps.draw(panel, bpy.context)
-    assert [(one["rows"], one["maxrows"]) for one in panel.layout.lists] == [(2, 2), (10, 10), (3, 3)]
+    assert [(one["rows"], one["maxrows"]) for one in panel.layout.lists] == [(2, 2), (3, 3)]

@@ -1,5 +1,6 @@
 """Placement for the road in traffic from the panel: the command's answer, and a sentence for what cannot be used."""
 
+import re
 import shutil
 from types import SimpleNamespace
 
@@ -19,7 +20,7 @@ from tests.builders.small_scene import make_run
 
 OPTIONS = [
     *("--sensor", "vlp16", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--delta", "6", "--count", "2"),
-    *("--traffic", "--criterion", "height", "--weights-from-traffic", "--scenarios", "2", "--held-out", "8"),
+    *("--traffic", "--scenarios", "2", "--held-out", "8"),
     "--no-render",
 ]
 
@@ -38,14 +39,11 @@ def coarse(junction):
 @pytest.mark.slow
 def test_panel_and_batch_place_alike_and_what_it_was_chosen_on_stays_with_it(coarse, tmp_path, small_scene):
     goal = coarse.seip.goal
-    goal.criterion, goal.weights_from_traffic = "height", True
     goal.failures = "worst"  # left from other scenarios, and not shown for these
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
     certificate, purpose, band = session.state_of(coarse).solution.caption
     assert band.startswith("over plausible gains")
-    assert certificate.endswith(
-        "among these candidates to see the points 1.5 m above the road in traffic, on average over 2 instants."
-    )
+    assert certificate.endswith("among these candidates to see the road in traffic, on average over 2 instants.")
     assert (certificate[:6], purpose[:17]) == ("Proven", "chosen to see the")
     path = tmp_path / "placed.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
@@ -53,11 +51,25 @@ def test_panel_and_batch_place_alike_and_what_it_was_chosen_on_stays_with_it(coa
     seip = bpy.context.scene.seip
     panel = parsed_record(seip.result.record)
     assert any(note.startswith("this placement sees ") for note in panel.notes)
-    seip.traffic.file = str(small_scene.parent / "small_traffic" / "run-1.npz")
-    bpy.ops.seip.load_traffic()
-    bpy.ops.seip.try_in_traffic()
-    assert parsed_record(seip.result.record).notes[:-1] == panel.notes
     place.main([str(small_scene), *OPTIONS, "-o", str(tmp_path)])
+    assert comparable(panel) == comparable(load_placement(tmp_path / "placement.json"))
+
+
+def test_evaluate_only_states_what_traffic_leaves_of_the_placement_for_the_empty_road(coarse, tmp_path, small_scene):
+    coarse.seip.goal.scenarios = "nominal"
+    assert bpy.ops.seip.solve_placement() == {"FINISHED"}
+    empty = parsed_record(coarse.seip.result.record)
+    coarse.seip.goal.scenarios, coarse.seip.goal.risk = "traffic", "none"
+    assert bpy.ops.seip.solve_placement() == {"FINISHED"}
+    panel = parsed_record(coarse.seip.result.record)
+    assert [sensor.pose for sensor in panel.sensors] == [sensor.pose for sensor in empty.sensors]
+    (note,) = set(panel.notes) - set(empty.notes)
+    found = re.fullmatch(
+        r"in traffic \(\d+ road users at a time\) .* sees ([\d.]+)% .*, ([\d.]+)% when it is empty", note
+    )
+    assert 0 < float(found[1]) <= 100
+    assert float(found[2]) == pytest.approx(100 * empty.coverage.whole, abs=0.01)
+    place.main([str(small_scene), *OPTIONS, "--risk", "none", "-o", str(tmp_path)])
     assert comparable(panel) == comparable(load_placement(tmp_path / "placement.json"))
 
 

@@ -233,7 +233,7 @@ def test_work_that_is_stopped_at_its_end_leaves_no_trace(junction):
     seen = dict(vars(before))
     placed = finish(work_of("SEIP_OT_solve_placement", junction))
     assert len(placed.solution.deployment.sensors) == 3
-    for name in ("compute_visibility", "rank_candidates", "follow_sensors", "save_picture"):
+    for name in ("compute_visibility", "follow_sensors", "save_picture"):
         finish(work_of(f"SEIP_OT_{name}", junction))
         assert session.state_of(junction) is before
         assert vars(before) == seen
@@ -269,8 +269,6 @@ def test_a_saved_placement_goes_on_without_computing(junction, tmp_path, monkeyp
     for forbidden in ("compute_visibility", "optimise"):
         monkeypatch.setattr(f"seip_addon.core.sensing.visibility.store.{forbidden}", None, raising=False)
         monkeypatch.setattr(f"seip_addon.core.workflows.survey.{forbidden}", None, raising=False)
-    assert bpy.ops.seip.rank_candidates() == {"FINISHED"}
-    assert len(scene.seip.result.ranking) > 0
     scene.seip.result.folder = "//out/"
     assert bpy.ops.seip.export_result() == {"FINISHED"}
     assert comparable(load_placement(tmp_path / "out" / "placement.json")) == comparable(parsed_record(before))
@@ -282,9 +280,9 @@ def test_an_emptied_cache_is_said(junction, tmp_path):
     for file in (tmp_path / "cache").glob("*.npz"):
         file.unlink()
     with pytest.raises(RuntimeError, match="no longer holds the visibility of this placement: place again"):
-        bpy.ops.seip.rank_candidates()
+        bpy.ops.seip.follow_sensors()
     bpy.ops.seip.compute_visibility()
-    assert bpy.ops.seip.rank_candidates() == {"FINISHED"}
+    assert bpy.ops.seip.follow_sensors() == {"FINISHED"}
 
 
 def test_undo_brings_the_earlier_placement_back_and_redo_the_new(junction):
@@ -300,7 +298,7 @@ def test_undo_brings_the_earlier_placement_back_and_redo_the_new(junction):
     scene = bpy.context.scene
     assert labels(scene) == ["S1", "S2"]
     assert len(json.loads(scene.seip.result.record)["sensors"]) == 2
-    bpy.ops.seip.rank_candidates()
+    bpy.ops.seip.follow_sensors()
     assert len(session.state_of(scene).solution.deployment.sensors) == 2
     bpy.ops.ed.redo()
     assert labels(bpy.context.scene) == ["S1", "S2", "S3"]

@@ -1,4 +1,4 @@
-"""Looking at a placement: ranking, comparison, and sensors that a hand moves."""
+"""Looking at a placement: comparison, and sensors that a hand moves."""
 
 import bpy
 import numpy as np
@@ -27,28 +27,6 @@ def shown(scene: bpy.types.Scene) -> np.ndarray:
     counts = np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.attributes["seip_seen"].data.foreach_get("value", counts)
     return counts
-
-
-def test_candidates_are_ranked_as_a_slow_loop_does(placed):
-    bpy.ops.seip.rank_candidates()
-    known = session.state_of(placed)
-    visible, site = known.survey.grid.visible, known.survey.site
-    chosen = [sensor.pose for sensor in known.solution.deployment.sensors]
-    taken = {int(site.candidates.position_of[pose]) for pose in chosen}
-    seen = visible[chosen].any(axis=0)
-    worth = {
-        pose: int((row & ~seen).sum())
-        for pose, row in enumerate(visible)
-        if int(site.candidates.position_of[pose]) not in taken
-    }
-    best = placed.seip.result.ranking[0]
-    assert best.share == pytest.approx(max(worth.values()) / len(site.targets))
-    assert worth[best.pose] == max(worth.values())
-    placed.seip.result.order = "ALONE"
-    bpy.ops.seip.rank_candidates()
-    assert placed.seip.result.ranking[0].share == pytest.approx(visible.sum(axis=1).max() / len(site.targets))
-    placed.seip.result.active_ranked = 0
-    assert np.allclose(placed.cursor.location, site.candidates.xyz[placed.seip.result.ranking[0].pose], atol=1e-4)
 
 
 def test_a_click_selects_the_sensor(placed):
@@ -197,8 +175,6 @@ def test_tilted_sensors_are_where_the_placement_put_them_until_a_hand_turns_them
     bpy.ops.seip.solve_placement()
     known = session.state_of(placed)
     assert {sensor.tilt for sensor in known.solution.deployment.sensors} == {np.radians(12)}
-    bpy.ops.seip.rank_candidates()
-    assert all("8 m, tilted 12° " in line.name for line in placed.seip.result.ranking)
     bpy.ops.seip.show_sight_lines(sensor="S1")
 
     bpy.ops.seip.follow_sensors()
@@ -242,8 +218,6 @@ def test_sensors_that_look_one_way_are_where_the_placement_put_them_until_a_hand
         sensors, poses = known.solution.deployment.sensors, known.layout.site.candidates
         assert len(set(poses.yaw[poses.position_of == 0])) in range(1, 6)
         assert [sensor.yaw for sensor in sensors] == [poses.yaw[sensor.pose] for sensor in sensors]
-        bpy.ops.seip.rank_candidates()
-        assert all("8 m, yaw " in line.name for line in junction.seip.result.ranking)
         bpy.ops.seip.show_sight_lines(sensor="S1")
         bpy.ops.seip.follow_sensors()
         assert session.following.moved == ()

@@ -12,6 +12,7 @@ from seip_addon.core import sumo_programs
 from seip_addon.core.errors import SeipError
 from seip_addon.core.sumo_installation import SUMO_VERSION, sumo_size
 from seip_addon.panels import front_door, site, sumo
+from seip_addon.panels import preferences as preferences_panel
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing
 from tests.builders.sumo_wheel import write_programs, write_wheel
@@ -138,7 +139,7 @@ def test_the_preferences_draw_folder_status_and_button(scene, machine):
     try:
         layout = DrawnLayout()
         stand_in = SimpleNamespace(layout=layout, catalogues=())
-        preferences.SEIP_AP_preferences.draw(stand_in, bpy.context)
+        preferences_panel.SEIP_AP_preferences.draw(stand_in, bpy.context)
         assert "sumo" in {name for name, _ in layout.properties}
         assert preferences.NO_SUMO in layout.text
         assert ("seip.install_sumo", BUTTON) in layout.operators

@@ -1,27 +1,16 @@
 """Traffic and scans: the operators do what the batch command does, byte for byte."""
 
-import json
-import re
-
 from headless import simulate
 
 import bpy
 import numpy as np
 import pytest
 
-from seip_addon import live_scan, traffic_coverage
-from seip_addon.core.choosing.robustness.traffic_instants import obstacles_of
-from seip_addon.core.choosing.robustness.visibility_in_traffic import visibility_in_traffic
-from seip_addon.core.output.results.placement_file import load_placement
-from seip_addon.core.progress import finish
 from seip_addon.core.sensing.scans.frame import Frame
-from seip_addon.core.workflows.survey import surroundings
-from seip_addon.panels import traffic as traffic_panel
-from seip_addon.scene.write import ASPECT, SEEN_BY, coverage_of, write_result
+from seip_addon.scene.write import write_result
 from seip_addon.session import session
 from seip_addon.viewport import overlays
 from seip_addon.viewport.point_cloud import NAME as CLOUD
-from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import ORIGIN, make_example
 
@@ -45,27 +34,6 @@ def test_traffic_is_loaded_animated_and_cleared(placed):
     assert bpy.ops.seip.clear_traffic() == {"FINISHED"}
     assert "SEIP Traffic" not in bpy.data.collections
     assert not placed.seip.traffic.loaded
-
-
-@pytest.mark.slow
-def test_what_traffic_leaves_of_a_placement_stands_with_it(placed, tmp_path):
-    assert not bpy.ops.seip.try_in_traffic.poll()
-    bpy.ops.seip.load_traffic()
-    before = json.loads(placed.seip.result.record)["notes"]
-    for _ in range(2):
-        assert bpy.ops.seip.try_in_traffic() == {"FINISHED"}
-        notes = json.loads(placed.seip.result.record)["notes"]
-        assert notes[:-1] == before
-        assert re.fullmatch(
-            r"in traffic \(\d+ road users at a time\) this placement sees [\d.]+% \[too few data for an interval\] of "
-            r"the road on average over time, [\d.]+% when it is empty",
-            notes[-1],
-        )
-    coverage = json.loads(placed.seip.result.record)["coverage"]["whole"]
-    assert notes[-1].endswith(f"{coverage:.2%} when it is empty")
-    placed.seip.result.folder = str(tmp_path)
-    bpy.ops.seip.export_result()
-    assert list(load_placement(tmp_path / "placement.json").notes) == notes
 
 
 @pytest.mark.slow
@@ -130,13 +98,10 @@ def test_the_cloud_is_drawn_in_the_colours_asked_for(placed):
 def test_other_traffic_ends_the_scan_of_the_earlier(placed, small_scene):
     bpy.ops.seip.load_traffic()
     bpy.ops.seip.scan_frame()
-    placed.seip.traffic.follow = True
     placed.seip.traffic.file = str(small_scene.parent / "small_traffic" / "run-2.npz")
     bpy.ops.seip.load_traffic()
     assert session.scan_of(placed) is None
     assert overlays.find(placed, CLOUD) is None
-    placed.frame_set(300)
-    assert session.scan_of(placed) is None
 
 
 def test_animated_objects_are_scanned_as_the_file_is(placed):
@@ -150,19 +115,6 @@ def test_animated_objects_are_scanned_as_the_file_is(placed):
     animated = session.scan_of(placed).frame
     assert len(animated.labels) == len(from_file.labels)
     assert np.allclose(np.sort(animated.labels.centre[:, 0]), np.sort(from_file.labels.centre[:, 0]), atol=0.01)
-
-
-def test_following_scans_at_each_frame_and_leaves_no_handler(placed):
-    before = len(bpy.app.handlers.frame_change_post)
-    bpy.ops.seip.scan_frame()
-    placed.seip.traffic.follow = True
-    assert len(bpy.app.handlers.frame_change_post) == before + 1
-    placed.frame_set(480)
-    assert session.scan_of(placed).frame.time == pytest.approx(480 / placed.render.fps)
-    placed.seip.traffic.follow = False
-    placed.frame_set(490)
-    assert session.scan_of(placed).frame.time == pytest.approx(480 / placed.render.fps)
-    assert len(bpy.app.handlers.frame_change_post) == before
 
 
 @pytest.mark.parametrize(
@@ -219,54 +171,3 @@ def test_floating_car_data_are_put_on_the_road(placed, tmp_path):
     assert placed.seip.traffic.loaded.startswith("1 road user, 0 to 5 s\n1 car")
     bpy.ops.seip.scan_frame()
     assert session.scan_of(placed).run.trajectories.source == "run.fcd.xml"
-
-
-def shown_seen_by(scene):
-    attribute = coverage_of(scene).data.attributes[SEEN_BY]
-    counts = np.empty(len(attribute.data), dtype=np.int32)
-    attribute.data.foreach_get("value", counts)
-    return counts
-
-
-def test_coverage_follows_the_timeline_and_is_that_of_the_empty_road_again(placed):
-    empty, aspect = shown_seen_by(placed), coverage_of(placed)[ASPECT]
-    with pytest.raises(RuntimeError, match="load the traffic first"):
-        bpy.ops.seip.show_in_traffic()
-    bpy.ops.seip.load_traffic()
-    placed.frame_set(0)
-    assert bpy.ops.seip.show_in_traffic() == {"FINISHED"}
-    survey, solution = session.state_of(placed).placed()
-    run = session.traffic[placed.session_uid].trajectories
-    hidden = 0
-    for frame in (0, 150, 300, 450):
-        placed.frame_set(frame)
-        traffic_coverage.update()  # as the timer does, which does not run without a window
-        present = obstacles_of(run, run.at(live_scan.now(placed)))
-        views = finish(visibility_in_traffic(surroundings(survey), solution.placement.chosen, [present]))
-        assert shown_seen_by(placed).tolist() == views.seen(0).sum(axis=0).tolist()
-        assert session.in_traffic.coverage == pytest.approx((shown_seen_by(placed) > 0).mean())
-        hidden += int(((empty > 0) & (shown_seen_by(placed) == 0)).sum())
-    assert hidden > 0
-    layout = DrawnLayout()
-    traffic_panel.draw(layout, bpy.context)
-    assert "seip.show_in_traffic" in dict(layout.operators)
-    assert bpy.ops.seip.show_in_traffic() == {"FINISHED"}
-    assert session.in_traffic is None
-    assert shown_seen_by(placed).tolist() == empty.tolist()
-    assert coverage_of(placed)[ASPECT] == aspect
-
-
-def test_coverage_in_traffic_of_another_placement_or_without_traffic_says_so(placed):
-    bpy.ops.seip.load_traffic()
-    bpy.ops.seip.show_in_traffic()
-    own = session.traffic.pop(placed.session_uid)
-    traffic_coverage.update()
-    assert "load it again" in session.in_traffic.problem
-    session.traffic[placed.session_uid] = own
-    traffic_coverage.update()
-    assert session.in_traffic.problem == ""
-    placed.seip.result.record += " "
-    traffic_coverage.update()
-    assert "another placement" in session.in_traffic.problem
-    bpy.ops.seip.show_in_traffic()
-    assert session.in_traffic is None

@@ -75,9 +75,8 @@ def test_a_damaged_record_is_not_shown_and_has_its_sentence(placed, change, word
     change(record)
     placed.seip.result.record = json.dumps(record)
     assert re.search(words, results.no_placement(placed))
-    for button in (bpy.ops.seip.rank_candidates, bpy.ops.seip.evaluate_sensors, bpy.ops.seip.keep_placement):
+    for button in (bpy.ops.seip.follow_sensors, bpy.ops.seip.evaluate_sensors, bpy.ops.seip.keep_placement):
         assert not button.poll()
-    assert not bpy.ops.seip.try_in_traffic.poll()
     bpy.ops.seip.solve_placement()
     assert not results.no_placement(placed)
 
@@ -146,7 +145,7 @@ def test_a_record_of_a_pose_that_is_not_there_has_its_sentence(placed, pose, sen
     record["sensors"][0]["pose"] = pose
     placed.seip.result.record = json.dumps(record)
     with pytest.raises(RuntimeError, match=sentence):
-        bpy.ops.seip.rank_candidates()
+        bpy.ops.seip.follow_sensors()
 
 
 def test_a_record_of_a_newer_version_is_not_shown(placed):

@@ -27,7 +27,6 @@ def make_site(number, draw, *, middle=(52.47, 13.44), spread=0.02, criterion="ro
             f"S{at + 1}",
             TYPES[kind],
             *(latitude + 2e-4 * math.sin(at), longitude + 3e-4 * math.cos(at), 5.4, f"Pole {at}", PRICES[kind]),
-            phase=1 + at // 2,
         )
         for at, kind in enumerate(types)
     )
@@ -50,18 +49,16 @@ def make_site(number, draw, *, middle=(52.47, 13.44), spread=0.02, criterion="ro
     )
 
 
-def make_network(
-    count=25, *, criterion="road", budgets=None, statuses=("equipped",) * 5 + ("without sensor", "failed"), **changes
-):
+def make_network(count=25, *, criterion="road", statuses=("equipped",) * 5 + ("without sensor", "failed"), **changes):
     """Return a network whose sites take the statuses in turn."""
     draw = np.random.default_rng(7)
     sites = tuple(
         make_site(number, draw, criterion=criterion, status=statuses[number % len(statuses)]) for number in range(count)
     )
-    return network_of(sites, criterion=criterion, budgets=budgets, **changes)
+    return network_of(sites, criterion=criterion, **changes)
 
 
-def network_of(sites, *, criterion="road", budgets=None, **changes):
+def network_of(sites, *, criterion="road", **changes):
     """Return the network of given sites with a concave curve."""
     usable = [site for site in sites if site.status != "failed"]
     total = sum(site.weight for site in usable) or 1.0
@@ -73,7 +70,7 @@ def network_of(sites, *, criterion="road", budgets=None, **changes):
     points = tuple(NetworkPoint(a, b, b * 1.02) for a, b in zip(money, curve, strict=True))
     content = {
         "name": "Invented town",
-        "budgets_usd": budgets or (1.02 * price + 1000.0,),
+        "budget_usd": 1.02 * price + 1000.0,
         "attribution": ("© OpenStreetMap contributors (ODbL), data of 2024-03-22",),
         "notes": ("prices are those of sensors only",),
         "created": CREATED,

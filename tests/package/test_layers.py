@@ -111,9 +111,32 @@ def test_packages_of_the_core_import_each_other_in_no_circle():
         package = package_of(path.relative_to(ROOT / "seip_addon" / "core").parts)
         names = [name.split(".")[2:] for name in imported(path) if name.startswith("seip_addon.core.")]
         uses.setdefault(package, set()).update({package_of(parts) for parts in names} - {package})
-    while free := {package for package, used in uses.items() if not used & set(uses)}:
-        uses = {package: used for package, used in uses.items() if package not in free}
-    assert not uses
+    assert not circles(uses)
+
+
+def module_name(path):
+    """Full name of a module or package."""
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def circles(uses: dict[str, set[str]]) -> set[str]:
+    """Modules that are part of a circle of imports, or between two."""
+    while True:
+        used = set().union(*uses.values())
+        ends = {name for name, names in uses.items() if name not in used or not names & uses.keys()}
+        if not ends:
+            return set(uses)
+        uses = {name: names for name, names in uses.items() if name not in ends}
+
+
+def test_no_modules_import_each_other_in_a_circle_not_even_within_functions():
+    there = {module_name(path): path for folder in ("seip_addon", "headless") for path in modules(folder)}
+    uses = {}
+    for name, path in there.items():
+        of_modules = {one if one in there else one.rpartition(".")[0] for one in imported(path)}
+        uses[name] = of_modules & there.keys() - {name}
+    assert not circles(uses)
+    assert circles(uses | {"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == {"a", "b", "c"}
 
 
 def test_groups_of_the_core_import_only_lower_ones():

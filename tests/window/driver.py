@@ -3,8 +3,7 @@
 Blender must run with ``--enable-event-simulate``. A scenario is a generator that
 yields seconds to wait; buttons are found by what they do, wherever they are: the
 mouse goes down the sidebar and asks of each place which operator or property is
-there. The environment variables SEIP_THEME and SEIP_UI_SCALE name a theme and a
-scale of the interface.
+there.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ import sys
 import tempfile
 import time
 import traceback
+import unicodedata
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -34,31 +34,8 @@ BLUE = 40
 """How much more blue than red a bar's filled part is."""
 BEAT = 0.04
 """Seconds that Blender has to notice an event."""
-NAMES = dict(
-    zip(
-        "0123456789.:-/ ",
-        (
-            "ZERO",
-            "ONE",
-            "TWO",
-            "THREE",
-            "FOUR",
-            "FIVE",
-            "SIX",
-            "SEVEN",
-            "EIGHT",
-            "NINE",
-            "PERIOD",
-            "SEMI_COLON",
-            "MINUS",
-            "SLASH",
-            "SPACE",
-        ),
-        strict=True,
-    )
-)
-
-
+NAMES = {digit: unicodedata.name(digit).removeprefix("DIGIT ") for digit in "0123456789"}
+NAMES |= {".": "PERIOD", ":": "SEMI_COLON", "-": "MINUS", "/": "SLASH", " ": "SPACE"}
 FULL = {"full_path": True}
 
 
@@ -282,7 +259,6 @@ class Window:
 def play(scenario: Callable[[Window], Iterator[float]], window: Window) -> None:
     """Play a scenario once Blender's window is up, and end Blender: status 0, or 1 with the fault on standard error."""
     steps = scenario(window)
-    _set_look(os.environ.get("SEIP_THEME", ""), float(os.environ.get("SEIP_UI_SCALE", "1")))
 
     def tick() -> float | None:
         try:
@@ -296,14 +272,6 @@ def play(scenario: Callable[[Window], Iterator[float]], window: Window) -> None:
         return None
 
     bpy.app.timers.register(tick, first_interval=2.0, persistent=True)
-
-
-def _set_look(theme: str, scale: float) -> None:
-    """Set a theme that comes with Blender, such as Blender_Light, and the scale of the interface."""
-    bpy.context.preferences.view.ui_scale = scale
-    if theme:
-        path = next(Path(folder) / f"{theme}.xml" for folder in bpy.utils.preset_paths("interface_theme"))
-        bpy.ops.script.execute_preset(filepath=str(path), menu_idname="USERPREF_MT_interface_theme_presets")
 
 
 def _leave(status: int) -> None:

@@ -265,8 +265,13 @@ class Candidates:
         return orientation(float(self.yaw[pose]), float(self.tilt[pose]))
 
 
-def generate_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Candidates:
+def generate_candidates(geometry: SceneGeometry, settings: CandidateSettings, most: float = math.inf) -> Candidates:
     """Generate candidate poses on the candidate areas and poles, without those where no sensor can be mounted.
+
+    Parameters
+    ----------
+    most : float
+        Largest number of poses; more are refused before any is tested.
 
     Returns
     -------
@@ -277,7 +282,7 @@ def generate_candidates(geometry: SceneGeometry, settings: CandidateSettings) ->
     Raises
     ------
     SeipError
-        No candidate is left (with the reasons), or a mandatory pole or area has none.
+        No candidate is left (with the reasons), there are too many, or a mandatory pole or area has none.
 
     Examples
     --------
@@ -293,6 +298,7 @@ def generate_candidates(geometry: SceneGeometry, settings: CandidateSettings) ->
     dropped: dict[str, int] = {}
     foot, axis_offset, top, name, source, on_pole = _positions(geometry, settings, dropped)
     heights = np.array(sorted(set(settings.heights)), dtype=np.float64)
+    _check_number(len(foot), len(heights), settings, most)
     position_of = np.repeat(np.arange(len(foot)), len(heights))
     height = np.tile(heights, len(foot))
     xyz = foot[position_of] + axis_offset[position_of]
@@ -334,6 +340,18 @@ def generate_candidates(geometry: SceneGeometry, settings: CandidateSettings) ->
         mandatory_name=np.array([title for title, _ in groups], dtype=np.str_),
         dropped={reason: count for reason, count in dropped.items() if count},
     )
+
+
+def _check_number(positions: int, heights: int, settings: CandidateSettings, most: float) -> None:
+    tilts, types = len(settings.tilts), len(set(settings.sensors))
+    number = positions * heights * tilts * types
+    if number > most:
+        counts = (counted(positions, "position"), counted(heights, "height"), counted(tilts, "tilt"))
+        raise SeipError(
+            f"{number:,} candidates ({' × '.join(counts)} × {counted(types, 'sensor type')}) are too many: at most "
+            f"{most:,.0f} are possible with the targets of this site; give fewer heights, tilts or types, or larger "
+            "spacings of candidates or targets"
+        )
 
 
 def _positions(

@@ -22,6 +22,9 @@ from .yaws import with_yaws
 
 __all__ = ["Candidates", "Site", "Targets", "make_site"]
 
+MOST_PAIRS = 10**9
+"""Largest number of candidates times targets: a byte of memory for each, and several times that in a search."""
+
 
 @dataclass(frozen=True, eq=False)
 class Site:
@@ -92,7 +95,7 @@ def make_site(
     Raises
     ------
     SeipError
-        There is no road, no target or no candidate.
+        There is no road, no target or no candidate, or more of both than fit in memory.
 
     Examples
     --------
@@ -116,7 +119,9 @@ def make_site(
     near, _ = without_far_objects(geometry, geometry.region, reach)
     triangles, reflectivity = ordered_surfaces((*near.roads, *near.ground, *near.occluders))
     targets = generate_targets(geometry.region, road, grid_spacing, geometry.weighted_regions)
-    candidates = generate_candidates(geometry, settings)
+    one_way = any(not model.all_round for model in models.values())
+    most = MOST_PAIRS / (max(1, len(targets)) * (settings.yaws if one_way else 1))
+    candidates = generate_candidates(geometry, settings, most)
     return Site(
         name=geometry.name,
         origin=geometry.origin,

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 import re
 import unicodedata
-from collections import Counter
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +16,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
+from ..distinct_names import distinct_names
 from ..errors import SeipError
 from ..geometry.geo_reference import GeoReference
 from ..geometry.solids import from_faces
@@ -103,8 +104,12 @@ def table_places(path: Path, approaches: float) -> tuple[NetworkPlace, ...]:
     for line, row in rows:
         numbers = {name: _number(path, line, name, row, limits) for name, limits in _NUMBER_COLUMNS.items()}
         source = path.parent / row["source"]
-        if not source.is_file():
-            raise SeipError(f"{path} row {line}: there is no file {source}; correct the source")
+        try:
+            there = source.is_file()
+        except OSError:  # a name longer than the system allows
+            there = False
+        if not there:
+            raise SeipError(f"{path} row {line}: there is no file {_brief(str(source))}; correct the source")
         name = row.get("name") or f"Site at {numbers['latitude']:.5f}, {numbers['longitude']:.5f}"
         places.append((name, numbers["latitude"], numbers["longitude"], numbers["weight"], source))
     if not any(weight for _, _, _, weight, _ in places):
@@ -199,15 +204,12 @@ def _numbered(places: Sequence[tuple[str, float, float, float, Path]], approache
     origin = places[0][1:3]
     plane = metres([(latitude, longitude) for _, latitude, longitude, _, _ in places], origin)
     tree = shapely.STRtree(shapely.points(plane))
-    used: Counter[str] = Counter()
+    folders = distinct_names(_folder_name(place[0]) for place in places)
     found = []
     for number, (name, latitude, longitude, weight, source) in enumerate(places):
-        stem = _folder_name(name)
-        used[stem] += 1
-        folder = stem if used[stem] == 1 else f"{stem}-{used[stem]}"
         near = tree.query(shapely.Point(plane[number]), "dwithin", distance=NEIGHBOUR_REACH * approaches)
         neighbours = tuple(places[other][1:3] for other in sorted(near.tolist()) if other != number)
-        found.append(NetworkPlace(name, folder, latitude, longitude, weight, source, neighbours))
+        found.append(NetworkPlace(name, folders[number], latitude, longitude, weight, source, neighbours))
     return tuple(found)
 
 
@@ -226,9 +228,8 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SeipError(f"{path} is not in UTF-8: save it as CSV in UTF-8") from error
-    lines = text.splitlines()
-    delimiter = max(",;\t", key=lines[0].count) if lines else ","
-    reader = csv.reader(lines, delimiter=delimiter)
+    delimiter = max(",;\t", key=text.partition("\n")[0].count)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
     try:
         head = [name.strip().casefold() for name in next(reader, [])]
         missing = [name for name in _COLUMNS if name not in head]
@@ -242,6 +243,10 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
                 yield reader.line_num, dict(zip(head, (cell.strip() for cell in row), strict=False))
     except csv.Error as error:
         raise SeipError(f"{path} is not a valid CSV: {error}; save it again") from error
+
+
+def _brief(text: str) -> str:
+    return text if len(text) <= 200 else f"{text[:100]}…{text[-100:]}"
 
 
 def _number(path: Path, line: int, name: str, row: Mapping[str, str], limits: Limits) -> float:

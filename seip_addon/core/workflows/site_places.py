@@ -1,11 +1,11 @@
 """Places of a file at which a site can be built, for a user to choose from."""
 
 import re
-from collections import Counter
-from collections.abc import Generator, Iterable
+from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..distinct_names import distinct_names
 from ..errors import SeipError
 from ..progress import Progress
 from ..world.opendrive.junctions import STREETS, streets_of_junctions
@@ -74,7 +74,7 @@ def site_places(source: Path) -> Generator[Progress, None, SitePlaces]:
     if is_extract(source):
         extract = yield from read_extract(source)
         crossings = named_crossings(extract)
-        named = _unlike([one.name for one in crossings])
+        named = distinct_names((one.name for one in crossings), "{} ({})")
         places = tuple(NamedPlace(name, _position(one)) for name, one in zip(named, crossings, strict=True))
         return SitePlaces(DEFAULT_RADIUS, places, street_plan(extract, crossings))
     map_path, description = describe_place(source)
@@ -88,7 +88,9 @@ def site_places(source: Path) -> Generator[Progress, None, SitePlaces]:
     junctions = road_map.junctions_with_roads()
     streets = {one.id: STREETS.join(meeting.get(one.id, ())) for one in junctions}
     named = [" · ".join(filter(None, (one.id, one.name, streets[one.id]))) for one in junctions]
-    places = tuple(NamedPlace(name, one.id) for name, one in zip(_unlike(named), junctions, strict=True))
+    places = tuple(
+        NamedPlace(name, one.id) for name, one in zip(distinct_names(named, "{} ({})"), junctions, strict=True)
+    )
     return SitePlaces(description.radius or DEFAULT_RADIUS, places)
 
 
@@ -114,13 +116,3 @@ def parsed_position(text: str) -> tuple[float, float]:
 
 def _position(crossing: Crossing) -> str:
     return f"{crossing.latitude:.7f}, {crossing.longitude:.7f}"
-
-
-def _unlike(names: Iterable[str]) -> list[str]:
-    """Return unique names: repeated ones get a number."""
-    known: Counter[str] = Counter()
-    numbered = []
-    for name in names:
-        known[name] += 1
-        numbered.append(f"{name} ({known[name]})" if known[name] > 1 else name)
-    return numbered

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ..distinct_names import distinct_names
 from ..output.results.verification_record import (
     SCHEMA,
     RecordedBackground,
@@ -65,15 +67,14 @@ def _pose(one: VerifiedSensor) -> RecordedPose:
 
 def save_units(path: Path, recording: str, sensors: Sequence[VerifiedSensor]) -> bool:
     """Write a catalogue with a model for each unit whose gain is known, and return whether there is one."""
+    known = [(one.registration.sensor, one.gain) for one in sensors if one.gain is not None]
+    keys = [re.sub(r"[^a-z0-9]", "_", f"{sensor.model.key}_{sensor.label}".lower()) for sensor, _ in known]
     tables = []
-    for one in sensors:
-        if one.gain is None:
-            continue
-        model, label = one.registration.sensor.model, one.registration.sensor.label
-        key = "".join(letter if letter.isalnum() else "_" for letter in f"{model.key}_{label}".lower())
+    for key, (sensor, gain) in zip(distinct_names(keys, "{}_{}"), known, strict=True):
+        model, label = sensor.model, _plain(sensor.label)
         tables.append(
             f'[{key}]\nlike = "{model.key}"\nname = "{model.name}, unit {label}"\n'
-            f"gain = {one.gain.value:.4g}  # 95 % interval: {one.gain.low:.3g} to {one.gain.high:.3g}\n"
+            f"gain = {gain.value:.4g}  # 95 % interval: {gain.low:.3g} to {gain.high:.3g}\n"
             f'calibration = "recording {_plain(recording)}"\n'
         )
     if tables:

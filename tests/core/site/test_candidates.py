@@ -1,5 +1,6 @@
 """Candidates stand where a post can stand, evenly, and nowhere else."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.site.candidates import generate_candidates
 from seip_addon.core.site.pavement_sampling import spread
 from seip_addon.core.site.scene_geometry import Mesh, NamedArea, Pole
+from seip_addon.core.site.site import make_site
 from tests.builders.plain_street import PLAIN, block, street
 from tests.oracles.random_cases import cases
 
@@ -30,6 +32,14 @@ def test_poses_are_positions_by_heights_by_types():
     assert np.bincount(candidates.position_of).tolist() == [4] * positions
     assert candidates.sensor[:4].tolist() == ["type1", "type3"] * 2
     assert candidates.height[:4].tolist() == [3.5, 3.5, 8.0, 8.0]
+
+
+def test_candidates_and_targets_that_do_not_fit_in_memory_are_refused_before_any_is_tested():
+    heights = tuple(np.linspace(3.0, 23.0, 2001).tolist())
+    with pytest.raises(SeipError, match=r"positions × 2,001 heights .* too many") as refused:
+        make_site(street(), replace(PLAIN, heights=heights, spacing=0.5), 0.2)
+    most = int(re.search(r"at most ([\d,]+)", str(refused.value))[1].replace(",", ""))
+    assert len(generate_candidates(street(), PLAIN, most)) < most
 
 
 def test_a_narrow_strip_is_filled_evenly():

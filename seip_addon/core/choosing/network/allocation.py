@@ -51,13 +51,13 @@ class RelaxedAllocation:
     value: float
 
 
-def allocate(options: Sequence[Options], weights: Float, budget: float) -> Allocation | None:
-    """Return the allocation of largest weighted value within a budget, the cheapest of those; None if there is none.
+def allocate(options: Sequence[Options], weights: Float, budget: float) -> Allocation:
+    """Return the allocation of largest weighted value within a budget, the cheapest of those.
 
     Parameters
     ----------
     options : sequence of Options
-        Alternatives of each site.
+        Alternatives of each site, one of which costs nothing.
     weights : (s,) float64
         Importance of each site.
     budget : float, dollars
@@ -67,23 +67,19 @@ def allocate(options: Sequence[Options], weights: Float, budget: float) -> Alloc
     SeipError
         The solver stopped with an error.
     """
-    if any(len(each.prices) == 0 for each in options):
-        return None
     program = _Program(options, weights, budget)
     best = program.solve(program.value, pulp.LpMaximize)
-    if best is None:
-        return None
     # Money that adds nothing is not spent: of all allocations of that value the cheapest one.
     program.model += program.value >= best.value * program.value_scale * (1 - TIE_TOLERANCE)
     cheapest = program.solve(program.price, pulp.LpMinimize)
-    return best if cheapest is None or cheapest.value < best.value * (1 - 2 * TIE_TOLERANCE) else cheapest
+    return best if cheapest.value < best.value * (1 - 2 * TIE_TOLERANCE) else cheapest
 
 
-def relaxed_allocation(options: Sequence[Options], weights: Float, budget: float) -> RelaxedAllocation | None:
-    """Return the optimum of the linear relaxation; None if there is none.
+def relaxed_allocation(options: Sequence[Options], weights: Float, budget: float) -> RelaxedAllocation:
+    """Return the optimum of the linear relaxation.
 
-    Alternatives that the budget cannot pay together with the cheapest ones of all other sites are left out. The
-    cheapest alternatives with a share are an allocation within the budget.
+    Alternatives that the budget cannot pay are left out. The cheapest alternatives with a share are an allocation
+    within the budget.
 
     Parameters
     ----------
@@ -95,19 +91,10 @@ def relaxed_allocation(options: Sequence[Options], weights: Float, budget: float
     SeipError
         The solver stopped with an error.
     """
-    if any(len(each.prices) == 0 for each in options):
-        return None
-    least = math.fsum(each.prices.min() for each in options)
-    affordable = [
-        np.flatnonzero(each.prices - each.prices.min() + least <= budget * (1 + TIE_TOLERANCE)) for each in options
-    ]
-    if any(len(each) == 0 for each in affordable):
-        return None
+    affordable = [np.flatnonzero(each.prices <= budget * (1 + TIE_TOLERANCE)) for each in options]
     options = [Options(each.prices[own], each.values[own], own) for each, own in zip(options, affordable, strict=True)]
     program = _Program(options, weights, budget)
     shares = program.shares(program.value, pulp.LpMaximize, whole=False)
-    if shares is None:
-        return None
     taken = tuple(
         tuple(
             int(each.index[one]) for one in np.argsort(each.prices, kind="stable").tolist() if of_site[one] > _NO_SHARE
@@ -130,14 +117,6 @@ def allocation_of(options: Sequence[Options], weights: Float, taken: Sequence[in
         math.fsum(each.prices[one] for each, _, one in chosen),
         math.fsum(weight * each.values[one] for each, weight, one in chosen),
     )
-
-
-def cheapest_allocation(options: Sequence[Options]) -> Allocation | None:
-    """Return the allocation of least price, whatever its value; None if a site has no alternative."""
-    if any(len(each.prices) == 0 for each in options):
-        return None
-    taken = tuple(int(each.prices.argmin()) for each in options)
-    return Allocation(taken, math.fsum(each.prices[one] for each, one in zip(options, taken, strict=True)), 0.0)
 
 
 class _Program:
@@ -164,15 +143,13 @@ class _Program:
             self.model += pulp.lpSum(of_site) == 1
         self.model += self.price <= budget * price_scale * (1 + TIE_TOLERANCE)
 
-    def solve(self, objective: pulp.LpAffineExpression, sense: int) -> Allocation | None:
-        """Return the best allocation for an objective; None if there is none."""
+    def solve(self, objective: pulp.LpAffineExpression, sense: int) -> Allocation:
+        """Return the best allocation for an objective."""
         shares = self.shares(objective, sense)
-        if shares is None:
-            return None
         return allocation_of(self._options, self._weights, tuple(one.index(max(one)) for one in shares))
 
-    def shares(self, objective: pulp.LpAffineExpression, sense: int, *, whole: bool = True) -> list[list[float]] | None:
-        """Return the share of each alternative of each site in the optimum; None if there is none.
+    def shares(self, objective: pulp.LpAffineExpression, sense: int, *, whole: bool = True) -> list[list[float]]:
+        """Return the share of each alternative of each site in the optimum.
 
         Parameters
         ----------
@@ -191,5 +168,7 @@ class _Program:
         except (pulp.PulpSolverError, OSError) as error:
             raise SeipError(f"the solver stopped with an error ({error}); choose another solver") from error
         if self.model.sol_status != pulp.LpSolutionOptimal:
-            return None
+            raise SeipError(
+                f"the solver ended without an allocation ({pulp.LpSolution[self.model.sol_status]}): run it again"
+            )
         return [[x.value() or 0.0 for x in of_site] for of_site in self._x]

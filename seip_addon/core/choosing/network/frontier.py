@@ -23,9 +23,8 @@ class SolvedBudget:
     ----------
     budget : float, dollars
     chosen : tuple of int
-        Poses, those that were installed before included.
+        Poses.
     price : float, dollars
-        Price without sensors that were installed before.
     value : float
         Value of the criterion.
     bound : float
@@ -40,6 +39,10 @@ class SolvedBudget:
     value: float
     bound: float
     effort: float
+
+
+NOTHING = SolvedBudget(0.0, (), 0.0, 0.0, 0.0, math.inf)
+"""Placement of no sensors, which costs nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +72,6 @@ class Frontier:
     amounts, ends : (k,) float64, dollars
         Amounts of money, rising from 0, as ranges that contain all possible prices of placements; see
         `possible_amounts`.
-    floor : SolvedBudget
-        Placement without further money: sensors that were installed before, or none.
     ceiling : float
         Bound on the value for any money.
     solved : tuple of SolvedBudget
@@ -79,7 +80,6 @@ class Frontier:
 
     amounts: Float
     ends: Float
-    floor: SolvedBudget
     ceiling: float
     solved: tuple[SolvedBudget, ...] = ()
 
@@ -94,31 +94,30 @@ class Frontier:
             # What cannot be exceeded within a budget cannot be exceeded within less money either.
             within = self.ends <= one.budget * (1 + TIE_TOLERANCE)
             bounds[within] = np.minimum(bounds[within], one.bound)
-        bounds[0] = self.floor.value
-        rising: Float = np.maximum(np.maximum.accumulate(bounds), self.floor.value)
+        bounds[0] = NOTHING.value
+        rising: Float = np.maximum.accumulate(bounds)
         return rising
 
-    def bounding_options(self, minimum: float = 0.0) -> Options:
-        """Return the amounts at which the bound rises, with their bounds from a minimum on."""
+    def bounding_options(self) -> Options:
+        """Return the amounts at which the bound rises, with their bounds."""
         bounds = self.bounds()
-        rises = np.flatnonzero(np.diff(bounds, prepend=-math.inf) > 0)
-        index = rises[bounds[rises] >= minimum]
+        index = np.flatnonzero(np.diff(bounds, prepend=-math.inf) > 0)
         return Options(self.amounts[index], bounds[index], index)
 
-    def found_options(self, minimum: float = 0.0) -> Options:
-        """Return the placements found, with their values from a minimum on; number 0 is the one without money."""
+    def found_options(self) -> Options:
+        """Return the placements found, with their values; number 0 is the one without money."""
         found = self.found
         prices, values = (np.array([getattr(one, name) for one in found]) for name in ("price", "value"))
         order = np.lexsort((np.arange(len(found)), -values, prices))
         best = np.maximum.accumulate(values[order])
         better = np.diff(best, prepend=-math.inf) > 0  # placements that no cheaper one equals
-        index = order[better & (values[order] >= minimum)]
+        index = order[better]
         return Options(prices[index], values[index], index)
 
     @property
     def found(self) -> tuple[SolvedBudget, ...]:
-        """Placements found, the one without further money first."""
-        return (self.floor, *self.solved)
+        """Placements found, the one without money first."""
+        return (NOTHING, *self.solved)
 
     def spent(self, budget: float) -> float:
         """Return the largest effort with which a budget was solved, 0 if it was not."""

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Float
-from ...errors import SeipError
 from ...progress import Progress
 from ..placement.problem import TIE_TOLERANCE, relative_gap
-from .allocation import allocate, allocation_of, cheapest_allocation, relaxed_allocation
-from .frontier import Frontier, Options, SolvedBudget
+from .allocation import allocate, allocation_of, relaxed_allocation
+from .frontier import Frontier, SolvedBudget
 
 FIRST_EFFORT, LAST_EFFORT, GROWTH = 1.0, 64.0, 4.0
 """Counted work of the first and the last search of a budget at a site, and the factor from one to the next."""
@@ -51,21 +50,13 @@ class Goal:
     budget : float, dollars
     tolerance : float
         Gap at which the search ends.
-    minimum : float
-        Least value at each site.
     effort : float, units of counted work
         Limit of each search at a site; the gap stays larger than the tolerance where it does not suffice.
     """
 
     budget: float
     tolerance: float
-    minimum: float = 0.0
     effort: float = LAST_EFFORT
-
-    @property
-    def money(self) -> tuple[float, float]:
-        """Budget and minimum, which alone decide what is the best allocation."""
-        return self.budget, self.minimum
 
 
 Solve = Callable[[Sequence[Request]], Generator[Progress, None, Sequence[SolvedBudget]]]
@@ -132,49 +123,40 @@ def search_allocations(
     -------
     tuple of NetworkAllocation
         One for each goal.
-
-    Raises
-    ------
-    SeipError
-        A minimum cannot be reached at every site, or not within the budget.
     """
     known = list(frontiers)
     first = {one for goal in goals for one in _first_requests(known, goal.budget)}
     known = yield from _solved(known, first, solve)
     open_goals = list(goals)
     while open_goals:
-        wanted: dict[tuple[float, float], list[Request]] = {}
-        gaps: dict[tuple[float, float], float] = {}
-        # Goals of the same money share the work; they differ by tolerance and effort alone.
-        for key in dict.fromkeys(goal.money for goal in open_goals):
-            least = min(goal.tolerance for goal in open_goals if goal.money == key)
-            wanted[key], gaps[key] = [], math.inf
+        wanted: dict[float, list[Request]] = {}
+        gaps: dict[float, float] = {}
+        # Goals of the same budget share the work; they differ by tolerance and effort only.
+        for budget in dict.fromkeys(goal.budget for goal in open_goals):
+            least = min(goal.tolerance for goal in open_goals if goal.budget == budget)
+            wanted[budget], gaps[budget] = [], math.inf
             if len(known) >= MANY_SITES:
-                wanted[key], gaps[key] = _relaxed_round(known, weights, *key, gap)
-            if not wanted[key] and gaps[key] > least:
-                exact = _Round(known, weights, *key)
-                wanted[key], gaps[key] = exact.requests(), exact.gap(gap)
+                wanted[budget], gaps[budget] = _relaxed_round(known, weights, budget, gap)
+            if not wanted[budget] and gaps[budget] > least:
+                exact = _Round(known, weights, budget)
+                wanted[budget], gaps[budget] = exact.requests(), exact.gap(gap)
         requests = {
-            goal: [one for one in wanted[goal.money] if one.effort <= goal.effort]
+            goal: [one for one in wanted[goal.budget] if one.effort <= goal.effort]
             for goal in open_goals
-            if gaps[goal.money] > goal.tolerance
+            if gaps[goal.budget] > goal.tolerance
         }
         open_goals = [goal for goal, own in requests.items() if own]
         known = yield from _solved(known, set().union(*requests.values()), solve)
-    return tuple(_Round(known, weights, *goal.money).allocation() for goal in goals)
+    return tuple(_Round(known, weights, goal.budget).allocation() for goal in goals)
 
 
-def _relaxed_round(
-    known: Sequence[Frontier], weights: Float, budget: float, minimum: float, gap: Gap
-) -> tuple[list[Request], float]:
+def _relaxed_round(known: Sequence[Frontier], weights: Float, budget: float, gap: Gap) -> tuple[list[Request], float]:
     """Return the amounts to solve next by the linear relaxation, and a gap that is not below that of `_Round`.
 
-    There are no requests if it takes solved amounts only, or if it has no solution.
+    There are no requests if it takes solved amounts only.
     """
-    bounding, found = ([getattr(one, name)(minimum) for one in known] for name in ("bounding_options", "found_options"))
+    bounding, found = ([getattr(one, name)() for one in known] for name in ("bounding_options", "found_options"))
     upper, among_found = (relaxed_allocation(options, weights, budget) for options in (bounding, found))
-    if upper is None or among_found is None:
-        return [], math.inf
     lower = allocation_of(found, weights, [parts[0] for parts in among_found.taken])
     amounts = [each.index[list(parts)].tolist() for each, parts in zip(bounding, upper.taken, strict=True)]
     return _unsolved(known, amounts, budget), gap(lower.value, max(lower.value, upper.value))
@@ -183,20 +165,15 @@ def _relaxed_round(
 class _Round:
     """Allocations of a budget from what is known of the sites: among placements found, and among bounds."""
 
-    def __init__(self, known: Sequence[Frontier], weights: Float, budget: float, minimum: float) -> None:
+    def __init__(self, known: Sequence[Frontier], weights: Float, budget: float) -> None:
         self._known, self._weights, self._budget = known, weights, budget
-        self._bounding = [one.bounding_options(minimum) for one in known]
-        upper = allocate(self._bounding, weights, budget)
-        if upper is None:
-            raise _unreachable(known, self._bounding, budget, minimum)
-        self._upper = upper
-        self._found = [one.found_options(minimum) for one in known]
+        self._bounding = [one.bounding_options() for one in known]
+        self._upper = allocate(self._bounding, weights, budget)
+        self._found = [one.found_options() for one in known]
         self._lower = allocate(self._found, weights, budget)
 
     def gap(self, gap: Gap) -> float:
-        """Return the gap between the two; infinite if no placement was found."""
-        if self._lower is None:
-            return math.inf
+        """Return the gap between the two."""
         return gap(self._lower.value, max(self._lower.value, self._upper.value))
 
     def requests(self) -> list[Request]:
@@ -223,11 +200,6 @@ class _Round:
     def allocation(self) -> NetworkAllocation:
         """Return the allocation among placements found, with its bound."""
         lower = self._lower
-        if lower is None:
-            raise SeipError(
-                f"no allocation of ${self._budget:,.0f} was found that reaches the minimum at every site, though none "
-                "is excluded: raise the budget, or lower the minimum"
-            )
         chosen = zip(self._known, self._found, lower.taken, strict=True)
         taken = tuple(one.found[each.index[index]] for one, each, index in chosen)
         bound = max(lower.value, self._upper.value)
@@ -286,18 +258,3 @@ def _solved(
     for request, result in zip(ordered, results, strict=True):
         known[request.site] = known[request.site].with_solved(result)
     return known
-
-
-def _unreachable(frontiers: Sequence[Frontier], options: Sequence[Options], budget: float, minimum: float) -> SeipError:
-    least = cheapest_allocation(options)
-    if least is None:
-        number = sum(len(each.prices) == 0 for each in options)
-        best = min(float(one.bounds()[-1]) for one in frontiers)
-        return SeipError(
-            f"the minimum of {minimum:.3g} cannot be reached at {number} of {len(frontiers)} sites, at one of them not "
-            f"more than {best:.3g}: lower the minimum, leave these sites out, or allow more sensors at a site"
-        )
-    return SeipError(
-        f"${budget:,.0f} do not reach the minimum of {minimum:.3g} at every site: at least ${least.price:,.0f} are "
-        "needed"
-    )

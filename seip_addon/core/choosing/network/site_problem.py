@@ -99,27 +99,18 @@ class SiteProblem:
         """Return the share of the targets that chosen poses see, 0 to 1."""
         return float(self.visible[np.asarray(chosen, dtype=np.int64)].any(axis=0).mean()) if len(chosen) else 0.0
 
-    def frontier(self, budget: float, installed: Sequence[int] = ()) -> Frontier:
+    def frontier(self, budget: float) -> Frontier:
         """Return the frontier of the site before anything is solved.
 
         Parameters
         ----------
         budget : float, dollars
             Largest amount of money.
-        installed : sequence of int
-            Poses that were installed before; they remain and cost nothing.
         """
-        free = self._free(installed)
-        more = max(0, self.most_sensors - len(installed))
-        amounts, ends = possible_amounts(self.prices[free], self.positions[free], more, budget)
-        value = self.value(installed)
-        floor = SolvedBudget(0.0, tuple(installed), 0.0, value, value, math.inf)
-        everything = np.flatnonzero(free).tolist() + list(installed)
-        return Frontier(amounts, ends, floor, max(value, self.value(everything)))
+        amounts, ends = possible_amounts(self.prices, self.positions, self.most_sensors, budget)
+        return Frontier(amounts, ends, self.value(range(len(self.prices))))
 
-    def solve(
-        self, budget: float, effort: float, installed: Sequence[int] = ()
-    ) -> Generator[Progress, None, SolvedBudget]:
+    def solve(self, budget: float, effort: float) -> Generator[Progress, None, SolvedBudget]:
         """Find the best placement within a budget.
 
         Parameters
@@ -127,10 +118,8 @@ class SiteProblem:
         budget : float, dollars
         effort : float, units of counted work
             Limit of the search.
-        installed : sequence of int
-            Poses that were installed before.
         """
-        problem = self._problem(installed, budget)
+        problem = self._problem(budget)
         search = SolverLimits("auto", effort=effort)
         if self.criterion == "returns":
             placement = yield from solve_returns(problem, self.returns, search)
@@ -138,11 +127,9 @@ class SiteProblem:
         else:
             placement = yield from solve(problem, search)
             whole = math.fsum(problem.weights)
-        return self._solved(placement, budget, effort, installed, placement.bound / whole)
+        return self._solved(placement, budget, effort, placement.bound / whole)
 
-    def cheapest(
-        self, coverage: float, effort: float, installed: Sequence[int] = ()
-    ) -> Generator[Progress, None, tuple[SolvedBudget, float]]:
+    def cheapest(self, coverage: float, effort: float) -> Generator[Progress, None, tuple[SolvedBudget, float]]:
         """Find the cheapest placement that sees a share of the targets; return it with a bound on the least price.
 
         Raises
@@ -150,44 +137,34 @@ class SiteProblem:
         SeipError
             The coverage cannot be reached.
         """
-        problem = self._problem(installed, None)
+        problem = self._problem(None)
         placement = yield from cheapest_for_coverage(problem, coverage, SolverLimits("auto", effort=effort))
-        found = self._solved(placement, placement.price, effort, installed, 1.0)
+        found = self._solved(placement, placement.price, effort, 1.0)
         return replace(found, bound=found.value), max(0.0, placement.bound)
 
-    def _solved(
-        self, placement: Placement, budget: float, effort: float, installed: Sequence[int], bound: float
-    ) -> SolvedBudget:
+    def _solved(self, placement: Placement, budget: float, effort: float, bound: float) -> SolvedBudget:
         chosen = tuple(placement.chosen.tolist())
         value = self.value(chosen)
-        price = math.fsum(self.prices[[pose for pose in chosen if pose not in installed]])
-        # A search that ends early may have no bound of its own; all free poses together are one.
-        most = self.value((*np.flatnonzero(self._free(installed)).tolist(), *installed))
+        price = math.fsum(self.prices[list(chosen)])
+        # A search that ends early may have no bound of its own; all poses together are one.
+        most = self.value(range(len(self.prices)))
         bound = value if placement.status == "optimal" else max(value, min(bound, most))
         return SolvedBudget(budget, chosen, price, value, bound, effort)
 
-    def _free(self, installed: Sequence[int]) -> Boolean:
-        """Return the poses at positions without an installed sensor, (c,) bool."""
-        return ~np.isin(self.positions, self.positions[np.asarray(installed, dtype=np.int64)])
-
-    def _problem(self, installed: Sequence[int], budget: float | None) -> PlacementProblem:
-        """Return the problem in which installed poses must be chosen, and cost nothing."""
-        standing = np.asarray(installed, dtype=np.int64)
-        prices = self.prices.copy()
-        prices[standing] = 0.0
-        forbidden = ~self._free(installed)
-        forbidden[standing] = False
+    def _problem(self, budget: float | None) -> PlacementProblem:
+        """Return the problem of a budget, or without one."""
+        poses = len(self.prices)
         of_returns = self.criterion == "returns"
         return PlacementProblem(
             visible=self.returns > 0 if of_returns else self.visible,
             weights=self.user_weights if of_returns else np.ones(self.visible.shape[1]),
-            prices=prices,
+            prices=self.prices,
             positions=self.positions,
             xyz=self.xyz,
             labels=self.labels,
-            mandatory=np.eye(len(prices), dtype=bool)[standing],
-            forbidden=forbidden,
-            count=min(max(self.most_sensors, len(standing)), len(np.unique(self.positions[~forbidden]))),
+            mandatory=np.zeros((0, poses), dtype=bool),
+            forbidden=np.zeros(poses, dtype=bool),
+            count=min(self.most_sensors, len(np.unique(self.positions))),
             budget=budget,
         )
 
@@ -219,6 +196,11 @@ class SiteProblem:
 
 
 def check_problem(problem: SiteProblem) -> None:
-    """Raise SeipError if no pose adds anything to the value of a site."""
+    """Raise SeipError if a sensor costs nothing, or no pose adds anything to the value of a site."""
+    if not problem.prices.all():
+        raise SeipError(
+            f"{problem.labels[problem.prices == 0][0]} costs nothing, so that no budget limits its number: give its "
+            "model a price"
+        )
     if problem.frontier(math.inf).ceiling <= 0.0:
         raise SeipError("no candidate sees anything here: try other heights or sensor types, or remove obstacles")

@@ -136,10 +136,10 @@ def _entry_of(manifest: Record, run: TrafficRun, kind: Format, folder: Path) -> 
     new = _new_entry(run, kind)
     runs: list[Record] = manifest["runs"]
     for entry in runs:
-        if entry["name"] == run.name:
-            if entry["key"] != new["key"] or entry["split"] != run.split:
+        if entry["name"].casefold() == run.name.casefold():  # the same folder on many disks
+            if entry["name"] != run.name or entry["key"] != new["key"] or entry["split"] != run.split:
                 raise SeipError(
-                    f"{folder} has a run '{run.name}' already, of other frames or in another split; "
+                    f"{folder} has a run '{entry['name']}' already, of other frames or in another split; "
                     "give this one another name, or choose another folder"
                 )
             return entry

@@ -1,10 +1,7 @@
-"""``network.html``: sites of a network on a map and in a table, in one file that loads nothing."""
+"""``network.html``: sites of a network on a map and in a table, in one file without script that loads nothing."""
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import math
 from collections.abc import Sequence
 from html import escape
 from urllib.parse import quote
@@ -17,7 +14,6 @@ from ..pictures.drawing import percent
 from ..pictures.palette import INK, PAPER, PAPER_STREETS, SHARE_COLOURS, SOFT_INK
 from ..report.html import STYLE
 from ..report.wording import dollars
-from .network_page_script import SCRIPT
 from .network_record import NetworkRecord, NetworkSite
 from .network_view import BARE_RADIUS, NetworkView, Street, legend_money, network_view, radius_of
 from .ranked_sites import (
@@ -32,25 +28,20 @@ from .ranked_sites import (
 )
 
 UNITS = 10_000  # of the map's width, so that whole numbers are fine enough
-USUAL_WIDTH = 900  # pixels of the map that its marks are sized for where no script runs
+USUAL_WIDTH = 900  # pixels of the map that its marks are sized for
 SHAPES = (0.5, 1.0)  # how many times as high as wide the map is
 
 MAP_STYLE = f"""
-.map {{ position: relative; }}
-.map svg {{ display: block; width: 100%; border: 1px solid #c9d1d7; cursor: grab;
-  box-sizing: border-box; user-select: none; -webkit-user-select: none; }}
+#map {{ display: block; width: 100%; border: 1px solid #c9d1d7; box-sizing: border-box; }}
 .street {{ fill: none; stroke-linecap: round; vector-effect: non-scaling-stroke; }}
 .mark circle {{ stroke: {INK}; }}
 .mark .hit {{ fill: transparent; stroke: none; }}
 .mark .bare {{ fill: {PAPER}; stroke: {SOFT_INK}; }}
 .cross {{ fill: none; stroke: {SOFT_INK}; stroke-width: 2; }}
-.mark:hover circle, .mark:focus circle, .chosen circle {{ stroke-width: 3; }}
+.mark:hover circle, .mark:focus circle, .mark:target circle {{ stroke-width: 3; }}
 .mark:focus {{ outline: none; }}
-.mark:focus-visible .hit, .chosen .hit {{ stroke: {INK}; stroke-width: 2; stroke-dasharray: 3 2; }}
-.chosen, tr:target {{ background: {PAPER_STREETS[0]}; }}
-.zoom {{ position: absolute; top: .5em; right: .5em; display: flex; gap: .3em; }}
-.zoom button {{ font: inherit; min-width: 2.4em; min-height: 2.4em; background: {PAPER}; border: 1px solid {SOFT_INK};
-  border-radius: 4px; color: {INK}; }}
+.mark:focus-visible .hit, .mark:target .hit {{ stroke: {INK}; stroke-width: 2; stroke-dasharray: 3 2; }}
+tr:target {{ background: {PAPER_STREETS[0]}; }}
 .under {{ display: flex; flex-wrap: wrap; justify-content: space-between; gap: .2em 1em; font-size: .85em;
   color: {SOFT_INK}; }}
 .scale {{ border: 2px solid {INK}; border-top: 0; height: .35em; margin-top: .3em; }}
@@ -59,10 +50,6 @@ MAP_STYLE = f"""
   list-style: none; font-size: .9em; }}
 .legend li {{ display: flex; align-items: center; gap: .35em; }}
 .wide {{ overflow-x: auto; }}
-th button {{ font: inherit; background: none; border: 0; padding: 0; color: inherit; text-align: inherit;
-  cursor: pointer; text-decoration: underline dotted; }}
-th[aria-sort=ascending] button::after {{ content: " ▲"; }}
-th[aria-sort=descending] button::after {{ content: " ▼"; }}
 tbody th {{ font-weight: 600; border-bottom-color: #dde3e7; min-width: 8em; overflow-wrap: anywhere; }}
 td:last-child {{ white-space: nowrap; }}
 a {{ color: inherit; }}
@@ -75,12 +62,11 @@ def network_page(record: NetworkRecord, streets: Sequence[Street] | None = None)
     """Return the page; its links lead to the folders of the sites beside it."""
     view = network_view(record, streets, SHAPES)
     ranked = ranked_sites(record)
-    digest = base64.b64encode(hashlib.sha256(SCRIPT.encode()).digest()).decode()
-    policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
+    policy = "default-src 'none'; style-src 'unsafe-inline'"
     equipped = sum(site.status == "equipped" for site in record.sites)
     summary = (
         f"{equipped:,} of {counted(len(record.sites), 'site has', 'sites have')} sensors for "
-        f"{dollars(record.price_usd)} of {dollars(math.fsum(record.budgets_usd))}. "
+        f"{dollars(record.price_usd)} of {dollars(record.budget_usd)}. "
         f"{colour_title(record)}, mean of the sites: {outcome(record, record.value)}."
         if equipped
         else "No site has sensors."
@@ -102,12 +88,7 @@ def network_page(record: NetworkRecord, streets: Sequence[Street] | None = None)
 </header>
 <main>
 <a class="skip" href="#sites">Skip the map</a>
-<div class="map">
 {_map(record, view, ranked)}
-<div class="zoom" hidden><button type="button" data-zoom="0.5" aria-label="Zoom in">+</button>
-<button type="button" data-zoom="2" aria-label="Zoom out">−</button>
-<button type="button" data-zoom="0">All</button></div>
-</div>
 <div class="under">{_scale(view)}<div>{credits_}</div></div>
 {_legend(record, view)}
 <h2 id="sites">Sites</h2>
@@ -115,7 +96,6 @@ def network_page(record: NetworkRecord, streets: Sequence[Street] | None = None)
 {_table(record, ranked)}
 </div>
 </main>
-<script>{SCRIPT}</script>
 </body>
 </html>
 """
@@ -135,8 +115,8 @@ def _map(record: NetworkRecord, view: NetworkView, ranked: tuple[RankedSite, ...
         x, y = np.rint((view.places[number] - (left, top)) * (unit, -unit)).astype(int).tolist()
         parts.append(_mark(record, one, (x, y), float(view.radii[number])))
     size = f"{UNITS} {UNITS * view.shape:.0f}"
-    scale = f'viewBox="0 0 {size}" data-metres="{1 / unit:.6g}"'
-    return f'<svg id="map" role="group" aria-label="Map of the sites" {scale}>\n' + "\n".join(parts) + "\n</svg>"
+    start = f'<svg id="map" role="group" aria-label="Map of the sites" viewBox="0 0 {size}">'
+    return "\n".join((start, *parts, "</svg>"))
 
 
 def _pairs(points: Integer) -> str:
@@ -151,7 +131,7 @@ def _mark(record: NetworkRecord, one: RankedSite, place: tuple[int, int], radius
     elif site.status == "without sensor":
         shape = f'<circle class="bare" r="{BARE_RADIUS}"/>'
     words = escape(f"{site.name}: {_described(record, site)}")
-    start = f'<a class="mark" id="mark-{one.number}" href="#site-{one.number}" aria-label="{words}" data-at="{x} {y}"'
+    start = f'<a class="mark" id="mark-{one.number}" href="#site-{one.number}" aria-label="{words}"'
     moved = f'transform="translate({x} {y}) scale({UNITS / USUAL_WIDTH:.1f})"'
     return f'{start} {moved}><title>{words}</title>{shape}<circle class="hit" r="{max(10.0, radius + 4):.1f}"/></a>'
 
@@ -196,35 +176,25 @@ def _entry(shape: str, half: float, words: str) -> str:
 
 def _table(record: NetworkRecord, ranked: tuple[RankedSite, ...]) -> str:
     result = "Road seen" if record.criterion == "road" else "Returns"
-    names = ("Rank", "Site", result, "Gain per $1,000", "Money", "Sensors")
-    attributes = (' class="number" aria-sort="ascending"', "", *3 * (' class="number"',), "")
-    heads = "".join(
-        f'<th scope="col"{each}><button type="button">{name}</button></th>'
-        for each, name in zip(attributes, names, strict=True)
-    )
+    numbers = "".join(f'<th scope="col" class="number">{name}</th>' for name in (result, "Gain per $1,000", "Money"))
+    names = ('<th scope="col" class="number">Rank</th><th scope="col">Site</th>', numbers)
+    heads = "".join((*names, '<th scope="col">Sensors</th><th scope="col">Files</th>'))
     rows = "\n".join(_row(record, one) for one in ranked)
-    head = f'<thead><tr>{heads}<th scope="col">Files</th></tr></thead>'
-    return f"<table>\n{head}\n<tbody>\n{rows}\n</tbody>\n</table>"
+    return f"<table>\n<thead><tr>{heads}</tr></thead>\n<tbody>\n{rows}\n</tbody>\n</table>"
 
 
 def _row(record: NetworkRecord, one: RankedSite) -> str:
     site = one.site
     equipped = site.status == "equipped"
+    value = percent(site.coverage) if record.criterion == "road" else outcome(record, site.value)
+    figures = (value, gain_text(record, one.gain), dollars(site.price_usd)) if equipped else ("–", "–", "–")
+    cells = "".join(f'<td class="number">{words}</td>' for words in figures)
     sensors = sensors_text(site.sensors) if equipped else _described(record, site)
-    road = record.criterion == "road"
-    value = site.coverage if road else site.value
-    figures = (
-        (value if equipped else -1.0, (percent(value) if road else outcome(record, value)) if equipped else "–"),
-        (-math.inf if one.gain is None else one.gain, gain_text(record, one.gain)),
-        (site.price_usd, dollars(site.price_usd) if equipped else "–"),
-    )
-    cells = "".join(f'<td class="number" data-value="{key:.9g}">{words}</td>' for key, words in figures)
     place = "./" + quote(site.folder, safe="/")
     files = ", ".join(
         f'<a href="{escape(f"{place}/{file}")}">{word}</a>'
         for word, file in (("plan", "plan.png"), ("data", "placement.json"))
     )
     name = f'<th scope="row"><a href="#mark-{one.number}"><bdi>{escape(site.name)}</bdi></a></th>'
-    rank = f'<td class="number" data-value="{one.number}">{one.rank or "–"}</td>'
-    start = f'<tr id="site-{one.number}">{rank}{name}'
+    start = f'<tr id="site-{one.number}"><td class="number">{one.rank or "–"}</td>{name}'
     return f"{start}{cells}<td>{escape(sensors)}</td><td>{files if equipped else ''}</td></tr>"

@@ -91,7 +91,7 @@ def _draw_legend(figure: Figure, record: NetworkRecord, view: NetworkView) -> No
 
 
 def draw_curve(record: NetworkRecord) -> bytes:
-    """Return the value of the network against money, with its bound and the budgets, as PNG."""
+    """Return the value of the network against money, with its bound and the budget, as PNG."""
     figure, (axes,) = new_figure(*CURVE_SIZE, dpi=DPI)
     money = np.array([point.price_usd for point in record.curve]) / 1000.0
     values, bounds = (_shown(record, [getattr(point, name) for point in record.curve]) for name in ("value", "bound"))
@@ -108,12 +108,10 @@ def draw_curve(record: NetworkRecord) -> bytes:
     placed = _shown(record, [record.value])
     ring: Style = {"markersize": 12, "mfc": "none", "mec": INK, "mew": 1.6, "linestyle": "none"}
     axes.plot(record.price_usd / 1000.0, placed, marker="o", label="this network", clip_on=False, **ring)
-    budgets = np.cumsum(record.budgets_usd) / 1000.0
-    for number, budget in enumerate(budgets.tolist(), start=1):
-        axes.axvline(budget, color=SOFT_INK, linewidth=1.0, linestyle=(0, (4, 2)), zorder=1.0)
-        words = f"phase {number}" if len(budgets) > 1 else "budget"
-        place: Style = {"transform": axes.get_xaxis_transform(), "ha": "center", "va": "bottom"}
-        axes.text(budget, 1.0, words, size=8.5, color=SOFT_INK, **place)
+    budget = record.budget_usd / 1000.0
+    axes.axvline(budget, color=SOFT_INK, linewidth=1.0, linestyle=(0, (4, 2)), zorder=1.0)
+    place: Style = {"transform": axes.get_xaxis_transform(), "ha": "center", "va": "bottom"}
+    axes.text(budget, 1.0, "budget", size=8.5, color=SOFT_INK, **place)
     style_axes(axes, "money, $1,000", CRITERIA[record.criterion])
     axes.xaxis.set_major_formatter("{x:,.0f}")
     axes.yaxis.set_major_formatter("{x:.0f}%" if record.criterion == "road" else "{x:g}")

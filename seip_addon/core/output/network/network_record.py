@@ -13,7 +13,7 @@ from ...errors import SeipError
 from ...storage.files import read_small
 from ...storage.json_dataclass import as_json, from_json
 
-SCHEMA = "seip-network/1"
+SCHEMA = "seip-network/2"
 
 PROVEN = 1e-9
 """Gap up to which a network is proven optimal: smaller differences are rounding, as in `problem.TIE_TOLERANCE`."""
@@ -58,8 +58,6 @@ class NetworkSensor:
     position : str
         Name of the pole or the area that carries it.
     price_usd : float, dollars
-    phase : int
-        Number of the budget, from 1, that pays for it; 0 if it was installed before.
     """
 
     id: str
@@ -69,7 +67,6 @@ class NetworkSensor:
     height_m: Length
     position: str
     price_usd: Money
-    phase: Annotated[int, limits.COUNT]
 
 
 @dataclass(frozen=True)
@@ -86,7 +83,7 @@ class NetworkSite:
     message : str
         Reason if the site failed, otherwise "".
     price_usd : float, dollars
-        Money spent at the site, without sensors that were installed before.
+        Money spent at the site.
     value, bound : float
         Value of the criterion at the site with its sensors, and a bound on it for that money.
     coverage : float, 0 to 1
@@ -122,10 +119,8 @@ class NetworkRecord:
         ``road``: share of the targets on the road that are seen, 0 to 1. ``returns``: mean of ln(1 + expected returns)
         of road users. The value of the network is the mean over its sites, by their weights; sites that failed are left
         out.
-    budgets_usd : tuple of float, dollars
-        Money of each phase; the sensors of earlier phases remain.
     curve : tuple of NetworkPoint
-        Value of the network for amounts of money in one phase; prices rise.
+        Value of the network for amounts of money; prices rise.
     created : str
         Time of the placement (ISO 8601), "" if it is not recorded.
     goal : float, optional
@@ -137,7 +132,7 @@ class NetworkRecord:
 
     name: str
     criterion: Literal["road", "returns"]
-    budgets_usd: tuple[Money, ...]
+    budget_usd: Money
     price_usd: Money
     value: Value
     bound: Value
@@ -158,7 +153,7 @@ class NetworkRecord:
     @property
     def certificate(self) -> str:
         """Certificate as a sentence."""
-        money = f"${sum(self.budgets_usd):,.0f}"
+        money = f"${self.budget_usd:,.0f}"
         if self.goal is not None:
             whole = f"{self.goal:.0%} of the road at every site"
             if self.least_usd >= self.price_usd * (1.0 - PROVEN):

@@ -1,4 +1,4 @@
-"""Report on a network: one page for decisions, then the sites, phases, failures and sources."""
+"""Report on a network: one page for decisions, then the sites, failures and sources."""
 
 from __future__ import annotations
 
@@ -25,7 +25,6 @@ def make_network_report(record: NetworkRecord, drawn_map: bytes, drawn_curve: by
     """Return the report with the map and the curve, PNG, on its first page."""
     ranked = ranked_sites(record)
     sections = (
-        Section("Phases", tuple(_phases(record))),
         Section("Sites with sensors", tuple(_equipped(record, ranked))),
         Section("Sites that failed", tuple(_failed(ranked))),
         Section("Notes", (Bullets(tuple(map(sentence, record.notes))),) if record.notes else ()),
@@ -48,7 +47,7 @@ def _key_figures(record: NetworkRecord) -> Iterator[tuple[str, str]]:
     sensors = [sensor for site in record.sites for sensor in site.sensors]
     names = {key: model.name for key, model in load_catalogue().items()}
     yield "Sensors", f"{len(sensors):,}: {sensors_text(sensors, names)}" if sensors else "none"
-    yield "Money", f"{dollars(record.price_usd)} of a budget of {dollars(math.fsum(record.budgets_usd))}"
+    yield "Money", f"{dollars(record.price_usd)} of a budget of {dollars(record.budget_usd)}"
     yield "Quality", _quality(record)
     if count["failed"] < len(record.sites):
         yield "Proof", _proof(record)
@@ -69,7 +68,7 @@ def _quality(record: NetworkRecord) -> str:
 
 
 def _proof(record: NetworkRecord) -> str:
-    money = f"For {dollars(math.fsum(record.budgets_usd))} no other choice of sensors among these sites and positions"
+    money = f"For {dollars(record.budget_usd)} no other choice of sensors among these sites and positions"
     if record.goal is not None:
         return record.certificate
     if record.gap <= PROVEN:
@@ -77,19 +76,6 @@ def _proof(record: NetworkRecord) -> str:
     if record.criterion == "road":
         return f"{money} sees more than {math.ceil(record.bound * 1000 - 1e-6) / 10:.1f}%: this is proven."
     return f"{money} gives more than {outcome(record, record.bound)} points: this is proven."
-
-
-def _phases(record: NetworkRecord) -> Iterator[Block]:
-    if len(record.budgets_usd) < 2:
-        return
-    rows = []
-    for number, budget in enumerate(record.budgets_usd, start=1):
-        own = [[sensor for sensor in site.sensors if sensor.phase == number] for site in record.sites]
-        bought = [sensor for sensors in own for sensor in sensors]
-        spent = math.fsum(sensor.price_usd for sensor in bought)
-        rows.append((str(number), dollars(budget), dollars(spent), f"{sum(map(bool, own)):,}", sensors_text(bought)))
-    yield Paragraph("Sensors of earlier phases remain.")
-    yield Table(("Phase", "Budget", "Spent", "Sites", "New sensors"), tuple(rows), frozenset({0, 1, 2, 3}))
 
 
 def _equipped(record: NetworkRecord, ranked: tuple[RankedSite, ...]) -> Iterator[Block]:

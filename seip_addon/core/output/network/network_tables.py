@@ -42,7 +42,7 @@ def _features(record: NetworkRecord) -> Iterator[Feature]:
             place = _point(_within_a_turn(sensor.longitude), round(sensor.latitude, DECIMALS))
             figures = {"id": sensor.id, "site": one.site.name, "folder": one.site.folder, "sensor": sensor.sensor}
             figures |= {"position": sensor.position, "height_m": round(sensor.height_m, 3)}
-            yield feature("sensor", place, **figures, price_usd=round(sensor.price_usd, 2), phase=sensor.phase)
+            yield feature("sensor", place, **figures, price_usd=round(sensor.price_usd, 2))
 
 
 def _figures(one: RankedSite) -> dict[str, object]:

@@ -57,8 +57,7 @@ def ranked_sites(record: NetworkRecord) -> tuple[RankedSite, ...]:
 def _gain(site: NetworkSite, relative_weight: float) -> float | None:
     if site.status != "equipped" or site.price_usd <= 0:
         return None
-    before = max((point.value for point in site.frontier if point.price_usd == 0), default=0.0)
-    return relative_weight * (site.value - before) / site.price_usd * 1000.0
+    return relative_weight * site.value / site.price_usd * 1000.0
 
 
 def sensors_text(sensors: Sequence[NetworkSensor], names: Mapping[str, str] | None = None) -> str:
@@ -82,13 +81,8 @@ def gain_text(record: NetworkRecord, gain: float | None) -> str:
 def level(record: NetworkRecord, site: NetworkSite) -> int:
     """Return the index of a site's colour among `SHARE_COLOURS`."""
     if record.criterion == "road":
-        return coverage_level(site.coverage)
+        return bisect_right(COVERAGE_STEPS, site.coverage)
     return bisect_right(RETURNS_STEPS, math.expm1(site.value))
-
-
-def coverage_level(coverage: float) -> int:
-    """Return the index of a coverage's colour among `SHARE_COLOURS`."""
-    return bisect_right(COVERAGE_STEPS, coverage)
 
 
 def level_words(record: NetworkRecord) -> tuple[str, ...]:

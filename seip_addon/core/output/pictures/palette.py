@@ -52,8 +52,6 @@ AREA_COLOURS = (WEIGHTED, FORBIDDEN, MANDATORY, *AREA_VEILS, *WEIGHT_COLOURS)
 
 MAP_GROUND, MAP_STREETS, MAP_JUNCTION = "#17191b", ("#53575b", "#83888d", "#b4b9be"), "#ffffff"
 """Of the map on which a junction is chosen: streets by importance. Greys: nothing on it is coverage or a sensor."""
-NO_SITE_COLOUR = MAP_STREETS[1]
-"""Of junctions of a network that have no site yet; sites have `SHARE_COLOURS`."""
 PAPER_STREETS = ("#e3e7ea", "#cfd5d9", "#b7bfc5")
 """Of the streets on a map of sites, on paper, by importance."""
 SERIES_COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")

@@ -13,7 +13,6 @@ from seip_addon.core.choosing.network import network_search
 from seip_addon.core.choosing.network.allocation import allocate, allocation_of, relaxed_allocation
 from seip_addon.core.choosing.network.frontier import Frontier, Options, SolvedBudget, possible_amounts
 from seip_addon.core.choosing.network.network_search import Goal, search_allocations
-from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, finish
 from tests.few import few
 
@@ -42,7 +41,7 @@ class EnumeratedSite:
     def frontier(self, budget):
         amounts, ends = possible_amounts(self.prices, self.positions, MOST, budget)
         everything = self.value(range(len(self.prices)))
-        return Frontier(amounts, ends, SolvedBudget(0.0, (), 0.0, 0.0, 0.0, math.inf), everything)
+        return Frontier(amounts, ends, everything)
 
 
 def solver(sites, looseness=0.0):
@@ -62,14 +61,13 @@ def solver(sites, looseness=0.0):
     return solve
 
 
-def best_of_all(sites, weights, budget, minimum=0.0):
-    """Return the largest weighted value within a budget, over all combinations of placements; -inf if there is none."""
+def best_of_all(sites, weights, budget):
+    """Return the largest weighted value within a budget, over all combinations of placements."""
     reached = {0.0: 0.0}
     for site, weight in zip(sites, weights, strict=True):
         best = {}
         for price, value, _ in site.placements():
-            if value >= minimum:
-                best[price] = max(best.get(price, -math.inf), value)
+            best[price] = max(best.get(price, -math.inf), value)
         after = {}
         for spent, so_far in reached.items():
             for price, value in best.items():
@@ -77,7 +75,7 @@ def best_of_all(sites, weights, budget, minimum=0.0):
                 if total <= budget * (1 + 1e-9):
                     after[total] = max(after.get(total, -math.inf), so_far + weight * value)
         reached = after
-    return max(reached.values(), default=-math.inf)
+    return max(reached.values())
 
 
 @pytest.fixture(params=["integer", "relaxed"])
@@ -86,42 +84,25 @@ def rounds(request, monkeypatch):
     monkeypatch.setattr(network_search, "MANY_SITES", 0 if request.param == "relaxed" else math.inf)
 
 
-@pytest.mark.parametrize("seed", few(range(15), 5))
-@pytest.mark.parametrize("looseness", [0.0, 0.05])
+@pytest.mark.parametrize("seed", few(range(8), 3))
 @pytest.mark.usefixtures("rounds")
-def test_search_finds_the_best_of_all_allocations(seed, looseness):
+def test_search_finds_the_best_allocation_of_each_budget(seed):
     rng = np.random.default_rng(seed)
-    sites = [EnumeratedSite(rng) for _ in range(rng.integers(1, 5))]
-    weights = rng.choice([0.5, 1.0, 3.0], size=len(sites))
-    budget = float(rng.integers(1, 90) * 1000)
-    known = [site.frontier(budget) for site in sites]
-    (found,) = finish(search_allocations(known, weights, [Goal(budget, 0.0)], solver(sites, looseness)))
-    best = best_of_all(sites, weights, budget)
-    assert found.value == pytest.approx(best, rel=1e-9)
-    assert found.bound >= best * (1 - 1e-9)
-    assert found.bound == pytest.approx(best, rel=1e-6)
-    assert found.price <= budget * (1 + 1e-9)
-    assert found.price == pytest.approx(math.fsum(one.price for one in found.taken))
-
-
-@pytest.mark.parametrize("seed", few(range(5), 2))
-@pytest.mark.usefixtures("rounds")
-def test_budgets_that_are_searched_together_each_have_their_best_allocation(seed):
-    rng = np.random.default_rng(3000 + seed)
     sites = [EnumeratedSite(rng) for _ in range(3)]
-    weights, budgets = rng.choice([0.5, 1.0, 3.0], size=3), (rng.integers(1, 90, size=5) * 1000.0).tolist()
+    weights, budgets = rng.choice([0.5, 1.0, 3.0], size=3), (rng.integers(1, 90, size=4) * 1000.0).tolist()
     known = [site.frontier(max(budgets)) for site in sites]
     goals = [Goal(budget, 0.0) for budget in budgets]
-    for budget, found in zip(
-        budgets, finish(search_allocations(known, weights, goals, solver(sites, 0.05))), strict=True
-    ):
+    results = finish(search_allocations(known, weights, goals, solver(sites, 0.05)))
+    for budget, found in zip(budgets, results, strict=True):
         best = best_of_all(sites, weights, budget)
         assert found.value == pytest.approx(best, rel=1e-9)
+        assert found.bound >= best * (1 - 1e-9)
         assert found.bound == pytest.approx(best, rel=1e-6)
         assert found.price <= budget * (1 + 1e-9)
+        assert found.price == pytest.approx(math.fsum(one.price for one in found.taken))
 
 
-@pytest.mark.parametrize("seed", few(range(8), 3))
+@pytest.mark.parametrize("seed", few(range(6), 2))
 @pytest.mark.usefixtures("rounds")
 def test_a_search_that_ends_early_has_a_bound_that_holds(seed):
     rng = np.random.default_rng(1000 + seed)
@@ -133,23 +114,6 @@ def test_a_search_that_ends_early_has_a_bound_that_holds(seed):
     assert found.value <= best * (1 + 1e-9)
     assert found.bound >= best * (1 - 1e-9)
     assert found.bound <= found.value * 1.2 * (1 + 1e-9)
-
-
-@pytest.mark.parametrize("seed", few(range(8), 3))
-@pytest.mark.usefixtures("rounds")
-def test_minimum_at_every_site_is_reached_or_proven_impossible(seed):
-    rng = np.random.default_rng(2000 + seed)
-    sites = [EnumeratedSite(rng) for _ in range(3)]
-    weights, budget, minimum = np.ones(3), float(rng.integers(10, 60) * 1000), 0.5
-    known = [site.frontier(budget) for site in sites]
-    best = best_of_all(sites, weights, budget, minimum)
-    if best == -math.inf:
-        with pytest.raises(SeipError, match="minimum"):
-            finish(search_allocations(known, weights, [Goal(budget, 0.0, minimum)], solver(sites)))
-    else:
-        (found,) = finish(search_allocations(known, weights, [Goal(budget, 0.0, minimum)], solver(sites)))
-        assert found.value == pytest.approx(best, rel=1e-9)
-        assert min(one.value for one in found.taken) >= minimum
 
 
 @pytest.mark.usefixtures("rounds")
@@ -195,7 +159,7 @@ def test_searches_of_a_goal_are_no_longer_than_its_limit_and_its_bound_holds():
 @pytest.mark.usefixtures("rounds")
 def test_search_needs_far_fewer_rounds_than_there_are_amounts():
     amounts = np.arange(257) * 1000.0
-    known = [Frontier(amounts, amounts, SolvedBudget(0.0, (), 0.0, 0.0, 0.0, math.inf), 600.0) for _ in range(3)]
+    known = [Frontier(amounts, amounts, 600.0) for _ in range(3)]
     rounds = []
 
     def solve(requests):
@@ -220,13 +184,12 @@ def test_money_that_adds_nothing_is_not_spent():
 
 
 @given(
-    st.lists(
-        st.lists(st.tuples(st.integers(0, 40), st.integers(0, 1000)), min_size=1, max_size=5), min_size=1, max_size=4
-    ),
+    st.lists(st.lists(st.tuples(st.integers(0, 40), st.integers(0, 1000)), max_size=4), min_size=1, max_size=4),
     st.integers(0, 120),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_allocation_equals_enumeration_and_no_relaxed_one_is_worse(tables, budget):
+    tables = [[(0, 0), *table] for table in tables]
     options = [
         Options(*(np.array(column, dtype=np.float64) for column in zip(*table, strict=True)), np.arange(len(table)))
         for table in tables
@@ -237,22 +200,16 @@ def test_allocation_equals_enumeration_and_no_relaxed_one_is_worse(tables, budge
         if sum(price for price, _ in rows) <= budget
     ]
     found = allocate(options, np.ones(len(options)), float(budget))
-    if within:
-        assert found.value == pytest.approx(max(within))
-        assert found.price <= budget * (1 + 1e-9)
-    else:
-        assert found is None
+    assert found.value == pytest.approx(max(within))
+    assert found.price <= budget * (1 + 1e-9)
     relaxed = relaxed_allocation(options, np.ones(len(options)), float(budget))
-    if within:
-        assert relaxed.value >= max(within) * (1 - 1e-9)
-        lower = allocation_of(options, np.ones(len(options)), [parts[0] for parts in relaxed.taken])
-        assert lower.price <= budget * (1 + 1e-6)
-        assert lower.value <= max(within) * (1 + 1e-9)
-    else:
-        assert relaxed is None
+    assert relaxed.value >= max(within) * (1 - 1e-9)
+    lower = allocation_of(options, np.ones(len(options)), [parts[0] for parts in relaxed.taken])
+    assert lower.price <= budget * (1 + 1e-6)
+    assert lower.value <= max(within) * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(4))
 def test_amounts_contain_the_price_of_every_placement(seed, monkeypatch):
     rng = np.random.default_rng(seed)
     monkeypatch.setattr(frontiers, "MOST_AMOUNTS", int(rng.integers(2, 30)))
@@ -266,7 +223,7 @@ def test_amounts_contain_the_price_of_every_placement(seed, monkeypatch):
             assert any(low - 1e-6 <= price <= high + 1e-6 for low, high in zip(amounts, ends, strict=True))
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(4))
 def test_bounds_of_a_frontier_hold_for_every_placement(seed):
     rng = np.random.default_rng(seed)
     site = EnumeratedSite(rng)

@@ -14,21 +14,19 @@ from tests.builders.random_site import random_problem
 from tests.few import few
 
 
-def best_by_enumeration(problem, budget, installed=()):
-    """Return the largest value over all placements within a budget that contain the installed poses."""
-    best = problem.value(installed)
-    for number in range(1, problem.most_sensors - len(installed) + 1):
-        for more in itertools.combinations(range(len(problem.prices)), number):
-            chosen = (*installed, *more)
-            if len(set(problem.positions[list(chosen)].tolist())) == len(chosen) and math.fsum(
-                problem.prices[list(more)]
-            ) <= budget * (1 + 1e-9):
+def best_by_enumeration(problem, budget):
+    """Return the largest value over all placements within a budget."""
+    best = 0.0
+    for number in range(1, problem.most_sensors + 1):
+        for chosen in itertools.combinations(range(len(problem.prices)), number):
+            apart = len(set(problem.positions[list(chosen)].tolist())) == number
+            if apart and math.fsum(problem.prices[list(chosen)]) <= budget * (1 + 1e-9):
                 best = max(best, problem.value(chosen))
     return best
 
 
 @pytest.mark.parametrize("criterion", ["road", "returns"])
-@pytest.mark.parametrize("seed", few(range(12), 4))
+@pytest.mark.parametrize("seed", few(range(6), 2))
 def test_solved_budget_is_the_best_of_all_placements(criterion, seed):
     problem = random_problem(seed, criterion)
     for budget in (20_000.0, 34_000.0, 60_000.0):
@@ -37,21 +35,6 @@ def test_solved_budget_is_the_best_of_all_placements(criterion, seed):
         assert found.bound == pytest.approx(found.value)
         assert found.price <= budget
         assert found.value == pytest.approx(problem.value(found.chosen))
-
-
-@pytest.mark.parametrize("criterion", ["road", "returns"])
-@pytest.mark.parametrize("seed", range(8))
-def test_installed_sensors_remain_and_cost_nothing(criterion, seed):
-    problem = random_problem(100 + seed, criterion)
-    installed = (seed % 9,)
-    known = problem.frontier(60_000.0, installed)
-    assert known.floor.value == pytest.approx(problem.value(installed))
-    assert known.floor.price == 0.0
-    found = finish(problem.solve(20_000.0, 10.0, installed))
-    assert set(installed) <= set(found.chosen)
-    assert found.value == pytest.approx(best_by_enumeration(problem, 20_000.0, installed), rel=1e-6)
-    assert found.price == pytest.approx(sum(problem.prices[pose] for pose in found.chosen if pose not in installed))
-    assert known.ceiling >= found.value
 
 
 def test_cheapest_reaches_the_coverage_at_the_least_price():
@@ -84,7 +67,14 @@ def test_damaged_file_is_refused(tmp_path):
         SiteProblem.load(path)
 
 
-def test_site_where_nothing_is_seen_is_refused():
+@pytest.mark.parametrize(
+    ("changed", "fault"),
+    [
+        (lambda problem: {"visible": np.zeros_like(problem.visible)}, "no candidate sees anything"),
+        (lambda problem: {"prices": np.where(np.arange(9) == 4, 0.0, problem.prices)}, "os1_128 costs nothing"),
+    ],
+)
+def test_sites_without_a_frontier_are_refused(changed, fault):
     problem = random_problem(1, "road")
-    with pytest.raises(SeipError, match="no candidate sees anything"):
-        check_problem(replace(problem, visible=np.zeros_like(problem.visible)))
+    with pytest.raises(SeipError, match=fault):
+        check_problem(replace(problem, **changed(problem)))

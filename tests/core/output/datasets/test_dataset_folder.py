@@ -169,6 +169,8 @@ def test_a_run_stands_for_its_frames(tmp_path):
     write("kitti", make_frames(), make_run(), tmp_path)
     refused("of other frames", "kitti", make_frames(), make_run(key="another"), tmp_path)
     refused("in another split", "kitti", make_frames(), make_run(split="val"), tmp_path)
+    shouted = make_run(make_run().name.upper())  # the same folder on many disks
+    refused("has a run", "kitti", make_frames(), shouted, tmp_path)
     refused("of other frames", "kitti", make_frames(), replace(make_run(), origin=np.zeros(3)), tmp_path)
 
 

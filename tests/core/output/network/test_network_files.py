@@ -14,7 +14,7 @@ import shapely
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.network.network_page import network_page
 from seip_addon.core.output.network.network_pictures import draw_curve
-from seip_addon.core.output.network.network_record import NetworkPoint, load_network
+from seip_addon.core.output.network.network_record import load_network
 from seip_addon.core.output.network.network_report import make_network_report
 from seip_addon.core.output.network.network_view import MOST_CORNERS, network_view
 from seip_addon.core.output.network.ranked_sites import gain_text, level, ranked_sites
@@ -72,7 +72,7 @@ def rows_of(path):
 
 @pytest.mark.parametrize("criterion", ["road", "returns"])
 def test_the_record_survives_its_file_and_the_same_record_gives_the_same_bytes(tmp_path, criterion):
-    record = make_network(criterion=criterion, budgets=(200_000.0, 900_000.0))
+    record = make_network(criterion=criterion)
     first, again = (write_network(tmp_path / name, record, make_streets()) for name in ("a", "b"))
     assert load_network(tmp_path / "a" / "network.json") == record
     assert len(first) == 8
@@ -86,8 +86,7 @@ def test_names_stay_text(tmp_path):
     record = hostile_network()
     write_network(tmp_path, record)
     page = Page((tmp_path / "network.html").read_text(encoding="utf-8"))
-    assert page.tags.count("script") == 1
-    assert not {"b", "i", "img", "iframe"} & set(page.tags)
+    assert not {"b", "i", "img", "iframe", "script", "button"} & set(page.tags)
     assert set(HOSTILE) <= set(page.cells)
     assert any(label.startswith(HOSTILE[4]) for label in page.labels)
     report = (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -136,15 +135,14 @@ def test_the_geojson_holds_every_site_and_sensor_where_the_record_has_them(tmp_p
 def test_sites_are_ranked_by_gain_per_dollar_with_their_weight():
     draw = np.random.default_rng(0)
     twins = [replace(make_site(number, draw), price_usd=20_000.0, value=0.5, weight=1.0) for number in range(3)]
-    before = (NetworkPoint(0.0, 0.3, 0.3), NetworkPoint(20_000.0, 0.5, 0.5))
-    twins = [replace(twins[0], frontier=before), replace(twins[1], weight=4.0), twins[2]]
+    twins[1] = replace(twins[1], weight=4.0)
     free = replace(make_site(3, draw), price_usd=0.0, weight=2.0)
     failed, bare = (make_site(4 + at, draw, status=status) for at, status in enumerate(("failed", "without sensor")))
     record = network_of((failed, free, bare, *twins))
     ranked = ranked_sites(record)
-    assert [one.site for one in ranked] == [twins[1], twins[2], twins[0], free, bare, failed]
+    assert [one.site for one in ranked] == [twins[1], twins[0], twins[2], free, bare, failed]
     mean = (2.0 + bare.weight + 1.0 + 4.0 + 1.0) / 5
-    assert [one.gain for one in ranked[:3]] == pytest.approx([0.1 / mean, 0.025 / mean, 0.01 / mean])
+    assert [one.gain for one in ranked[:3]] == pytest.approx([0.1 / mean, 0.025 / mean, 0.025 / mean])
     assert [one.rank for one in ranked] == [1, 2, 3, None, None, None]
     assert gain_text(record, 0.0251) == "2.51 points"
     assert gain_text(replace(record, criterion="returns"), math.log(1.25)) == "25.0%"
@@ -160,7 +158,7 @@ def test_colours_begin_at_round_coverages_and_returns():
 
 
 def test_tables_agree_for_300_sites(tmp_path):
-    record = make_network(300, budgets=(2e6, 9e6))
+    record = make_network(300)
     write_network(tmp_path, record, make_streets())
     rows = rows_of(tmp_path / "sites.csv")
     assert len(rows) == 300
@@ -172,8 +170,6 @@ def test_tables_agree_for_300_sites(tmp_path):
     tables = {section.title: [b for b in section.blocks if isinstance(b, Table)] for section in report.sections}
     assert len(tables["Sites with sensors"][0].rows) == sum(row["status"] == "equipped" for row in rows)
     assert len(tables["Sites that failed"][0].rows) == sum(row["status"] == "failed" for row in rows)
-    spent = [float(row[2].strip("$").replace(",", "")) for row in tables["Phases"][0].rows]
-    assert sum(spent) == pytest.approx(record.price_usd)
 
 
 @pytest.mark.parametrize(("status", "sites"), [("without sensor", 5), ("failed", 5), ("failed", 1), ("failed", 0)])
@@ -235,10 +231,10 @@ def test_a_bound_above_the_value_is_stated_in_the_unit_of_the_criterion():
 
 
 def test_the_curve_is_drawn_from_the_points_of_the_record():
-    record = make_network(budgets=(100_000.0, 300_000.0))
+    record = make_network()
     higher = tuple(replace(point, bound=point.bound + 0.2) for point in record.curve)
     assert draw_curve(record) != draw_curve(replace(record, curve=higher))
-    assert draw_curve(record) != draw_curve(replace(record, budgets_usd=(400_000.0,)))
+    assert draw_curve(record) != draw_curve(replace(record, budget_usd=400_000.0))
     assert draw_curve(replace(record, curve=())).startswith(b"\x89PNG")
 
 
@@ -247,7 +243,7 @@ def test_damaged_and_foreign_files_are_refused(tmp_path):
     write_network(tmp_path, make_network(2))
     whole = path.read_text(encoding="utf-8")
     for damaged, says in (
-        (whole.replace("seip-network/1", "seip-network/9"), "has the schema"),
+        (whole.replace("seip-network/2", "seip-network/1"), "has the schema"),
         (whole[:-20], "is damaged"),
         (whole.replace('"weight"', '"wait"'), "weight is missing"),
         (re.sub(r'"latitude": [\d.]+', '"latitude": 91', whole), "latitude"),

@@ -17,7 +17,6 @@ from seip_addon.core.output.results.comparison import (
     packed_counts,
     unpacked_counts,
 )
-from seip_addon.core.output.results.ranking import rank_added, rank_alone
 
 
 def test_each_target_is_in_one_class():
@@ -56,14 +55,6 @@ def test_counts_come_back_up_to_255(counts):
 def test_damaged_counts_are_said(text):
     with pytest.raises(SeipError, match="damaged"):
         unpacked_counts(text)
-
-
-def test_ranks_leave_out_taken_positions_and_seen_targets():
-    visible = np.array([[1, 1, 0, 0], [1, 1, 1, 0], [0, 0, 1, 1], [0, 1, 0, 0]], dtype=bool)
-    weight = np.array([1.0, 1.0, 1.0, 3.0])
-    assert [one.pose for one in rank_alone(visible, weight, 3)] == [2, 1, 0]
-    added = rank_added(visible, weight, visible[1], np.array([False, False, True, True]), 9)
-    assert [(one.pose, one.share) for one in added] == [(2, 0.5), (3, 0.0)]
 
 
 def test_the_automatic_solver_is_one_that_runs():

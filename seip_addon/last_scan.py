@@ -1,4 +1,4 @@
-"""Live scans: the last frame of each scene, shown as a point cloud and scanned again as the timeline moves."""
+"""Last scan of each scene, shown as a point cloud."""
 
 import time
 
@@ -45,7 +45,6 @@ def measure(run: Run, simulation: Simulation, at: float) -> LastScan:
 def keep(scene: bpy.types.Scene, scan: LastScan) -> None:
     """Keep a scan and show its points."""
     session.scans[scene.session_uid] = scan
-    keep_following()  # a file may have been saved while it followed
     show_cloud(scene)
 
 
@@ -60,26 +59,3 @@ def hide_cloud(scene: bpy.types.Scene) -> None:
     """Let go of a scene's scan."""
     session.scans.pop(scene.session_uid, None)
     overlays.hide(scene, NAME)
-
-
-def keep_following() -> None:
-    """Have a handler of frame changes while a scene follows its timeline."""
-    handlers = bpy.app.handlers.frame_change_post
-    wanted = any(scene.seip.traffic.follow for scene in bpy.data.scenes)
-    if wanted and _frame_changed not in handlers:
-        handlers.append(_frame_changed)
-    if not wanted:
-        forget()
-
-
-def _frame_changed(scene: bpy.types.Scene, *_: object) -> None:
-    scan = session.scan_of(scene)
-    busy = session.running is not None or bpy.app.is_job_running("RENDER")
-    if scan is not None and scene.seip.traffic.follow and not busy:
-        keep(scene, measure(scan.run, scan.simulation, now(scene)))
-
-
-def forget() -> None:
-    """Follow no timeline: another file is opened, or the add-on is disabled."""
-    if _frame_changed in bpy.app.handlers.frame_change_post:
-        bpy.app.handlers.frame_change_post.remove(_frame_changed)

@@ -1,0 +1,72 @@
+"""The add-on's preferences: their properties, and how they are drawn."""
+
+import bpy
+
+from .. import preferences
+from ..core.sensing.visibility.ray_casting import MAX_THREADS
+from . import sumo
+
+
+class SEIP_PG_catalogue_file(bpy.types.PropertyGroup):
+    """A catalogue of the user's own."""
+
+    path: bpy.props.StringProperty(
+        name="Catalogue", subtype="FILE_PATH", description="A TOML file of LiDAR models, as docs/sensors.md describes"
+    )
+
+
+class SEIP_AP_preferences(bpy.types.AddonPreferences):
+    """Preferences of the add-on."""
+
+    bl_idname = preferences.ADDON_ID
+
+    cores: bpy.props.IntProperty(
+        name="Cores",
+        description="Processor cores that compute visibility at once; more than four rarely help",
+        default=MAX_THREADS,
+        min=1,
+        max=MAX_THREADS,
+    )
+    cache: bpy.props.StringProperty(
+        name="Cache",
+        subtype="DIR_PATH",
+        description="Where visibility is kept from run to run; empty for the extension's own folder",
+    )
+    python: bpy.props.StringProperty(
+        name="Python with PyTorch",
+        subtype="FILE_PATH",
+        description="In which Detect runs: .venv/bin/python of a checkout of this project after `make detection`, "
+        "or one of your own after `pip install '.[detection]'` there",
+    )
+    sumo: bpy.props.StringProperty(
+        name="SUMO",
+        subtype="DIR_PATH",
+        description="Folder of Eclipse SUMO, which lays out the streets of an extract of OpenStreetMap and simulates "
+        "traffic: the one with bin and data in it. Empty for the SUMO that was installed here, on the PATH or in "
+        "SUMO_HOME",
+    )
+    catalogues: bpy.props.CollectionProperty(type=SEIP_PG_catalogue_file)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Draw the preferences."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "cores")
+        layout.prop(self, "cache")
+        row = layout.row()
+        row.label(text=f"Kept visibility: {preferences.kept_visibility().megabytes():,.1f} MB")
+        row.operator("seip.empty_cache", icon="TRASH")
+        layout.prop(self, "python")
+        layout.prop(self, "sumo")
+        sumo.draw_status(layout)
+        layout.label(text="Catalogues of sensor types")
+        for number, file in enumerate(self.catalogues):
+            row = layout.row(align=True)
+            row.prop(file, "path", text="")
+            row.operator("seip.remove_catalogue", text="", icon="X").index = number
+        row = layout.row(align=True)
+        row.operator("seip.add_catalogue", icon="ADD")
+        row.operator("seip.list_sensor_types", icon="FILE_REFRESH")
+
+
+CLASSES = (SEIP_PG_catalogue_file, SEIP_AP_preferences)
