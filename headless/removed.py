@@ -4,7 +4,9 @@ from collections.abc import Sequence
 
 from seip_addon.core.errors import SeipError
 
-REMOVED: dict[str, str] = {}
+REMOVED: dict[str, str] = {
+    "--tolerance": "give --grid and --spacing; docs/stability.md shows what coarser ones lose",
+}
 """By option, or by option and value as in ``--format opv2v``: what to do instead, as the end of a sentence."""
 
 

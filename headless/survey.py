@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TypeVar
 
 from headless import runtime
-from headless.convergence import Convergence
 from headless.options import add_optics, add_settings, read_settings
 
 import bpy
@@ -29,7 +28,6 @@ from seip_addon.core.sensing.visibility.triangle_culling import culling_message
 from seip_addon.core.settings import settings_of
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
-from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
 from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.folder_contents import check_no_run
@@ -112,12 +110,7 @@ def runs_beside(scene: Path | None, kind: str = "") -> list[Path]:
     return runs_in(traffic_folder(Path(bpy.data.filepath) if scene is None else scene, kind))
 
 
-Refine = Callable[[SceneGeometry, SurveySettings], Generator[Progress, None, Convergence]]
-
-
-def survey(
-    options: argparse.Namespace, check: Callable[[Layout], None], refine: Refine | None = None
-) -> tuple[Survey, Stopwatch]:
+def survey(options: argparse.Namespace, check: Callable[[Layout], None]) -> tuple[Survey, Stopwatch]:
     """Read the scene, lay out its site, and find or compute its visibility grid; return with it how long that took.
 
     Parameters
@@ -126,8 +119,6 @@ def survey(
         Options of a parser with `add_options`.
     check : callable
         Called before any ray is cast: refuses what cannot be had on the layout.
-    refine : callable, optional
-        Finds the spacings of targets and candidates.
     """
     settings = read_survey_settings(options)
     settings.models()  # refuses unknown types before the scene is read
@@ -138,9 +129,6 @@ def survey(
     set_reflectivity(options.reflectivity)
     watch = Stopwatch()
     reading = watch.time("read the scene", lambda: read_scene(bpy.context.scene))
-    if refine is not None:
-        settings = watch.run("spacings", refine(reading.geometry, settings)).settings
-        LOG.info(settings.spacings_because)
     layout = watch.time("lay out the site", lambda: lay_out(reading.geometry, settings, reading.warnings))
     LOG.info(_describe_site(layout.site))
     runtime.warn(layout.warnings)

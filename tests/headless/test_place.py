@@ -130,16 +130,6 @@ def test_eight_sensors_at_the_shipped_junction_are_proven_the_best(tmp_path):
     assert (objective.status, objective.gap) == ("optimal", 0.0)
 
 
-@pytest.mark.slow
-def test_a_tolerance_picks_the_spacings_and_the_record_says_why(tmp_path, run):
-    record = run(tmp_path, "--count", "2", "--tolerance", "0.05")
-    settings = record.settings
-    assert "picked for a tolerance of 0.05" in settings["spacings_because"]
-    assert f"targets {settings['grid_spacing_m']:g} m apart" in settings["spacings_because"]
-    assert f"posts {settings['candidates']['spacing']:g} m apart" in settings["spacings_because"]
-    assert "spacings" in record.times.durations_s
-
-
 def test_another_goal_uses_the_stored_grid(folder, tmp_path, run):
     stored = tmp_path / "visibility.npz"
     stored.write_bytes((folder / "visibility.npz").read_bytes())

@@ -65,7 +65,6 @@ def settings() -> dict[str, Any]:
         "installed_cost": {"anyOf": [anything, {"type": "null"}]},
         "time_limit_s": number("number", EFFORT),
         "effort": number("number", EFFORT),
-        "spacings_because": text,
         "render": truth,
     }
     return {"type": "object", "required": ["candidates", "goal"], "properties": known}

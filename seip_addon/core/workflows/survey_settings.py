@@ -41,8 +41,6 @@ class SurveySettings:
         Limit of the counted work of each search, which makes results reproducible: see `SolverLimits`.
     installed_cost : InstalledCost, optional
         Cost of installation to include in every price; by default prices are those of sensors only.
-    spacings_because : str
-        Reason for the spacings of targets and candidates; empty if the user chose them.
 
     Examples
     --------
@@ -72,7 +70,6 @@ class SurveySettings:
     installed_cost: InstalledCost | None = setting(
         None, "include posts, power and backhaul in prices, from the shipped table or your own", metavar="TOML"
     )
-    spacings_because: str = ""
 
     def models(self) -> dict[str, LidarModel]:
         """Return the sensor types to choose from, in the given weather, by catalogue key.
@@ -119,7 +116,6 @@ class SurveySettings:
             "engine": self.engine,
             "solver": self.solver,
             "installed_cost": self.installed_cost and asdict(self.installed_cost),
-            "spacings_because": self.spacings_because,
             **limits,
         }
 

@@ -42,4 +42,3 @@ class RecordedSettings:
     time_limit_s: Annotated[float, limits.EFFORT] | None = None
     installed_cost: InstalledCost | None = None
     render: bool = False
-    spacings_because: str = ""

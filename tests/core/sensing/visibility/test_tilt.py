@@ -3,9 +3,9 @@
 import math
 from dataclasses import replace
 
-from headless.convergence import Evaluator
 from headless.studies.full_scan import beam_directions
 from headless.studies.stability.criterion import in_view
+from headless.studies.stability.spacings import Evaluator
 
 import numpy as np
 import pytest
