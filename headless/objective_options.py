@@ -15,7 +15,7 @@ from seip_addon.core.errors import SeipError
 def add_objective(parser: argparse.ArgumentParser) -> None:
     """Add the parts of an objective to a command: criterion, constraints, scenarios and risk measure."""
     objective = parser.add_argument_group("objective")
-    add_settings(objective, Objective, "count", "budget", "coverage", "criterion", "shares", "seen_by", "failures")
+    add_settings(objective, Objective, "count", "budget", "coverage", "criterion", "shares", "failures")
     objective.add_argument("--weighted", action="store_true", help="weight targets by their regions")
     add_settings(objective, Objective, "central_weight", "min_distance", "forbidden", "mandatory")
     scenarios = parser.add_argument_group("scenarios")
@@ -32,7 +32,6 @@ def add_objective(parser: argparse.ArgumentParser) -> None:
         help="optimise over instants of runs of traffic, and evaluate on the last third of the runs (default: those in "
         "the folder SCENE_traffic beside the scene)",
     )
-    add_settings(scenarios, Scenarios, "weights_from_traffic")
     add_settings(scenarios, Objective, "risk")
     add_settings(scenarios, Scenarios, "count", "held_out", "seed")
 
@@ -49,8 +48,6 @@ def _scenarios(options: argparse.Namespace) -> Scenarios:
     if errs and options.traffic is not None:
         raise SeipError("scenarios are of pose errors or of traffic: leave out --pose-errors or --traffic")
     kind: ScenarioKind = "pose-errors" if errs else "nominal" if options.traffic is None else "traffic"
-    if kind != "traffic" and options.weights_from_traffic:
-        raise SeipError("--weights-from-traffic needs --traffic")
     return replace(read_settings(Scenarios, options, pose_errors=_pose_errors(*errors)), kind=kind)
 
 

@@ -5,7 +5,10 @@ from collections.abc import Sequence
 from seip_addon.core.errors import SeipError
 
 REMOVED: dict[str, str] = {
+    "--criterion height": "use --criterion road or returns",
+    "--seen-by": "the result has the share of the road seen twice; --failures worst asks for redundancy",
     "--tolerance": "give --grid and --spacing; docs/stability.md shows what coarser ones lose",
+    "--weights-from-traffic": "give regions a weight in the scene and add --weighted",
 }
 """By option, or by option and value as in ``--format opv2v``: what to do instead, as the end of a sentence."""
 

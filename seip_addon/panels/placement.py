@@ -26,9 +26,9 @@ from .sidebar import RowList, is_narrow, settings_column
 from .wrapped_text import BOX, draw_sentence
 
 _SHOWN = {
-    "nominal": ("failures", "seen_by"),
-    "pose-errors": ("risk", "position_error", "tilt_error", "failures", "seen_by"),
-    "traffic": ("risk", "weights_from_traffic", "instants", "held_out"),
+    "nominal": ("failures",),
+    "pose-errors": ("risk", "position_error", "tilt_error", "failures"),
+    "traffic": ("risk", "instants", "held_out"),
 }
 """Properties of the objective that are shown for each kind of scenarios."""
 
@@ -105,7 +105,7 @@ def button_text(scene: bpy.types.Scene) -> str:
         "BUDGET": f"Place for ${goal.budget:,.0f}",
         "COVERAGE": f"Cover {goal.coverage:g}%",
     }[goal.limit]
-    seconds = scene_status.expected_seconds(scene)
+    seconds = scene_status.search_seconds(scene)
     return what if seconds is None else f"{what}, up to {duration_text(5.0 * max(1.0, round(seconds / 5.0)))}"
 
 

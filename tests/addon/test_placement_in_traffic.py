@@ -19,7 +19,7 @@ from tests.builders.small_scene import make_run
 
 OPTIONS = [
     *("--sensor", "vlp16", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--delta", "6", "--count", "2"),
-    *("--traffic", "--criterion", "height", "--weights-from-traffic", "--scenarios", "2", "--held-out", "8"),
+    *("--traffic", "--scenarios", "2", "--held-out", "8"),
     "--no-render",
 ]
 
@@ -38,14 +38,11 @@ def coarse(junction):
 @pytest.mark.slow
 def test_panel_and_batch_place_alike_and_what_it_was_chosen_on_stays_with_it(coarse, tmp_path, small_scene):
     goal = coarse.seip.goal
-    goal.criterion, goal.weights_from_traffic = "height", True
     goal.failures = "worst"  # left from other scenarios, and not shown for these
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
     certificate, purpose, band = session.state_of(coarse).solution.caption
     assert band.startswith("over plausible gains")
-    assert certificate.endswith(
-        "among these candidates to see the points 1.5 m above the road in traffic, on average over 2 instants."
-    )
+    assert certificate.endswith("among these candidates to see the road in traffic, on average over 2 instants.")
     assert (certificate[:6], purpose[:17]) == ("Proven", "chosen to see the")
     path = tmp_path / "placed.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
@@ -67,7 +64,7 @@ def test_the_panel_shows_what_the_objective_asks_for(coarse):
     placement_panel.draw(layout, bpy.context)
     drawn = dict(layout.properties)
     names = list(drawn)[list(drawn).index("criterion") :]
-    assert names == ["criterion", "scenarios", "runs", "risk", "weights_from_traffic", "instants", "held_out"]
+    assert names == ["criterion", "scenarios", "runs", "risk", "instants", "held_out"]
     assert all(hasattr(coarse.seip.goal, name) for name in names)
     assert drawn["runs"] == {"placeholder": "small_traffic"}
     assert "Rays are cast from every candidate in 2 instants, which takes minutes." in layout.text

@@ -104,7 +104,6 @@ def test_weights_are_the_scene_s_or_one_for_all():
             Scenarios("pose-errors", PoseErrors(0.5, 0.5, math.radians(5), math.radians(2)), count=7),
         ),
         (["--traffic", "a.npz", "--held-out", "9", "--seed", "3"], Scenarios("traffic", held_out=9, seed=3)),
-        (["--traffic", "--weights-from-traffic"], Scenarios("traffic", weights_from_traffic=True)),
     ],
 )
 def test_scenarios_are_those_that_the_options_name(typed, scenarios):

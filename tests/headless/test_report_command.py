@@ -106,7 +106,7 @@ def test_the_command_of_a_record_asks_for_the_same_again(folder, tmp_path, monke
             "--count",
             "3",
         ],
-        ["--seen-by", "2", "--budget", "90000"],
+        ["--failures", "worst", "--budget", "90000"],
         ["--effort", "9e14", "--time-limit", "9e14"],
         [],
     ],

@@ -10,12 +10,10 @@ from headless.charts import pose_errors as pose_error_charts
 from headless.charts import traffic as traffic_charts
 
 from seip_addon.core.choosing.placement.deployment import deploy
-from seip_addon.core.choosing.placement.near_optimal import NearOptimalSet, near_optimal_set
 from seip_addon.core.choosing.placement.objective import DEFAULT_COUNT, Objective, placement_problem
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.scenarios import Scenarios
-from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.choosing.robustness.pose_study import PoseStudySettings, pose_study
 from seip_addon.core.choosing.robustness.robust_study import robust_study
@@ -37,7 +35,7 @@ from .weather import untouched_types, weather_rows, weather_study
 TAIL_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
 """Risks studied over pose errors: the mean, the worst quarter and the worst scenario."""
 
-RISKS = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
+RISKS = (Risk(failure="worst"), Risk(failure="mean"))
 """Risks studied: failure of a sensor, and coverage by two sensors."""
 
 CHAPTERS = ("criterion", "arithmetic", "solvers", "poses", "failures", "traffic", "weather")
@@ -165,24 +163,13 @@ def arithmetic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
 
 
 def solvers(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Find the limits of the solvers, and the size of the near-optimal set."""
+    """Find the limits of the solvers."""
     study = yield from solver_study(scene.scope.instances)
-    tops: list[tuple[str, NearOptimalSet]] = []
-    for sensor in scene.survey.models:
-        problem = scene.problem(sensor)
-        best = yield from solve(problem, SolverLimits(scene.survey.settings.solver))
-        top = yield from near_optimal_set(problem, best.chosen)
-        if top is not None:
-            tops.append((f"{DEFAULT_COUNT} × {sensor}", top))
     limits_charts.save_solver_chart(scene.charts / "solvers.png", study, "Solvers at their limits")
-    limits_charts.save_near_optimal_chart(scene.charts / "flat_top.png", tops, f"{scene.name}: how flat the top is")
     return Chapter(
         "Solvers",
-        tuple(solver_rows(study, tops)),
-        (
-            Chart("solvers.png", "Loss of solutions on random and adversarial instances"),
-            Chart("flat_top.png", "Placements within 1 % of the best, by the number of positions they share with it"),
-        ),
+        tuple(solver_rows(study)),
+        (Chart("solvers.png", "Loss of solutions on random and adversarial instances"),),
     )
 
 

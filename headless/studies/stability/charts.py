@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from seip_addon.core.choosing.placement.near_optimal import NearOptimalSet
 from seip_addon.core.choosing.placement.problem import TIE_TOLERANCE
 from seip_addon.core.output.pictures.chart_style import DASHED, MARKERS, new_figure, save_chart, style_axes
 from seip_addon.core.output.pictures.palette import INK, SOFT_INK
@@ -180,19 +179,6 @@ def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: s
     style_axes(panels[2], "sensors", "coverage on the worst instance")
     for panel in (panels[0], panels[2]):
         panel.legend(frameon=False, fontsize=8)
-    save_chart(path, figure, title)
-
-
-def save_near_optimal_chart(
-    path: str | os.PathLike[str], tops: Sequence[tuple[str, NearOptimalSet]], title: str
-) -> None:
-    """Draw the number of placements near the best by the number of positions that they share with it."""
-    figure, panels = _figure(len(tops))
-    for panel, (name, top) in zip(panels, tops, strict=True):
-        panel.bar_label(panel.bar(range(len(top.in_common)), top.in_common, color=COLOURS[0]), fontsize=9)
-        panel.set_xticks(range(len(top.in_common)))
-        panel.set_title(f"{name}: {len(top):,}{'' if top.complete else ' and more'}", fontsize=10, color=INK)
-        style_axes(panel, "positions in common with the best", f"placements within {top.share:.0%} of the best")
     save_chart(path, figure, title)
 
 

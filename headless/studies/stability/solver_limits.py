@@ -11,7 +11,6 @@ import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.choosing.placement.integer_program import reaching
-from seip_addon.core.choosing.placement.near_optimal import NearOptimalSet
 from seip_addon.core.choosing.placement.problem import TIE_TOLERANCE, Placement, PlacementProblem
 from seip_addon.core.choosing.placement.reduced_problem import make_instance
 from seip_addon.core.choosing.placement.search_limits import Clock, SolverLimits
@@ -300,8 +299,8 @@ def _check_time(name: str, problem: PlacementProblem, limit: float) -> TimeCheck
     return TimeCheck(name, limit, found.seconds, found.gap, found.status == "optimal")
 
 
-def solver_rows(study: SolverStudy, tops: Sequence[tuple[str, NearOptimalSet]] = ()) -> list[Row]:
-    """Return the rows on the limits of solvers; ``tops`` are near-optimal sets of real scenes, by name."""
+def solver_rows(study: SolverStudy) -> list[Row]:
+    """Return the rows on the limits of solvers."""
     rows = []
     methods = dict.fromkeys((check.what, check.method) for check in study.spans)
     for what, method in methods:
@@ -353,14 +352,4 @@ def solver_rows(study: SolverStudy, tops: Sequence[tuple[str, NearOptimalSet]] =
             answer="returns the best placement found with its bound, and reports that the time limit was reached",
         )
     )
-    rows += [
-        Row(
-            "placement",
-            f"near-optimal set, {name}",
-            top.message,
-            "all placements, by branch and bound" if top.complete else "the first branches, and swaps of one sensor",
-            "reported with every proven placement",
-        )
-        for name, top in tops
-    ]
     return rows

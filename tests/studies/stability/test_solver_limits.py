@@ -1,4 +1,4 @@
-"""Where solvers begin to fail, what they say then, and how flat the top is."""
+"""Where solvers begin to fail, and what they say then."""
 
 from __future__ import annotations
 
@@ -27,13 +27,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.choosing.placement import near_optimal
 from seip_addon.core.choosing.placement.cheapest import cheapest_for_coverage
-from seip_addon.core.choosing.placement.near_optimal import near_optimal_set
 from seip_addon.core.choosing.placement.problem import TIE_TOLERANCE
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.placement.solver import scale_notes, solve, solve_greedy
-from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from tests.oracles.random_cases import cases
 
@@ -125,59 +122,6 @@ def test_a_second_is_a_second() -> None:
     assert found.status == "optimal" or any("search ended before" in note for note in found.notes)
 
 
-@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.05, 0.3]))
-@cases(40, 6)
-def test_near_optimal_set_lists_exactly_what_enumeration_finds(seed: int, share: float) -> None:
-    problem, _ = random_problem(seed)
-    best = finish(solve(problem))
-    top = finish(near_optimal_set(problem, best.chosen, share))
-    useful = np.flatnonzero(problem.visible.any(axis=1))
-    goal = (1 - share) * best.covered - 1e-9
-    expected = {
-        choice
-        for size in (1, 2, 3)
-        for choice in combinations(useful.tolist(), size)
-        if covered(problem, np.array(choice)) >= goal
-    }
-    assert top.complete
-    assert {tuple(row[row >= 0].tolist()) for row in top.placements} == expected
-    assert top.covered.max() == pytest.approx(best.covered)
-    common = [len(set(choice) & set(best.chosen.tolist())) for choice in expected]
-    assert top.in_common.tolist() == np.bincount(common, minlength=len(best.chosen) + 1).tolist()
-    assert len(top) == len(expected)
-
-
-def test_near_optimal_set_says_when_there_are_more() -> None:
-    problem, _ = random_problem(5, candidates=20, targets=12, count=4)
-    best = finish(solve(problem))
-    with patch.object(near_optimal, "MAX_LISTED", 3):
-        top = finish(near_optimal_set(problem, best.chosen, 0.5))
-    assert not top.complete
-    assert top.message.startswith("at least 3 placements")
-    with pytest.raises(SeipError, match="at least 0 and below 1"):
-        finish(near_optimal_set(problem, best.chosen, 1.5))
-
-
-def without_padding(placements: np.ndarray) -> set[tuple[int, ...]]:
-    return {tuple(candidate for candidate in row if candidate >= 0) for row in placements.tolist()}
-
-
-@given(st.integers(0, 2**32 - 1))
-@cases(20, 6)
-def test_a_search_cut_short_lists_the_best_and_what_differs_in_one_sensor(seed: int) -> None:
-    problem, _ = random_problem(seed)
-    best = finish(solve(problem))
-    every = without_padding(finish(near_optimal_set(problem, best.chosen, 0.3)).placements)
-    with patch.object(near_optimal, "MAX_BRANCHES", 0):
-        top = finish(near_optimal_set(problem, best.chosen, 0.3))
-    found = without_padding(top.placements)
-    chosen = set(best.chosen.tolist())
-    assert not top.complete
-    assert top.message.startswith("at least")
-    assert found <= every
-    assert {row for row in every if len(chosen - set(row)) <= 1 and len(row) == len(chosen)} <= found
-
-
 def test_rows_and_charts_of_a_study(tmp_path: Path) -> None:
     tie, time = TieCheck(1e-6, Share(0, 5), 0.0), TimeCheck("plane", 1.0, 1.1, 0.05, proven=False)
     with patch("headless.studies.stability.solver_limits.PLANE_ORDERS", (2, 3, 5)):
@@ -186,8 +130,5 @@ def test_rows_and_charts_of_a_study(tmp_path: Path) -> None:
     rows = solver_rows(SolverStudy((), (tie,), (greedy,), (time,)))
     assert "68.4%" in rows[1].begins
     assert "gap 5.0%" in rows[2].begins
-    problem, _ = random_problem(1)
-    top = finish(near_optimal_set(problem, finish(solve(problem)).chosen, 0.1))
     charts.save_solver_chart(tmp_path / "solvers.png", study, "solvers")
-    charts.save_near_optimal_chart(tmp_path / "flat.png", [("small", top)], "flat")
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in tmp_path.iterdir())

@@ -97,8 +97,6 @@ class Scenarios:
         of traffic at which vehicles block the view.
     pose_errors : PoseErrors
         Standard deviations, for pose errors only.
-    weights_from_traffic : bool
-        Whether the weight of each target is the number of seconds for which road users are there; for traffic only.
     count, held_out : int, optional
         Number of scenarios to optimise over and of held-out ones; `DEFAULT_COUNTS` if not given.
     seed : int
@@ -112,9 +110,6 @@ class Scenarios:
 
     kind: ScenarioKind = "nominal"
     pose_errors: PoseErrors = PoseErrors()
-    weights_from_traffic: bool = setting(
-        default=False, help="weight targets by the time that road users are there (with --traffic)"
-    )
     count: int | None = setting(
         None,
         "scenarios to optimise over (20 pose errors or 24 instants of traffic)",
