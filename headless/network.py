@@ -287,7 +287,6 @@ def _parser() -> argparse.ArgumentParser:
     survey.add_survey_settings(parser)
     add_settings(parser.add_argument_group("criterion"), Objective, "criterion", "shares")
     work = parser.add_argument_group("work")
-    add_settings(work, SurveySettings, "engine")
     work.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler: tcp://host:8786 or tls://host:8786")
     work.add_argument("--workers", type=whole_number(Limits(1, 1024)), metavar="N", help="processes on this machine")
     work.add_argument(

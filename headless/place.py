@@ -38,10 +38,9 @@ def main(argv: list[str]) -> None:
     """Place sensors in a scene and write the result to a folder."""
     options = _parser().parse_args(argv)
     objective = read_objective(options)
-    if options.keep_sensors:
+    if options.require == []:
         runtime.open_scene(options.scene)
-        kept = sensor_positions(bpy.context.scene)
-        objective = replace(objective, mandatory=tuple(dict.fromkeys((*objective.mandatory, *kept))))
+        objective = replace(objective, mandatory=tuple(sensor_positions(bpy.context.scene)))
     traffic: list[TrafficRuns] = []
 
     def check(layout: Layout) -> None:
@@ -88,11 +87,6 @@ def _parser() -> argparse.ArgumentParser:
     parser = new_parser("place", "Place roadside LiDARs in a scene.")
     survey.add_options(parser)
     add_objective(parser)
-    parser.add_argument(
-        "--keep-sensors",
-        action="store_true",
-        help="require a sensor at the position of each sensor of the scene, as --require with their names",
-    )
     parser.add_argument("--no-render", action="store_true", help="leave out the rendered view")
     return parser
 

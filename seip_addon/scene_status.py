@@ -140,4 +140,4 @@ def same_grid(one: SurveySettings, other: SurveySettings) -> bool:
 
 def _without_search(settings: SurveySettings) -> SurveySettings:
     default = SurveySettings()
-    return replace(settings, solver=default.solver, time_limit=default.time_limit, effort=default.effort)
+    return replace(settings, solver=default.solver, effort=default.effort)

@@ -9,7 +9,7 @@ from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProper
 
 from .. import selection
 from ..core.choosing.placement.objective import DEFAULT_COUNT, Objective
-from ..core.choosing.placement.scenarios import DEFAULT_COUNTS, MAX_ANGLE_STD, PoseErrors, Scenarios
+from ..core.choosing.placement.scenarios import MAX_ANGLE_STD, PoseErrors, Scenarios
 from .conversion import as_typed, of_setting
 
 
@@ -110,15 +110,6 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         subtype="DIR_PATH",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
-    instants: IntProperty(
-        name="Instants", description="Instants of traffic to optimise over", default=DEFAULT_COUNTS["traffic"][0], min=1
-    )
-    held_out: IntProperty(
-        name="Held-out Instants",
-        description="Instants of other runs to evaluate on",
-        default=DEFAULT_COUNTS["traffic"][1],
-        min=1,
-    )
     rules: CollectionProperty(type=SEIP_PG_position_rule)
     active_rule: IntProperty(name="Position")
     position: StringProperty(
@@ -152,7 +143,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
 
     def _scenarios(self) -> Scenarios:
         if self.scenarios == "traffic":
-            return Scenarios("traffic", count=self.instants, held_out=self.held_out)
+            return Scenarios("traffic")
         if self.scenarios == "pose-errors":
             position, tilt = as_typed(self.position_error), as_typed(self.tilt_error)
             return Scenarios("pose-errors", PoseErrors(position, position, tilt, tilt))

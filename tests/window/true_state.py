@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import bpy
 from bl_ext.user_default.seip.seip_addon import preferences
+from bl_ext.user_default.seip.seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
 from bl_ext.user_default.seip.seip_addon.core.sensing.visibility import ray_casting
 from bl_ext.user_default.seip.seip_addon.panels import detection, placement, results, site
 from bl_ext.user_default.seip.seip_addon.session import session
@@ -105,11 +106,9 @@ def _traffic_is_placed_on(window: Window) -> Steps:
     goal = _scene().seip.goal
     yield from window.open_section("objective")
     goal.scenarios, goal.risk, goal.runs = "traffic", "auto", str((Path("scenes") / "junction_traffic").resolve())
-    yield from window.enter("seip.goal.instants", "4")
-    yield from window.enter("seip.goal.held_out", "8")
+    DEFAULT_COUNTS["traffic"] = (4, 8)
     yield from window.picture("in-traffic")
     yield from _press(window, "seip.solve_placement(")
-    assert _record()["settings"]["goal"]["scenarios"]["count"] == 4
     assert any(note.startswith("this placement sees ") for note in _record()["notes"])
     assert (yield from _says(window, "This placement sees "))
 

@@ -22,9 +22,7 @@ COARSE = [
     "8",
     "--spacing",
     "25",
-    "--delta",
-    "6",
-    "--time-limit",
+    "--effort",
     "2",
 ]
 LITTLE = stability_chapters.StabilityScope(

@@ -81,12 +81,10 @@ class Objective:
     coverage: float | None = setting(
         None, "reach this share (0 to 1) at the least price", minimum=0.0, maximum=1.0, metavar="SHARE"
     )
-    central_weight: float | Literal["scene"] | None = setting(
-        None, "one weight for all weighted regions", minimum=0.0, maximum=CHOSEN_WEIGHT.most, metavar="W"
-    )
+    central_weight: float | Literal["scene"] | None = None
     min_distance: float = setting(0.0, "least distance between two sensors", unit="m", minimum=0.0, metavar="M")
     forbidden: tuple[str, ...] = setting((), "positions without sensor", option="forbid", metavar="POSITION")
-    mandatory: tuple[str, ...] = setting((), "positions with a sensor", option="require", metavar="POSITION")
+    mandatory: tuple[str, ...] = ()
     criterion: Literal["auto", "road", "returns"] = setting(
         "auto",
         "optimise the road seen, or the returns from road users (auto: returns, if sensors have a range law)",
@@ -157,8 +155,6 @@ class Objective:
         scenarios = self.scenarios
         given = {
             "the risk measure": self.risk != "auto",
-            "the number of scenarios": scenarios.count is not None,
-            "the number of held-out scenarios": scenarios.held_out is not None,
             "the seed of the scenarios": scenarios.seed != 0,
         }
         idle = next((setting for setting, there in given.items() if there), None)

@@ -39,32 +39,14 @@ class PoseErrors:
         A standard deviation is negative or too large.
     """
 
-    position: float = setting(
-        0.3, "standard deviation of x and of y", unit="m", maximum=MAX_OFFSET_STD, option="position-error", metavar="M"
-    )
-    height: float = setting(
-        0.3,
-        "default: same as --position-error",
-        unit="m",
-        maximum=MAX_OFFSET_STD,
-        option="height-error",
-        metavar="M",
-    )
-    yaw: float = setting(
-        math.radians(2.0),
-        "default: same as --tilt-error",
-        unit="rad",
-        maximum=math.pi,
-        option="yaw-error",
-        metavar="DEG",
-    )
+    position: float = setting(0.3, "standard deviation of x and of y", unit="m", maximum=MAX_OFFSET_STD)
+    height: float = 0.3
+    yaw: float = math.radians(2.0)
     tilt: float = setting(
         math.radians(2.0),
         "standard deviation of pitch and of roll",
         unit="rad",
         maximum=MAX_ANGLE_STD,
-        option="tilt-error",
-        metavar="DEG",
     )
 
     def __post_init__(self) -> None:
@@ -110,21 +92,8 @@ class Scenarios:
 
     kind: ScenarioKind = "nominal"
     pose_errors: PoseErrors = PoseErrors()
-    count: int | None = setting(
-        None,
-        "scenarios to optimise over (20 pose errors or 24 instants of traffic)",
-        minimum=1,
-        maximum=int(SCENARIOS.most),
-        option="scenarios",
-        metavar="N",
-    )
-    held_out: int | None = setting(
-        None,
-        "held-out scenarios to evaluate on (500 or 120)",
-        minimum=1,
-        maximum=int(DRAWS.most),
-        metavar="N",
-    )
+    count: int | None = None
+    held_out: int | None = None
     seed: int = setting(0, "seed of the scenarios (held-out scenarios use seed + 1)", minimum=0)
 
     def __post_init__(self) -> None:

@@ -21,8 +21,6 @@ class RecordedSettings:
     goal : Objective
     catalogue : tuple of str
         Names of the user's own catalogues, without their folders.
-    time_limit_s : float, optional
-        None for no limit.
     render : bool
         Whether the result includes a rendered view.
     """
@@ -31,12 +29,10 @@ class RecordedSettings:
     candidates: CandidateSettings
     visibility: VisibilitySettings = VisibilitySettings()
     weather: Weather = Weather()
-    reflectivity: tuple[str, ...] = ()
     grid_spacing_m: float = 1.0
     catalogue: tuple[str, ...] = ()
     engine: Engine = "auto"
     solver: str = "auto"
     effort: float = DEFAULT_EFFORT
-    time_limit_s: float | None = None
     installed_cost: InstalledCost | None = None
     render: bool = False
