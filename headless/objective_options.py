@@ -21,7 +21,7 @@ def add_objective(parser: argparse.ArgumentParser) -> None:
         "--weighted",
         nargs="?",
         const="scene",
-        type=real_number(CHOSEN_WEIGHT),
+        type=_weight,
         metavar="W",
         help="weight targets by their regions, or give all weighted regions one weight",
     )
@@ -52,6 +52,11 @@ def add_objective(parser: argparse.ArgumentParser) -> None:
     )
     add_settings(scenarios, Objective, "risk")
     add_settings(scenarios, Scenarios, "seed")
+
+
+def _weight(text: str) -> float | str:
+    """Read a weight; the text ``scene`` stands for those of the scene."""
+    return text if text == "scene" else real_number(CHOSEN_WEIGHT)(text)
 
 
 def read_objective(options: argparse.Namespace) -> Objective:

@@ -206,7 +206,7 @@ def test_the_button_states_number_and_time(junction):
     junction.seip.goal.limit = "BUDGET"
     junction.seip.goal.budget = 40_000.0
     assert placement.button_text(junction).startswith("Place for $40,000, up to ")
-    junction.seip.survey.heights = "8"
+    junction.seip.survey.heights = "5 8"
     assert placement.button_text(junction) == "Place for $40,000"
 
 

@@ -15,7 +15,7 @@ from ..errors import SeipError
 from ..geometry.plan import closed, without
 
 RuleName = Literal["cycle-tracks", "driveways", "landings", "private", "islands", "power-poles"]
-AllowedName = RuleName | Literal["assumed-poles"]
+AllowedName = Literal["cycle-tracks", "driveways", "landings", "private", "islands", "power-poles", "assumed-poles"]
 
 MIN_ISLAND_WIDTH = 4.0
 """Metres: islands and medians narrower than this are reserved for pedestrians, signals and signs."""

@@ -244,8 +244,8 @@ def read_small(path: Path, most: int, cure: str) -> bytes:
 
 
 def check_regular(path: Path) -> None:
-    """Raise SeipError if a path is something other than a file, such as a folder or a device that never ends."""
-    if path.exists() and not path.is_file():
+    """Raise SeipError if a path is a device or the like, which may never end."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
         raise SeipError(f"{path} is not a regular file: name a file")
 
 

@@ -40,8 +40,8 @@ class PoseErrors:
     """
 
     position: float = setting(0.3, "standard deviation of x and of y", unit="m", maximum=MAX_OFFSET_STD)
-    height: float = 0.3
-    yaw: float = math.radians(2.0)
+    height: float = setting(0.3, "standard deviation of the height", unit="m", maximum=MAX_OFFSET_STD)
+    yaw: float = setting(math.radians(2.0), "standard deviation of the yaw", unit="rad", maximum=math.pi)
     tilt: float = setting(
         math.radians(2.0),
         "standard deviation of pitch and of roll",
@@ -88,6 +88,12 @@ class Scenarios:
     ------
     SeipError
         A number is out of its limits.
+
+    Examples
+    --------
+    >>> scenarios = Scenarios("pose-errors", PoseErrors(position=0.1, height=0.1))
+    >>> scenarios.errs, scenarios.optimised, scenarios.evaluated
+    (True, 20, 500)
     """
 
     kind: ScenarioKind = "nominal"

@@ -29,6 +29,7 @@ from .reduced_problem import Instance, common_unit, make_instance
 from .search_limits import DEFAULT_LIMITS, MIN_PART, Clock, SolverLimits
 from .solvers import check_solver
 
+LISTED_SENSORS = 2  # sensors up to which branch and bound lists all choices in one step
 QUICK_STEPS = 50  # bounding steps before tabu search: a few seconds at the largest sites, and often enough for a proof
 BRANCHING_SHARE = 0.25  # of what is left of the limits, for a first branch and bound, which goes on after other methods
 
@@ -170,11 +171,13 @@ def solve_within(
 
 
 def _can_be_listed(instance: Instance, chosen: Integer, clock: Clock) -> Generator[Progress, None, bool]:
-    """Return whether few bounding steps leave so few candidates that branch and bound soon lists all their choices.
+    """Return whether branch and bound soon lists all choices: of one or two sensors, or of few candidates.
 
-    Then tabu search, which takes longer, cannot add anything. The work of these steps is not counted, so that what is
-    left for the other searches does not depend on them.
+    Then tabu search, which takes longer, cannot add anything. Few bounding steps show whether few candidates are left;
+    their work is not counted, so that what is left for the other searches does not depend on them.
     """
+    if instance.count <= LISTED_SENSORS and is_worthwhile(instance, np.arange(len(instance))):
+        return True
     apart = Clock(max(clock.seconds_left, MIN_PART), acceptance=clock.acceptance)
     goal = instance.as_good(instance.value(chosen))
     keep, _ = yield from lagrangian_bound(instance, goal, apart, iterations=QUICK_STEPS)
