@@ -62,7 +62,6 @@ def settings() -> dict[str, Any]:
         "engine": text,
         "solver": text,
         "installed_cost": {"anyOf": [anything, {"type": "null"}]},
-        "time_limit_s": {"type": "number"},
         "effort": {"type": "number"},
         "render": truth,
     }

@@ -257,7 +257,7 @@ def test_every_required_part_is_missed_when_it_is_absent(example, run):
 
 
 def test_settings_of_the_work_are_accepted_and_held_to_their_types(example, run):
-    work = {"engine": "auto", "solver": "highs", "catalogue": ["mine.toml"], "render": True, "time_limit_s": 60.0}
+    work = {"engine": "auto", "solver": "highs", "catalogue": ["mine.toml"], "render": True}
     record = content_of(make_record(example, {**run, "settings": {**run["settings"], **work}}))
     assert violations(record, SCHEMA) == []
     for name in work:
