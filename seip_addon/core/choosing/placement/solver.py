@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Integer
 from ...counts import counted
 from ...progress import Progress, finish
-from .bounds import MAX_LISTED_CHOICES, Bound, can_reach, lagrangian_bound
+from .bounds import MAX_ITERATIONS, MAX_LISTED_CHOICES, Bound, can_reach, lagrangian_bound
 from .branch_and_bound import BestPlacements, is_worthwhile, merit
 from .feasibility import starting_choice
 from .greedy import (
@@ -238,7 +238,10 @@ def prove(
         Function that is called with the objective value reached and the bound proven whenever one may have improved.
     """
     # First reduction: only candidates that an equally good or better placement may contain, and the incumbent's own.
-    keep, bound = yield from lagrangian_bound(instance, instance.as_good(instance.value(chosen)), clock)
+    # For one or two sensors branch and bound needs few: it must get its turn before the limits are reached.
+    steps = QUICK_STEPS if instance.count <= LISTED_SENSORS else MAX_ITERATIONS
+    goal = instance.as_good(instance.value(chosen))
+    keep, bound = yield from lagrangian_bound(instance, goal, clock, iterations=steps)
     note(instance.value(chosen), bound.value)
     proof = yield from _prove_among(instance.part(keep), np.searchsorted(keep, chosen), bound, solver, clock, note)
     return replace(proof, chosen=keep[proof.chosen], bound=instance.attained(proof.bound))
