@@ -27,7 +27,6 @@ from seip_addon.core.workflows.survey import Survey, lay_out, see
 from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.scene.blend_file import new_file, open_blend, save_blend
 from seip_addon.scene.build import build_scene
-from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.result_folder import write_result_folder
 
@@ -89,7 +88,6 @@ def _place(folder: Path, job: PlaceJob) -> Generator[Progress, None, None]:
 
 
 def _surveyed(folder: Path, settings: SurveySettings) -> Generator[Progress, None, Survey]:
-    set_reflectivity(settings.reflectivity)
     reading = read_scene(bpy.context.scene)
     layout = lay_out(reading.geometry, settings, reading.warnings)
     return (yield from see(layout, folder / VISIBILITY, threads=1))

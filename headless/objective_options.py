@@ -5,25 +5,43 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
-from headless.options import add_settings, read_settings
+from headless.options import add_settings, read_settings, real_number
 
 from seip_addon.core.choosing.placement.objective import Objective
 from seip_addon.core.choosing.placement.scenarios import PoseErrors, ScenarioKind, Scenarios
 from seip_addon.core.errors import SeipError
+from seip_addon.core.limits import CHOSEN_WEIGHT
 
 
 def add_objective(parser: argparse.ArgumentParser) -> None:
     """Add the parts of an objective to a command: criterion, constraints, scenarios and risk measure."""
     objective = parser.add_argument_group("objective")
-    add_settings(objective, Objective, "count", "budget", "coverage", "criterion", "shares", "seen_by", "failures")
-    objective.add_argument("--weighted", action="store_true", help="weight targets by their regions")
-    add_settings(objective, Objective, "central_weight", "min_distance", "forbidden", "mandatory")
-    scenarios = parser.add_argument_group("scenarios")
-    scenarios.add_argument(
-        "--pose-errors", action="store_true", help="optimise over random errors of the sensors' poses"
+    add_settings(objective, Objective, "count", "budget", "coverage", "criterion", "shares", "failures")
+    objective.add_argument(
+        "--weighted",
+        nargs="?",
+        const="scene",
+        type=_weight,
+        metavar="W",
+        help="weight targets by their regions, or give all weighted regions one weight",
     )
-    add_settings(scenarios, PoseErrors, "position", "height", "yaw", "tilt")
-    scenarios.set_defaults(position_error=None, height_error=None, yaw_error=None, tilt_error=None)
+    add_settings(objective, Objective, "min_distance", "forbidden")
+    objective.add_argument(
+        "--require",
+        nargs="*",
+        metavar="POSITION",
+        help="positions with a sensor; without names those of the sensors in the scene",
+    )
+    scenarios = parser.add_argument_group("scenarios")
+    usual = PoseErrors()
+    scenarios.add_argument(
+        "--pose-errors",
+        nargs="*",
+        type=float,
+        metavar=("METRES", "DEGREES"),
+        help="optimise over random errors of the sensors' poses, by standard deviations of position and of angles "
+        f"({usual.position:g} {math.degrees(usual.tilt):g})",
+    )
     scenarios.add_argument(
         "--traffic",
         nargs="*",
@@ -32,33 +50,37 @@ def add_objective(parser: argparse.ArgumentParser) -> None:
         help="optimise over instants of runs of traffic, and evaluate on the last third of the runs (default: those in "
         "the folder SCENE_traffic beside the scene)",
     )
-    add_settings(scenarios, Scenarios, "weights_from_traffic")
     add_settings(scenarios, Objective, "risk")
-    add_settings(scenarios, Scenarios, "count", "held_out", "seed")
+    add_settings(scenarios, Scenarios, "seed")
+
+
+def _weight(text: str) -> float | str:
+    """Read a weight; the text ``scene`` stands for those of the scene."""
+    return text if text == "scene" else real_number(CHOSEN_WEIGHT)(text)
 
 
 def read_objective(options: argparse.Namespace) -> Objective:
     """Return the objective that options of `add_objective` name."""
-    weight = "scene" if options.weighted and options.central_weight is None else options.central_weight
-    return read_settings(Objective, options, central_weight=weight, scenarios=_scenarios(options))
+    required = tuple(options.require or ())
+    return read_settings(
+        Objective, options, central_weight=options.weighted, mandatory=required, scenarios=_scenarios(options)
+    )
 
 
 def _scenarios(options: argparse.Namespace) -> Scenarios:
-    errors = [options.position_error, options.height_error, options.yaw_error, options.tilt_error]
-    errs = options.pose_errors or any(error is not None for error in errors)
-    if errs and options.traffic is not None:
+    errors: list[float] | None = options.pose_errors
+    if errors is not None and options.traffic is not None:
         raise SeipError("scenarios are of pose errors or of traffic: leave out --pose-errors or --traffic")
-    kind: ScenarioKind = "pose-errors" if errs else "nominal" if options.traffic is None else "traffic"
-    if kind != "traffic" and options.weights_from_traffic:
-        raise SeipError("--weights-from-traffic needs --traffic")
-    return replace(read_settings(Scenarios, options, pose_errors=_pose_errors(*errors)), kind=kind)
+    kind: ScenarioKind = "nominal" if options.traffic is None else "traffic"
+    kind = kind if errors is None else "pose-errors"
+    return replace(read_settings(Scenarios, options, pose_errors=_pose_errors(errors or [])), kind=kind)
 
 
-def _pose_errors(position: float | None, height: float | None, yaw: float | None, tilt: float | None) -> PoseErrors:
-    """Return pose errors in metres and degrees: height follows position, and yaw tilt, where they are not given."""
+def _pose_errors(errors: list[float]) -> PoseErrors:
+    """Return pose errors of up to two numbers: metres of position and height, degrees of all angles."""
+    if len(errors) > 2:
+        raise SeipError(f"--pose-errors takes metres and degrees, not {len(errors)} numbers")
     usual = PoseErrors()
-    position = usual.position if position is None else position
-    tilted = usual.tilt if tilt is None else math.radians(tilt)
-    return PoseErrors(
-        position, position if height is None else height, tilted if yaw is None else math.radians(yaw), tilted
-    )
+    position = errors[0] if errors else usual.position
+    angle = math.radians(errors[1]) if len(errors) > 1 else usual.tilt
+    return PoseErrors(position, position, angle, angle)

@@ -17,13 +17,14 @@ from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from headless.removed import check_removed
 
+from seip_addon.core.counts import typed_number
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import Limits
 from seip_addon.core.settings import Setting, settings_of
 
 Options = TypeVar("Options")
 Number = TypeVar("Number", int, float)
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 NUMBER = "number"
 """Name of the types of options that take a number within limits."""
 
@@ -125,7 +126,7 @@ def real_number(limits: Limits) -> Callable[[str], float]:
     """Return a type of options that takes a number within limits; NaN and infinity are outside."""
 
     def read(text: str) -> float:
-        return _within(limits, text, float(text))
+        return _within(limits, text, typed_number(text))
 
     read.__name__ = NUMBER  # argparse says "invalid number value"
     return read
@@ -135,7 +136,7 @@ def whole_number(limits: Limits) -> Callable[[str], int]:
     """Return a type of options that takes a whole number within limits."""
 
     def read(text: str) -> int:
-        return _within(limits, text, int(text))
+        return _within(limits, text, int(text if text.isascii() else ""))
 
     read.__name__ = "whole number"
     return read
@@ -185,15 +186,8 @@ def add_rolling_shutter(group: argparse._ActionsContainer) -> None:
     )
 
 
-def add_optics(group: argparse._ActionsContainer) -> None:
-    """Add options of what surfaces reflect and of the weather."""
-    group.add_argument(
-        "--reflectivity",
-        nargs="+",
-        default=[],
-        metavar="M=SHARE",
-        help="reflectivity of materials M, 0 to 1 (default: from the scene)",
-    )
+def add_weather(group: argparse._ActionsContainer) -> None:
+    """Add the option of the weather."""
     group.add_argument(
         "--weather", nargs="+", default=[], metavar="WHAT", help="weather: rain=MM/H, visibility=M in fog, wet"
     )

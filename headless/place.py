@@ -12,7 +12,6 @@ or as plain Python on the bpy module::
 import argparse
 import sys
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -20,16 +19,14 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime, survey
 from headless.charts.evaluation import save_evaluation_charts
-from headless.convergence import coarsest_settings
 from headless.objective_options import add_objective, read_objective
-from headless.options import new_parser, real_number
+from headless.options import new_parser
 
 import bpy
 
 from seip_addon.core.choosing.placement.deployment import price_text
 from seip_addon.core.choosing.placement.objective import Solution, check_objective
 from seip_addon.core.choosing.placement.returns_summary import share_reached
-from seip_addon.core.limits import SHARE
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.placing import place, with_context
 from seip_addon.core.workflows.survey import Layout
@@ -41,12 +38,9 @@ def main(argv: list[str]) -> None:
     """Place sensors in a scene and write the result to a folder."""
     options = _parser().parse_args(argv)
     objective = read_objective(options)
-    if options.keep_sensors:
+    if options.require == []:
         runtime.open_scene(options.scene)
-        kept = sensor_positions(bpy.context.scene)
-        objective = replace(objective, mandatory=tuple(dict.fromkeys((*objective.mandatory, *kept))))
-    tolerance = options.tolerance
-    refine = None if tolerance is None else partial(coarsest_settings, objective=objective, tolerance=tolerance)
+        objective = replace(objective, mandatory=tuple(sensor_positions(bpy.context.scene)))
     traffic: list[TrafficRuns] = []
 
     def check(layout: Layout) -> None:
@@ -54,7 +48,7 @@ def main(argv: list[str]) -> None:
         if objective.scenarios.kind == "traffic":
             traffic.append(finish(read_runs(options.traffic or survey.runs_beside(options.scene), layout)))
 
-    surveyed, watch = survey.survey(options, check, refine)
+    surveyed, watch = survey.survey(options, check)
     runs = traffic[0] if traffic else None
     if runs is not None:
         runtime.LOG.info(runs.overlap)
@@ -93,17 +87,6 @@ def _parser() -> argparse.ArgumentParser:
     parser = new_parser("place", "Place roadside LiDARs in a scene.")
     survey.add_options(parser)
     add_objective(parser)
-    parser.add_argument(
-        "--tolerance",
-        type=real_number(SHARE),
-        metavar="SHARE",
-        help="choose the coarsest --grid and --spacing whose placement loses at most this share of coverage",
-    )
-    parser.add_argument(
-        "--keep-sensors",
-        action="store_true",
-        help="require a sensor at the position of each sensor of the scene, as --require with their names",
-    )
     parser.add_argument("--no-render", action="store_true", help="leave out the rendered view")
     return parser
 

@@ -4,12 +4,38 @@ from collections.abc import Sequence
 
 from seip_addon.core.errors import SeipError
 
+_CONSTANT = "the value that it had by default is used; from Python, set it in the settings of a survey"
+_ERRORS = "give the standard deviations in metres and degrees as --pose-errors 0.3 2"
+
 REMOVED: dict[str, str] = {
+    "--assumed-poles": "use --allow assumed-poles",
+    "--bracket": _CONSTANT,
+    "--central-weight": "use --weighted W",
+    "--clearance": _CONSTANT,
+    "--criterion height": "use --criterion road or returns",
+    "--delta": _CONSTANT,
+    "--detection": _CONSTANT,
+    "--engine": "Embree is used where it is installed, otherwise BVHTree",
     "--flows": "write the vehicles per hour of each site into the column weight of a table of sites",
+    "--height-error": _ERRORS,
+    "--held-out": _CONSTANT,
     "--installed": "give the whole budget at once",
+    "--keep-sensors": "use --require without names",
     "--memory": "each process may use 4 GiB; use fewer --workers where the machine has less",
+    "--min-intensity": _CONSTANT,
     "--minimum": "use --coverage for a share of the road at every site",
+    "--position-error": _ERRORS,
+    "--reflectivity": "set the property seip_reflectivity of the material in the scene",
+    "--scenarios": _CONSTANT,
+    "--seen-by": "the result has the share of the road seen twice; --failures worst asks for redundancy",
     "--sensors-only": "give --installed-cost a TOML file whose costs are 0",
+    "--setback": _CONSTANT,
+    "--tilt-error": _ERRORS,
+    "--time-limit": "use --effort, about a second of one core for each unit",
+    "--tolerance": "give --grid and --spacing; docs/stability.md shows what coarser ones lose",
+    "--weights-from-traffic": "give regions a weight in the scene and add --weighted",
+    "--yaw-error": _ERRORS,
+    "--yaws": _CONSTANT,
 }
 """By option, or by option and value as in ``--format opv2v``: what to do instead, as the end of a sentence."""
 

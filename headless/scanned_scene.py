@@ -8,13 +8,12 @@ import bpy
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.site.weather import weather_of
-from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import SceneReading, read_scene
 from seip_addon.scene.sensors import read_sensors
 
 
 def read_scanned_scene(options: argparse.Namespace) -> tuple[SceneReading, list[MountedSensor]]:
-    """Read the open scene and its sensors, with the catalogue, the reflectivity and the weather of the options.
+    """Read the open scene and its sensors, with the catalogue and the weather of the options.
 
     Raises
     ------
@@ -22,7 +21,6 @@ def read_scanned_scene(options: argparse.Namespace) -> tuple[SceneReading, list[
         An option, the scene or a sensor is invalid, or there are no sensors.
     """
     weather = weather_of(options.weather)
-    set_reflectivity(options.reflectivity)
     reading = read_scene(bpy.context.scene)
     sensors = [
         replace(sensor, model=weather.through(sensor.model))

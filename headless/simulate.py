@@ -15,7 +15,7 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime
-from headless.options import add_optics, add_settings, new_parser, read_settings
+from headless.options import add_settings, add_weather, new_parser, read_settings
 from headless.scanned_scene import read_scanned_scene
 
 import bpy
@@ -56,13 +56,7 @@ def main(argv: list[str]) -> None:
 
 
 def _settings(options: argparse.Namespace) -> RecordingSettings:
-    scan = read_settings(
-        ScanSettings,
-        options,
-        noise=not options.no_noise,
-        weather=tuple(options.weather),
-        reflectivity=tuple(options.reflectivity),
-    )
+    scan = read_settings(ScanSettings, options, noise=not options.no_noise, weather=tuple(options.weather))
     return read_settings(RecordingSettings, options, scan=scan, formats=tuple(options.format), split=options.split)
 
 
@@ -111,8 +105,7 @@ def _parser() -> argparse.ArgumentParser:
     how = parser.add_argument_group("measurement")
     add_settings(how, ScanSettings, "seed", "rolling_shutter")
     how.add_argument("--no-noise", action="store_true", help="exact ranges without lost returns")
-    add_optics(how)
-    add_settings(how, ScanSettings, "engine")
+    add_weather(how)
     export = parser.add_argument_group("datasets")
     export.add_argument(
         "--format", nargs="+", choices=tuple(FORMATS), default=[], help="also write the run in these formats"

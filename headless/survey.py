@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from headless import runtime
-from headless.convergence import Convergence
-from headless.options import add_optics, add_settings, read_settings
+from headless.options import add_settings, add_weather, read_settings
 
 import bpy
 import numpy as np
@@ -24,12 +23,10 @@ from seip_addon.core.counts import counted
 from seip_addon.core.output.results.placement_record import Provenance
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.triangle_culling import culling_message
 from seip_addon.core.settings import settings_of
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
-from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
 from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.folder_contents import check_no_run
@@ -37,7 +34,6 @@ from seip_addon.core.workflows.records import record_of
 from seip_addon.core.workflows.survey import Layout, Survey, lay_out, see
 from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.core.workflows.traffic_runs import runs_in, traffic_folder
-from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.result_folder import write_result_folder
 
@@ -71,23 +67,21 @@ def add_options(parser: argparse.ArgumentParser) -> tuple[argparse._ArgumentGrou
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the results")
     groups = add_survey_settings(parser)
     work = parser.add_argument_group("work")
-    add_settings(work, SurveySettings, "engine")
     work.add_argument(
         "--scheduler",
         metavar="ADDRESS",
         help="Dask scheduler for ray casting: tcp://host:8786 or tls://host:8786",
     )
-    add_settings(work, SurveySettings, "solver")
-    add_settings(work, SurveySettings, "effort", "time_limit")
+    add_settings(work, SurveySettings, "solver", "effort")
     return (*groups, work)
 
 
 def add_survey_settings(parser: argparse.ArgumentParser) -> tuple[argparse._ArgumentGroup, ...]:
-    """Add what a survey depends on to a command: sensors, grid and candidates, and returns; return their groups."""
+    """Add what a survey depends on to a command: sensors, grid, candidates and weather; return their groups."""
     sensors = parser.add_argument_group("sensors")
     add_settings(sensors, CandidateSettings, "sensors")
     add_settings(sensors, SurveySettings, "catalogue")
-    add_settings(sensors, CandidateSettings, "heights", "tilts", "yaws", "assumed_poles")
+    add_settings(sensors, CandidateSettings, "heights", "tilts")
     installed, _ = settings_of(SurveySettings)["installed_cost"]
     sensors.add_argument(
         "--installed-cost",
@@ -97,14 +91,11 @@ def add_survey_settings(parser: argparse.ArgumentParser) -> tuple[argparse._Argu
         metavar=installed.metavar,
         help=installed.help,
     )
-    metres = parser.add_argument_group("grid and candidates, in metres")
+    metres = parser.add_argument_group("site: grid and candidates in metres, and weather")
     add_settings(metres, SurveySettings, "grid_spacing")
-    add_settings(metres, VisibilitySettings, "delta")
-    add_settings(metres, CandidateSettings, "spacing", "setback", "clearance", "bracket", "allow")
-    returns = parser.add_argument_group("returns")
-    add_settings(returns, VisibilitySettings, "detection", "min_intensity")
-    add_optics(returns)
-    return sensors, metres, returns
+    add_settings(metres, CandidateSettings, "spacing", "allow")
+    add_weather(metres)
+    return sensors, metres
 
 
 def runs_beside(scene: Path | None, kind: str = "") -> list[Path]:
@@ -112,12 +103,7 @@ def runs_beside(scene: Path | None, kind: str = "") -> list[Path]:
     return runs_in(traffic_folder(Path(bpy.data.filepath) if scene is None else scene, kind))
 
 
-Refine = Callable[[SceneGeometry, SurveySettings], Generator[Progress, None, Convergence]]
-
-
-def survey(
-    options: argparse.Namespace, check: Callable[[Layout], None], refine: Refine | None = None
-) -> tuple[Survey, Stopwatch]:
+def survey(options: argparse.Namespace, check: Callable[[Layout], None]) -> tuple[Survey, Stopwatch]:
     """Read the scene, lay out its site, and find or compute its visibility grid; return with it how long that took.
 
     Parameters
@@ -126,8 +112,6 @@ def survey(
         Options of a parser with `add_options`.
     check : callable
         Called before any ray is cast: refuses what cannot be had on the layout.
-    refine : callable, optional
-        Finds the spacings of targets and candidates.
     """
     settings = read_survey_settings(options)
     settings.models()  # refuses unknown types before the scene is read
@@ -135,12 +119,8 @@ def survey(
     check_no_run(options.output)
     runtime.open_scene(options.scene)
 
-    set_reflectivity(options.reflectivity)
     watch = Stopwatch()
     reading = watch.time("read the scene", lambda: read_scene(bpy.context.scene))
-    if refine is not None:
-        settings = watch.run("spacings", refine(reading.geometry, settings)).settings
-        LOG.info(settings.spacings_because)
     layout = watch.time("lay out the site", lambda: lay_out(reading.geometry, settings, reading.warnings))
     LOG.info(_describe_site(layout.site))
     runtime.warn(layout.warnings)
@@ -171,15 +151,12 @@ def describe_sensor(sensor: Sensor) -> str:
 def read_survey_settings(options: argparse.Namespace) -> SurveySettings:
     """Return the settings of a survey that options name."""
     candidates = read_settings(CandidateSettings, options)
-    visibility = read_settings(VisibilitySettings, options)
     return read_settings(
         SurveySettings,
         options,
         candidates=candidates,
-        visibility=visibility,
         weather=weather_of(options.weather),
         installed_cost=None if options.installed_cost is None else load_installed_cost(options.installed_cost),
-        reflectivity=tuple(options.reflectivity),
     )
 
 

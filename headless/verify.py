@@ -15,7 +15,7 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime
-from headless.options import add_optics, add_settings, new_parser, read_settings
+from headless.options import add_settings, add_weather, new_parser, read_settings
 from headless.scanned_scene import read_scanned_scene
 
 import bpy
@@ -48,10 +48,8 @@ def main(argv: list[str]) -> None:
     reading, planned = read_scanned_scene(options)
     geometry = reading.geometry
     recording = open_recording(options.recording, min(one.model.rotation_rate for one in planned))
-    survey = read_settings(SurveySettings, options, visibility=read_settings(VisibilitySettings, options))
-    found = runtime.finish_with_bar(
-        verify(geometry, planned, recording, survey.visibility, spacing=survey.grid_spacing, engine=survey.engine)
-    )
+    spacing = read_settings(SurveySettings, options).grid_spacing
+    found = runtime.finish_with_bar(verify(geometry, planned, recording, VisibilitySettings(), spacing=spacing))
     folder = options.output
     for one in found.sensors:
         runtime.warn(one.background.warnings(one.registration.sensor.label))
@@ -112,9 +110,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("scene", type=Path, help="the .blend of the plan, with its sensors")
     parser.add_argument("recording", type=Path, help="folder of sweeps, one for each sensor, or a .pcap")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the results")
-    add_settings(parser, SurveySettings, "catalogue", "grid_spacing", "engine")
-    add_settings(parser, VisibilitySettings, "delta", "min_intensity", "detection")
-    add_optics(parser)
+    add_settings(parser, SurveySettings, "catalogue", "grid_spacing")
+    add_weather(parser)
     return parser
 
 

@@ -11,7 +11,6 @@ import bpy
 
 from .core.errors import SeipError
 from .core.output.results.placement_file import parsed_record
-from .core.sensing.lidar.range_equation import RangeEquation
 from .core.workflows.survey_settings import SurveySettings
 from .scene import contract
 from .session import session
@@ -76,41 +75,12 @@ def current_step(scene: bpy.types.Scene) -> str:
     return "placement" if operator in {"", "seip.solve_placement"} and not has_nothing(scene) else "site"
 
 
-def expected_seconds(scene: bpy.types.Scene) -> float | None:
-    """Return an approximate upper limit of the time that a placement takes, seconds; None if it is not known.
-
-    It is the sum of the estimate of the last check for visibility, scaled to the present sensors and poses, and the
-    limit of the search. Returns from road users take about twice as long as visibility.
-    """
-    survey, check = scene.seip.survey, session.checks.get(scene.session_uid)
+def search_seconds(scene: bpy.types.Scene) -> float | None:
+    """Return an approximate upper limit of the time of a search in seconds; None if visibility is not computed yet."""
     state = session.state_of(scene)
-    search = float(survey.time_limit or survey.effort)
-    if state is not None and state.survey is not None and not stale_survey(scene):
-        return search
-    settings = checked_settings(scene)
-    if check is None or check.estimate is None or isinstance(settings, str) or isinstance(check.settings, str):
+    if state is None or state.survey is None or stale_survey(scene):
         return None
-    ratio = _rays(settings) / max(_rays(check.settings), 1.0)
-    return search + check.estimate * ratio * (1.0 + 2.0 * _counts_returns(scene, settings))
-
-
-def _rays(settings: SurveySettings) -> float:
-    """Return a measure of the rays from one position: those of each type in a revolution, at each height and tilt."""
-    rays = 0.0
-    for key in settings.candidates.sensors:
-        model = session.sensor_types.get(key)
-        if model is not None:
-            yaws = 1 if model.all_round else settings.candidates.yaws
-            rays += model.channels * model.azimuth_count * yaws
-    return rays * len(settings.candidates.heights) * len(settings.candidates.tilts)
-
-
-def _counts_returns(scene: bpy.types.Scene, settings: SurveySettings) -> bool:
-    """Return whether a placement would be chosen for returns from road users."""
-    criterion = scene.seip.goal.criterion
-    types = (session.sensor_types.get(key) for key in settings.candidates.sensors)
-    real = any(model is not None and isinstance(model.law, RangeEquation) for model in types)
-    return criterion == "returns" or (criterion == "auto" and real)
+    return float(scene.seip.survey.effort)
 
 
 def stale_survey(scene: bpy.types.Scene) -> str:
@@ -170,4 +140,4 @@ def same_grid(one: SurveySettings, other: SurveySettings) -> bool:
 
 def _without_search(settings: SurveySettings) -> SurveySettings:
     default = SurveySettings()
-    return replace(settings, solver=default.solver, time_limit=default.time_limit, effort=default.effort)
+    return replace(settings, solver=default.solver, effort=default.effort)

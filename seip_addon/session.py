@@ -129,13 +129,10 @@ class CheckedScene:
         Whether the scene has changed since.
     settings : SurveySettings or str
         See `scene_status.checked_settings`.
-    estimate : float or None
-        Seconds that the visibility grid will take with these settings.
     """
 
     watch: Watch
     settings: SurveySettings | str
-    estimate: float | None = None
 
 
 @dataclass

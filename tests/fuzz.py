@@ -3,7 +3,7 @@
 Numbers of a result are finite and within `core.limits`: an accepted file with any other number is a fault.
 
     python -m tests.fuzz --count 1000            # of each format
-    python -m tests.fuzz map npz --count 5000 --seed 7
+    python -m tests.fuzz map sweep.npz --count 5000 --seed 7
     python -m tests.fuzz --minutes 60              # with further seeds, for an hour
 
 Inputs are read in a process of their own, so that one that hangs, crashes or fills the memory is counted and named
@@ -30,7 +30,7 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -339,139 +339,6 @@ def _read_routes(path: Path, content: bytes) -> None:
         require_physical(finish(read_vehicle_types([path])), most=100.0)
 
 
-# --- files of arrays
-
-
-def _arrays(folder: Path) -> list[bytes]:
-    from seip_addon.core.sensing.scans.frame import Frame, Labels  # noqa: PLC0415
-    from seip_addon.core.sensing.visibility.grid import VisibilityGrid  # noqa: PLC0415
-    from tests.builders.traffic_by_hand import USERS, make_trajectories  # noqa: PLC0415
-
-    random = np.random.default_rng(0)
-    ways = [[(0.1 * step, step + 9.0 * user, 0.0, 0.0, 0.1 * step, 0.0) for step in range(4)] for user in range(2)]
-    trajectories = make_trajectories(*ways, users=USERS)
-    grid = VisibilityGrid(random.integers(0, 256, (9, 5)).astype(np.uint8), (9, 37), "0" * 64, {"delta": 1.0})
-    instance = np.where(random.random(50) < 0.5, -1, 3).astype(np.int32)
-    labels = Labels(
-        user=np.array([0, 3]),
-        category=np.array(["car", "bus"]),
-        centre=np.zeros((2, 3)),
-        size=np.ones((2, 3)),
-        yaw=np.zeros(2),
-        pitch=np.zeros(2),
-        speed=np.zeros(2),
-        points=np.array([[0, 0], [int(np.count_nonzero(instance == 3)), 0]]),
-        visibility=np.ones(2),
-        inside=np.array([True, False]),
-    )
-    frame = Frame(
-        time=1.0,
-        points=random.normal(size=(50, 3)).astype(np.float32),
-        sensor=np.zeros(50, dtype=np.int16),
-        delay=np.zeros(50, dtype=np.float32),
-        intensity=random.random(50).astype(np.float32),
-        instance=instance,
-        foreground=random.random(50) < 0.5,
-        labels=labels,
-    )
-    contents = []
-    for thing in (trajectories, grid, frame):
-        thing.save(folder / "sample.npz")
-        contents.append((folder / "sample.npz").read_bytes())
-    return contents
-
-
-def _mutate_arrays(random: Random, content: bytes) -> Case:
-    if random.random() < 0.4:
-        return Case(mutated_bytes(random, content))
-    with np.load(io.BytesIO(content)) as stored:
-        arrays = {name: stored[name] for name in stored.files}
-    header = json.loads(str(arrays.pop("header")))
-    whole = random.random() < 0.5
-    if whole:  # a file of the version without a digest: its content alone is at fault
-        del header["digest"]
-        header["version"] = 1
-    name = sorted(arrays)[int(random.integers(len(arrays)))]
-    arrays[name] = _at_fault(random, arrays[name])
-    file = io.BytesIO()
-    np.savez(file, header=np.array(json.dumps(header)), **arrays)
-    return Case(file.getvalue(), contradicts=True)
-
-
-def _at_fault(random: Random, array: np.ndarray) -> np.ndarray:
-    """Return an array of another shape or type, or with a value that no file may have."""
-    kind = int(random.integers(5))
-    if kind == 0:
-        return np.concatenate([array, array[:1]]) if array.shape[0] else np.zeros((1, *array.shape[1:]))
-    if kind == 1:
-        return array[:-1]
-    if kind == 2:
-        return array.astype("U" if array.dtype.kind != "U" else "S", copy=False)
-    if kind == 3:
-        return array[None]
-    if array.dtype.kind == "f":
-        changed = array.copy()
-        changed.flat[int(random.integers(changed.size))] = (np.nan, np.inf, -np.inf, 1e30)[int(random.integers(4))]
-        return changed
-    return array.astype(np.float16) if array.dtype.kind in "iub" else array.astype(object).astype("S")
-
-
-def _read_arrays(path: Path, content: bytes) -> None:
-    from seip_addon.core.errors import SeipError  # noqa: PLC0415
-    from seip_addon.core.sensing.scans.frame import Frame  # noqa: PLC0415
-    from seip_addon.core.sensing.traffic.trajectories import Trajectories  # noqa: PLC0415
-    from seip_addon.core.sensing.visibility.grid import VisibilityGrid  # noqa: PLC0415
-
-    read = 0
-    for kind in (Trajectories, VisibilityGrid, Frame):
-        try:
-            found = kind.load(path)
-        except SeipError as error:
-            _sentence(str(error))
-        else:
-            read += 1
-            require_physical(found, most=1e11)
-            found.save(path.with_suffix(".again.npz"))
-            assert _values(path.with_suffix(".again.npz")) == _values(path), "arrays other than those written"
-    if not read:
-        raise SeipError("no kind of array file")
-
-
-def _values(path: Path) -> dict[str, bytes]:
-    with np.load(path) as stored:
-        return {name: stored[name].tobytes() for name in stored.files if name != "header"}
-
-
-# --- manifests
-
-
-def _manifests(_: Path) -> list[bytes]:
-    frame = {"name": "000000", "time_s": 0.0, "points": 5, "road_users": 1, "sha256": "0" * 64}
-    run = {
-        "schema": "seip-run/1",
-        "key": "0" * 64,
-        "complete": True,
-        "sensors": [{"label": "S1", "sensor": "type1", "local_m": [1.0, 2.0, 5.0]}],
-        "trajectories": {"source": "by hand", "road_users": 1},
-        "frames": [frame, {**frame, "name": "000001"}],
-    }
-    return [json.dumps(run, indent=1).encode()]
-
-
-_mutate_manifest = _with_wrong_values(
-    0.15, r'"(?:name|sensors|local_m|complete|frames)": ("\d+"|\[|true)', ("NaN", '"../x"', "null", "7")
-)
-
-
-def _read_manifest(path: Path, _: bytes) -> None:
-    from seip_addon.core.sensing.scans.run_folder import load_manifest  # noqa: PLC0415
-
-    folder = path.parent / "run"
-    folder.mkdir(exist_ok=True)
-    path.replace(folder / "manifest.json")
-    load_manifest(folder)
-
-
 # --- Blender's files and detectors
 
 
@@ -557,121 +424,6 @@ def _read_detector(path: Path, _: bytes) -> None:
 
 
 # --- records of placements, and the arrays beside them
-
-
-def _records(folder: Path) -> list[bytes]:
-    from tests.builders.report_folder import make_folder  # noqa: PLC0415
-
-    make_folder(folder / "sample", pictures=True)
-    return [(folder / "sample" / "placement.json").read_bytes()]
-
-
-_FAULTS = {
-    "height_m": ("-1e308", "1e308", "1e5"),
-    "price_usd": ("-5", "1e300", "3e10"),
-    "coverage_alone": ("3e29", "-0.5", "1.5"),
-    "coverage_added": ("3e29", "-0.5", "1.5"),
-    "whole": ("3e29", "-0.5", "1.5"),
-    "seen_twice": ("-1", "2"),
-    "yaw_deg": ("1e30", "-1e4"),
-    "targets": ("-1", "1e30"),
-    "value": ("-3", "1e300"),
-    "gap_to_placement": ("0.9", "-0.9"),
-    "grid_spacing_m": ("-1", "3e29"),
-    "delta": ("-1", "3e29"),
-    "effort": ("-1e308", "3e29"),
-    "spacing": ("-1", "3e29"),
-}
-
-
-def _mutate_record(random: Random, content: bytes) -> Case:
-    if random.random() < 0.3:
-        names = [name for name in sorted(_FAULTS) if f'"{name}": ' in content.decode()]
-        name = names[int(random.integers(len(names)))]
-        pattern = rf'"{name}": (-?[\d.]+(?:e[-+]?\d+)?)'
-        return Case(_changed(random, content.decode(), pattern, _FAULTS[name]), contradicts=True)
-    if random.random() < 0.1:
-        return Case(_changed(random, content.decode(), r'"id": "(S[23])"', ("S1",)), contradicts=True)
-    return Case(mutated_text(random, content))
-
-
-def _read_record(path: Path, _: bytes) -> None:
-    from seip_addon.core.output.results.placement_file import load_placement  # noqa: PLC0415
-
-    record = load_placement(path)
-    settings = asdict(record.request)
-    settings["weather"]["visibility"] = min(settings["weather"]["visibility"], 1e6)  # infinite in clear air
-    require_physical(record.as_json() | {"settings": settings}, "placement.json")
-    assert len({sensor.id for sensor in record.sensors}) == len(record.sensors), "two sensors of one label"
-
-
-def _site_files(folder: Path) -> list[bytes]:
-    from tests.builders.report_folder import make_folder  # noqa: PLC0415
-
-    make_folder(folder / "sample", pictures=True)
-    return [(folder / "sample" / "site.npz").read_bytes()]
-
-
-def _mutate_signed(random: Random, content: bytes) -> Case:
-    """Change a number of an array or of the header, and sign the file again."""
-    from seip_addon.core.storage.array_file import _digest  # noqa: PLC0415
-
-    with np.load(io.BytesIO(content)) as stored:
-        arrays = {name: stored[name] for name in stored.files}
-    header = json.loads(str(arrays.pop("header")))
-    del header["digest"]
-    floats = sorted(name for name, array in arrays.items() if array.dtype.kind == "f" and array.size)
-    if random.random() < 0.5 and floats:
-        name = floats[int(random.integers(len(floats)))]
-        arrays[name] = arrays[name].copy()
-        wrong = (np.nan, np.inf, -np.inf, 1e30, -1e30)
-        arrays[name].flat[int(random.integers(arrays[name].size))] = wrong[int(random.integers(len(wrong)))]
-    else:
-        numbers = sorted(name for name, value in header.items() if isinstance(value, int | float) and name != "version")
-        if not numbers:
-            return Case(mutated_bytes(random, content))
-        header[numbers[int(random.integers(len(numbers)))]] = (1e300, -1e300)[int(random.integers(2))]
-    header["digest"] = _digest(header, arrays)
-    file = io.BytesIO()
-    np.savez(file, header=np.array(json.dumps(header)), **arrays)
-    return Case(file.getvalue(), contradicts=True)
-
-
-def _read_site_file(path: Path, _: bytes) -> None:
-    from seip_addon.core.output.results.site_file import load_site_file  # noqa: PLC0415
-
-    require_physical(load_site_file(path))
-
-
-def _runs(folder: Path) -> list[bytes]:
-    """Return manifests of a run whose frames lie in the folder."""
-    from seip_addon.core.sensing.scans.frame import Frame  # noqa: PLC0415
-    from seip_addon.core.sensing.scans.run_folder import _frame_record  # noqa: PLC0415
-    from seip_addon.core.storage.folder_contents import MANIFEST  # noqa: PLC0415
-
-    frames = folder / "run" / "frames"
-    _arrays(folder)
-    frame = Frame.load(folder / "sample.npz")
-    records = []
-    for number in range(2):
-        one = replace(frame, time=float(number))
-        one.save(frames / f"{number:06d}.npz")
-        records.append(_frame_record(number, one))
-    run = json.loads(_manifests(folder)[0]) | {"frames": records}
-    run["sensors"] = run["sensors"] * 2
-    run["trajectories"]["road_users"] = 4
-    (folder / "run" / MANIFEST).write_text(json.dumps(run))
-    return [json.dumps(run, indent=1).encode()]
-
-
-_mutate_run = _with_wrong_values(0.5, r'"(?:time_s|points)": ([\d.]+)', ("-7", "1e300", "99", "2.5"))
-
-
-def _read_run(path: Path, _: bytes) -> None:
-    from seip_addon.core.sensing.scans.run_folder import load_frames  # noqa: PLC0415
-
-    path.replace(path.parent / "run" / "manifest.json")
-    require_physical([frame for _, frame in load_frames(path.parent / "run")], most=1e11)
 
 
 # --- city models, elevation models and surveys
@@ -879,33 +631,6 @@ def _read_costs(path: Path, _: bytes) -> None:
     require_physical(load_installed_cost(path), most=1e9)
 
 
-def _detections(_: Path) -> list[bytes]:
-    figure = {"average_precision": 0.5, "interval": [0.4, 0.6], "road_users": 12}
-    record = {"schema": "seip-detection/1", "average_precision": {"bev_0.7": figure}, "warnings": ["few runs"]}
-    return [json.dumps(record, indent=1).encode()]
-
-
-_mutate_detection = _with_wrong_values(
-    0.3, r'"(?:average_precision|road_users)": (\d[\d.]*)', ("-1", "1e30", "NaN", "-0.5")
-)
-
-
-def _read_detection(path: Path, _: bytes) -> None:
-    from seip_addon.core.output.results.detection_record import parsed_detection  # noqa: PLC0415
-
-    require_physical(parsed_detection(path.read_bytes().decode("utf-8", "replace")), most=1e15)
-
-
-def _simulations(_: Path) -> list[bytes]:
-    return [json.dumps({"map": "m.xodr", "flow": 600.0, "runs": ["run-1.npz", "run-2.npz"]}, indent=1).encode()]
-
-
-def _read_simulation(path: Path, _: bytes) -> None:
-    from seip_addon.core.workflows.traffic_simulation import listed_runs  # noqa: PLC0415
-
-    assert all(isinstance(name, str) for name in listed_runs(path))
-
-
 # --- meshes, which Blender's importers read
 
 
@@ -1097,12 +822,6 @@ FORMATS = {
     "measurements": Format((".json",), _measurements, _mutate_text, _read_measurements),
     "fcd": Format((".xml",), _floating_car_data, _mutate_floating_car_data, _read_floating_car_data),
     "routes": Format((".xml",), _routes, _mutate_routes, _read_routes),
-    "npz": Format((".npz",), _arrays, _mutate_arrays, _read_arrays),
-    "npz.signed": Format((".npz",), _arrays, _mutate_signed, _read_arrays),
-    "site.npz": Format((".npz",), _site_files, _mutate_signed, _read_site_file),
-    "placement": Format((".json",), _records, _mutate_record, _read_record),
-    "detection": Format((".json",), _detections, _mutate_detection, _read_detection),
-    "simulation": Format((".json",), _simulations, _mutate_text, _read_simulation),
     "cost": Format((".toml",), _costs, _mutate_text, _read_costs),
     "network": Format((".xml",), _networks, _mutate_network, _read_network),
     "flows": Format((".xml",), _flows, _mutate_flow, _read_flow),
@@ -1124,8 +843,6 @@ FORMATS = {
     },
     "poses": Format((".json",), _sensor_poses, _mutate_text, _read_poses),
     "boxes": Format((".json",), _box_labels, _mutate_text, _read_box_labels),
-    "manifest": Format((".json",), _manifests, _mutate_manifest, _read_manifest),
-    "run": Format((".json",), _runs, _mutate_run, _read_run),
     **{
         f"mesh{suffix}": Format((suffix,), _meshes(suffix), _mutate_mesh, _read_mesh, share=0.05) for suffix in _EXPORTS
     },

@@ -10,7 +10,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.ticker import PercentFormatter
 
 from seip_addon.core.choosing.placement.deployment import Deployment
-from seip_addon.core.choosing.robustness.traffic_study import LAYER_NAMES, TrafficEvaluation, TrafficStudy
+from seip_addon.core.choosing.robustness.traffic_study import TrafficEvaluation, TrafficStudy
 from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.geometry.plan import closed, outline
 from seip_addon.core.output.pictures.chart_style import (
@@ -44,24 +44,21 @@ def save_time_map(
     placed: TrafficEvaluation,
     title: str,
 ) -> None:
-    """Draw the share of time for which each target, and the point above it, is visible, as PNG."""
+    """Draw the share of time for which each target is visible, as PNG."""
     limits, shape = limits_around(site.region.bounds, MARGIN_SHARE)
-    figure, panels = new_figure(PICTURE_SIDE * len(placed.seen) + 0.9, PICTURE_SIDE * shape + 0.9, len(placed.seen))
-    for panel, (layer, seen) in zip(panels, placed.seen.items(), strict=True):
-        panel.set(**limits)
-        panel.set_title(
-            f"{LAYER_NAMES[layer]}: {seen.mean.describe(1)}, empty {seen.empty:.1%}", color=INK, fontsize=10
-        )
-        panel.set(xticks=(), yticks=())
-        squares, colours = target_squares(site.targets)[:, :, :2], TIME_CMAP(seen.time)
-        draw_polygons(panel, squares, facecolors=colours, edgecolors="none", antialiaseds=False, zorder=1)
-        _draw_place(panel, geometry)
-    for panel in panels:  # after the last change of the layout that moves data on the page
-        figure.draw_without_rendering()
-        where = np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2)
-        draw_sensors(panel, deployment, where, site.targets.xyz[:, :2], zorder=4)
-        draw_attribution(panel, site.attribution)
-    bar = figure.colorbar(ScalarMappable(Normalize(0, 1), TIME_CMAP), ax=list(panels), shrink=0.7, pad=0.01)
+    figure, (panel,) = new_figure(PICTURE_SIDE + 0.9, PICTURE_SIDE * shape + 0.9)
+    seen = placed.seen
+    panel.set(**limits)
+    panel.set_title(f"road: {seen.mean.describe(1)}, empty {seen.empty:.1%}", color=INK, fontsize=10)
+    panel.set(xticks=(), yticks=())
+    squares, colours = target_squares(site.targets)[:, :, :2], TIME_CMAP(seen.time)
+    draw_polygons(panel, squares, facecolors=colours, edgecolors="none", antialiaseds=False, zorder=1)
+    _draw_place(panel, geometry)
+    figure.draw_without_rendering()  # after the last change of the layout that moves data on the page
+    where = np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2)
+    draw_sensors(panel, deployment, where, site.targets.xyz[:, :2], zorder=4)
+    draw_attribution(panel, site.attribution)
+    bar = figure.colorbar(ScalarMappable(Normalize(0, 1), TIME_CMAP), ax=panel, shrink=0.7, pad=0.01)
     bar.ax.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
     bar.set_label("share of time for which it is seen", color=INK)
     save_chart(path, figure, title)
@@ -76,11 +73,11 @@ def save_traffic_chart(path: str | os.PathLike[str], study: TrafficStudy, sensor
         Number and types of the sensors, like ``2 × type1``.
     """
     figure, (shares, changes) = new_figure(11.5, 4.6, 2)
-    empty, traffic = study.empty.seen[study.layer], study.traffic.seen[study.layer]
+    empty, traffic = study.empty.seen, study.traffic.seen
     _bar(shares, -1, IntervalEstimate(empty.empty, empty.empty, empty.empty), "empty road")
     _bar(shares, 0, empty.mean, "in traffic")
     _bar(shares, 1, traffic.mean, "in traffic, placed on traffic")
-    shares.set_ylabel(f"share of the {LAYER_NAMES[study.layer]} seen", color=INK)
+    shares.set_ylabel("share of the road seen", color=INK)
     _dot(changes, -0.5, negative(empty.loss), 1, "change by traffic")
     _dot(changes, 0.5, traffic.more_than(empty), 2, "gain by placing on traffic")
     changes.axhline(0.0, color=SOFT_INK, linewidth=0.8, zorder=0)

@@ -14,35 +14,24 @@ from headless.studies.simulated_recordings import frames_key
 import numpy as np
 from numpy.typing import NDArray
 
-from seip_addon.core import limits
 from seip_addon.core.progress import Progress
-from seip_addon.core.storage.array_file import ArrayFile, ArrayRule, ContentError
+from seip_addon.core.storage.array_file import ArrayFile
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
 
 TABLES = {"truth": GroundTruth, "detected": EvaluatedBoxes}
 TYPES = {"category": "U", "points": "i8", "inside": "b1", "parked": "b1"}  # of columns; of others float64
-LIMITS = {
-    "boxes": limits.LOCAL_COORDINATE,
-    "visibility": limits.ROUNDED_SHARE,
-    "distance": limits.DISTANCE,
-    "score": limits.ROUNDED_SHARE,
-    "density": limits.COUNT,
-    "points": limits.COUNT,
-}
 
 
-def _rules() -> dict[str, ArrayRule]:
-    rules = {"run": ArrayRule("U", ("f",)), "time": ArrayRule("f8", ("f",), limits.TIME)}
+def _types() -> dict[str, str]:
+    types = {"run": "U", "time": "f8"}
     for table, kind in TABLES.items():
-        rules[f"{table}.count"] = ArrayRule("i8", ("f",), limits.COUNT)
-        for column in fields(kind):
-            shape: tuple[int | str, ...] = (table, 7) if column.name == "boxes" else (table,)
-            rules[f"{table}.{column.name}"] = ArrayRule(TYPES.get(column.name, "f8"), shape, LIMITS.get(column.name))
-    return rules
+        types[f"{table}.count"] = "i8"
+        types |= {f"{table}.{column.name}": TYPES.get(column.name, "f8") for column in fields(kind)}
+    return types
 
 
-FILE = ArrayFile("seip.detections", 1, "file of detections", "delete it, and it is made again", _rules())
+FILE = ArrayFile("seip.detections", 1, "file of detections", "delete it, and it is made again", _types())
 
 
 def stored_detections(
@@ -108,7 +97,5 @@ def _split(table: str, arrays: dict[str, NDArray[Any]]) -> list[Any]:
     kind = TABLES[table]
     ends = np.cumsum(arrays[f"{table}.count"])
     columns = {column.name: arrays[f"{table}.{column.name}"] for column in fields(kind)}
-    if len(columns["boxes"]) != (ends[-1] if len(ends) else 0):
-        raise ContentError("its rows are not those of its frames")
     split = {name: np.split(values, ends[:-1]) for name, values in columns.items()}
     return [kind(**{name: parts[frame] for name, parts in split.items()}) for frame in range(len(ends))]

@@ -1,4 +1,4 @@
-"""Numbers for messages and scales: counted nouns, durations and round numbers."""
+"""Numbers as people type and read them: counted nouns, durations and round numbers."""
 
 import math
 
@@ -21,6 +21,13 @@ def counted(number: int, one: str, several: str = "") -> str:
     ('1 sensor', '1,200 crossings', '0 bodies')
     """
     return f"{number:,} {one if number == 1 else several or f'{one}s'}"
+
+
+def typed_number(text: str) -> float:
+    """Return the number in a text; raise ValueError for anything else, such as digits that are not ASCII."""
+    if not text.isascii():
+        raise ValueError(text)
+    return float(text)
 
 
 def duration_text(seconds: float) -> str:

@@ -6,7 +6,6 @@ results computed from numbers within them neither overflow nor lose the millimet
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -167,26 +166,10 @@ TOTAL_WEIGHT = Limits(0.0, 1e15)
 """Sum of the weights of targets, or their weight times seconds."""
 
 SHARE = Limits(0.0, 1.0)
-ROUNDED_SHARE = Limits(0.0, 1.0 + 1e-5)
-"""Share as float32 may round it."""
-
-SIGNED_SHARE = Limits(-1.0, 1.0)
-"""Share that is lost, or gained where negative."""
-
-RELATIVE_GAP = Limits(-1e-6, 1e15)
-"""Gap between a value and its bound, relative to the value; solvers round."""
-
 COUNT = Limits(0, 1e12)
-INDEX = Limits(-1, 2**31 - 1)
-"""Index into a table; -1 for none."""
-
 DEGREES = Limits(-360.0, 360.0, "degrees")
 LATITUDE = Limits(-90.0, 90.0, "degrees")
 LONGITUDE = Limits(-180.0, 180.0, "degrees")
-YAW = Limits(-4.0, 4.0, "rad")
-"""Heading in [-π, π), as float32 may round it."""
-
-PITCH = Limits(-math.pi / 2.0, math.pi / 2.0, "rad")
 UNWRAPPED_ANGLE = Limits(-1e5, 1e5, "rad")
 """Heading with whole turns."""
 
@@ -199,9 +182,6 @@ TIME_STEP = Limits(0.001, 86400.0, "s")
 
 DELAY = Limits(-1e3, 1e3, "s")
 SPEED = Limits(-1e3, 1e3, "m/s")
-APPARENT_SPEED = Limits(-1e6, 1e6, "m/s")
-"""Speed of an animated object, which may leap from one frame to the next."""
-
 FRAMES = Limits(1, 1_000_000)
 """Frames of a recording or of the test of a detector."""
 

@@ -12,7 +12,6 @@ from ..core.counts import counted
 from ..core.errors import SeipError
 from ..core.output.results.placement_record import relevant_warnings
 from ..core.progress import Progress, finish
-from ..core.sensing.visibility.estimate import estimate_visibility
 from ..core.site.check import SceneContents, SiteCheck, check_site
 from ..core.site.obstruction import NO_OBSTACLES_MESSAGE
 from ..core.site.roles import Role
@@ -20,7 +19,7 @@ from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
 from ..core.workflows.site_building import BuiltSite, SiteRequest, build_site
 from ..core.workflows.site_places import SitePlaces, site_places
-from ..core.workflows.survey import Layout, lay_out
+from ..core.workflows.survey import lay_out
 from ..core.workflows.survey_settings import SurveySettings
 from ..core.world.streetscape.description import DESCRIPTION_SUFFIX
 from ..core.world.streetscape.mesh_place import MeshPlace, mesh_place
@@ -370,13 +369,13 @@ class SEIP_OT_add_area(_WritesScene, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_check_site(LongWork[tuple[SiteCheck, float | None]], bpy.types.Operator):
+class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
     """Count what the scene holds by role, and list what stops a placement or harms its answer"""
 
     bl_idname = "seip.check_site"
     bl_label = "Check Site"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SiteCheck, float | None]]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SiteCheck]:
         """Read the scene as it is now."""
         self._watch, self._settings = watch(scene), scene_status.checked_settings(scene)
         contents = contents_of(scene)
@@ -385,45 +384,36 @@ class SEIP_OT_check_site(LongWork[tuple[SiteCheck, float | None]], bpy.types.Ope
             settings = scene.seip.survey.settings()
         except SeipError as error:
             settings = error
-        return _checked(contents, settings, preferences.cores())
+        return _checked(contents, settings)
 
-    def conclude(self, scene: bpy.types.Scene, result: tuple[SiteCheck, float | None]) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: SiteCheck) -> None:
         """List what was found."""
-        check, estimated = result
-        session.checks[scene.session_uid] = CheckedScene(self._watch, self._settings, estimated)
+        session.checks[scene.session_uid] = CheckedScene(self._watch, self._settings)
         site = scene.seip.site
         site.checked = True
         site.counts.clear()
-        for what, value in check.counts.items():
+        for what, value in result.counts.items():
             one = site.counts.add()
             one.name, one.value = what, value
         site.problems.clear()
-        for problem in check.problems:
+        for problem in result.problems:
             listed = site.problems.add()
             listed.name, listed.text, listed.is_error = problem.obj, problem.text, problem.severity == "ERROR"
         scene.seip.sections.follow_steps()
         self.report({"INFO"}, in_short(site.problems))
 
 
-def _checked(
-    contents: SceneContents, settings: SurveySettings | SeipError, cores: int | None
-) -> Generator[Progress, None, tuple[SiteCheck, float | None]]:
-    """Check a scene; if it can be laid out, estimate the time of its visibility grid as well."""
-    layouts: list[Layout] = []
+def _checked(contents: SceneContents, settings: SurveySettings | SeipError) -> Generator[Progress, None, SiteCheck]:
+    """Check a scene."""
 
     def laid_out(geometry: SceneGeometry) -> tuple[Site, tuple[str, ...]]:
         if isinstance(settings, SeipError):
             raise settings
-        layouts.append(lay_out(geometry, settings))
+        layout = lay_out(geometry, settings)
         keys = settings.candidates.sensors  # warnings about a type are shown with the type
-        return layouts[0].site, tuple(relevant_warnings(layouts[0].warnings, keys, ()))
+        return layout.site, tuple(relevant_warnings(layout.warnings, keys, ()))
 
-    check = yield from check_site(contents, laid_out)
-    if any(problem.severity == "ERROR" for problem in check.problems) or not layouts:
-        return check, None
-    layout = layouts[0]
-    sight, engine = layout.settings.visibility, layout.settings.engine
-    return check, (yield from estimate_visibility(layout.site, layout.models, sight, engine, cores))
+    return (yield from check_site(contents, laid_out))
 
 
 def in_short(problems: Iterable[SEIP_PG_problem]) -> str:

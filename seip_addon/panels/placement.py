@@ -10,6 +10,7 @@ import bpy
 from .. import scene_status
 from ..core.choosing.placement.objective import certificate, purpose
 from ..core.choosing.placement.returns_summary import returns_text
+from ..core.choosing.placement.scenarios import DEFAULT_COUNTS
 from ..core.counts import counted, duration_text
 from ..core.output.results.answer import answer, sentence, status_text
 from ..core.output.results.placement_file import parsed_record
@@ -26,9 +27,9 @@ from .sidebar import RowList, is_narrow, settings_column
 from .wrapped_text import BOX, draw_sentence
 
 _SHOWN = {
-    "nominal": ("failures", "seen_by"),
-    "pose-errors": ("risk", "position_error", "tilt_error", "failures", "seen_by"),
-    "traffic": ("risk", "weights_from_traffic", "instants", "held_out"),
+    "nominal": ("failures",),
+    "pose-errors": ("risk", "position_error", "tilt_error", "failures"),
+    "traffic": ("risk",),
 }
 """Properties of the objective that are shown for each kind of scenarios."""
 
@@ -105,7 +106,7 @@ def button_text(scene: bpy.types.Scene) -> str:
         "BUDGET": f"Place for ${goal.budget:,.0f}",
         "COVERAGE": f"Cover {goal.coverage:g}%",
     }[goal.limit]
-    seconds = scene_status.expected_seconds(scene)
+    seconds = scene_status.search_seconds(scene)
     return what if seconds is None else f"{what}, up to {duration_text(5.0 * max(1.0, round(seconds / 5.0)))}"
 
 
@@ -121,7 +122,7 @@ def _draw_objective(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         column.prop(goal, name)
     if goal.scenarios == "nominal" or goal.risk == "none":
         return
-    number = f"{goal.instants} instants" if goal.scenarios == "traffic" else "twenty draws"
+    number = f"{DEFAULT_COUNTS[goal.scenarios][0]} {'instants' if goal.scenarios == 'traffic' else 'draws'}"
     draw_sentence(layout, f"Rays are cast from every candidate in {number}, which takes minutes.", icon="INFO")
 
 
@@ -156,8 +157,8 @@ def _draw_candidates(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None
     column = settings_column(layout)
     for heading, names in (
         ("", ("grid", "delta")),
-        ("Positions", ("spacing", "setback", "clearance", "bracket", "assumed_poles", "allow")),
-        ("Returns", ("detection", "min_intensity", "rain", "wet_road", "fog")),
+        ("Positions", ("spacing", "allow")),
+        ("Weather", ("rain", "wet_road", "fog")),
     ):
         group = column.column(heading=heading)
         for name in names:
@@ -167,19 +168,14 @@ def _draw_candidates(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None
     column.prop(survey, "installed")
     if survey.installed:
         column.prop(survey, "installed_cost", placeholder="Shipped")
-    column.prop(survey, "engine")
 
 
 def _draw_search(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
-    """Draw the solver and its limits."""
+    """Draw the solver and its limit."""
     survey = scene.seip.survey
     column = settings_column(layout)
     column.prop(survey, "solver")
-    limits = column.column(align=True)
-    row = limits.row(align=True)
-    row.active = survey.time_limit == 0
-    row.prop(survey, "effort")
-    limits.prop(survey, "time_limit")
+    column.prop(survey, "effort")
 
 
 def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:

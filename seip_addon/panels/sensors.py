@@ -106,7 +106,7 @@ def _draw_about(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         draw_sentence(layout, "Choose a sensor that is in the catalogue.", icon="INFO")
         return
     layout.label(text=sensor_types.title(model), translate=False)
-    for what, value in (*_figures(model), *_on_road(model, survey.parsed_heights(), survey.delta, survey.detection)):
+    for what, value in (*_figures(model), *_on_road(model, survey.parsed_heights(), survey.delta)):
         split = layout.split(factor=0.42)
         split.scale_y = 0.8
         split.label(text=what)
@@ -118,12 +118,12 @@ def _draw_about(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     draw_sentence(layout, f"Price: {model.price_source or 'no source'}")
 
 
-def _on_road(model: LidarModel, heights: list[float], delta: float, detection: float) -> list[tuple[str, str]]:
+def _on_road(model: LidarModel, heights: list[float], delta: float) -> list[tuple[str, str]]:
     """Return the range on the road, and where the rings of the beams begin to leave gaps, for the greatest height."""
     if not heights:
         return []
     height = max(heights)
-    far = road_range(model, REFLECTIVITY["asphalt"], height, VisibilitySettings(detection=detection))
+    far = road_range(model, REFLECTIVITY["asphalt"], height, VisibilitySettings())
     across = math.sqrt(max(model.max_range**2 - height**2, 0.0))
     dense = unresolved_from(model, height, delta, across)
     lines = [("Height", f"{height:g} m"), ("On dry asphalt", f"up to {far:.0f} m")]

@@ -9,8 +9,7 @@ from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProper
 
 from .. import selection
 from ..core.choosing.placement.objective import DEFAULT_COUNT, Objective
-from ..core.choosing.placement.scenarios import DEFAULT_COUNTS, MAX_ANGLE_STD, PoseErrors, Scenarios
-from ..core.choosing.robustness.traffic_study import LAYER_NAMES
+from ..core.choosing.placement.scenarios import MAX_ANGLE_STD, PoseErrors, Scenarios
 from .conversion import as_typed, of_setting
 
 
@@ -69,7 +68,6 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             ("auto", "By Sensor", "Returns from road users for products, the road seen for the paper's sensor types"),
             ("road", "Road Seen", "The share of the road that sensors see"),
             ("returns", "Returns", "The expected returns from cars, cyclists and pedestrians"),
-            ("height", "Vehicles' Height", f"The {LAYER_NAMES['height']}, in traffic"),
         ),
     )
     scenarios: EnumProperty(
@@ -95,7 +93,6 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
     )
     position_error: of_setting(PoseErrors, "position", "Position Error", min=0.0)
     tilt_error: of_setting(PoseErrors, "tilt", "Tilt Error", min=0.0, max=MAX_ANGLE_STD)
-    seen_by: of_setting(Objective, "seen_by", "Seen by", max=8)
     failures: of_setting(
         Objective,
         "failures",
@@ -112,16 +109,6 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         "Empty for the folder SCENE_traffic beside the file",
         subtype="DIR_PATH",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-    )
-    weights_from_traffic: of_setting(Scenarios, "weights_from_traffic", "Weights from Traffic")
-    instants: IntProperty(
-        name="Instants", description="Instants of traffic to optimise over", default=DEFAULT_COUNTS["traffic"][0], min=1
-    )
-    held_out: IntProperty(
-        name="Held-out Instants",
-        description="Instants of other runs to evaluate on",
-        default=DEFAULT_COUNTS["traffic"][1],
-        min=1,
     )
     rules: CollectionProperty(type=SEIP_PG_position_rule)
     active_rule: IntProperty(name="Position")
@@ -152,17 +139,11 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             scenarios=self._scenarios(),
             risk="auto" if nominal else self.risk,
             failures="none" if self.scenarios == "traffic" else self.failures,
-            seen_by=1 if self.scenarios == "traffic" else self.seen_by,
         )
 
     def _scenarios(self) -> Scenarios:
         if self.scenarios == "traffic":
-            return Scenarios(
-                "traffic",
-                weights_from_traffic=self.weights_from_traffic,
-                count=self.instants,
-                held_out=self.held_out,
-            )
+            return Scenarios("traffic")
         if self.scenarios == "pose-errors":
             position, tilt = as_typed(self.position_error), as_typed(self.tilt_error)
             return Scenarios("pose-errors", PoseErrors(position, position, tilt, tilt))

@@ -13,7 +13,7 @@ from ..core.errors import SeipError
 from ..core.sensing.visibility.settings import VisibilitySettings
 from ..core.site.candidates import DEFAULT_TYPE, MAX_SENSOR_HEIGHT, CandidateSettings, heights_of, tilts_of
 from ..core.site.installed_cost import InstalledCost, load_installed_cost
-from ..core.site.post_rules import RULES
+from ..core.site.post_rules import ALLOWED, ASSUMED_POLES, RULES
 from ..core.site.weather import Weather
 from ..core.workflows.survey_settings import SurveySettings
 from ..preferences import catalogue_files
@@ -60,25 +60,21 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         "FROM:TO:STEP; 0 is upright, a negative tilt points up",
         default=_TILTS,
     )
-    yaws: of_setting(CandidateSettings, "yaws", "Yaws", soft_max=36)
     grid: of_setting(SurveySettings, "grid_spacing", "Target Spacing", min=0.05, soft_max=10.0, step=10)
     delta: of_setting(VisibilitySettings, "delta", "Seen Within δ", min=0.01, soft_max=5.0, step=10)
-    min_intensity: of_setting(VisibilitySettings, "min_intensity", "Min. Intensity", subtype="FACTOR")
-    detection: of_setting(VisibilitySettings, "detection", "Detection", subtype="FACTOR")
     rain: of_setting(Weather, "rain", "Rain (mm/h)", max=500.0, soft_max=50.0)
     fog: BoolProperty(name="Fog", description="Look through fog or snow")
     visibility: of_setting(Weather, "visibility", "Visibility", default=200.0, soft_max=2000.0)
     wet_road: of_setting(Weather, "wet_road", "Wet Road")
     spacing: of_setting(CandidateSettings, "spacing", "Spacing", soft_max=50.0, step=50)
-    setback: of_setting(CandidateSettings, "setback", "Setback", soft_max=5.0, step=10)
-    clearance: of_setting(CandidateSettings, "clearance", "Clearance", soft_max=5.0, step=10)
-    bracket: of_setting(CandidateSettings, "bracket", "Bracket", soft_max=5.0, step=10)
-    assumed_poles: of_setting(CandidateSettings, "assumed_poles", "Assumed Poles")
     allow: of_setting(
         CandidateSettings,
         "allow",
         "Allow",
-        items=[(name, rule.title, f"Positions {rule.reason}") for name, rule in RULES.items()],
+        items=[
+            *((name, rule.title, f"Positions {rule.reason}") for name, rule in RULES.items()),
+            (ASSUMED_POLES, "Assumed poles", "Poles of traffic lights for which the map has no post"),
+        ],
     )
     installed: BoolProperty(name="Installed Cost", description="Include posts, power and backhaul in prices")
     installed_cost: of_setting(
@@ -87,16 +83,6 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         "Cost Table",
         subtype="FILE_PATH",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-    )
-    engine: EnumProperty(
-        name="Ray Caster",
-        description="What casts the rays",
-        items=(
-            ("auto", "Automatic", "Embree where it is installed, else BVHTree"),
-            ("embree", "Embree", "The faster one"),
-            ("bvh", "BVHTree", "Blender's own"),
-        ),
-        default="auto",
     )
     solver: EnumProperty(
         name="Solver",
@@ -108,18 +94,6 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
             ("gurobi", "Gurobi", "Needs your own installation and licence"),
         ),
         default="auto",
-    )
-    time_limit: FloatProperty(
-        name="Time Limit",
-        description=(
-            "Limit the search by time instead of counted work. What is found and proven then depends on the machine "
-            "and on what else runs on it. 0: no limit of time"
-        ),
-        subtype="TIME_ABSOLUTE",
-        unit="TIME_ABSOLUTE",
-        default=0.0,
-        min=0.0,
-        soft_max=3600.0,
     )
     effort: FloatProperty(
         name="Effort",
@@ -170,23 +144,16 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
                 sensors=tuple(self.used_types()),
                 heights=heights_of(self.heights.split()),
                 tilts=tilts_of(self.tilts.split()),
-                yaws=self.yaws,
                 spacing=as_typed(self.spacing),
-                setback=as_typed(self.setback),
-                clearance=as_typed(self.clearance),
-                bracket=as_typed(self.bracket),
-                assumed_poles=self.assumed_poles,
-                allow=tuple(name for name in RULES if name in self.allow),
+                allow=tuple(name for name in ALLOWED if name in self.allow),
             ),
-            visibility=VisibilitySettings(as_typed(self.delta), as_typed(self.min_intensity), as_typed(self.detection)),
+            visibility=VisibilitySettings(as_typed(self.delta)),
             weather=self.weather(),
             grid_spacing=as_typed(self.grid),
             catalogue=catalogue_files(),
             installed_cost=self._installed_cost(),
-            engine=self.engine,
             solver=self.solver,
-            time_limit=as_typed(self.time_limit) or None,
-            effort=None if self.time_limit else as_typed(self.effort),
+            effort=as_typed(self.effort),
         )
 
     def _installed_cost(self) -> InstalledCost | None:

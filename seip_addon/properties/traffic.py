@@ -105,7 +105,7 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
     def recording(self) -> RecordingSettings:
         """Return the settings of scans as the core takes them."""
         return RecordingSettings(
-            scan=ScanSettings(self.seed, self.noise, self.rolling_shutter, self.id_data.seip.survey.engine),
+            scan=ScanSettings(self.seed, self.noise, self.rolling_shutter),
             start=None if self.whole else as_typed(self.start),
             duration=None if self.whole else as_typed(self.duration),
             rate=as_typed(self.rate) or None,

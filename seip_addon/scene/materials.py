@@ -5,10 +5,6 @@
 
 from __future__ import annotations
 
-import difflib
-import math
-from collections.abc import Sequence
-
 import bpy
 import numpy as np
 
@@ -168,31 +164,6 @@ def reflectivity(of: bpy.types.Material | None) -> float:
             f"property {contract.REFLECTIVITY} of material {of.name!r} must be a number from 0 to 1, not {given!r}"
         )
     return float(given)
-
-
-def set_reflectivity(given: Sequence[str]) -> None:
-    """Give materials of the open file a reflectivity, each named as ``asphalt=0.12``.
-
-    Raises
-    ------
-    SeipError
-        There is no such material, or no share from 0 to 1 is given.
-    """
-    for one in given:
-        name, _, share = one.rpartition("=")
-        try:
-            value = float(share)
-        except ValueError:
-            value = math.nan
-        if not name or not 0 <= value <= 1:
-            raise SeipError(f"reflectivity {one!r} is not understood: give MATERIAL=SHARE, a share from 0 to 1")
-        named = [each for each in bpy.data.materials if contract.NUMBER.sub("", each.name) in {name, PREFIX + name}]
-        if not named:
-            known = sorted(each.name.removeprefix(PREFIX) for each in bpy.data.materials)
-            close = difflib.get_close_matches(name, known, n=3, cutoff=0.4) or known
-            raise SeipError(f"the scene has no material {name!r}; did you mean {', '.join(close) or 'another scene'}?")
-        for each in named:
-            each[contract.REFLECTIVITY] = value
 
 
 def linear(colour: str) -> tuple[float, float, float, float]:

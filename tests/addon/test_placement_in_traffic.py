@@ -3,12 +3,14 @@
 import re
 import shutil
 from types import SimpleNamespace
+from unittest.mock import patch
 
 from headless import place
 
 import bpy
 import pytest
 
+from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
 from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
 from seip_addon.operators.placement import SEIP_OT_solve_placement
 from seip_addon.panels import placement as placement_panel
@@ -19,9 +21,8 @@ from tests.builders.small_junction import make_example
 from tests.builders.small_scene import make_run
 
 OPTIONS = [
-    *("--sensor", "vlp16", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--delta", "6", "--count", "2"),
-    *("--traffic", "--scenarios", "2", "--held-out", "8"),
-    "--no-render",
+    *("--sensor", "vlp16", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--count", "2"),
+    *("--traffic", "--no-render"),
 ]
 
 
@@ -29,11 +30,12 @@ OPTIONS = [
 def coarse(junction):
     """The small junction with coarser settings, to place on its traffic."""
     survey, goal = junction.seip.survey, junction.seip.goal
-    survey.heights, survey.grid, survey.spacing, survey.delta = "5.4", 8.0, 25.0, 6.0
+    survey.heights, survey.grid, survey.spacing = "5.4", 8.0, 25.0
     for one in survey.types:
         one.use = one.name == "vlp16"
-    goal.scenarios, goal.instants, goal.held_out = "traffic", 2, 8
-    return junction
+    goal.scenarios = "traffic"
+    with patch.dict(DEFAULT_COUNTS, traffic=(2, 8)):
+        yield junction
 
 
 @pytest.mark.slow
@@ -79,7 +81,7 @@ def test_the_panel_shows_what_the_objective_asks_for(coarse):
     placement_panel.draw(layout, bpy.context)
     drawn = dict(layout.properties)
     names = list(drawn)[list(drawn).index("criterion") :]
-    assert names == ["criterion", "scenarios", "runs", "risk", "weights_from_traffic", "instants", "held_out"]
+    assert names == ["criterion", "scenarios", "runs", "risk"]
     assert all(hasattr(coarse.seip.goal, name) for name in names)
     assert drawn["runs"] == {"placeholder": "small_traffic"}
     assert "Rays are cast from every candidate in 2 instants, which takes minutes." in layout.text

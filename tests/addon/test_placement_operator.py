@@ -228,7 +228,7 @@ def work_of(operator: str, scene: bpy.types.Scene) -> Generator[Progress, None, 
 def test_work_that_is_stopped_at_its_end_leaves_no_trace(junction):
     bpy.ops.seip.solve_placement()
     junction.seip.goal.count = 3
-    junction.seip.survey.time_limit = 30.0
+    junction.seip.survey.effort = 30.0
     before = session.state_of(junction)
     seen = dict(vars(before))
     placed = finish(work_of("SEIP_OT_solve_placement", junction))
@@ -413,7 +413,7 @@ def test_panel_and_batch_place_alike_over_pose_errors(junction, tmp_path, risk, 
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
     panel = parsed_record(junction.seip.result.record)
     options = ["--heights", "8", "--grid", "8", "--spacing", "25", "--count", "2", "--no-render", "--sensor", "type1"]
-    wrong = ["--position-error", "0.5", "--tilt-error", "3", "--failures", "mean", "--risk", risk]
+    wrong = ["--pose-errors", "0.5", "3", "--failures", "mean", "--risk", risk]
     place.main([str(small_scene), *options, *wrong, "-o", str(tmp_path)])
     batch = load_placement(tmp_path / "placement.json")
     assert comparable(panel) == comparable(replace(batch, settings={**batch.settings, "render": False}))

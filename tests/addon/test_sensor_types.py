@@ -65,20 +65,12 @@ def test_the_list_is_the_catalogue_and_the_choice_the_default(survey):
     assert survey.settings().candidates == CandidateSettings(sensors=(DEFAULT_TYPE,))
 
 
-def test_assumed_poles_are_asked_for_in_the_panel_as_on_the_command_line(survey):
-    survey.assumed_poles = True
-    assert survey.settings().candidates.assumed_poles
-    for options, wanted in (([], False), (["--assumed-poles"], True)):
-        parser = argparse.ArgumentParser()
-        add_options(parser)
-        assert parser.parse_args(["-o", "out", *options]).assumed_poles is wanted
-
-
 def test_rules_on_positions_are_allowed_in_the_panel_as_on_the_command_line(survey):
-    survey.allow = {"islands", "cycle-tracks"}
+    allowed = ["cycle-tracks", "islands", "assumed-poles"]
+    survey.allow = set(allowed)
     parser = argparse.ArgumentParser()
     add_options(parser)
-    typed = parser.parse_args(["-o", "out", "--allow", "cycle-tracks", "islands", "--sensor", DEFAULT_TYPE])
+    typed = parser.parse_args(["-o", "out", "--allow", *allowed, "--sensor", DEFAULT_TYPE])
     assert survey.settings().candidates == read_settings(CandidateSettings, typed)
 
 
@@ -268,9 +260,6 @@ def test_cores_are_those_that_the_user_allows(own):
 
 def test_tilts_are_degrees_in_the_panel_and_radians_inside(survey):
     assert survey.settings().candidates.tilts == (0.0,)
-    assert survey.settings().candidates.yaws == 8
-    survey.yaws = 12
-    assert survey.settings().candidates.yaws == 12
     survey.tilts = "-5 0:10:5"
     assert np.degrees(survey.settings().candidates.tilts) == pytest.approx([-5, 0, 5, 10])
     for text, sentence in (

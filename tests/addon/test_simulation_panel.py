@@ -4,6 +4,7 @@ import re
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import patch
 
 from headless import build_scene, traffic
 
@@ -11,6 +12,7 @@ import bpy
 import pytest
 
 from seip_addon import preferences
+from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
 from seip_addon.operators.simulation import NO_MAP, SEIP_OT_simulate_traffic
 from seip_addon.panels import simulation as simulation_panel
 from seip_addon.session import session
@@ -171,8 +173,9 @@ def test_a_placement_in_traffic_uses_the_simulated_runs(site):
     bpy.ops.seip.simulate_traffic()
     survey, goal = site.seip.survey, site.seip.goal
     bpy.ops.seip.list_sensor_types()
-    survey.heights, survey.grid, survey.spacing, survey.delta = "5", 8.0, 25.0, 6.0
+    survey.heights, survey.grid, survey.spacing = "5", 8.0, 25.0
     for one in survey.types:
         one.use = one.name == "vlp16"
-    goal.scenarios, goal.instants, goal.held_out, goal.count = "traffic", 2, 4, 2
-    assert bpy.ops.seip.solve_placement() == {"FINISHED"}
+    goal.scenarios, goal.count = "traffic", 2
+    with patch.dict(DEFAULT_COUNTS, traffic=(2, 4)):
+        assert bpy.ops.seip.solve_placement() == {"FINISHED"}

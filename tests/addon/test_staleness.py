@@ -176,7 +176,7 @@ def test_a_check_holds_until_scene_or_settings_change(known, tmp_path):
     scene = bpy.context.scene
     bpy.ops.seip.check_site()
     assert scene_status.stale_check(scene) == ""
-    scene.seip.survey.time_limit = 30.0  # nothing that a check looks at
+    scene.seip.survey.effort = 30.0  # nothing that a check looks at
     assert scene_status.stale_check(scene) == ""
     scene.seip.survey.heights = "5 8"
     assert scene_status.stale_check(scene) == "The settings have changed since the check."

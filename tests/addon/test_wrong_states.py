@@ -132,19 +132,12 @@ def test_the_certificate_of_a_placement_for_traffic_is_about_that_and_has_no_tic
     assert icons[certificate] == "INFO"
 
 
-@pytest.mark.parametrize(
-    ("pose", "sentence"),
-    [
-        (None, "the scene or its settings have changed: place again"),
-        (-1, r"sensors\[0\]\.pose is -1, not 0 to"),
-        (10**6, "a sensor has the pose 1000000, but poses end at 15"),
-    ],
-)
-def test_a_record_of_a_pose_that_is_not_there_has_its_sentence(placed, pose, sentence):
+@pytest.mark.parametrize("pose", [None, -1, 10**6])
+def test_a_record_of_a_pose_that_is_not_there_has_its_sentence(placed, pose):
     record = json.loads(placed.seip.result.record)
     record["sensors"][0]["pose"] = pose
     placed.seip.result.record = json.dumps(record)
-    with pytest.raises(RuntimeError, match=sentence):
+    with pytest.raises(RuntimeError, match="place again"):
         bpy.ops.seip.follow_sensors()
 
 

@@ -11,13 +11,14 @@ import termios
 import time
 from functools import partial
 from pathlib import Path
+from unittest.mock import patch
 
 from headless import place, runtime
 
 import bpy
 import pytest
 
-from seip_addon.core.choosing.placement.scenarios import Scenarios
+from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS, Scenarios
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.placement_file import comparable, load_placement
 from seip_addon.core.sensing.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
@@ -61,7 +62,6 @@ def test_the_folder_holds_every_result(folder):
 
 def test_the_record_says_how_far_it_can_be_trusted(folder):
     record = load_placement(folder / "placement.json")
-    assert any("within 1% of the best" in note for note in record.notes)
     assert record.request.goal.scenarios == Scenarios()
     assert not any("in one of twenty cases" in note for note in record.notes)
     assert any("neighbouring rings" in warning for warning in record.warnings)
@@ -69,7 +69,7 @@ def test_the_record_says_how_far_it_can_be_trusted(folder):
 
 def test_the_next_placement_keeps_the_positions_of_the_installed_sensors(folder, tmp_path):
     first = {sensor.position for sensor in load_placement(folder / "placement.json").sensors}
-    place.main([str(folder / "placed.blend"), "-o", str(tmp_path / "more"), *QUICK, "--count", "3", "--keep-sensors"])
+    place.main([str(folder / "placed.blend"), "-o", str(tmp_path / "more"), *QUICK, "--count", "3", "--require"])
     record = load_placement(tmp_path / "more" / "placement.json")
     assert len(record.sensors) == 3
     assert first < {sensor.position for sensor in record.sensors}
@@ -77,7 +77,7 @@ def test_the_next_placement_keeps_the_positions_of_the_installed_sensors(folder,
 
 
 def test_sensors_that_are_not_at_a_position_are_not_kept(small_scene, folder, tmp_path):
-    arguments = ["-o", str(tmp_path / "more"), *QUICK, "--count", "3", "--keep-sensors"]
+    arguments = ["-o", str(tmp_path / "more"), *QUICK, "--count", "3", "--require"]
     with pytest.raises(SeipError, match="no sensors to keep"):
         place.main([str(small_scene), *arguments])
     runtime.open_scene(folder / "placed.blend")
@@ -130,16 +130,6 @@ def test_eight_sensors_at_the_shipped_junction_are_proven_the_best(tmp_path):
     assert (objective.status, objective.gap) == ("optimal", 0.0)
 
 
-@pytest.mark.slow
-def test_a_tolerance_picks_the_spacings_and_the_record_says_why(tmp_path, run):
-    record = run(tmp_path, "--count", "2", "--tolerance", "0.05")
-    settings = record.settings
-    assert "picked for a tolerance of 0.05" in settings["spacings_because"]
-    assert f"targets {settings['grid_spacing_m']:g} m apart" in settings["spacings_because"]
-    assert f"posts {settings['candidates']['spacing']:g} m apart" in settings["spacings_because"]
-    assert "spacings" in record.times.durations_s
-
-
 def test_another_goal_uses_the_stored_grid(folder, tmp_path, run):
     stored = tmp_path / "visibility.npz"
     stored.write_bytes((folder / "visibility.npz").read_bytes())
@@ -147,7 +137,7 @@ def test_another_goal_uses_the_stored_grid(folder, tmp_path, run):
     record = run(tmp_path, "--budget", "20000")
     assert record.price_usd <= 20_000
     assert stored.stat().st_mtime_ns == before
-    run(tmp_path, "--count", "2", "--delta", "0.7")
+    run(tmp_path, "--count", "2", "--grid", "3")
     assert stored.stat().st_mtime_ns != before
 
 
@@ -174,9 +164,10 @@ def test_another_goal_casts_no_ray_again(folder, tmp_path, rays, run):
     run(tmp_path, "--count", "3")
     run(tmp_path, "--budget", "20000")
     assert sum(rays) == 0
-    record = run(tmp_path, "--count", "3", "--pose-errors", "--risk", "none", "--held-out", "100")
+    with patch.dict(DEFAULT_COUNTS, {"pose-errors": (20, 100)}):
+        record = run(tmp_path, "--count", "3", "--pose-errors", "--risk", "none")
     assert sum(rays) > 0
-    assert record.request.goal.scenarios == Scenarios("pose-errors", held_out=100)
+    assert record.request.goal.scenarios == Scenarios("pose-errors")
     assert any("in one of twenty cases" in note for note in record.notes)
 
 
@@ -217,12 +208,10 @@ price_usd = [2_000, 2_000]
 def test_a_sensor_that_looks_one_way_is_turned_where_it_sees_most(tmp_path, run):
     (tmp_path / "mine.toml").write_text(CORNER, encoding="utf-8")
     mine = ["--catalogue", str(tmp_path / "mine.toml"), "--sensor", "corner", "--count", "2"]
-    one, several = (run(tmp_path / f"{yaws}", *mine, "--yaws", str(yaws)) for yaws in (1, 8))
+    several = run(tmp_path, *mine)
     assert several.settings["candidates"]["yaws"] == 8
-    assert one.counts.poses < several.counts.poses < 8 * one.counts.poses
-    assert several.coverage.whole > one.coverage.whole
-    rows = list(csv.DictReader((tmp_path / "8" / "candidates.csv").read_text(encoding="utf-8").splitlines()))
-    spawned = json.loads((tmp_path / "8" / "carla_spawn.json").read_text(encoding="utf-8"))
+    rows = list(csv.DictReader((tmp_path / "candidates.csv").read_text(encoding="utf-8").splitlines()))
+    spawned = json.loads((tmp_path / "carla_spawn.json").read_text(encoding="utf-8"))
     for sensor, spawn in zip(several.sensors, spawned, strict=True):
         assert float(rows[sensor.pose]["yaw_deg"]) == pytest.approx(sensor.yaw_deg, abs=1e-3)
         assert (spawn["transform"]["rotation"]["yaw"] + sensor.yaw_deg) % 360 == pytest.approx(0.0, abs=1e-5)
@@ -244,7 +233,7 @@ def test_the_reverse_problem_by_command(tmp_path, run):
         (["--tilts", "0", "90"], "a tilt must be more than -90° and less than 90°, not 90°"),
         (["--tilts", "5", "5"], "the tilt of 5° is given twice"),
         (["--budget", "5"], "below the cheapest sensor"),
-        (["--delta", "0"], "delta must be"),
+        (["--delta", "2"], "--delta is no longer an option"),
         (["--grid", "0"], "grid spacing must be"),
         (["--sensor", "typ1"], "type1"),
         (["--coverage", "1"], "cannot be reached"),
@@ -252,6 +241,7 @@ def test_the_reverse_problem_by_command(tmp_path, run):
         (["--forbid", "sidewalk 3", "--require", "sidewalk 3"], "both forbidden and mandatory"),
         (["--require", "sidewalk 4000"], "there is no position"),
         (["--catalogue", "missing.toml"], "missing.toml"),
+        (["--catalogue", "/dev/null"], "/dev/null is not a regular file"),
         (["--spacing", "-1"], "spacing must be"),
     ],
 )
@@ -330,7 +320,7 @@ def test_no_file_of_an_earlier_result_stays_beside_a_new_one(folder, tmp_path, r
     assert not (tmp_path / "view.png").exists()
 
 
-@pytest.mark.parametrize("limit", [("--effort", "nan"), ("--effort", "0"), ("--time-limit", "-1")])
+@pytest.mark.parametrize("limit", [("--effort", "nan"), ("--effort", "0")])
 def test_an_impossible_limit_is_refused_before_any_ray_is_cast(tmp_path, limit):
     with pytest.raises(SeipError, match=r"give a positive number|--effort must be a finite number"):
         place.main(["scenes/junction.blend", *limit, "-o", str(tmp_path / "out")])

@@ -1,26 +1,28 @@
 """Placement over instants of traffic by the command, from a scene and its runs to the folder of its result."""
 
 import json
+from unittest.mock import patch
 
 from headless import place
 
 import numpy as np
 import pytest
 
+from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.file_names import TRAFFIC_PICTURES
 from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
 from seip_addon.scene.result_folder import FILES
 from tests.builders.small_junction import ORIGIN
 
-COARSE = ["--sensor", "vlp16", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--delta", "6", "--no-render"]
+COARSE = ["--sensor", "vlp16", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--no-render"]
 
 
 @pytest.fixture(scope="module")
 def run(small_scene):
     def run(folder, *options):
-        numbers = ["--scenarios", "4", "--held-out", "24"]
-        place.main([str(small_scene), "-o", str(folder), *COARSE, "--traffic", *numbers, *options])
+        with patch.dict(DEFAULT_COUNTS, traffic=(4, 24)):
+            place.main([str(small_scene), "-o", str(folder), *COARSE, "--traffic", *options])
 
     return run
 
@@ -40,19 +42,14 @@ def trajectories(path, *, x=0.0, end=30.0):
     return str(path)
 
 
-@pytest.mark.parametrize(
-    "options", [[], pytest.param(["--criterion", "height", "--weights-from-traffic"], marks=pytest.mark.slow)]
-)
-def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, options, run):
-    run(tmp_path, "--count", "2", *options)
+def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, run):
+    run(tmp_path, "--count", "2")
     names = {path.name for path in tmp_path.iterdir()}
     assert {*FILES, *TRAFFIC_PICTURES, "visibility.npz"} - {"view.png"} <= names
     record = json.loads((tmp_path / "placement.json").read_text(encoding="utf-8"))
     goal, notes = record["settings"]["goal"], record["notes"]
-    assert goal["criterion"] == ("height" if options else "auto")
-    assert (goal["scenarios"]["kind"], goal["scenarios"]["count"], goal["scenarios"]["held_out"]) == ("traffic", 4, 24)
+    assert goal["scenarios"]["kind"] == "traffic"
     assert "in traffic, on average over 4 instants" in notes[0]
-    assert ("targets are weighted by the time that road users are there" in notes) == bool(options)
     said = capsys.readouterr().out
     assert "chosen for the empty road: " in said
     assert "vehicles of one run within 1 m of one of another at the same instant: " in said
@@ -84,5 +81,3 @@ def test_traffic_that_is_of_no_use_is_refused(tmp_path, run):
         run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "short.npz", x=5.0, end=1.0))
     with pytest.raises(SeipError, match=r"here.npz and .*again.npz are nearly the same traffic"):
         run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "again.npz", x=0.5))
-    with pytest.raises(SeipError, match="--scenarios must be 1 to 10,000, not 0"):
-        run(tmp_path / "out", "--scenarios", "0")

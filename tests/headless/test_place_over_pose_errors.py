@@ -1,27 +1,30 @@
 """Placement over pose errors and sensor failures by the command, from a scene to the folder of its result."""
 
 import json
+from unittest.mock import patch
 
 from headless import place
 
 import pytest
 
+from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.file_names import POSE_ERROR_PICTURES
 from seip_addon.scene.result_folder import FILES
 
-COARSE = ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--delta", "6", "--no-render"]
+COARSE = ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--no-render"]
 
 
 @pytest.fixture(scope="module")
 def run(small_scene):
     def run(folder, *options):
-        place.main([str(small_scene), "-o", str(folder), *COARSE, *options])
+        with patch.dict(DEFAULT_COUNTS, {"pose-errors": (3, 20)}):
+            place.main([str(small_scene), "-o", str(folder), *COARSE, *options])
 
     return run
 
 
-ERRORS = ["--pose-errors", "--scenarios", "3", "--held-out", "20"]
+ERRORS = ["--pose-errors", "0.3", "2"]
 
 
 def test_it_writes_a_result_with_the_objective_and_the_evaluation(tmp_path, capsys, run):
@@ -64,11 +67,9 @@ def test_failures_of_nominal_sensors_are_optimised_without_pose_errors(tmp_path,
     [
         (["--pose-errors", "--coverage", "0.5"], "needs a number of sensors or a budget"),
         (["--pose-errors", "--criterion", "returns"], "choose the criterion road"),
-        (["--criterion", "height"], "the criterion height needs traffic: choose traffic as scenarios"),
         (["--failures", "worst", "--risk", "none"], "cannot be combined with the risk none"),
         (["--pose-errors", "--traffic"], "leave out --pose-errors or --traffic"),
-        (["--seen-by", "2", "--traffic"], "cannot be combined with traffic"),
-        (["--weights-from-traffic"], "--weights-from-traffic needs --traffic"),
+        (["--failures", "mean", "--traffic"], "cannot be combined with traffic"),
         (
             ["--risk", "worst"],
             "the risk measure has no effect on nominal poses and the empty road: choose",
@@ -77,33 +78,20 @@ def test_failures_of_nominal_sensors_are_optimised_without_pose_errors(tmp_path,
             ["--risk", "none"],
             "the risk measure has no effect on nominal poses and the empty road: choose",
         ),
-        (
-            ["--scenarios", "5"],
-            "the number of scenarios has no effect on nominal poses and the empty road: choose",
-        ),
-        (
-            ["--held-out", "5"],
-            "the number of held-out scenarios has no effect on nominal poses and the empty road: choose",
-        ),
         (["--seed", "1"], "the seed of the scenarios has no effect on nominal poses and the empty road: choose"),
         (["--failures", "mean", "--risk", "worst"], "the risk measure has no effect on nominal poses"),
         (
             ["--coverage", "0.5", "--failures", "worst"],
-            "give one of these, or leave out failures and several sensors per target$",
+            "give one of these, or leave out failures$",
         ),
         (["--coverage", "0.5", "--pose-errors"], r"give one of these, or only evaluate \(risk none\)$"),
-        (["--criterion", "returns", "--seen-by", "2"], "choose the criterion road .* or leave out failures and"),
+        (["--criterion", "returns", "--failures", "worst"], "choose the criterion road .* or leave out failures"),
     ],
 )
 def test_parts_of_an_objective_that_contradict_each_other_are_refused(tmp_path, run, options, sentence):
     with pytest.raises(SeipError, match=sentence):
         run(tmp_path / "out", *options)
     assert not (tmp_path / "out").exists()
-
-
-def test_errors_that_cannot_be_meant_are_refused(tmp_path, run):
-    with pytest.raises(SeipError, match=r"--tilt-error must be at most 57\.3 degrees, not 90"):
-        run(tmp_path, "--tilt-error", "90")
 
 
 def test_one_sensor_cannot_be_lost_of_one(tmp_path, run):
@@ -115,26 +103,13 @@ def test_one_sensor_cannot_be_lost_of_one(tmp_path, run):
 @pytest.mark.parametrize(
     ("option", "sentence"),
     [
-        (("--tilt-error", "-2"), "the error of tilt must be 0 to 57°, not -2°"),  # not of yaw, which follows it
-        (("--position-error", "-1"), "the error of position must be 0 to 100 m"),
+        (("--pose-errors", "0.3", "-2"), "the error of tilt must be 0 to 57°, not -2°"),
+        (("--pose-errors", "-1"), "the error of position must be 0 to 100 m"),
+        (("--pose-errors", "1", "2", "3"), "takes metres and degrees, not 3 numbers"),
+        (("--weighted", "1e308"), "--weighted must be .* not 1e308"),
     ],
 )
-def test_a_slip_is_named_before_any_work(tmp_path, option, sentence, run):
-    with pytest.raises(SeipError, match=sentence):
-        run(tmp_path / "out", *option)
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("option", "sentence"),
-    [
-        (("--scenarios", "0"), "--scenarios must be 1 to 10,000, not 0"),
-        (("--scenarios", "1000000000"), "--scenarios must be 1 to 10,000, not 1000000000"),
-        (("--held-out", "0"), "--held-out must be 1 to 100,000, not 0"),
-        (("--central-weight", "1e308"), "--central-weight must be 0 to 1,000,000, not 1e308"),
-    ],
-)
-def test_a_number_out_of_its_limits_is_named_by_its_option(tmp_path, option, sentence, run):
+def test_a_number_out_of_its_limits_is_named_before_any_work(tmp_path, option, sentence, run):
     with pytest.raises(SeipError, match=sentence):
         run(tmp_path / "out", *option)
     assert not (tmp_path / "out").exists()

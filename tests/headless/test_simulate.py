@@ -28,7 +28,7 @@ from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import ORIGIN, make_example
 
 ROOT = Path(__file__).resolve().parents[2]
-QUICK = ["--duration", "0.4", "--engine", "bvh"]
+QUICK = ["--duration", "0.4"]
 
 
 def make_traffic(origin=ORIGIN) -> Trajectories:

@@ -1,4 +1,4 @@
-"""The JSON Schema of ``placement.json``, made from the types that read it and the limits of their numbers.
+"""The JSON Schema of ``placement.json``, made from the types that read it.
 
     python -m tests.oracles.placement_schema
 
@@ -12,10 +12,9 @@ from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from seip_addon.core.choosing.placement.objective import MOVED
-from seip_addon.core.limits import EFFORT, SIZE, WEIGHT, Limits
 from seip_addon.core.output.results.placement_record import SCHEMA, PlacementRecord
 
 FILE = Path(__file__).resolve().parents[2] / "docs" / "placement.schema.json"
@@ -30,7 +29,7 @@ NARROWER: dict[str, dict[str, Any]] = {
     "gap": {"minimum": 0},
     "status": {"enum": ["optimal", "feasible", MOVED]},
 }
-"""What is written lies within narrower limits than what is read, by the names of fields."""
+"""Limits of what is written, by the names of fields; what is read has types only."""
 ALWAYS = {"types"}
 """Fields that are always written, though they may be left out of what is read."""
 
@@ -53,9 +52,9 @@ def settings() -> dict[str, Any]:
     """Return the schema of the settings, which a program of another version may know others of."""
     text, truth, anything = {"type": "string"}, {"type": "boolean"}, {"type": "object"}
     texts = {"type": "array", "items": text}
-    shares = {"type": "array", "items": number("number", WEIGHT), "minItems": 3, "maxItems": 3}
+    shares = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
     known = {
-        "grid_spacing_m": number("number", SIZE),
+        "grid_spacing_m": {"type": "number"},
         "candidates": {"type": "object", "properties": {"sensors": texts}},
         "visibility": anything,
         "goal": {"type": "object", "properties": {"shares": shares}},
@@ -63,9 +62,7 @@ def settings() -> dict[str, Any]:
         "engine": text,
         "solver": text,
         "installed_cost": {"anyOf": [anything, {"type": "null"}]},
-        "time_limit_s": number("number", EFFORT),
-        "effort": number("number", EFFORT),
-        "spacings_because": text,
+        "effort": {"type": "number"},
         "render": truth,
     }
     return {"type": "object", "required": ["candidates", "goal"], "properties": known}
@@ -76,9 +73,6 @@ def schema_of(kind: Any) -> dict[str, Any]:
     parts, origin = get_args(kind), get_origin(kind)
     if is_dataclass(kind):
         made = _object(kind)
-    elif origin is Annotated:
-        (limits,) = (one for one in parts if isinstance(one, Limits))
-        made = number(PLAIN[parts[0]], limits)
     elif origin in {Union, UnionType}:
         made = {"anyOf": [schema_of(part) for part in parts]}
     elif origin is tuple:
@@ -93,13 +87,8 @@ def schema_of(kind: Any) -> dict[str, Any]:
     return made
 
 
-def number(kind: str, limits: Limits) -> dict[str, Any]:
-    """Return the schema of numbers within limits."""
-    return {"type": kind, "minimum": _whole(limits.least), "maximum": _whole(limits.most)}
-
-
 def _object(kind: Any) -> dict[str, Any]:
-    hints = get_type_hints(kind, include_extras=True)
+    hints = get_type_hints(kind)
     return {
         "type": "object",
         "additionalProperties": False,
@@ -109,18 +98,12 @@ def _object(kind: Any) -> dict[str, Any]:
 
 
 def _narrowed(name: str, wide: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of a field within what is written of it; the narrower limits must lie within the wider."""
+    """Return the schema of a field within what is written of it."""
     narrower = NARROWER.get(name, {})
     if "anyOf" in wide:
         first, *others = wide["anyOf"]
         return {"anyOf": [_narrowed(name, first), *others]}
-    assert narrower.get("minimum", 0) >= wide.get("minimum", 0) or "minimum" not in narrower
-    assert narrower.get("maximum", 0) <= wide.get("maximum", 0) or "maximum" not in narrower
     return narrower if "enum" in narrower else wide | narrower
-
-
-def _whole(value: float) -> float:
-    return int(value) if value == int(value) and abs(value) < 1e15 else value
 
 
 def text() -> str:

@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seip_addon.core.choosing.placement.cheapest import cheapest_for_coverage
-from seip_addon.core.choosing.placement.near_optimal import near_optimal_set
 from seip_addon.core.choosing.placement.problem import Placement, PlacementProblem
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.placement.solver import solve, solve_greedy
@@ -197,8 +196,6 @@ def faults(seed: int) -> tuple[str, list[str]]:
         found += _of_reverse(problem, subsets, seed)
     if seed % 5 == 0:
         found += _of_little_effort(problem, subsets)
-    if seed % 7 == 0:
-        found += _of_near_best(problem, subsets)
     return kind, found
 
 
@@ -222,8 +219,6 @@ def _of_solve(problem: PlacementProblem, subsets: Subsets) -> list[str]:
     found = _of_answer(problem, subsets, answer)
     if answer.status != "optimal":
         return [*found, "not proven"]
-    if any("ties" in note for note in answer.notes):
-        return [*found, "ties not broken"]
     return found + _of_ties(subsets, subsets.mask(answer.chosen))
 
 
@@ -308,36 +303,9 @@ def _of_little_effort(problem: PlacementProblem, subsets: Subsets) -> list[str]:
     return found
 
 
-def _of_near_best(problem: PlacementProblem, subsets: Subsets) -> list[str]:
-    if not (subsets.allowed & (subsets.covered > 0)).any() or len(np.unique(problem.positions)) < len(problem.visible):
-        return []
-    answer = finish(solve(problem))
-    near = finish(near_optimal_set(problem, answer.chosen, 0.1))
-    if near is None or not near.complete or answer.status != "optimal":
-        return []
-    best = int(subsets.covered[subsets.allowed].max())
-    slack = math.ceil(TIE * subsets.total)
-    listed = {subsets.mask(row[row >= 0]) for row in near.placements}
-    goal = math.ceil(Fraction(0.9) * best)
-    wrong = [s for s in listed if not subsets.allowed[s] or int(subsets.covered[s]) < goal - slack - 1]
-    lacking = [
-        int(s)
-        for s in np.flatnonzero(subsets.allowed & (subsets.covered >= goal + slack + 1))
-        if not _has_idle(problem, subsets, int(s)) and int(s) not in listed
-    ]
-    return [f"of the placements near the best {len(lacking)} lack, {len(wrong)} are wrong"] if wrong or lacking else []
-
-
-def _has_idle(problem: PlacementProblem, subsets: Subsets, subset: int) -> bool:
-    members = [bit for bit in range(len(subsets.order)) if subset >> bit & 1]
-    without = [int(subsets.covered[subset & ~(1 << bit)]) for bit in members]
-    blind = [not problem.visible[subsets.order[bit]].any() for bit in members]
-    return any(value == int(subsets.covered[subset]) for value in without) or any(blind)
-
-
 # ---- many of them ----------------------------------------------------------------------------------------------------
 
-UNDECIDED = ("not proven", "ties not broken", "the price is not proven")
+UNDECIDED = ("not proven", "the price is not proven")
 """No faults, but to be few."""
 
 

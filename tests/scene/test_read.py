@@ -12,7 +12,6 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.site.scene_geometry import NamedArea
 from seip_addon.scene import contract
-from seip_addon.scene.materials import REFLECTIVITY, material, set_reflectivity
 from seip_addon.scene.named_places import places_text
 from seip_addon.scene.read import read_scene
 
@@ -377,24 +376,6 @@ def test_objects_with_damaged_faces_are_named(scene, damage):
         mesh.polygons.foreach_set("loop_start", [3])
     with pytest.raises(SeipError, match="object 'torn' has damaged faces: repair or delete it"):
         read_scene(scene)
-
-
-def test_materials_get_the_reflectivity_that_is_asked_for(scene):
-    material("asphalt")
-    bpy.data.objects["road"].data.materials.append(bpy.data.materials["SEIP asphalt"])
-    assert (read_scene(scene).geometry.roads[0].reflectivity == REFLECTIVITY["asphalt"]).all()
-    set_reflectivity(["asphalt=0.08"])
-    assert (read_scene(scene).geometry.roads[0].reflectivity == 0.08).all()
-    for asked, message in (
-        ("asfalt=0.1", "no material 'asfalt'; did you mean asphalt"),
-        ("asphalt=dark", "reflectivity 'asphalt=dark' is not understood: give MATERIAL=SHARE"),
-        ("asphalt=1.5", "a share from 0 to 1"),
-        ("asphalt=nan", "a share from 0 to 1"),
-        ("asphalt", "is not understood"),
-        ("=0.5", "is not understood"),
-    ):
-        with pytest.raises(SeipError, match=message):
-            set_reflectivity([asked])
 
 
 def test_an_object_may_name_the_rule_that_keeps_new_posts_off_it(scene):

@@ -20,5 +20,5 @@ def test_help_names_the_options_of_a_survey_where_another_command_explains_them(
     parser = new_parser("study coverage", "Study coverage.")
     add_survey_options(parser)
     text = parser.format_help()
-    assert "--heights --tilts --yaws --assumed-poles --installed-cost (see: seip place --help)\n" in text
+    assert "--heights --tilts --installed-cost (see: seip place --help)\n" in text
     assert "types to choose from" not in text

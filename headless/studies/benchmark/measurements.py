@@ -165,7 +165,7 @@ def compare_sensor_models(
     Progress
     """
     models = sensor_models(load_catalogue()[scope.modelled])
-    settings = SurveySettings(replace(scope.layout, sensors=(scope.modelled,)), time_limit=time_limit)
+    settings = SurveySettings(replace(scope.layout, sensors=(scope.modelled,)))
     sites, precision = [], None
     for number, scene in enumerate(scenes):
         yield Progress(number, len(scenes), f"models of the sensor in {scene.name}")

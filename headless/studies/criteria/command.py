@@ -81,7 +81,7 @@ def _study(options: argparse.Namespace, settings: CriteriaStudySettings) -> Mapp
     check_runs([run.trajectories for run in runs], surveyed.site.region)
     for run in runs:
         require_own_traffic(run.trajectories, surveyed.geometry, run.name)
-    scans = ScanSettings(seed=options.scan_seed, rolling_shutter=options.rolling_shutter, engine=options.engine)
+    scans = ScanSettings(seed=options.scan_seed, rolling_shutter=options.rolling_shutter)
     settings_record = {
         **surveyed.settings.as_record(),
         **vars(settings),

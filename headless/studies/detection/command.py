@@ -132,7 +132,7 @@ def prepare_site(options: argparse.Namespace, count: int) -> DetectionSite:
     runtime.LOG.info(traffic.overlap())
     runtime.LOG.info(traffic.shared_bays())
     runtime.warn(filter(None, [too_few_runs(len(traffic.test))]))
-    scans = ScanSettings(seed=options.scan_seed, rolling_shutter=options.rolling_shutter, engine=options.engine)
+    scans = ScanSettings(seed=options.scan_seed, rolling_shutter=options.rolling_shutter)
     return DetectionSite(surveyed, watch, traffic, Simulator(surveyed.geometry, scans))
 
 

@@ -119,7 +119,7 @@ def _evaluation(options: argparse.Namespace, scene: Path, runs: list[Path]) -> a
     evaluate.add_options(parser)
     arguments = [str(scene), "-o", str(options.work), "--traffic", *map(str, runs), "--every", f"{options.every:g}"]
     arguments += ["--sensor", *(sensor.key for sensor in PUBLISHED_SENSORS)]
-    arguments += ["--heights", *(f"{height:g}" for height in HEIGHTS), "--time-limit", f"{options.time_limit:g}"]
+    arguments += ["--heights", *(f"{height:g}" for height in HEIGHTS), "--effort", f"{options.effort:g}"]
     return parser.parse_args([*arguments, "--device", options.device])
 
 
@@ -152,7 +152,7 @@ def _facts(
             + (f"--types {' '.join(path.name for path in options.types)} " if options.types else "")
             + f"--network {options.network.name} --steps {options.steps} --trainings {options.trainings} "
             f"--every {options.every:g} --runs {options.runs} --duration {options.duration:g} "
-            f"--time-limit {options.time_limit:g} -o docs"
+            f"--effort {options.effort:g} -o docs"
         ),
         scene=f"only the OpenDRIVE map, {geometry.region.area:,.0f} m² around junction {junction}; {hidden}",
         criterion=(
@@ -214,7 +214,11 @@ def _parser() -> argparse.ArgumentParser:
         "--approaches", type=float, metavar="M", help="length of the streets in the region, metres (80)"
     )
     parser.add_argument(
-        "--time-limit", type=float, default=60.0, metavar="S", help="time limit of the solver for each placement"
+        "--effort",
+        type=float,
+        default=60.0,
+        metavar="UNITS",
+        help="limit of the search for each placement, in counted work",
     )
     traffic = parser.add_argument_group("traffic")
     traffic.add_argument(

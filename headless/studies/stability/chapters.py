@@ -34,8 +34,8 @@ from .weather import untouched_types, weather_rows, weather_study
 TAIL_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
 """Risks studied over pose errors: the mean, the worst quarter and the worst scenario."""
 
-RISKS = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
-"""Risks studied: failure of a sensor, and coverage by two sensors."""
+RISKS = (Risk(failure="worst"), Risk(failure="mean"))
+"""Risks studied: failure of a sensor."""
 
 CHAPTERS = ("criterion", "arithmetic", "poses", "failures", "traffic", "weather")
 """Names of the chapters, in the order of the page."""

@@ -95,24 +95,20 @@ def save_delta_chart(path: str | os.PathLike[str], study: CriterionStudy, delta:
 
 
 def save_convergence_chart(path: str | os.PathLike[str], study: CriterionStudy, title: str) -> None:
-    """Draw coverage against the spacing of targets and of candidates, with the spacings chosen for the tolerance."""
+    """Draw coverage against the spacing of targets and of candidates."""
     figure, panels = _figure(2)
-    picked = study.convergence.settings
-    for panel, answers, what, at in (
-        (panels[0], study.by_grid, "spacing of the targets (m)", picked.grid_spacing),
-        (panels[1], study.by_candidates, "spacing of the candidates (m)", picked.candidates.spacing),
+    for panel, answers, what in (
+        (panels[0], study.by_grid, "spacing of the targets (m)"),
+        (panels[1], study.by_candidates, "spacing of the candidates (m)"),
     ):
         spacing = [a.grid_spacing if panel is panels[0] else a.candidate_spacing for a in answers]
         panel.plot(spacing, [a.own for a in answers], color=COLOURS[1], marker="s", label="on its own grid")
         panel.plot(spacing, [a.evaluated for a in answers], color=COLOURS[0], marker="o", label="on the fine grid")
-        best = max(a.evaluated for a in answers)
-        panel.axhspan(best - study.convergence.tolerance, best, color=COLOURS[2], alpha=0.12, label="tolerance")
-        panel.axvline(at, **LIMIT_LINE)
         panel.set_xscale("log", base=2)
         panel.invert_xaxis()
         panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         _share_axis(panel)
-        style_axes(panel, f"{what}; dashed: picked", "coverage of the best placement")
+        style_axes(panel, what, "coverage of the best placement")
         panel.legend(frameon=False, fontsize=8.5)
     save_chart(path, figure, title)
 

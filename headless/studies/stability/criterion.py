@@ -10,16 +10,6 @@ import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
-from headless.convergence import (
-    CANDIDATE_SPACINGS,
-    EVALUATION_SPACING,
-    GRID_SPACINGS,
-    Answer,
-    Convergence,
-    Evaluator,
-    coarsest_settings,
-)
-
 import numpy as np
 import shapely
 
@@ -41,6 +31,7 @@ from seip_addon.core.workflows.survey_settings import SurveySettings
 
 from .rows import Row
 from .shares import Share
+from .spacings import CANDIDATE_SPACINGS, EVALUATION_SPACING, GRID_SPACINGS, Answer, Evaluator
 
 DELTAS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # metres
 
@@ -152,8 +143,6 @@ class CriterionStudy:
     ----------
     by_grid, by_candidates : tuple of Answer
         Best placements for all values of one spacing, with the other spacing as requested.
-    convergence : Convergence
-        Spacings chosen for a tolerance.
     phase, azimuth : Draws
         Coverage of the best placement on shifted and rotated grids, and with other starting azimuths of beams.
     rechosen : Draws
@@ -165,7 +154,6 @@ class CriterionStudy:
     by_delta: tuple[DeltaAnswer, ...]
     by_grid: tuple[Answer, ...]
     by_candidates: tuple[Answer, ...]
-    convergence: Convergence
     phase: Draws
     azimuth: Draws
     rechosen: Draws
@@ -176,7 +164,6 @@ def criterion_study(
     settings: SurveySettings,
     count: int = 4,
     *,
-    tolerance: float = 0.01,
     draws: int = 40,
     seed: int = 0,
 ) -> Generator[Progress, None, CriterionStudy]:
@@ -214,7 +201,6 @@ def criterion_study(
     for spacing in CANDIDATE_SPACINGS:
         tried = replace(settings, candidates=replace(settings.candidates, spacing=spacing))
         by_candidates.append((yield from within(Progress(0, 0, f"posts {spacing:g} m apart"), evaluator.answer(tried))))
-    convergence = yield from coarsest_settings(geometry, settings, objective, tolerance)
 
     best = yield from evaluator.solve(site, settings)
     phase, rechosen = yield from _by_grid_laid(evaluator, site, settings, best, draws, random)
@@ -225,7 +211,6 @@ def criterion_study(
         by_delta=tuple(by_delta),
         by_grid=tuple(by_grid),
         by_candidates=tuple(by_candidates),
-        convergence=convergence,
         phase=phase,
         azimuth=azimuth,
         rechosen=rechosen,
@@ -427,9 +412,9 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
                 answer="the record contains δ; a warning if it is too small for the rings",
             )
         )
-    for what, tried, picked in (
-        ("grid spacing", study.by_grid, study.convergence.settings.grid_spacing),
-        ("candidate spacing", study.by_candidates, study.convergence.settings.candidates.spacing),
+    for what, tried, option in (
+        ("grid spacing", study.by_grid, "--grid"),
+        ("candidate spacing", study.by_candidates, "--spacing"),
     ):
         finest = max(answer.evaluated for answer in tried)
         worst = min(tried, key=lambda answer: answer.evaluated)
@@ -440,7 +425,7 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
                 regime=what,
                 begins=f"loses up to {100 * (finest - worst.evaluated):.2f} points of coverage ({spacing:g} m)",
                 how=f"best placements for each spacing, evaluated on targets {EVALUATION_SPACING:g} m apart",
-                answer=f"`--tolerance {study.convergence.tolerance:g}` chooses {picked:g} m",
+                answer=f"a finer `{option}`",
             )
         )
     for draws in (study.phase, study.azimuth, study.rechosen):

@@ -4,7 +4,7 @@ import numpy as np
 
 from seip_addon.core.choosing.robustness.pose_study import LOW_QUANTILE, PoseStudy
 from seip_addon.core.choosing.robustness.robust_study import Contender, RobustStudy
-from seip_addon.core.choosing.robustness.traffic_study import LAYER_NAMES, MOSTLY_SEEN_SHARE, NOTABLE_LOSS, TrafficStudy
+from seip_addon.core.choosing.robustness.traffic_study import MOSTLY_SEEN_SHARE, NOTABLE_LOSS, TrafficStudy
 from seip_addon.core.estimates import mean_of, quantile_gain, quantile_of
 
 from .rows import Row
@@ -92,29 +92,25 @@ def saving_converged(study: RobustStudy, contender: Contender) -> bool:
 def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
     """Return the results of the study of traffic as rows."""
     regime = f"{study.road_users:.0f} road users at a time"
-    batch = study.empty.seen[study.layer].batch
+    seen, batch = study.empty.seen, study.empty.seen.batch
     how = (
         f"{len(batch)} instants in {len(np.unique(batch))} stretches of time, of runs not used in the optimisation; "
         f"half of them {'give the same result' if study.is_converged() else 'give a different result: take more'}"
     )
-    losses = tuple(
-        Row(
-            f"view of the {LAYER_NAMES[layer]}",
-            regime,
-            f"{seen.empty:.2%} of the targets' weight is visible on the empty road, {seen.mean.describe()} on average "
-            f"over time in traffic: vehicles hide {seen.hidden.describe()} of the visible weight, and "
-            f"{seen.rarely_seen:.1%} of the visible targets are seen less than {MOSTLY_SEEN_SHARE:.0%} of the time",
-            how,
-            f"a warning if {NOTABLE_LOSS:.0%} of the weight or more is lost, and a map of the share of time",
-        )
-        for layer, seen in study.empty.seen.items()
+    loss = Row(
+        "view of the road",
+        regime,
+        f"{seen.empty:.2%} of the targets' weight is visible on the empty road, {seen.mean.describe()} on average "
+        f"over time in traffic: vehicles hide {seen.hidden.describe()} of the visible weight, and "
+        f"{seen.rarely_seen:.1%} of the visible targets are seen less than {MOSTLY_SEEN_SHARE:.0%} of the time",
+        how,
+        f"a warning if {NOTABLE_LOSS:.0%} of the weight or more is lost, and a map of the share of time",
     )
     gain = Row(
-        f"placement for the empty road, to see the {LAYER_NAMES[study.layer]}",
+        "placement for the empty road, to see the road",
         regime,
-        f"a placement optimised in traffic sees {study.traffic.seen[study.layer].mean.describe()}, "
-        f"{study.gain(study.layer).as_change()}",
+        f"a placement optimised in traffic sees {study.traffic.seen.mean.describe()}, {study.gain.as_change()}",
         f"optimised for {study.chosen_at} instants; {how}",
         f"placement over instants of traffic; certificate: within {study.traffic.placement.gap:.2%} of the best",
     )
-    return (*losses, gain)
+    return (loss, gain)

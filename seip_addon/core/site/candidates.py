@@ -11,14 +11,14 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Boolean, Float, Integer, Text
-from ..counts import counted
+from ..counts import counted, typed_number
 from ..errors import SeipError
 from ..geometry.orientation import orientation
 from ..geometry.plan import outline, surface_height
 from ..settings import setting
 from .obstruction import inside_any, post_blocked
 from .pavement_sampling import spread
-from .post_rules import RULES, RuleName, check_allowed, excluded_posts
+from .post_rules import ALLOWED, ASSUMED_POLES, RULES, AllowedName, check_allowed, excluded_posts
 from .scene_geometry import ASSUMED, NamedArea, Pole, SceneGeometry, joined
 
 DEFAULT_TYPE = "os1_128"
@@ -33,7 +33,7 @@ _MAX_ABOVE_POLE = 0.5
 MAX_SENSOR_HEIGHT = 100.0
 """Metres above the ground; larger heights are rejected as typing errors."""
 
-ASSUMED_POLES = "on an assumed pole"
+ON_ASSUMED_POLE = "on an assumed pole"
 """Reason for which assumed poles are dropped."""
 
 MAX_TILT = 90.0
@@ -67,10 +67,9 @@ class CandidateSettings:
         Distance of a new post and its sensor from walls and other objects.
     bracket : float, metres
         Distance of a sensor from the axis of an existing pole, towards the region.
-    assumed_poles : bool
-        Whether assumed poles, which are not in the map, may carry sensors.
     allow : tuple of str
-        Names of the rules of `post_rules.RULES` that do not apply; by default all apply.
+        Names of the rules of `post_rules.RULES` that do not apply, by default all apply; and `ASSUMED_POLES` if assumed
+        poles, which are not in the map, may carry sensors.
     """
 
     sensors: tuple[str, ...] = setting((DEFAULT_TYPE,), "types to choose from", option="sensor", metavar="KEY")
@@ -89,30 +88,12 @@ class CandidateSettings:
         metavar="DEG",
         read=lambda texts: tilts_of(texts),  # noqa: PLW0108 -- as above
     )
-    yaws: int = setting(
-        8,
-        "directions, evenly over the circle, of sensors that do not look all round",
-        minimum=1,
-        maximum=MAX_YAWS,
-        metavar="N",
-    )
+    yaws: int = 8
     spacing: float = setting(4.0, "distance between new posts on the pavement", unit="m", minimum=0.1, maximum=1000.0)
-    setback: float = setting(0.5, "distance of new posts from the kerb", unit="m", minimum=0.0, maximum=100.0)
-    clearance: float = setting(
-        0.3,
-        "distance of new posts and their sensors from walls and other objects",
-        unit="m",
-        minimum=0.0,
-        maximum=100.0,
-    )
-    bracket: float = setting(
-        0.4, "distance of sensors from the axis of an existing pole", unit="m", minimum=0.0, maximum=100.0
-    )
-    assumed_poles: bool = setting(
-        default=False,
-        help="let assumed poles carry sensors: those of traffic lights for which the map has no post",
-    )
-    allow: tuple[RuleName, ...] = setting((), f"also use: {' '.join(RULES)}", metavar="RULE")
+    setback: float = 0.5
+    clearance: float = 0.3
+    bracket: float = 0.4
+    allow: tuple[AllowedName, ...] = setting((), f"also use: {' '.join(ALLOWED)}", metavar="RULE")
 
     def __post_init__(self) -> None:
         if not self.sensors:
@@ -191,7 +172,7 @@ def _numbers(texts: Sequence[str], above: float, most: float, what: str) -> list
 def _named_by(text: str, above: float, most: float) -> list[float]:
     """Return the number in a text, or those of a range FROM:TO:STEP; an empty list if it is neither."""
     try:
-        numbers = [float(part) for part in text.split(":")]
+        numbers = [typed_number(part) for part in text.split(":")]
     except ValueError:
         return []
     if len(numbers) == 1:
@@ -387,8 +368,8 @@ def _free_poles(geometry: SceneGeometry, settings: CandidateSettings, dropped: d
         if pole.mandatory and pole not in free:
             raise SeipError(f"mandatory pole {pole.name!r} stands in a forbidden area: move the area or unmark it")
     dropped["on a forbidden pole"] = len(geometry.poles) - len(free)
-    usable = [pole for pole in free if settings.assumed_poles or pole.mandatory or pole.source != ASSUMED]
-    dropped[ASSUMED_POLES] = len(free) - len(usable)
+    usable = [pole for pole in free if ASSUMED_POLES in settings.allow or pole.mandatory or pole.source != ASSUMED]
+    dropped[ON_ASSUMED_POLE] = len(free) - len(usable)
     allowed = []
     for pole in usable:
         if pole.keep_off is None or pole.keep_off in settings.allow or pole.mandatory:

@@ -6,7 +6,6 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
 
@@ -15,7 +14,6 @@ from ..storage.toml_table import REQUIRED, Key, number, parse_toml, read_table, 
 from .candidates import Candidates
 
 DEFAULTS = Path(__file__).with_name("installed_cost.toml")
-Dollars = Annotated[float, PRICE]
 
 
 @dataclass(frozen=True)
@@ -32,13 +30,13 @@ class InstalledCost:
         Costs of electricity and of the data line.
     """
 
-    new_post_usd: Dollars
-    existing_pole_usd: Dollars
-    mast_arm_usd: Dollars
-    mast_arm_beyond_m: Annotated[float, DISTANCE]
-    power_new_post_usd: Dollars
-    power_existing_pole_usd: Dollars
-    backhaul_usd: Dollars
+    new_post_usd: float
+    existing_pole_usd: float
+    mast_arm_usd: float
+    mast_arm_beyond_m: float
+    power_new_post_usd: float
+    power_existing_pole_usd: float
+    backhaul_usd: float
 
     def over(self, candidates: Candidates, bracket: float) -> Candidates:
         """Return candidates with the cost of installation at each position.

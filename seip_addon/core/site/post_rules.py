@@ -15,6 +15,7 @@ from ..errors import SeipError
 from ..geometry.plan import closed, without
 
 RuleName = Literal["cycle-tracks", "driveways", "landings", "private", "islands", "power-poles"]
+AllowedName = Literal["cycle-tracks", "driveways", "landings", "private", "islands", "power-poles", "assumed-poles"]
 
 MIN_ISLAND_WIDTH = 4.0
 """Metres: islands and medians narrower than this are reserved for pedestrians, signals and signs."""
@@ -49,6 +50,12 @@ RULES: dict[RuleName, Rule] = {
 }
 """Rules in order of application: a position is counted for the first rule that excludes it."""
 
+ASSUMED_POLES: AllowedName = "assumed-poles"
+"""Name that lets assumed poles carry sensors: those of traffic lights for which the map has no post."""
+
+ALLOWED: tuple[AllowedName, ...] = (*RULES, ASSUMED_POLES)
+"""Names that a survey may allow."""
+
 
 @dataclass(frozen=True, eq=False)
 class KeepOffArea:
@@ -60,10 +67,10 @@ class KeepOffArea:
 
 
 def check_allowed(names: Sequence[str]) -> None:
-    """Raise SeipError if a name is not that of a rule."""
+    """Raise SeipError if a name is not that of a rule, or `ASSUMED_POLES`."""
     for name in names:
-        if name not in RULES:
-            raise SeipError(f"there is no rule {name!r} to allow: choose among {', '.join(RULES)}")
+        if name not in ALLOWED:
+            raise SeipError(f"there is no rule {name!r} to allow: choose among {', '.join(ALLOWED)}")
 
 
 def excluded_posts(

@@ -4,9 +4,6 @@ import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated
-
-from ..limits import COUNT
 
 _NUMBER = re.compile(r"[ ._]*\d+( of the [a-z ]+)?$")
 
@@ -30,8 +27,8 @@ class SourceCount:
 
     kind: str
     source: str
-    count: Annotated[int, COUNT]
-    assumed: Annotated[int, COUNT]
+    count: int
+    assumed: int
 
 
 def one_line(text: str) -> str:

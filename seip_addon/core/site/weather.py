@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..counts import typed_number
 from ..errors import SeipError
 from ..sensing.lidar.model import LidarModel
 from ..settings import setting
@@ -105,7 +106,7 @@ def weather_of(words: Sequence[str]) -> Weather:
 
 def _is_number(text: str) -> bool:
     try:
-        return math.isfinite(float(text))
+        return math.isfinite(typed_number(text))
     except ValueError:
         return False
 

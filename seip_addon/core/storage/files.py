@@ -227,6 +227,7 @@ def read_small(path: Path, most: int, cure: str) -> bytes:
     SeipError
         The file cannot be read, is empty, or is larger; ``cure`` ends the message of the last two.
     """
+    check_regular(path)
     try:
         with path.open("rb") as file:
             size = os.fstat(file.fileno()).st_size
@@ -240,6 +241,12 @@ def read_small(path: Path, most: int, cure: str) -> bytes:
     if not content:
         raise SeipError(f"{path.name} is empty; {cure}")
     return content
+
+
+def check_regular(path: Path) -> None:
+    """Raise SeipError if a path is a device or the like, which may never end."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise SeipError(f"{path} is not a regular file: name a file")
 
 
 def parse_json(text: str | bytes) -> Any:  # noqa: ANN401  # any JSON

@@ -9,6 +9,7 @@ from typing import Any, TypeGuard
 
 from ..errors import SeipError
 from ..limits import MAP_NUMBER, Limits
+from .files import check_regular
 
 Reader = Callable[[Any], Any]  # converts a value; raises a `ValueError` that names the accepted values
 REQUIRED = object()  # default of a required key
@@ -30,6 +31,7 @@ def toml_text(path: Path, what: str) -> str:
     SeipError
         The file cannot be read, or is not UTF-8 text.
     """
+    check_regular(path)
     try:
         return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:

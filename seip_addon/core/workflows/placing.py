@@ -9,7 +9,6 @@ import numpy as np
 
 from ..acceptance import Acceptance
 from ..choosing.placement.deployment import deploy
-from ..choosing.placement.near_optimal import near_optimal_set
 from ..choosing.placement.objective import (
     CHOSEN_FOR,
     Objective,
@@ -23,15 +22,12 @@ from ..choosing.placement.optimisation import optimise
 from ..choosing.placement.price_front import price_front
 from ..choosing.placement.risk import Risk
 from ..choosing.placement.search_limits import SolverLimits
-from ..choosing.robustness.assumed_heights import height_notes
 from ..choosing.robustness.gain_band import with_gain_band
 from ..choosing.robustness.pose_error_evaluation import PoseErrorEvaluation
 from ..choosing.robustness.pose_study import PoseStudySettings, pose_message, pose_study
 from ..choosing.robustness.robust_study import robust_study
 from ..choosing.robustness.traffic_instants import spread_instants
-from ..choosing.robustness.traffic_presence import road_user_seconds
-from ..choosing.robustness.traffic_study import LAYER_NAMES, traffic_message, traffic_scenarios, traffic_study
-from ..choosing.robustness.visibility_in_traffic import TrafficLayer
+from ..choosing.robustness.traffic_study import traffic_message, traffic_scenarios, traffic_study
 from ..errors import SeipError
 from ..progress import Progress
 from .returns import crossing_returns, place_by_returns, with_returns_front
@@ -49,10 +45,7 @@ _OVER_INSTANTS = {1.0: "on average over", 0.25: "in the worst quarter of", 0.0: 
 def place(
     survey: Survey, objective: Objective, runs: TrafficRuns | None = None, acceptance: Acceptance | None = None
 ) -> Generator[Progress, None, Solution]:
-    """Optimise a placement, evaluate it on held-out scenarios, and add notes on its reliability.
-
-    The notes give the number of near-optimal placements (`near_optimal_set`), the effect of assumed heights
-    (`height_notes`), and the result of the evaluation.
+    """Optimise a placement, evaluate it on held-out scenarios, and add notes on the evaluation.
 
     Parameters
     ----------
@@ -79,7 +72,6 @@ def place(
     notes = [*solution.placement.notes]
     if acceptance is not None and acceptance.accepted and solution.placement.status != "optimal":
         notes.append(ACCEPTED_MESSAGE)
-    notes += height_notes(around, survey.geometry, deployment.sensors, deployment.coverage)
     if measure is None and deployment.sensors:
         notes += yield from _evaluated(survey, replace(solution, deployment=deployment), runs)
     return replace(solution, deployment=deployment, placement=replace(solution.placement, notes=tuple(notes)))
@@ -97,14 +89,7 @@ def _nominal(survey: Survey, objective: Objective, limits: SolverLimits) -> Gene
     """Optimise for nominal poses on the empty road."""
     if criterion_of(objective, survey.models) == "returns":
         return (yield from place_by_returns(survey, objective, limits))
-    site, models, visible = survey.site, survey.models, survey.grid.visible
-    solution = yield from optimise(site, visible, models, objective, limits)
-    placement = solution.placement
-    if placement.status != "optimal" or objective.cheapest:
-        return solution
-    top = yield from near_optimal_set(placement_problem(site, visible, models, objective), placement.chosen)
-    notes = placement.notes if top is None else (*placement.notes, top.message)
-    return replace(solution, placement=replace(placement, notes=notes))
+    return (yield from optimise(survey.site, survey.grid.visible, survey.models, objective, limits))
 
 
 def _under_risk(
@@ -137,22 +122,17 @@ def _in_traffic(
     """Optimise a risk measure over instants of traffic, whose vehicles block the view."""
     site, models, grid = survey.site, survey.models, survey.grid
     around, scenarios = surroundings(survey), objective.scenarios
-    layer: TrafficLayer = "height" if objective.criterion == "height" else "road"
     problem = placement_problem(site, grid.visible, models, objective)
-    if scenarios.weights_from_traffic:
-        seconds = yield from road_user_seconds(site.targets, runs.optimisation)
-        problem = replace(problem, weights=problem.weights * seconds)
     instants = spread_instants(runs.optimisation, scenarios.optimised, scenarios.seed)
-    views = yield from traffic_scenarios(around, problem, instants, layer)
+    views = yield from traffic_scenarios(around, problem, instants)
     held_out = spread_instants(runs.evaluation, scenarios.evaluated, scenarios.seed + 1)
     study = yield from traffic_study(around, problem, views, held_out, limits, measure)
     note = (
-        f"{CHOSEN_FOR}to see the {LAYER_NAMES[layer]} in traffic, {_OVER_INSTANTS[measure.tail]} {len(instants)} "
+        f"{CHOSEN_FOR}to see the road in traffic, {_OVER_INSTANTS[measure.tail]} {len(instants)} "
         "instants: objective, bound and gap refer to that"
     )
-    weights = ("targets are weighted by the time that road users are there",) if scenarios.weights_from_traffic else ()
     placement = study.traffic.placement
-    placement = replace(placement, notes=(note, *weights, *placement.notes, *study.messages()))
+    placement = replace(placement, notes=(note, *placement.notes, *study.messages()))
     deployment = deploy(site, models, grid.rows(placement.chosen), placement.chosen)
     return Solution(with_count(objective, site), placement, None, deployment, study)
 

@@ -35,14 +35,10 @@ class SurveySettings:
     solver : str
         Solver of integer programs: ``auto``, ``highs``, ``cbc`` or ``gurobi``; ``auto`` is HiGHS if it is installed,
         otherwise CBC.
-    time_limit : float, seconds, optional
-        Limit of the wall time of each search.
     effort : float, units of work, optional
         Limit of the counted work of each search, which makes results reproducible: see `SolverLimits`.
     installed_cost : InstalledCost, optional
         Cost of installation to include in every price; by default prices are those of sensors only.
-    spacings_because : str
-        Reason for the spacings of targets and candidates; empty if the user chose them.
 
     Examples
     --------
@@ -58,21 +54,18 @@ class SurveySettings:
     candidates: CandidateSettings = field(default_factory=CandidateSettings)
     visibility: VisibilitySettings = field(default_factory=VisibilitySettings)
     weather: Weather = field(default_factory=Weather)
-    reflectivity: tuple[str, ...] = ()
     grid_spacing: float = setting(1.0, "distance between neighbouring targets on the road", unit="m", option="grid")
     catalogue: tuple[Path, ...] = setting((), "catalogues of your own; a unit's beams as KEY=FILE", metavar="FILE")
-    engine: Engine = setting("auto", "ray caster")
+    engine: Engine = "auto"
     solver: str = setting("auto", "auto (HiGHS if it is installed, otherwise CBC), highs, cbc or gurobi")
     effort: float | None = setting(
         None,
         f"limit of each search in counted work, 1 is about a second of a core ({DEFAULT_EFFORT:g})",
         metavar="UNITS",
     )
-    time_limit: float | None = setting(None, "limit of each search in seconds, in place of counted work", metavar="S")
     installed_cost: InstalledCost | None = setting(
         None, "include posts, power and backhaul in prices, from the shipped table or your own", metavar="TOML"
     )
-    spacings_because: str = ""
 
     def models(self) -> dict[str, LidarModel]:
         """Return the sensor types to choose from, in the given weather, by catalogue key.
@@ -93,7 +86,7 @@ class SurveySettings:
     @property
     def limits(self) -> SolverLimits:
         """Solver and limits of a search."""
-        return SolverLimits(self.solver, self.time_limit, self.effort)
+        return SolverLimits(self.solver, effort=self.effort)
 
     def reach(self, models: Mapping[str, LidarModel] | None = None) -> float:
         """Return the largest distance from a target at which a ray that sees it can begin or be stopped, in metres.
@@ -108,19 +101,16 @@ class SurveySettings:
 
     def as_record(self) -> dict[str, Any]:
         """Return the settings for records, defaults included, as values that JSON can represent."""
-        limits = _finite({"time_limit_s": self.time_limit or math.inf, "effort": self.limits.work})
         return {
             "grid_spacing_m": self.grid_spacing,
             "candidates": as_json(self.candidates),
             "visibility": asdict(self.visibility),
             "weather": _finite(asdict(self.weather)),
-            "reflectivity": list(self.reflectivity),
             "catalogue": [path.name for path in self.catalogue],
             "engine": self.engine,
             "solver": self.solver,
             "installed_cost": self.installed_cost and asdict(self.installed_cost),
-            "spacings_because": self.spacings_because,
-            **limits,
+            "effort": self.limits.work,
         }
 
 

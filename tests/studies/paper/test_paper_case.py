@@ -67,7 +67,7 @@ def test_the_page_is_written_with_its_charts(run, network, tmp_path, capsys):
     arm = streets.arms[0]
     way = f"{arm.id} {streets.turns[arm.id][0][0]}"
     brief = ["--runs", "4", "--duration", "12", "--warm-up", "30", "--every", "9", "--steps", "1", "--trainings", "1"]
-    few = ["--approaches", "20", "--time-limit", "2"]
+    few = ["--approaches", "20", "--effort", "2"]
     run(*brief, *few, net=network.read_text(encoding="utf-8"), edges=way)
     text = (tmp_path / "docs" / "paper.md").read_text(encoding="utf-8")
     assert "--steps 1 --trainings 1 --every 9" in text

@@ -22,9 +22,7 @@ COARSE = [
     "8",
     "--spacing",
     "25",
-    "--delta",
-    "6",
-    "--time-limit",
+    "--effort",
     "2",
 ]
 LITTLE = stability_chapters.StabilityScope(
@@ -41,7 +39,7 @@ def run(folder, *options):
     spacings = {"GRID_SPACINGS": (8.0, 6.0), "CANDIDATE_SPACINGS": (30.0, 25.0)}
     with (
         patch.multiple(criterion, DELTAS=(4.0, 6.0), **spacings),
-        patch.multiple("headless.convergence", COARSE_CANDIDATE_SPACING=25.0, EVALUATION_SPACING=4.0, **spacings),
+        patch("headless.studies.stability.spacings.EVALUATION_SPACING", 4.0),
     ):
         stability.main(
             [str(SCENE), "-o", str(folder / "docs"), "--work", str(folder / "work"), *COARSE, *options], LITTLE

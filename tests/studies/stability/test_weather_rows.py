@@ -93,7 +93,7 @@ def test_rows_say_where_it_fails_and_what_helps():
 
 def test_one_chapter_is_studied_and_put_into_the_page(small_scene, tmp_path):
     argv = [str(small_scene), "-o", str(tmp_path), "--work", str(tmp_path / "work"), "--only", "weather"]
-    argv += ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "12", "--time-limit", "2"]
+    argv += ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "12", "--effort", "2"]
     with pytest.raises(SeipError, match="leave out --only"):
         stability.main(argv)
     save_page(tmp_path / "stability.md", "The lead.", [replace(CHAPTER, title="First", charts=())], "stability")

@@ -11,11 +11,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import limits
 from ...arrays import Boolean, Float, Integer, Text
 from ...errors import SeipError
 from ...progress import Progress
-from ...storage.array_file import ArrayFile, ArrayRule, ContentError
+from ...storage.array_file import ArrayFile
 from ..placement.cheapest import cheapest_for_coverage
 from ..placement.problem import Placement, PlacementProblem
 from ..placement.returns_solver import solve_returns
@@ -29,16 +28,16 @@ FILE = ArrayFile(
     "placement problem of a site",
     "delete it and compute it again",
     {
-        "packed": ArrayRule("u1", ("poses", "bytes")),
-        "returns": ArrayRule("f4", ("poses", "users"), limits.Limits(0.0, 1e12)),
-        "user_weights": ArrayRule("f8", ("users",), limits.Limits(0.0, 1e12)),
-        "prices": ArrayRule("f8", ("poses",), limits.PRICE),
-        "positions": ArrayRule("i8", ("poses",), limits.INDEX),
-        "xyz": ArrayRule("f8", ("poses", 3), limits.LOCAL_COORDINATE),
-        "heights": ArrayRule("f8", ("poses",), limits.DISTANCE),
-        "latlon": ArrayRule("f8", ("poses", 2), limits.Limits(-360.0, 360.0, "degrees")),
-        "labels": ArrayRule("U", ("poses",)),
-        "names": ArrayRule("U", ("poses",)),
+        "packed": "u1",
+        "returns": "f4",
+        "user_weights": "f8",
+        "prices": "f8",
+        "positions": "i8",
+        "xyz": "f8",
+        "heights": "f8",
+        "latlon": "f8",
+        "labels": "U",
+        "names": "U",
     },
 )
 
@@ -187,12 +186,9 @@ class SiteProblem:
             The file is missing, damaged or not such a problem.
         """
         with FILE.reading(path) as (header, arrays):
-            targets, most, criterion = int(header["targets"]), int(header["most"]), header["criterion"]
-            packed = arrays.pop("packed")
-            if criterion not in ("road", "returns") or targets < 1 or packed.shape[1] != (targets + 7) // 8 or most < 1:
-                raise ContentError("its header contradicts its arrays")
-            visible = np.unpackbits(packed, axis=1, count=targets).astype(bool)
-            return cls(criterion=criterion, visible=visible, most_sensors=most, **arrays), header
+            visible = np.unpackbits(arrays.pop("packed"), axis=1, count=int(header["targets"])).astype(bool)
+            problem = cls(criterion=header["criterion"], visible=visible, most_sensors=int(header["most"]), **arrays)
+            return problem, header
 
 
 def check_problem(problem: SiteProblem) -> None:

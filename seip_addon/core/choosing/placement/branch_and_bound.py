@@ -7,16 +7,8 @@ along the sorted candidates, so all children below the first that falls short ar
 most of them before they become nodes. Where rings of beams overlap a little everywhere the relaxed integer program is
 weak and this bound is strong.
 
-The value φ of a target by the number of sensors that see it (`multi_cover`) need not be concave: where two sensors must
-see it, one is worth nothing. With S chosen and l sensors still to come, a target seen n times is worth φ(n), and what
-follows adds to it no more than the least concave function :math:`φ_{n,l}` above :math:`φ(n), …, φ(n + l)`,
-
-.. math::
-    F(S \cup R) \le F(S) + \sum_j w_j\, φ_{n_j(S),\,l}(n_j(R)), \quad |R| \le l,
-
-which is submodular in R. It is tighter in every branch than above it: the next sensor on a target that was seen once
-adds its full value or nothing, a target that can no longer be seen often enough adds nothing, and for the last sensor
-the bound is exact.
+The value of a target by the number of sensors that see it is concave (`multi_cover`), so that the value of a placement
+is submodular, and exact for the last sensor.
 
 The largest bound among the open nodes holds for every placement that the search has not visited. It falls as the search
 continues, and a stopped search can be resumed.
@@ -41,10 +33,7 @@ from .search_limits import Clock
 MIN_SENSORS = 3  # least number of sensors to come for which a node is also bounded by Lagrangian relaxation
 
 MIN_CHILDREN = 60
-"""Least number of children of a node for which it is relaxed.
-
-A node is relaxed only where the objective is concave: otherwise branching itself tightens the bound, and sooner.
-"""
+"""Least number of children of a node for which it is relaxed."""
 
 TRIALS, MAX_KEPT_SHARE = 4, 0.5
 """Trials of the relaxation for each number of sensors to come, and the mean share of children that it may keep in them.
@@ -104,26 +93,19 @@ def merit(instance: Instance, chosen: Integer) -> tuple[int, float, float, list[
     doubly = instance.doubly(chosen)
     return (
         len(chosen),
-        relative_price(instance, math.fsum(instance.price[chosen])),
+        round(math.fsum(instance.price[chosen]) / (float(instance.price.max(initial=0.0)) or 1.0), 8),
         -(doubly if instance.step == 1 else round(doubly / instance.slack)),
         chosen.tolist(),
     )
 
 
-def relative_price(instance: Instance, price: float) -> float:
-    """Return a price as a share of the most expensive sensor's, rounded to what counts as equal."""
-    return round(price / (float(instance.price.max(initial=0.0)) or 1.0), 8)
-
-
 class Search:
-    """Search of all placements in greedy order; subclasses select results in `_take` and prune in `_is_hopeless`.
+    """Search of all placements in greedy order; subclasses select results in `_take`.
 
     Parameters
     ----------
     goal : float
         Least objective value of a result.
-    depth_first : bool
-        Whether to follow each branch to its end before the next one, instead of taking the largest bound first.
     root : (n,) int64 and Bound, optional
         Candidates to search among, and an upper bound on the value of their placements, where known.
 
@@ -135,13 +117,10 @@ class Search:
         Whether enough placements were found.
     """
 
-    def __init__(
-        self, instance: Instance, goal: float, *, depth_first: bool = False, root: tuple[Integer, Bound] | None = None
-    ) -> None:
+    def __init__(self, instance: Instance, goal: float, root: tuple[Integer, Bound] | None = None) -> None:
         self.instance = instance
         self.goal = instance.attainable(goal) - instance.slack
         self.satisfied = False
-        self._depth_first = depth_first
         self._clock = Clock(math.inf)
         self._matrix = instance.matrix
         self._by_target = np.ascontiguousarray(self._matrix.T)
@@ -192,10 +171,6 @@ class Search:
         """Record a placement that may reach the goal; return the goal for placements with more sensors."""
         raise NotImplementedError
 
-    def _is_hopeless(self, chosen: tuple[int, ...], followers: Integer) -> bool:  # noqa: ARG002 -- for subclasses
-        """Whether a node can be cut for a reason other than its bound."""
-        return False
-
     def offer(self, chosen: Integer) -> float:
         """Record a placement found elsewhere; return the goal for placements with more sensors."""
         return self._take(np.sort(np.array(chosen, dtype=np.int64)))
@@ -218,7 +193,7 @@ class Search:
         # little memory and finishes subtrees. The proof stays complete, since `bound` includes the stack. Children are
         # pushed last to first, so that the one of largest gain is taken from the stack first.
         for child in reversed(children):
-            if self._depth_first or self._waiting > MAX_WAITING_FOLLOWERS:
+            if self._waiting > MAX_WAITING_FOLLOWERS:
                 self._stack.append(child)
             else:
                 self._serial += 1
@@ -234,7 +209,7 @@ class Search:
         if left == 0:
             return []
         node, children = _within_reach(node, left, goal)
-        if children == 0 or self._is_hopeless(node.chosen, node.followers):
+        if children == 0:
             return []
         if left == 1:
             self._take_leaves(node, children)
@@ -243,7 +218,7 @@ class Search:
         # corrects that, but takes a product with V in each step: it is computed only where it may remove many children.
         # At the root the caller may have given its result already.
         known = node.multipliers is not None and not node.chosen
-        if children >= MIN_CHILDREN and self.instance.cover.concave and not known and self._relaxation_pays(left):
+        if children >= MIN_CHILDREN and not known and self._relaxation_pays(left):
             before = children
             node, children = yield from self._relaxed(node, left, goal)
             self._left_over.setdefault(left, []).append(children / before)
@@ -269,10 +244,9 @@ class Search:
         # Row i has the gains of all followers after child i is added: their gains so far, less what child i takes away.
         # One matrix product gives all rows, and the sum of the largest gains in each is that child's bound.
         later = self._may_follow(node, children)
-        gains_after = self._gains(node, times, left - 1) - self._overlaps(times, left - 1, node.followers, children)
+        gains_after = node.gains - self._overlaps(times, node.followers, children)
         multiplier, best = self._best_completions(node, np.where(later, gains_after, 0.0), left - 1)
-        # with one sensor to come the bound on a gain is exact, so that these are the children's own values
-        values = node.value + self._gains(node, times, 1)[:children].astype(np.float64)
+        values = node.value + node.gains[:children].astype(np.float64)
         kept = []
         for row in np.flatnonzero(values + best >= goal):
             chosen, value, wanted = (*node.chosen, int(node.followers[row])), float(values[row]), self._wanted(node)
@@ -375,24 +349,7 @@ class Search:
             later &= instance.affordable(spent + instance.price[first, None] + instance.price[followers])
         return later
 
-    def _gains(self, node: _Node, times: Integer, left: int) -> Numbers:
-        """Return an upper bound on what each follower adds, (n,).
-
-        Parameters
-        ----------
-        times : (t,) int64
-            Number of chosen sensors that see each target.
-        left : int
-            Number of sensors to come.
-        """
-        instance = self.instance
-        if instance.cover.concave:  # then the bound is the gain itself, whatever the number of sensors to come
-            return node.gains
-        increments = instance.increments(times, left).astype(self._matrix.dtype)
-        gains: Numbers = (self._matrix @ increments)[node.followers]
-        return gains
-
-    def _overlaps(self, times: Integer, left: int, followers: Integer, children: int) -> Numbers:
+    def _overlaps(self, times: Integer, followers: Integer, children: int) -> Numbers:
         """Return the loss of each follower's gain by the choice of each child, (children, n).
 
         For plain coverage this is the weight that both see and no chosen sensor sees.
@@ -401,13 +358,11 @@ class Search:
         ----------
         times : (t,) int64
             Number of chosen sensors that see each target.
-        left : int
-            Number of sensors to come after the child.
         """
         instance = self.instance
         # A target that child and follower both see, and that is seen n times, adds increment(n) before the child is
         # chosen and increment(n + 1) after it. The sum of these differences over the common targets is the loss.
-        lost = instance.increments(times, left) - instance.increments(times + 1, left)
+        lost = instance.increments(times) - instance.increments(times + 1)
         # Only targets that some child sees matter. For plain coverage there are two ways to the same whole numbers: add
         # up the targets that nobody sees yet, or take those seen already from the overlap of all targets that was
         # computed at the start. The product over fewer targets is the cheaper one.
@@ -509,56 +464,6 @@ class BestPlacements(Search):
             self.goal = max(self.goal, more)
         self.satisfied = self.overflowed and self._bound < more
         return more
-
-
-class FirstInOrder(Search):
-    """Search for the first by `merit` of the placements that cover a goal with exactly ``count`` sensors.
-
-    It goes depth first, as all results have the same value: the order of bounds would not lead to the first of them.
-    Nodes that can only become more expensive, or cover less weight twice, than the best so far are cut.
-
-    Parameters
-    ----------
-    instance : Instance
-        No placement with fewer sensors than its ``count`` reaches the goal.
-
-    Attributes
-    ----------
-    best : (k,) int64 or None
-        First placement by `merit` so far.
-    """
-
-    def __init__(self, instance: Instance, goal: float) -> None:
-        super().__init__(instance, goal, depth_first=True)
-        self.best: Integer | None = None
-        self._key: tuple[int, float, float, list[int]] | None = None
-
-    def _take(self, placement: Integer) -> float:
-        if self.instance.value(placement) >= self.goal and self.instance.feasible(placement):
-            key = merit(self.instance, placement)
-            if self._key is None or key < self._key:
-                self.best, self._key = placement, key
-        return self.goal
-
-    def _is_hopeless(self, chosen: tuple[int, ...], followers: Integer) -> bool:
-        if self._key is None:
-            return False
-        instance, left = self.instance, self.instance.count - len(chosen)
-        # Price is compared before double coverage. The cheapest followers give a lower bound on it, since all ``count``
-        # sensors are needed to reach the goal. A bound below the best price leaves the node open.
-        prices = np.sort(instance.price[followers])[:left]
-        price = relative_price(instance, math.fsum(instance.price[list(chosen)]) + math.fsum(prices))
-        if price != self._key[1]:
-            return price > self._key[1]
-        # At the same price the double coverage decides. With n sensors on a target, the weighted sum of min(n, 2) is
-        # the weight covered once or more plus that covered twice or more. It is submodular as well, so that the largest
-        # gains bound it. The first part is at least the goal; what is left bounds the second.
-        twice = np.minimum(instance.times(chosen), 2)
-        below_two = instance.gains(instance.weight * (twice < 2))
-        reach = float(instance.weight @ twice) + float(_largest(below_two[followers], left).sum())
-        doubly = reach - self.goal + self._rounding
-        # without a common unit of weights `merit` rounds to multiples of the slack: one more makes up for the rounding
-        return (doubly if instance.step == 1 else doubly / instance.slack + 1) < -self._key[2]
 
 
 def _within_reach(node: _Node, left: int, goal: float) -> tuple[_Node, int]:

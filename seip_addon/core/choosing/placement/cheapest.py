@@ -10,18 +10,18 @@ from ...arrays import Float, Integer
 from ...errors import SeipError
 from ...progress import Progress
 from .bounds import bound_from, can_reach, lagrangian_bound, least_price
+from .branch_and_bound import BestPlacements, is_worthwhile
 from .feasibility import starting_choice
-from .greedy import drop_redundant, greedy, greedy_with_swaps
-from .integer_program import reaching
+from .greedy import drop_redundant, drop_weakest, greedy, greedy_with_swaps, swap_search
+from .integer_program import is_affordable, reaching
 from .objective import SAME_PRICE
 from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
 from .reduced_problem import Instance, common_unit, make_instance
 from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 from .solver import prove, scale_notes, solve_within
 from .solvers import check_solver
-from .tie_breaking import fewest
 
-MIN_TIE_BREAKING_LIMIT = 1.0  # least limit, seconds or units of work, of the choice among equally cheap placements
+MIN_FINISHING_LIMIT = 1.0  # least limit, seconds or units of work, of the choice among equally cheap placements
 
 
 def cheapest_for_coverage(
@@ -57,9 +57,9 @@ def cheapest_for_coverage(
     if problem.prices.any():
         cheapest, bound = yield from _cheapest(instance, chosen, goal, solver, clock)
     else:
-        cheapest, proven = yield from fewest(instance, chosen, goal, solver, clock)
+        cheapest, proven = yield from _fewest(instance, chosen, goal, solver, clock)
         bound = 0.0 if proven else -math.inf
-    finishing = clock.part(clock.elapsed, MIN_TIE_BREAKING_LIMIT)  # no longer than it took to find the price
+    finishing = clock.part(clock.elapsed, MIN_FINISHING_LIMIT)  # no longer than it took to find the price
     best = yield from solve_within(_no_dearer(problem, instance, cheapest), solver, finishing)
     reached = best.covered * factor >= goal - instance.slack
     chosen = best.chosen if reached else instance.original[cheapest]
@@ -102,7 +102,7 @@ def _cheapest(
     keep, bound = yield from lagrangian_bound(no_dearer, goal, clock)
     least = min(price, max(least_price(instance.of(keep), bound, goal), float(instance.price.min())))
     if np.ptp(instance.price) == 0:
-        chosen, proven = yield from fewest(instance, chosen, goal, solver, clock)
+        chosen, proven = yield from _fewest(instance, chosen, goal, solver, clock)
         price = math.fsum(instance.price[chosen])
         single = float(instance.price[0])
         return chosen, price if proven else min(price, math.ceil(least / single * (1 - TIE_TOLERANCE)) * single)
@@ -119,6 +119,41 @@ def _cheapest(
     if outcome.finished:
         return chosen, price
     return chosen, min(price, max(least, -outcome.bound / program.price_scale))
+
+
+def _fewest(
+    instance: Instance, chosen: Integer, goal: float, solver: str, clock: Clock
+) -> Generator[Progress, None, tuple[Integer, bool]]:
+    """Return a placement of fewest sensors that reaches the goal, and whether that is proven."""
+    # Each round asks for one sensor less, by ever more expensive means: local search, the Lagrangian bound, branch and
+    # bound, an integer program. A placement found at any of them starts the next round. A proof that there is none
+    # ends the stage: the limit on the number includes all smaller numbers.
+    while len(chosen) > 1:
+        fewer = replace(instance, count=len(chosen) - 1)
+        improved = yield from swap_search(fewer, drop_weakest(instance, chosen))
+        if fewer.feasible(improved) and fewer.value(improved) >= goal - instance.slack:
+            chosen = drop_redundant(fewer, improved, goal)
+            continue
+        keep, bound = yield from lagrangian_bound(fewer, fewer.as_good(goal), clock)
+        if bound.value < goal - instance.slack or len(keep) == 0:
+            break
+        yield Progress(0, 0, f"looking for fewer than {len(chosen)} sensors among {len(keep)} candidates")
+        if is_worthwhile(fewer, keep):
+            search = BestPlacements(fewer.part(keep), goal, 1, goal)
+            finished = yield from search.run(clock, clock.left / 2)
+            if search.found:
+                chosen = drop_redundant(fewer, keep[search.found[0]], goal)
+                continue
+            if finished:
+                break
+        part = fewer.part(keep)
+        if not is_affordable(part, clock):
+            return chosen, False
+        outcome = yield from reaching(part, goal).maximise_coverage(solver, clock)
+        if outcome.chosen is None:
+            return chosen, outcome.finished
+        chosen = drop_redundant(fewer, keep[outcome.chosen], goal)
+    return chosen, True
 
 
 def _below(price: float, prices: Float) -> float:

@@ -3,13 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Annotated
 
 import numpy as np
 
 from ...arrays import Boolean, Float, Integer
 from ...geometry.orientation import describe_turn, orientation
-from ...limits import SHARE
 from ...sensing.lidar.model import LidarModel
 from ...sensing.scans.sensor import MountedSensor
 from ...site.site import Candidates, Site
@@ -97,8 +95,8 @@ class TypeBand:
     """Coverage of a placement if all of its sensors were of one type, at that type's plausible gains."""
 
     sensor: str
-    low: Annotated[float, SHARE]
-    high: Annotated[float, SHARE]
+    low: float
+    high: float
 
     def describe(self) -> str:
         """Return the band as text: one share where both ends read the same."""
@@ -119,8 +117,8 @@ class GainBand:
         Band of each type that could be chosen; empty if there was only one.
     """
 
-    low: Annotated[float, SHARE]
-    high: Annotated[float, SHARE]
+    low: float
+    high: float
     sheets: tuple[str, ...]
     types: tuple[TypeBand, ...] = ()
 

@@ -38,8 +38,7 @@ def greedy_steps(
     chosen = start
     while True:
         yield chosen
-        left = max(instance.count - len(chosen), 0)
-        gain = instance.gains(instance.increments(instance.times(chosen), left))
+        gain = instance.gains(instance.increments(instance.times(chosen)))
         gain[~addable(instance, chosen)] = 0.0
         score = gain / np.maximum(instance.price, TIE_TOLERANCE * instance.price.max()) if per_price else gain
         best = int(np.argmax(score))

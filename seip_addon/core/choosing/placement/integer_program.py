@@ -112,12 +112,6 @@ class PlacementProgram:
         if check is not None:
             self._checks.append(check)
 
-    def require_price(self, price: float) -> None:
-        """Require a total price of at most ``price``, within `TIE_TOLERANCE`."""
-        limit = price * (1 + TIE_TOLERANCE)
-        prices = self._rules.price
-        self.require(self.price <= limit * self.price_scale, lambda c: math.fsum(prices[c]) <= limit)
-
     def maximise(
         self, objective: Expression, solver: str, clock: Clock, share: float = 1.0
     ) -> Generator[Progress, None, Outcome]:
@@ -169,8 +163,7 @@ class PlacementProgram:
 class CoverProgram(PlacementProgram):
     """The integer program of maximal covering; see `PlacementProblem` for the formulation.
 
-    The covered share ``y`` and the doubly covered share ``z`` of each target are continuous: they are integral at an
-    optimum. ``z`` is correct only if the covered weight is required to be the largest possible.
+    The covered share ``y`` of each target is continuous: it is integral at an optimum.
     """
 
     def __init__(self, instance: Instance) -> None:
@@ -183,14 +176,6 @@ class CoverProgram(PlacementProgram):
         for y, seen in zip(self._y, self._seen, strict=True):
             self.model += y <= seen
         return _linear(self._y, self.instance.weight * self.weight_scale)
-
-    @cached_property
-    def doubly_covered(self) -> Expression:
-        """The weight covered twice or more, scaled likewise; `covered` must be required to be at its maximum."""
-        z = [self.model.add_variable(f"z{j}", 0, 1) for j in range(len(self.instance.weight))]
-        for z_j, y, seen in zip(z, self._y, self._seen, strict=True):
-            self.model += z_j + y <= seen
-        return _linear(z, self.instance.weight * self.weight_scale)
 
     @property
     def weight_scale(self) -> float:
@@ -206,11 +191,6 @@ class CoverProgram(PlacementProgram):
         """Require a covered weight that is larger than ``than`` by at least the instance's step."""
         instance, goal = self.instance, than + self.instance.step
         self.require(self._at_least(self.covered, goal), lambda c: instance.value(c) >= goal)
-
-    def require_double_coverage(self, goal: float) -> None:
-        """Require a doubly covered weight, within the instance's slack."""
-        instance = self.instance
-        self.require(self._at_least(self.doubly_covered, goal), lambda c: instance.doubly(c) >= goal - instance.slack)
 
     def maximise_coverage(self, solver: str, clock: Clock, share: float = 1.0) -> Generator[Progress, None, Outcome]:
         """Solve for the largest covered weight within the limits; the outcome's bound is not scaled."""

@@ -4,13 +4,13 @@ import difflib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SeipError
-from ...limits import CHOSEN_WEIGHT, COUNT, DISTANCE, PRICE, SENSORS, SHARE
+from ...limits import CHOSEN_WEIGHT, DISTANCE, PRICE, SENSORS
 from ...sensing.lidar.carla_dropoff import CarlaDropoff
 from ...sensing.lidar.model import LidarModel
 from ...settings import setting
@@ -52,9 +52,8 @@ class Objective:
         Least distance between two sensors.
     forbidden, mandatory : tuple of str
         Names of positions that must not, and that must, carry a sensor.
-    criterion : {"auto", "road", "returns", "height"}
-        Quantity that is maximised: the road seen, the expected returns from road users, or the points above the road
-        that beams pass between the vehicles of traffic; see `criterion_of`.
+    criterion : {"auto", "road", "returns"}
+        Quantity that is maximised: the road seen, or the expected returns from road users; see `criterion_of`.
     shares : (float, float, float)
         Importance of cars, cyclists and pedestrians for the returns, in proportion.
     scenarios : Scenarios
@@ -66,8 +65,6 @@ class Objective:
     failures : {"none", "worst", "mean"}
         Failure of one sensor after which the outcome is measured: none, the most important sensor, or any of them on
         average.
-    seen_by : int
-        Number of sensors that must see a target.
 
     Raises
     ------
@@ -84,16 +81,13 @@ class Objective:
     coverage: float | None = setting(
         None, "reach this share (0 to 1) at the least price", minimum=0.0, maximum=1.0, metavar="SHARE"
     )
-    central_weight: float | Literal["scene"] | None = setting(
-        None, "one weight for all weighted regions", minimum=0.0, maximum=CHOSEN_WEIGHT.most, metavar="W"
-    )
+    central_weight: float | Literal["scene"] | None = None
     min_distance: float = setting(0.0, "least distance between two sensors", unit="m", minimum=0.0, metavar="M")
     forbidden: tuple[str, ...] = setting((), "positions without sensor", option="forbid", metavar="POSITION")
-    mandatory: tuple[str, ...] = setting((), "positions with a sensor", option="require", metavar="POSITION")
-    criterion: Literal["auto", "road", "returns", "height"] = setting(
+    mandatory: tuple[str, ...] = ()
+    criterion: Literal["auto", "road", "returns"] = setting(
         "auto",
-        "optimise the road seen, the returns from road users, or points above the road in traffic (auto: returns, if "
-        "sensors have a range law)",
+        "optimise the road seen, or the returns from road users (auto: returns, if sensors have a range law)",
     )
     shares: tuple[float, float, float] = setting(
         (1.0, 1.0, 1.0),
@@ -108,19 +102,14 @@ class Objective:
         "measure over the scenarios (auto: worst-quarter of pose errors, mean of traffic; none: only evaluate)",
     )
     failures: Failure = setting("none", "optimise what is left after the worst sensor, or any sensor (mean), fails")
-    seen_by: int = setting(1, "number of sensors that must see a target", minimum=1, metavar="K")
 
     def __post_init__(self) -> None:
         for name, limits in (("budget", PRICE), ("min_distance", DISTANCE)):
             value = getattr(self, name)
             if value is not None and not limits.allow(value):
                 raise SeipError(f"the {name.replace('_', ' ')} must be {limits}, not {value}")
-        for name, number in (
-            ("number of sensors", self.count),
-            ("number of sensors that must see a target", self.seen_by),
-        ):
-            if number is not None and not SENSORS.allow(number):
-                raise SeipError(f"the {name} must be {SENSORS}, not {number}")
+        if self.count is not None and not SENSORS.allow(self.count):
+            raise SeipError(f"the number of sensors must be {SENSORS}, not {self.count}")
         if self.coverage is not None and not 0 < self.coverage <= 1:
             raise SeipError(f"the coverage to reach must be a share above 0 and at most 1, not {self.coverage:g}")
         weight = self.central_weight
@@ -139,21 +128,15 @@ class Objective:
 
     def _check_scenarios(self) -> None:
         kind, measure = self.scenarios.kind, self.measure
-        if self._multi_cover and (self.risk == "none" or kind == "traffic"):
+        if self.failures != "none" and (self.risk == "none" or kind == "traffic"):
             other = "the risk none" if self.risk == "none" else "traffic"
-            raise SeipError(
-                f"sensor failures and several sensors per target cannot be combined with {other}: leave one out"
-            )
+            raise SeipError(f"sensor failures cannot be combined with {other}: leave one out")
         if kind == "nominal":
             self._require_no_settings_of_scenarios()
-        if self.criterion == "height" and (kind != "traffic" or measure is None):
-            raise SeipError("the criterion height needs traffic: choose traffic as scenarios, or another criterion")
         if measure is None:
             return
         # With failures the risk none is refused: only evaluating is no cure there.
-        instead = (
-            "leave out failures and several sensors per target" if self._multi_cover else "only evaluate (risk none)"
-        )
+        instead = "only evaluate (risk none)" if self.failures == "none" else "leave out failures"
         if self.cheapest:
             raise SeipError(
                 "optimising over scenarios or for failures needs a number of sensors or a budget, not a coverage to "
@@ -172,8 +155,6 @@ class Objective:
         scenarios = self.scenarios
         given = {
             "the risk measure": self.risk != "auto",
-            "the number of scenarios": scenarios.count is not None,
-            "the number of held-out scenarios": scenarios.held_out is not None,
             "the seed of the scenarios": scenarios.seed != 0,
         }
         idle = next((setting for setting, there in given.items() if there), None)
@@ -184,17 +165,12 @@ class Objective:
             )
 
     @property
-    def _multi_cover(self) -> bool:
-        """Whether the objective depends on the number of sensors that see a target."""
-        return self.failures != "none" or self.seen_by > 1
-
-    @property
     def measure(self) -> Risk | None:
         """Risk measure that is maximised over the scenarios; None for nominal poses on the empty road."""
-        if self.risk == "none" or (self.scenarios.kind == "nominal" and not self._multi_cover):
+        if self.risk == "none" or (self.scenarios.kind == "nominal" and self.failures == "none"):
             return None
         usual = "worst-quarter" if self.scenarios.kind == "pose-errors" else "mean"
-        return Risk(TAILS[usual if self.risk == "auto" else self.risk], self.seen_by, self.failures)
+        return Risk(TAILS[usual if self.risk == "auto" else self.risk], self.failures)
 
     @property
     def weighted(self) -> bool:
@@ -207,7 +183,7 @@ class Objective:
         return self.coverage is not None
 
 
-def criterion_of(objective: Objective, models: Mapping[str, LidarModel]) -> Literal["road", "returns", "height"]:
+def criterion_of(objective: Objective, models: Mapping[str, LidarModel]) -> Literal["road", "returns"]:
     """Return the criterion of an objective for the sensor types to choose from.
 
     Coverage of the road predicts detection where every return counts, as for the sensors of the SEIP paper. Sensors
@@ -252,10 +228,10 @@ class FrontPoint:
         Largest share of the weight that another placement could cover in addition; 0 where this one is proven optimal.
     """
 
-    count: Annotated[int, COUNT]
-    coverage: Annotated[float, SHARE]
-    price: Annotated[float, PRICE]
-    missed: Annotated[float, SHARE]
+    count: int
+    coverage: float
+    price: float
+    missed: float
 
 
 @dataclass(frozen=True, eq=False)

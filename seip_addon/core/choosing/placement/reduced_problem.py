@@ -98,18 +98,18 @@ class Instance(Constrained):
         seen: Integer = self.visible[np.asarray(chosen, dtype=np.int64)].sum(axis=0, dtype=np.int64)
         return seen
 
-    def increments(self, times: Integer, left: int = 1, level: int = 0) -> Float:
-        """Return the largest increment by the next sensor on targets seen ``times`` times (`MultiCover.increment`)."""
-        more: Float = self.weight * self.cover.increment(times, left, level)
+    def increments(self, times: Integer, level: int = 0) -> Float:
+        """Return the increment by the next sensor on targets seen ``times`` times (`MultiCover.increment`)."""
+        more: Float = self.weight * self.cover.increment(times, level)
         return more
 
     def layers(self, times: Integer, left: int) -> Float:
-        """Return the largest increment by each of the next sensors on targets seen ``times`` times, (top, t)."""
-        return np.stack([self.increments(times, left, level) for level in range(self.cover.top)])
+        """Return the increment by each of the next ``left`` sensors on targets seen ``times`` times, (top, t)."""
+        return np.stack([(level < left) * self.increments(times, level) for level in range(self.cover.top)])
 
     @property
     def unseen_layers(self) -> Float:
-        """Largest increments by each of the sensors on targets that are not seen yet, (top, t) float64."""
+        """Increments by each of the sensors on targets that are not seen yet, (top, t) float64."""
         return self.layers(np.zeros(len(self.weight), dtype=np.int64), self.count)
 
     def gains(self, per_target: Float) -> Float:

@@ -3,9 +3,8 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated
 
-from ...limits import COUNT, PRICE, Limits
+from ...limits import COUNT, Limits
 
 RETURNS = Limits(0.0, COUNT.most)
 FEW_RETURNS = 5.0
@@ -50,7 +49,7 @@ class CrossingReturns:
     """Expected returns of a pedestrian at the worst point of a crossing."""
 
     name: str
-    least: Annotated[float, RETURNS]
+    least: float
 
 
 @dataclass(frozen=True)
@@ -67,10 +66,10 @@ class ReturnsPoint:
         is proven optimal, None where nothing is proven.
     """
 
-    count: Annotated[int, COUNT]
-    returns: Annotated[float, RETURNS]
-    price: Annotated[float, PRICE]
-    gap: Annotated[float, RETURNS] | None
+    count: int
+    returns: float
+    price: float
+    gap: float | None
 
 
 @dataclass(frozen=True)
@@ -98,8 +97,8 @@ class ReturnsSummary:
     ('fewer than 5 returns from a pedestrian at the worst point of: Rope Lane (4.9)',)
     """
 
-    typical: Annotated[float, RETURNS]
-    of_each: Mapping[str, Annotated[float, RETURNS]]
+    typical: float
+    of_each: Mapping[str, float]
     crossings: tuple[CrossingReturns, ...]
     front: tuple[ReturnsPoint, ...] = ()
 

@@ -1,10 +1,10 @@
-r"""Risk measures of robust placement: expectation, worst case, CVaR, failures, multi-cover.
+r"""Risk measures of robust placement: expectation, worst case, CVaR, failures.
 
 In scenario k the chosen sensors S see target j :math:`n_{jk}(S)` times. The
-outcome of the scenario is the weight of the targets seen often enough,
+outcome of the scenario is the weight of the targets seen,
 
 .. math::
-    f_k(S) = \sum_j w_j\, [n_{jk}(S) \ge κ],
+    f_k(S) = \sum_j w_j\, [n_{jk}(S) \ge 1],
 
 or what is left of it after the failure of one sensor: at worst :math:`\min_{i \in S} f_k(S \setminus i)`, or on
 average, where each of the N sensors that are allowed is equally likely to fail (if only chosen sensors could fail,
@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Float, Integer
 from ...errors import SeipError
-from .multi_cover import MultiCover, multi_cover
+from .multi_cover import COVERAGE, MultiCover, multi_cover
 
 Failure = Literal["none", "worst", "mean"]
 
@@ -44,20 +44,17 @@ class Risk:
     ----------
     tail : float
         α, the share of the worst scenarios that are averaged; 1 for the expectation, 0 for the single worst one.
-    seen_by : int
-        κ, the number of sensors that must see a target, at least 1.
     failure : {"none", "worst", "mean"}
         Failure of one sensor: none, the most important one, or any of them on average.
     """
 
     tail: float = 1.0
-    seen_by: int = 1
     failure: Failure = "none"
 
     @property
     def least_sensors(self) -> int:
         """Number of sensors below which every outcome is zero."""
-        return self.seen_by + (self.failure != "none")
+        return 1 + (self.failure != "none")
 
     def require_sensors(self, most: int) -> None:
         """Raise SeipError if every outcome of ``most`` sensors is zero."""
@@ -69,19 +66,17 @@ class Risk:
         of = {1.0: "expected coverage", 0.0: "coverage in the worst scenario"}.get(
             self.tail, f"mean coverage of the worst {self.tail:.0%} of the scenarios"
         )
-        twice = "" if self.seen_by == 1 else f", seen by at least {self.seen_by}"
         lost = {"none": "", "worst": ", the most important sensor lost", "mean": ", any one sensor lost"}[self.failure]
-        return of + twice + lost
+        return of + lost
 
     def describe_outcome(self) -> str:
         """Name the outcome of one scenario."""
-        by = "" if self.seen_by == 1 else f" by at least {self.seen_by} sensors"
         lost = {
             "none": "",
             "worst": " after the loss of the most important sensor",
             "mean": " after the loss of any one sensor, on average",
         }[self.failure]
-        return f"coverage{by}{lost}"
+        return f"coverage{lost}"
 
     @property
     def alone(self) -> Risk:
@@ -104,13 +99,13 @@ class Risk:
             N, the largest number of sensors.
         """
         times = seen.sum(axis=1, dtype=np.uint8)
-        whole: Float = (times >= self.seen_by) @ weight
+        whole: Float = (times >= 1) @ weight
         if self.failure == "none":
             return whole
         if seen.shape[1] == 0:
             return np.zeros(len(seen))
-        # weight of the targets that fall below κ without each sensor: those seen by exactly κ, one of them this, (K, s)
-        lost: Float = ((times == self.seen_by)[:, None] & seen.view(bool)) @ weight
+        # weight of the targets that only one sensor sees, for each sensor: it is lost with that sensor, (K, s)
+        lost: Float = ((times == 1)[:, None] & seen.view(bool)) @ weight
         after: Float = whole - (lost.max(axis=1) if self.failure == "worst" else lost.sum(axis=1) / sensors)
         return after
 
@@ -126,15 +121,14 @@ class Risk:
     def cover(self, sensors: int) -> MultiCover:
         r"""Return the value of a target by the number of sensors that see it; for worst failures, an upper bound.
 
-        Without failures a target seen n times has the value 1 from n = κ on. After a failure among N sensors its mean
-        value is :math:`1 - κ/N` at n = κ and 1 from :math:`κ + 1` on. The worst failure gives no more.
+        Without failures a target seen n times has the value 1 from n = 1 on. After a failure among N sensors its mean
+        value is :math:`1 - 1/N` at n = 1 and 1 from n = 2 on. The worst failure gives no more.
 
         Parameters
         ----------
         sensors : int
-            N, the largest number of sensors.
+            N, the largest number of sensors; at least 2 with failures.
         """
-        values = [Fraction(0)] * self.seen_by + [Fraction(1)]
-        if self.failure != "none":
-            values = [*values[:-1], max(Fraction(sensors - self.seen_by, sensors), Fraction(0)), Fraction(1)]
-        return multi_cover(values)
+        if self.failure == "none":
+            return COVERAGE
+        return multi_cover([Fraction(0), Fraction(sensors - 1, sensors), Fraction(1)])

@@ -39,32 +39,14 @@ class PoseErrors:
         A standard deviation is negative or too large.
     """
 
-    position: float = setting(
-        0.3, "standard deviation of x and of y", unit="m", maximum=MAX_OFFSET_STD, option="position-error", metavar="M"
-    )
-    height: float = setting(
-        0.3,
-        "default: same as --position-error",
-        unit="m",
-        maximum=MAX_OFFSET_STD,
-        option="height-error",
-        metavar="M",
-    )
-    yaw: float = setting(
-        math.radians(2.0),
-        "default: same as --tilt-error",
-        unit="rad",
-        maximum=math.pi,
-        option="yaw-error",
-        metavar="DEG",
-    )
+    position: float = setting(0.3, "standard deviation of x and of y", unit="m", maximum=MAX_OFFSET_STD)
+    height: float = setting(0.3, "standard deviation of the height", unit="m", maximum=MAX_OFFSET_STD)
+    yaw: float = setting(math.radians(2.0), "standard deviation of the yaw", unit="rad", maximum=math.pi)
     tilt: float = setting(
         math.radians(2.0),
         "standard deviation of pitch and of roll",
         unit="rad",
         maximum=MAX_ANGLE_STD,
-        option="tilt-error",
-        metavar="DEG",
     )
 
     def __post_init__(self) -> None:
@@ -97,8 +79,6 @@ class Scenarios:
         of traffic at which vehicles block the view.
     pose_errors : PoseErrors
         Standard deviations, for pose errors only.
-    weights_from_traffic : bool
-        Whether the weight of each target is the number of seconds for which road users are there; for traffic only.
     count, held_out : int, optional
         Number of scenarios to optimise over and of held-out ones; `DEFAULT_COUNTS` if not given.
     seed : int
@@ -108,28 +88,18 @@ class Scenarios:
     ------
     SeipError
         A number is out of its limits.
+
+    Examples
+    --------
+    >>> scenarios = Scenarios("pose-errors", PoseErrors(position=0.1, height=0.1))
+    >>> scenarios.errs, scenarios.optimised, scenarios.evaluated
+    (True, 20, 500)
     """
 
     kind: ScenarioKind = "nominal"
     pose_errors: PoseErrors = PoseErrors()
-    weights_from_traffic: bool = setting(
-        default=False, help="weight targets by the time that road users are there (with --traffic)"
-    )
-    count: int | None = setting(
-        None,
-        "scenarios to optimise over (20 pose errors or 24 instants of traffic)",
-        minimum=1,
-        maximum=int(SCENARIOS.most),
-        option="scenarios",
-        metavar="N",
-    )
-    held_out: int | None = setting(
-        None,
-        "held-out scenarios to evaluate on (500 or 120)",
-        minimum=1,
-        maximum=int(DRAWS.most),
-        metavar="N",
-    )
+    count: int | None = None
+    held_out: int | None = None
     seed: int = setting(0, "seed of the scenarios (held-out scenarios use seed + 1)", minimum=0)
 
     def __post_init__(self) -> None:

@@ -129,11 +129,6 @@ class Clock:
             return Clock(max(self.seconds_left, least), share, self, self.acceptance)
         return Clock(share, whole=self, acceptance=self.acceptance)
 
-    def counted_part(self, most: float) -> Clock:
-        """Return a clock with at most ``most`` units of work, within what is left of this one."""
-        limit = min(most, self.left) if self.counts_work else most
-        return Clock(max(self.seconds_left, MIN_PART), max(limit, MIN_PART), self, self.acceptance)
-
     @property
     def counts_work(self) -> bool:
         """Whether work is limited."""

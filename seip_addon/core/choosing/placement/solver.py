@@ -10,9 +10,8 @@ import numpy as np
 from ...arrays import Integer
 from ...counts import counted
 from ...progress import Progress, finish
-from .bounds import MAX_LISTED_CHOICES, Bound, can_reach, lagrangian_bound
-from .branch_and_bound import BestPlacements, is_worthwhile
-from .decomposition import decomposition_bound
+from .bounds import MAX_ITERATIONS, MAX_LISTED_CHOICES, Bound, can_reach, lagrangian_bound
+from .branch_and_bound import BestPlacements, is_worthwhile, merit
 from .feasibility import starting_choice
 from .greedy import (
     drop_redundant,
@@ -29,21 +28,14 @@ from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
 from .reduced_problem import Instance, common_unit, make_instance
 from .search_limits import DEFAULT_LIMITS, MIN_PART, Clock, SolverLimits
 from .solvers import check_solver
-from .tie_breaking import MAX_SEARCHED_TIES, canonical_optimum
 
+LISTED_SENSORS = 2  # sensors up to which branch and bound lists all choices in one step
 QUICK_STEPS = 50  # bounding steps before tabu search: a few seconds at the largest sites, and often enough for a proof
 BRANCHING_SHARE = 0.25  # of what is left of the limits, for a first branch and bound, which goes on after other methods
 
-FIRST_DECOMPOSITION_SHARE, FULL_DECOMPOSITION_SHARE = 0.05, 0.4
-"""Shares for a first bound by decomposition, and for a full one where the first gains."""
-
-MIN_BOUND_GAIN = 0.05  # share of the gap that the first bound by decomposition must close for a full one to be worth it
-MIN_CLOSED_SHARE = 0.5  # share of the gap that a first branch and bound must close to continue without goals in between
-FIRST_GOALS = 32  # the first goal lies below the bound by the gap divided by this
-QUICK_SHARE = 0.1  # a goal proven within this share of the remaining limits was quick: the next step is doubled
+MAX_TIES = 2_000  # equally good placements that branch and bound compares
 PROGRAM_SHARE = 0.5  # share for the integer program, in addition to branch and bound
 MAX_RELAXATION_GAP = 0.01  # largest gap of the linear relaxation at which the program is tried besides branch and bound
-MIN_TIE_BREAKING_WORK = 10.0  # least work for the choice among equally good placements; otherwise that of the proof
 MIN_GAP_PROGRESS = 0.02  # share of the gap that must close in the second half of the time for more time to be of use
 
 Note = Callable[[float, float], None]
@@ -52,15 +44,13 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """A placement with its bound, its ties, and whether it is optimal.
+    """A placement with its bound, and whether it is optimal.
 
     Parameters
     ----------
     chosen : (k,) int64
     bound : float
         Upper bound on the weight that any placement covers.
-    ties : tuple of (k,) int64, optional
-        All placements that cover the same weight except those with idle sensors, where they are known.
     halfway : float, optional
         Bound after half the time of the last search, if that ended without a proof.
     """
@@ -68,7 +58,6 @@ class Proof:
     chosen: Integer
     bound: float
     optimal: bool
-    ties: tuple[Integer, ...] | None = None
     halfway: float | None = None
 
 
@@ -110,9 +99,10 @@ def solve(
 ) -> Generator[Progress, None, Placement]:
     """Choose the placement of largest coverage.
 
-    Among optimal placements the one with fewest sensors is returned, then the cheapest, then the one with the largest
-    doubly covered weight, then the first in the canonical order of candidates. The result does not depend on the order
-    of candidates and targets.
+    Of the optimal placements that branch and bound compares (up to `MAX_TIES`), the one with fewest sensors is
+    returned, then the cheapest, then the one with the largest doubly covered weight, then the first in the canonical
+    order of candidates (`merit`). Where another method proves the optimum, it is the placement found first, without
+    sensors that cover nothing more. The result does not depend on the order of candidates and targets.
 
     Placements are equally good if they cover the same weight. Weights that are whole multiples of one unit are compared
     exactly, however large their sum (up to 2^53 units). For other weights, placements are equally good if they cover at
@@ -120,8 +110,8 @@ def solve(
 
     Exact reductions come first. A greedy choice improved by swaps and tabu search gives an incumbent, and a Lagrangian
     relaxation gives a bound; candidates that the bound rules out are dropped. The rest is searched by branch and bound.
-    If that does not end soon, decomposition and an integer program lower the bound where they can, and branch and bound
-    continues with the remaining time, while its bound falls.
+    If that does not end soon, an integer program lowers the bound where it can, and branch and bound continues with the
+    remaining time.
 
     Parameters
     ----------
@@ -159,19 +149,9 @@ def solve_within(
     standing.note(instance.value(first), math.inf)
     proof = yield from standing.shown(prove(instance, first, solver, clock, standing.note))
     notes = [*scale_notes(problem)]
-    if proof.optimal:
-        # Tie-breaking has limits of its own. With a common unit of weights the optimum is exact, and ties are
-        # placements of the same weight; without one they are those within the slack of the bound.
-        part = clock.counted_part(max(clock.work, MIN_TIE_BREAKING_WORK))
-        best = instance.value(proof.chosen) if instance.step == 1 else proof.bound
-        chosen, settled = yield from canonical_optimum(instance, proof.chosen, best, proof.ties, solver, part)
-        if not settled:
-            notes.append(
-                "not all ties were broken: another placement may cover as much with fewer or cheaper sensors, or see "
-                "more targets twice"
-            )
-    else:
-        chosen = drop_redundant(instance, proof.chosen, instance.value(proof.chosen))
+    chosen = proof.chosen
+    if not proof.optimal:
+        chosen = drop_redundant(instance, chosen, instance.value(chosen))
         notes += [
             "the search ended before this placement was proven optimal: the gap is the most by which it may fall short",
             *_outlook(instance, proof),
@@ -191,11 +171,13 @@ def solve_within(
 
 
 def _can_be_listed(instance: Instance, chosen: Integer, clock: Clock) -> Generator[Progress, None, bool]:
-    """Return whether few bounding steps leave so few candidates that branch and bound soon lists all their choices.
+    """Return whether branch and bound soon lists all choices: of one or two sensors, or of few candidates.
 
-    Then tabu search, which takes longer, cannot add anything. The work of these steps is not counted, so that what is
-    left for the other searches does not depend on them.
+    Then tabu search, which takes longer, cannot add anything. Few bounding steps show whether few candidates are left;
+    their work is not counted, so that what is left for the other searches does not depend on them.
     """
+    if instance.count <= LISTED_SENSORS and is_worthwhile(instance, np.arange(len(instance))):
+        return True
     apart = Clock(max(clock.seconds_left, MIN_PART), acceptance=clock.acceptance)
     goal = instance.as_good(instance.value(chosen))
     keep, _ = yield from lagrangian_bound(instance, goal, apart, iterations=QUICK_STEPS)
@@ -256,11 +238,13 @@ def prove(
         Function that is called with the objective value reached and the bound proven whenever one may have improved.
     """
     # First reduction: only candidates that an equally good or better placement may contain, and the incumbent's own.
-    keep, bound = yield from lagrangian_bound(instance, instance.as_good(instance.value(chosen)), clock)
+    # For one or two sensors branch and bound needs few: it must get its turn before the limits are reached.
+    steps = QUICK_STEPS if instance.count <= LISTED_SENSORS else MAX_ITERATIONS
+    goal = instance.as_good(instance.value(chosen))
+    keep, bound = yield from lagrangian_bound(instance, goal, clock, iterations=steps)
     note(instance.value(chosen), bound.value)
     proof = yield from _prove_among(instance.part(keep), np.searchsorted(keep, chosen), bound, solver, clock, note)
-    ties = None if proof.ties is None else tuple(keep[choice] for choice in proof.ties)
-    return replace(proof, chosen=keep[proof.chosen], bound=instance.attained(proof.bound), ties=ties)
+    return replace(proof, chosen=keep[proof.chosen], bound=instance.attained(proof.bound))
 
 
 def _prove_among(  # incumbent and bound, the limits, and the callback
@@ -277,16 +261,13 @@ def _prove_among(  # incumbent and bound, the limits, and the callback
     as_good = np.union1d(can_reach(instance, bound, instance.as_good(instance.value(chosen))), chosen)
     search = None
     if is_worthwhile(instance, as_good):
-        search = BestPlacements(instance.part(as_good), instance.value(chosen), MAX_SEARCHED_TIES, least)
+        search = BestPlacements(instance.part(as_good), instance.value(chosen), MAX_TIES, least)
         finished = yield from search.run(clock, BRANCHING_SHARE * clock.left)
         chosen = max([chosen, *_found(search, as_good)], key=instance.value)
         if finished:
             return _finished(instance, search, as_good, chosen)
         least = min(least, search.bound)
     note(instance.value(chosen), least)
-    if least >= _better(instance, chosen) - instance.margin:
-        least = min(least, (yield from _decomposition_bound(instance, least, chosen, clock)))
-        note(instance.value(chosen), least)
     keep = can_reach(instance, bound, _better(instance, chosen))
     if least < _better(instance, chosen) - instance.margin or len(keep) == 0:
         return _proven(instance, chosen)
@@ -303,50 +284,7 @@ def _prove_among(  # incumbent and bound, the limits, and the callback
         chosen, least = proof.chosen, proof.bound
     if search is None or clock.left <= 0:
         return Proof(chosen, least, optimal=False)
-    # Branch and bound has closed less than half of the gap: a proof of optimality is not near, and the bound falls
-    # faster by goals. Otherwise the first search continues where it stopped.
-    known, value = Proof(chosen, least, optimal=False), instance.value(chosen)
-    if search.bound - value > (1 - MIN_CLOSED_SHARE) * (bound.value - value):
-        known = yield from lower_by_goals(instance, bound, known, clock, note)
-        if known.optimal or clock.left <= 0:
-            return known
-    return (yield from _search_on(instance, search, as_good, known.bound, known.chosen, clock))
-
-
-def lower_by_goals(
-    instance: Instance, bound: Bound, known: Proof, clock: Clock, note: Note = lambda _value, _bound: None
-) -> Generator[Progress, None, Proof]:
-    """Lower the bound by proofs that no placement reaches a goal, each goal below the one before.
-
-    A search for placements near the bound prunes far more than one for any that is better than the incumbent. It is
-    quick, and where a proof of optimality is out of reach it is the better use of the time.
-    """
-    chosen, least, halfway, half = known.chosen, min(known.bound, instance.total), None, clock.left / 2
-    step = (least - instance.value(chosen)) / FIRST_GOALS
-    while clock.left > 0 and least - step > _better(instance, chosen):
-        goal, left = least - step, clock.left
-        # Three outcomes. The search reaches the limits: its own bound holds. It ends with a placement that reaches the
-        # goal: that is the best one, as the search compared all that do. It ends without one: the goal is the new
-        # bound.
-        keep = can_reach(instance, bound, goal)
-        yield Progress(0, 0, f"proving that no placement covers {goal / instance.total:.2%}")
-        search = BestPlacements(instance.part(keep), goal, 1, least) if len(keep) else None
-        finished = search is None or (yield from search.run(clock, clock.left))
-        if search is not None:
-            chosen = max([chosen, *_found(search, keep)], key=instance.value)
-        if search is not None and not finished:
-            least = min(least, max(search.bound, goal, instance.value(chosen)))
-        elif instance.value(chosen) >= goal - instance.slack:
-            return _proven(instance, chosen)
-        else:
-            least = instance.attainable(goal) - 1 if instance.step == 1 else goal
-        note(instance.value(chosen), least)
-        if left - clock.left < QUICK_SHARE * left:
-            step *= 2
-        if halfway is None and clock.left <= half:
-            halfway = least
-    optimal = instance.attained(least) < _better(instance, chosen)
-    return Proof(chosen, max(least, instance.value(chosen)), optimal=optimal, halfway=halfway)
+    return (yield from _search_on(instance, search, as_good, least, chosen, clock))
 
 
 def _search_on(  # the search, its results so far, and the limits
@@ -373,20 +311,9 @@ def _found(search: BestPlacements, among: Integer) -> list[Integer]:
 
 
 def _finished(instance: Instance, search: BestPlacements, among: Integer, chosen: Integer) -> Proof:
-    """Return the proof given by a search that has ended."""
-    ties = None if search.overflowed else (chosen, *_found(search, among))
-    return Proof(chosen, instance.value(chosen), optimal=True, ties=ties)
-
-
-def _decomposition_bound(
-    instance: Instance, least: float, chosen: Integer, clock: Clock
-) -> Generator[Progress, None, float]:
-    """Bound by parts of the candidates: briefly first, and with more time if that closes part of the gap."""
-    better = _better(instance, chosen)
-    first = yield from decomposition_bound(instance, better, clock, FIRST_DECOMPOSITION_SHARE * clock.left)
-    if first < better or least - first < MIN_BOUND_GAIN * (least - better):
-        return first
-    return (yield from decomposition_bound(instance, better, clock, FULL_DECOMPOSITION_SHARE * clock.left))
+    """Return the proof given by a search that has ended, with the first by `merit` of the best placements it met."""
+    first = min([chosen, *_found(search, among)], key=lambda choice: merit(instance, choice))
+    return Proof(first, instance.value(chosen), optimal=True)
 
 
 def _better(instance: Instance, chosen: Integer) -> float:
@@ -427,9 +354,11 @@ def _decide(  # the proof so far, and the limits
 
 
 def _proven(instance: Instance, chosen: Integer) -> Proof:
-    """Return the proof that no placement covers more than the chosen one by the instance's step."""
+    """Return the proof that no placement covers more than the chosen one by the instance's step, less idle sensors."""
     value = instance.value(chosen)
-    return Proof(chosen, value if instance.step == 1 else value + instance.step, optimal=True)
+    return Proof(
+        drop_redundant(instance, chosen, value), value if instance.step == 1 else value + instance.step, optimal=True
+    )
 
 
 def _outlook(instance: Instance, proof: Proof) -> list[str]:

@@ -5,7 +5,7 @@ With K scenarios of pose errors, V of each known for every candidate,
 .. math::
     \max_{x \in X} \; \min_{p \in P} \sum_k p_k \sum_j w_j\, y_{jk}
     \quad\text{subject to}\quad
-    κ\, y_{jk} \le \sum_i V_{ijk} x_i, \quad y_{jk} \in \{0, 1\},
+    y_{jk} \le \sum_i V_{ijk} x_i, \quad y_{jk} \in \{0, 1\},
 
 where X are the placements of the problem (number, budget, one sensor per position, mandatory and forbidden positions,
 least distance) and P is defined in `risk`. The expectation is the maximal covering location problem of K × t targets.
@@ -33,7 +33,7 @@ import numpy as np
 
 from ...arrays import Float, Integer
 from ...progress import Progress, within
-from ..placement.bounds import Bound, lagrangian_bound
+from ..placement.bounds import lagrangian_bound
 from ..placement.branch_and_bound import FIRST_STEPS
 from ..placement.feasibility import starting_choice
 from ..placement.greedy import swap_search
@@ -41,14 +41,12 @@ from ..placement.problem import TIE_TOLERANCE, Placement, PlacementProblem, asse
 from ..placement.reduced_problem import WHOLE_SLACK, Instance, common_unit, make_instance, merge_targets
 from ..placement.risk import Risk
 from ..placement.search_limits import DEFAULT_LIMITS, Clock, SolverLimits
-from ..placement.solver import BRANCHING_SHARE, MIN_CLOSED_SHARE, Proof, lower_by_goals, solve, solve_within
-from .robust_search import BestUnderRisk, swap_search_by_risk, swap_search_from_pairs
+from ..placement.solver import solve, solve_within
+from .robust_search import BestUnderRisk
 from .scenario_visibility import ScenarioVisibility
 
 ROUNDS = 16  # rounds of fictitious play; weights of scenarios are multiples of 1 / (ROUNDS · m)
 SCENARIO_SHARE = 0.5  # share of the time for the problems of single scenarios
-GOALS_SHARE = 0.98  # share of the time for proofs that goals cannot be reached, where branching lowers no bound
-WEAK_BRANCHING_SHARE = 0.05  # share of the time for a first branch and bound where its bounds are weak
 MIN_SECONDS = 1.0  # least time, seconds or units of work, for the later steps, however long the earlier ones took
 
 
@@ -73,8 +71,7 @@ def solve_robust(
     scenarios : ScenarioVisibility
         Visibility of all candidates in each scenario.
     foreseen : sequence of Placement, optional
-        Best placement of each scenario, see `foresee`. By default they are computed within the time limit. They are
-        used only if a target must be seen by one sensor.
+        Best placement of each scenario, see `foresee`. By default they are computed within the time limit.
 
     Returns
     -------
@@ -91,19 +88,16 @@ def solve_robust(
     most = problem.most_sensors
     risk.require_sensors(most)
     different = _without_copies(scenarios)
-    plain = risk.seen_by == 1 and risk.failure == "none"
-    if plain and len(different) == 1:
+    if risk.failure == "none" and len(different) == 1:
         planned = replace(problem, visible=different.seen(0))
         placement = yield from solve(planned, limits)
         return replace(placement, covered=problem.covered(placement.chosen))
     solver, clock = limits.solver, limits.clock()
-    if foreseen is None and risk.seen_by == 1:
+    if foreseen is None:
         foreseen = yield from foresee(problem, different, solver, clock.part(SCENARIO_SHARE * clock.left))
     slack = equal_within(problem, risk, len(different))
     placement = yield from _searched(problem, different, risk, slack, solver, clock.part(math.inf, MIN_SECONDS))
-    # with several sensors per target the bound of single scenarios holds as well, but is far too large to be of use
-    if foreseen is not None and risk.seen_by == 1:
-        placement = _with_foresight(problem, different, risk, slack, placement, foreseen)
+    placement = _with_foresight(problem, different, risk, slack, placement, foreseen)
     return replace(placement, seconds=clock.seconds)
 
 
@@ -222,46 +216,17 @@ def _searched(
     goal = (game.evaluate(chosen) - slack) * unit
     root = yield from lagrangian_bound(instance, goal, clock, iterations=FIRST_STEPS)
     search = BestUnderRisk(instance, unit, game.evaluate, chosen, slack, root)
-    finished, bound = yield from _bounded_by_goals(search, instance, unit, root, clock)
+    finished = yield from search.run(clock, clock.left)
     return assess(
         problem,
         whole.original[search.best],
-        bound,
+        search.bound,
         optimal=finished,
         solver="branch and bound",
         seconds=clock.seconds,
         notes=() if finished else (UNPROVEN_MESSAGE,),
         objective=search.value,
     )
-
-
-def _bounded_by_goals(
-    search: BestUnderRisk, instance: Instance, unit: float, root: tuple[Integer, Bound], clock: Clock
-) -> Generator[Progress, None, tuple[bool, float]]:
-    """Run a branch and bound; if its bound hardly falls, lower it by goals, then continue with the time left.
-
-    F bounds T, so that a proof that no placement reaches a goal in F holds for T as well.
-
-    Returns
-    -------
-    bool
-        Whether the search has ended.
-    float
-        Bound on T.
-    """
-    # if several sensors must see a target, bounds of branches are weak: a short trial shows whether they close the gap
-    share = BRANCHING_SHARE if instance.cover.concave else WEAK_BRANCHING_SHARE
-    finished = yield from search.run(clock, share * clock.left)
-    keep, bound = root  # candidates of placements as good as the first incumbent, and so of all better ones
-    value = search.value * unit
-    closing = search.bound * unit - value <= (1 - MIN_CLOSED_SHARE) * (bound.value - value)
-    if finished or closing or not np.isin(search.best, keep).all():
-        finished = finished or (yield from search.run(clock, clock.left))
-        return finished, search.bound
-    known = Proof(np.searchsorted(keep, search.best), search.bound * unit, optimal=False)
-    proof = yield from lower_by_goals(instance.part(keep), bound, known, clock.part(GOALS_SHARE * clock.left))
-    finished = yield from search.run(clock, clock.left)
-    return finished, search.bound if finished else max(search.value, min(search.bound, proof.bound / unit))
 
 
 class FictitiousPlay:
@@ -312,9 +277,6 @@ class FictitiousPlay:
         even = np.ones(len(self._scenarios), dtype=np.int64)
         instance = self.instance(even)
         chosen = yield from swap_search(instance, start)
-        if not self._cover.concave:
-            chosen = yield from swap_search_from_pairs(instance, start, chosen, self._clock)
-            chosen = yield from swap_search_by_risk(instance, self.evaluate, chosen)
         best, value = chosen, self.evaluate(chosen)
         # the expectation: all scenarios have the same weight, and there is no game
         if self._risk.counted(len(even)) == len(even):

@@ -1,4 +1,4 @@
-r"""Best placement under risk: local searches and branch and bound on an objective bounded by a multi-cover.
+r"""Best placement under risk: branch and bound on an objective bounded by a multi-cover.
 
 The bounding function depends on the number of sensors that see a target: with p in P (`risk`),
 
@@ -14,79 +14,14 @@ units.
 """
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 
 import numpy as np
 
 from ...arrays import Integer
-from ...progress import Progress
 from ..placement.bounds import Bound
 from ..placement.branch_and_bound import Search
-from ..placement.greedy import addable, swap_gains, swap_search
 from ..placement.reduced_problem import Instance
-from ..placement.search_limits import Clock
-
-STARTING_PAIRS, MAX_FIRST_CANDIDATES = 8, 100
-"""Number of starting pairs if a single sensor gains nothing, and of candidates that may be the first of a pair."""
-
-SWAPS_TRIED = 24  # number of swaps of each sensor for which T is computed: those with the largest F
-
-
-def swap_search_from_pairs(
-    instance: Instance, start: Integer, best: Integer, clock: Clock
-) -> Generator[Progress, None, Integer]:
-    """Swap sensors from the pairs that see most together, for part of the time; return the best placement.
-
-    If targets must be seen twice, a single sensor adds nothing. The first one is then a guess, and swaps of single
-    sensors do not lead from every guess to the best placement.
-    """
-    time, value = clock.left, instance.value(best)
-    for pair in _best_pairs(instance, start):
-        if clock.left < 0.75 * time:
-            break
-        chosen = yield from swap_search(instance, np.append(start, pair))
-        if instance.value(chosen) > value:
-            best, value = chosen, instance.value(chosen)
-    return best
-
-
-def _best_pairs(instance: Instance, start: Integer) -> list[list[int]]:
-    """Return pairs that can join the start, those that see most together first; no candidate is in two of them."""
-    seen = instance.gains(instance.weight)
-    seen[~addable(instance, start)] = 0.0
-    first = np.argsort(-seen, kind="stable")[: min(MAX_FIRST_CANDIDATES, np.count_nonzero(seen))]
-    together = (instance.matrix[first] * instance.weight.astype(instance.matrix.dtype)) @ instance.matrix.T
-    together[instance.conflict[first] | (seen == 0) | (first[:, None] == np.arange(len(instance)))] = 0.0
-    pairs: list[list[int]] = []
-    while len(pairs) < STARTING_PAIRS and together.any():
-        row, other = np.unravel_index(int(np.argmax(together)), together.shape)
-        pair = [int(first[row]), int(other)]
-        together[np.isin(first, pair)] = 0.0
-        together[:, pair] = 0.0
-        if addable(instance, np.append(start, pair[0]))[pair[1]]:
-            pairs.append(pair)
-    return pairs
-
-
-def swap_search_by_risk(
-    instance: Instance, evaluate: Callable[[Integer], float], chosen: Integer
-) -> Generator[Progress, None, Integer]:
-    """Swap sensors for as long as T grows; for each sensor, the swaps with the largest F are tried."""
-    value = evaluate(chosen)
-    while len(chosen) > 0:
-        yield Progress(0, 0, "swapping sensors")
-        rivals = [
-            np.sort(np.append(chosen[chosen != gone], new))
-            for gone, row in zip(chosen, swap_gains(instance, chosen), strict=True)
-            for new in np.argsort(-row, kind="stable")[:SWAPS_TRIED]
-            if math.isfinite(row[new])
-        ]
-        reached = [evaluate(rival) for rival in rivals]
-        if not rivals or max(reached) <= value:
-            break
-        value = max(reached)
-        chosen = rivals[reached.index(value)]
-    return chosen
 
 
 class BestUnderRisk(Search):

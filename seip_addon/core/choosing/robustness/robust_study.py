@@ -29,9 +29,9 @@ class Contender:
     name : str
         Purpose for which it was optimised.
     planned : float
-        Share of the targets' weight that it covers as planned, by at least one sensor and without failures.
+        Share of the targets' weight that it covers as planned, without failures.
     evaluated_by : Risk
-        Risk measure whose outcome is evaluated: coverage, coverage after a failure, or coverage by several sensors.
+        Risk measure whose outcome is evaluated: coverage, or coverage after a failure.
     undisturbed : float
         Outcome for the poses as planned, as a share of the targets' weight.
     unseen : (n,) float64
@@ -107,9 +107,7 @@ def robust_study(
     views = yield from _views(around, problem, scenarios, every)
     spread = views.spread_to(every, len(problem.visible))
     nominal = yield from solve(problem, limits)
-    foreseen = None
-    if any(risk.seen_by == 1 for risk in risks):
-        foreseen = yield from foresee(problem, spread, limits.solver, limits.clock())
+    foreseen = yield from foresee(problem, spread, limits.solver, limits.clock())
     ways = dict.fromkeys(risk.alone for risk in risks)  # in the order of the risks, each once
     entries = [("the poses as planned", nominal, way) for way in ways]
     for number, risk in enumerate(risks):

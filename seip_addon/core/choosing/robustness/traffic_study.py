@@ -7,7 +7,7 @@ so that confidence intervals are computed from the means of batches of time (`me
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,16 +23,13 @@ from ..placement.solver import solve
 from .robust_placement import at_least, outcomes_of, solve_robust
 from .scenario_visibility import ScenarioVisibility
 from .traffic_instants import NO_TRAFFIC, Instants, TrafficObstacles
-from .visibility_in_traffic import LAYER_HEIGHT, TrafficLayer, visibility_in_traffic
+from .visibility_in_traffic import visibility_in_traffic
 
 NOTABLE_LOSS = 0.01  # share of the targets' weight whose loss in traffic is worth a warning
 IN_TRAFFIC = "in traffic"  # first words of a `traffic_message`, and of no other
 MOSTLY_SEEN_SHARE = 0.9  # least share of time for which a target must be seen to be mostly seen
 
 MEAN = Risk()
-
-LAYER_NAMES: Mapping[TrafficLayer, str] = {"road": "road", "height": f"points {LAYER_HEIGHT:g} m above the road"}
-"""Names of the layers in messages and charts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,15 +38,12 @@ class TrafficScenarios:
 
     Parameters
     ----------
-    layer : {"road", "height"}
-        Layer of the visibility.
     empty : (c, t) bool
         Visibility on the empty road.
     views : ScenarioVisibility
         Visibility at each instant.
     """
 
-    layer: TrafficLayer
     empty: Boolean
     views: ScenarioVisibility
 
@@ -114,13 +108,13 @@ class TrafficEvaluation:
     ----------
     name : str
         Purpose for which it was optimised.
-    seen : mapping of {"road", "height"} to TrafficCoverage
-        Coverage of the targets, and of the points `LAYER_HEIGHT` metres above them.
+    seen : TrafficCoverage
+        Coverage of the targets.
     """
 
     name: str
     placement: Placement
-    seen: Mapping[TrafficLayer, TrafficCoverage]
+    seen: TrafficCoverage
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,45 +123,41 @@ class TrafficStudy:
 
     Parameters
     ----------
-    layer : {"road", "height"}
-        Layer for which both were optimised.
     chosen_at : int
         Number of instants that the traffic-aware placement was optimised on.
     road_users : float
         Mean number of road users at the evaluated instants.
     """
 
-    layer: TrafficLayer
     chosen_at: int
     road_users: float
     empty: TrafficEvaluation
     traffic: TrafficEvaluation
 
-    def gain(self, layer: TrafficLayer) -> IntervalEstimate:
-        """Estimate the gain in coverage in traffic from optimising on traffic rather than for the empty road."""
-        return self.traffic.seen[layer].more_than(self.empty.seen[layer])
+    @property
+    def gain(self) -> IntervalEstimate:
+        """Gain in coverage in traffic from optimising on traffic rather than for the empty road."""
+        return self.traffic.seen.more_than(self.empty.seen)
 
     def is_converged(self) -> bool:
         """Return whether every second instant gives the same means as all, within their intervals."""
-        rows = [seen.at for placed in (self.empty, self.traffic) for seen in placed.seen.values()]
-        rows.append(self.traffic.seen[self.layer].at - self.empty.seen[self.layer].at)
-        batch = self.empty.seen[self.layer].batch
+        empty, traffic, batch = self.empty.seen.at, self.traffic.seen.at, self.empty.seen.batch
+        rows = [empty, traffic, traffic - empty]
         return all(mean_over_time(row[::2], batch[::2]).agrees_with(mean_over_time(row, batch)) for row in rows)
 
     def messages(self) -> tuple[str, ...]:
         """Return messages on the gain or loss by optimising on traffic, and warnings if traffic costs much."""
-        seen = f"of the {LAYER_NAMES[self.layer]} than the best placement for the empty road"
-        gain = self.gain(self.layer)
-        messages = [f"this placement sees {gain.as_change()} {seen}, in traffic that neither was chosen on"]
+        gain, seen = self.gain, self.empty.seen
+        than = "of the road than the best placement for the empty road"
+        messages = [f"this placement sees {gain.as_change()} {than}, in traffic that neither was chosen on"]
         if not self.is_converged():
             messages.append("half of the instants give a different result: evaluate on more held-out instants")
-        messages += [
-            f"the best placement for the empty road sees {seen.mean.value:.1%} of the {LAYER_NAMES[layer]} on average "
-            f"over time in traffic ({self.road_users:.0f} road users at a time), not {seen.empty:.1%}: "
-            f"{seen.loss.value:.1%} less"
-            for layer, seen in self.empty.seen.items()
-            if seen.loss.value >= NOTABLE_LOSS
-        ]
+        if seen.loss.value >= NOTABLE_LOSS:
+            messages.append(
+                f"the best placement for the empty road sees {seen.mean.value:.1%} of the road on average "
+                f"over time in traffic ({self.road_users:.0f} road users at a time), not {seen.empty:.1%}: "
+                f"{seen.loss.value:.1%} less"
+            )
         if gain.low <= 0 and not np.array_equal(self.empty.placement.chosen, self.traffic.placement.chosen):
             messages.append(
                 "on held-out traffic this placement is not significantly better than the empty-road optimum: use more "
@@ -178,24 +168,20 @@ class TrafficStudy:
     def summary(self) -> tuple[str, ...]:
         """Return a line for each placement: its coverage in traffic and on the empty road."""
         return tuple(
-            f"chosen for {placed.name}: "
-            + "; ".join(
-                f"{seen.mean.describe()} of the {LAYER_NAMES[layer]} on average over time, {seen.empty:.2%} on the "
-                "empty road"
-                for layer, seen in placed.seen.items()
-            )
+            f"chosen for {placed.name}: {placed.seen.mean.describe()} of the road on average over time, "
+            f"{placed.seen.empty:.2%} on the empty road"
             for placed in (self.empty, self.traffic)
         )
 
 
 def traffic_scenarios(
-    around: Surroundings, problem: PlacementProblem, instants: Instants, layer: TrafficLayer = "road"
+    around: Surroundings, problem: PlacementProblem, instants: Instants
 ) -> Generator[Progress, None, TrafficScenarios]:
     """Compute visibility at instants of traffic for the candidates that may be chosen; that of others is left false."""
     every = np.flatnonzero(problem.allowed)
-    views = yield from visibility_in_traffic(around, every, [NO_TRAFFIC, *instants.obstacles()], layer)
+    views = yield from visibility_in_traffic(around, every, [NO_TRAFFIC, *instants.obstacles()])
     spread = views.spread_to(every, len(problem.visible))
-    return TrafficScenarios(layer, spread.seen(0), ScenarioVisibility(spread.packed[1:], spread.targets))
+    return TrafficScenarios(spread.seen(0), ScenarioVisibility(spread.packed[1:], spread.targets))
 
 
 def traffic_study(
@@ -224,18 +210,13 @@ def traffic_study(
     placed = at_least(found, empty, reached)
     used = np.unique(np.concatenate([empty.chosen, placed.chosen]))
     obstacles = evaluation.obstacles()
-    layers: tuple[TrafficLayer, ...] = ("road", "height")
-    views: dict[TrafficLayer, ScenarioVisibility] = {}
-    for layer in layers:
-        views[layer] = yield from visibility_in_traffic(around, used, [NO_TRAFFIC, *obstacles], layer)
+    views = yield from visibility_in_traffic(around, used, [NO_TRAFFIC, *obstacles])
 
     def evaluate(name: str, placement: Placement) -> TrafficEvaluation:
         rows = np.searchsorted(used, placement.chosen)
-        seen = {layer: _seen(views[layer], rows, problem.weights, evaluation.batch) for layer in layers}
-        return TrafficEvaluation(name, placement, seen)
+        return TrafficEvaluation(name, placement, _seen(views, rows, problem.weights, evaluation.batch))
 
     return TrafficStudy(
-        layer=scenarios.layer,
         chosen_at=len(scenarios.views),
         road_users=_users(obstacles),
         empty=evaluate("the empty road", empty),
@@ -263,7 +244,7 @@ def traffic_message(
         Weights of the targets.
     """
     obstacles = instants.obstacles()
-    views = yield from visibility_in_traffic(around, poses, [NO_TRAFFIC, *obstacles], "road")
+    views = yield from visibility_in_traffic(around, poses, [NO_TRAFFIC, *obstacles])
     seen = _seen(views, np.arange(len(poses)), weight, instants.batch)
     return (
         f"{IN_TRAFFIC} ({_users(obstacles):.0f} road users at a time) this placement sees {seen.mean.describe()} of "

@@ -1,14 +1,8 @@
 r"""Visibility grids at instants of traffic, with vehicles as occluders.
 
-Each ray of a sensor's scan ends on the first triangle of the scene or of the bodies of road users. There are two
-layers:
-
-- ``road``: a target is seen by a return nearer than δ to it, as on the empty road. A return from a vehicle on a target,
-or
-  next to it, sees the target as a return from the road does.
-- ``height``: a target is seen by a beam that comes nearer than δ to the point `LAYER_HEIGHT` metres above it before the
-  beam ends, within the range at which the sensor detects a surface that faces it. On the empty road there is nothing to
-  return the beam there, but any object there would. Vehicles only hide: the more there are, the less is seen.
+Each ray of a sensor's scan ends on the first triangle of the scene or of the bodies of road users. A target is seen by
+a return nearer than δ to it, as on the empty road. A return from a vehicle on a target, or next to it, sees the target
+as a return from the road does.
 
 For each pose all rays are cast once against the empty road. At an instant, only the rays that pass through the bounding
 box of a road user are cast again, against the bodies only, and only targets with a stopped ray are evaluated again.
@@ -16,9 +10,8 @@ box of a road user are cast again, against the bodies only, and only targets wit
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
 
 import numpy as np
 
@@ -31,23 +24,17 @@ from ...sensing.visibility.near_surfaces import NearSurfaces, near_surfaces, rot
 from ...sensing.visibility.ray_casting import engine_name, make_ray_caster
 from ...sensing.visibility.scanning import Caster, ScanPosition
 from ...sensing.visibility.surroundings import Surroundings
-from ...sensing.visibility.target_index import TargetIndex, is_within
+from ...sensing.visibility.target_index import TargetIndex
 from ...sensing.visibility.visibility_model import in_sensor_axes
-from ...site.scene_geometry import DEFAULT_REFLECTIVITY
 from .scenario_visibility import ScenarioVisibility, each_in_threads
 from .traffic_instants import TrafficObstacles
 
-TrafficLayer = Literal["road", "height"]
-
-LAYER_HEIGHT = 1.5  # metres above a target: the roof of a car, or the side of a van or a truck
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
-_POINTS_AT_ONCE = 128  # bounds the memory of the rays past points
-_CUBE_SLACK = 1e-6  # share by which the cube around a ball is enlarged, so that rounding leaves out no ray
 _CORNERS = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1), indexing="ij")).reshape(3, 8).T
 
 
 def visibility_in_traffic(
-    around: Surroundings, poses: Integer, instants: Sequence[TrafficObstacles], layer: TrafficLayer = "road"
+    around: Surroundings, poses: Integer, instants: Sequence[TrafficObstacles]
 ) -> Generator[Progress, None, ScenarioVisibility]:
     """Compute visibility from poses at instants of traffic.
 
@@ -57,8 +44,6 @@ def visibility_in_traffic(
         Indices among the site's candidates.
     instants : sequence of TrafficObstacles
         Bodies of the vehicles present at each of n instants.
-    layer : {"road", "height"}
-        Layer for which visibility is computed.
 
     Yields
     ------
@@ -68,10 +53,9 @@ def visibility_in_traffic(
     Returns
     -------
     ScenarioVisibility
-        Visibility at each instant. For the layer ``road`` it is identical to that of full scans with all triangles in
-        one ray caster.
+        Visibility at each instant, identical to that of full scans with all triangles in one ray caster.
     """
-    setting = _Setting(around, layer)
+    setting = _Setting(around)
     vehicles = [_vehicle_caster(around, one) for one in instants]
     packed = np.zeros((len(instants), len(poses), (len(setting.wanted) + 7) // 8), dtype=np.uint8)
 
@@ -120,7 +104,7 @@ def poses_in_traffic(around: Surroundings, poses: Integer) -> Generator[Progress
     Progress
         Progress after each pose.
     """
-    setting = _Setting(around, "road")
+    setting = _Setting(around)
     found: dict[int, _PoseInTraffic] = {}
 
     def compute(number: int) -> None:
@@ -134,11 +118,11 @@ def poses_in_traffic(around: Surroundings, poses: Integer) -> Generator[Progress
 class _Setting:
     """Parts that all poses share: ray caster of the scene, and the points that may be seen."""
 
-    def __init__(self, around: Surroundings, layer: TrafficLayer) -> None:
+    def __init__(self, around: Surroundings) -> None:
         site = around.site
-        self.around, self.layer = around, layer
+        self.around = around
         self.caster = make_ray_caster(site.triangles, engine_name(around.engine))
-        self.wanted = site.targets.xyz + np.array([0.0, 0.0, LAYER_HEIGHT if layer == "height" else 0.0])
+        self.wanted = site.targets.xyz
         self.index = TargetIndex(self.wanted, around.sight.delta)
         self.surfaces = near_surfaces(site.triangles, self.wanted, around.sight.delta, site.reflectivity)
 
@@ -158,11 +142,7 @@ class _PoseInTraffic:
             place, near = in_sensor_axes(place, orientation), rotated_surfaces(setting.surfaces, xyz, orientation)
             points, found = near.xyz, TargetIndex(near.xyz, around.sight.delta)
         self._static = _StaticScan(place, points)
-        self._visibility: _LayerVisibility = (
-            _HeightVisibility(self._static, points)
-            if setting.layer == "height"
-            else _RoadVisibility(self._static, found, near)
-        )
+        self._visibility = _RoadVisibility(self._static, found, near)
 
     def seen(self, vehicles: _VehicleCaster) -> Boolean:
         """Return the targets that are seen while vehicles are present, (t,) bool."""
@@ -244,12 +224,6 @@ class _StaticScan:
             self.counts[ray] = place.counting(self.model, directions, self.distance[ray], triangle)
 
     @property
-    def reach(self) -> float:
-        """Distance up to which a surface of default reflectivity that faces the sensor is detected, metres."""
-        detected = self.model.law.reach(DEFAULT_REFLECTIVITY, self.place.settings.detection)
-        return min(self.model.max_range, detected)
-
-    @property
     def rays(self) -> int:
         """Number of all rays."""
         return self.model.channels * self.model.azimuth_count
@@ -257,21 +231,6 @@ class _StaticScan:
     def through(self, hulls: Float) -> tuple[Integer, Integer]:
         """Pair hulls with rays that may pass through them; see `BeamWindows.rays_towards`."""
         return self._windows.rays_towards((hulls - self.place.origin) @ self._orientation)
-
-    def nearest_to(self, points: Float) -> Integer:
-        """Return a ray next to the direction of each point, (n,) int64."""
-        # the channel of nearest elevation, and of its azimuth steps the nearest; the last step at the border of the
-        # view
-        x, y, z = ((points - self.place.origin) @ self._orientation).T
-        order = np.argsort(self.model.elevations, kind="stable")
-        between = (self.model.elevations[order][1:] + self.model.elevations[order][:-1]) / 2
-        channel = order[np.searchsorted(between, np.arctan2(z, np.hypot(x, y)))]
-        steps, size = self.model.azimuth_count, self.model.azimuth_step
-        middle = (steps - 1) / 2  # differences are taken from the middle step, so that they wrap at the ends
-        turn = np.arctan2(y, x) - self.model.azimuth_offsets[channel] - self.model.first_azimuth - middle * size
-        step = np.rint(((turn + np.pi) % (2 * np.pi) - np.pi) / size + middle).astype(np.int64)
-        nearest: Integer = channel * steps + np.clip(step, 0, steps - 1)
-        return nearest
 
     def directions(self, ray: Integer) -> Float:
         """Return the directions of rays, (n, 3)."""
@@ -293,13 +252,8 @@ class _StaticScan:
         return _BlockedRays(ray, distance, bodies.counting(self.model, directions[sooner], distance, triangle[sooner]))
 
 
-class _LayerVisibility(Protocol):
-    def seen(self, stopped: _BlockedRays) -> Boolean:
-        """Return the targets that are seen while road users stop some rays, (t,) bool."""
-
-
 class _RoadVisibility:
-    """Visibility of the layer ``road``: returns near each target are counted, and those of stopped rays subtracted."""
+    """Visibility of the road: returns near each target are counted, and those of stopped rays subtracted."""
 
     def __init__(self, static: _StaticScan, index: TargetIndex, surfaces: NearSurfaces) -> None:
         self._static, self._index, self._surfaces, self._targets = static, index, surfaces, len(surfaces.xyz)
@@ -340,51 +294,3 @@ class _RoadVisibility:
             static.model, self._surfaces, directions[which], distance[which], target
         )
         return ray[which[strong]], target[strong]
-
-
-class _HeightVisibility:
-    """Visibility of the layer ``height``: for each point, one beam that passes it on the empty road (its witness)."""
-
-    def __init__(self, static: _StaticScan, points: Float) -> None:
-        self._static, self._points = static, points
-        # The ray next to a point's direction passes it in most cases. For the other points all rays nearby are tried.
-        self._end = np.minimum(static.distance, static.reach)
-        self._witness = static.nearest_to(points)
-        self._seen = self._pass(self._witness, np.arange(len(points)))
-        for point, ray in self._passing(np.flatnonzero(~self._seen)):
-            self._seen[point], self._witness[point] = True, ray
-
-    def seen(self, stopped: _BlockedRays) -> Boolean:
-        # Vehicles only shorten rays. So a point whose witness is not stopped is still seen, and one that was not seen
-        # before stays unseen. Only the points whose witness was stopped are tested: first whether the shortened ray
-        # still passes, then by all rays nearby. The ends on the empty road are restored for the next instant.
-        usual = self._end[stopped.ray]
-        self._end[stopped.ray] = stopped.distance
-        seen = self._seen.copy()
-        doubtful = np.flatnonzero(seen & np.isin(self._witness, stopped.ray))
-        doubtful = doubtful[~self._pass(self._witness[doubtful], doubtful)]
-        seen[doubtful] = False
-        for point, _ in self._passing(doubtful):
-            seen[point] = True
-        self._end[stopped.ray] = usual
-        return seen
-
-    def _passing(self, points: Integer) -> Iterator[tuple[Integer, Integer]]:
-        """Try all rays near points, and yield points with the rays that pass them, in batches."""
-        # the ball of radius δ about a point is within a cube, whose corners give the window of rays
-        reach = self._static.place.settings.delta * (1 + _CUBE_SLACK)
-        for part in np.array_split(points, max(1, -(-len(points) // _POINTS_AT_ONCE))):
-            hull, ray = self._static.through(self._points[part][:, None] + reach * _CORNERS)
-            passing = self._pass(ray, part[hull])
-            yield part[hull[passing]], ray[passing]
-
-    def _pass(self, ray: Integer, point: Integer) -> Boolean:
-        """Return which rays come nearer than δ to points, within the sensor's range and before their ends, (n,)."""
-        # the point of the ray nearest to the target: the projection of the target, clipped to the part that is measured
-        static, end = self._static, self._end[ray]
-        towards = self._points[point] - static.place.origin
-        ahead = (towards * static.directions(ray)).sum(axis=1)
-        along = np.clip(ahead, static.model.min_range, end)
-        squared = (towards**2).sum(axis=1) - 2 * along * ahead + along**2
-        passes: Boolean = is_within(squared, static.place.settings.delta) & (end >= static.model.min_range)
-        return passes

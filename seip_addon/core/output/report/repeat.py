@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import Field, fields
+from typing import Any
 
 from ...choosing.placement.objective import Objective
 from ...choosing.placement.scenarios import PoseErrors
+from ...sensing.visibility.settings import VisibilitySettings
 from ...settings import Setting, settings_of
+from ...site.candidates import CandidateSettings
 from ...site.installed_cost import load_installed_cost
 from ...storage.json_dataclass import as_json
 from ..results.placement_record import PlacementRecord
@@ -21,41 +24,54 @@ def repeating_command(record: PlacementRecord) -> str:
     settings = record.request
     if record.objective.solver == "none" or settings.goal.scenarios.kind == "traffic":
         return ""  # moved by hand, or optimised on runs of traffic that the record does not name
+    if not _has_options(settings):
+        return ""
     words = ["seip", "place", "placed.blend", *_options(settings.candidates), *_of_survey(settings)]
-    words += [*_options(settings.visibility), *_of_objective(settings.goal)]
+    words += _of_objective(settings.goal)
     words += [] if settings.render else ["--no-render"]
     return shlex.join([*words, "-o", "again"])
 
 
+def _has_options(settings: RecordedSettings) -> bool:
+    """Return whether commands have options for all settings that differ from their defaults."""
+    scenarios, errors, candidates = settings.goal.scenarios, settings.goal.scenarios.pose_errors, settings.candidates
+    only_in_python = (
+        settings.engine != "auto",
+        settings.visibility != VisibilitySettings(),
+        any(getattr(candidates, each.name) != each.default for each in _without_options(CandidateSettings)),
+        scenarios.count is not None,
+        scenarios.held_out is not None,
+        (errors.height, errors.yaw) != (errors.position, errors.tilt),
+    )
+    return not any(only_in_python)
+
+
+def _without_options(kind: type) -> Iterator[Field[Any]]:
+    return (each for each in fields(kind) if each.name not in settings_of(kind))
+
+
 def _of_objective(objective: Objective) -> Iterator[str]:
-    if objective.central_weight == "scene":
-        objective = replace(objective, central_weight=None)
-        yield "--weighted"
+    if objective.central_weight is not None:
+        yield from ("--weighted", *([] if objective.central_weight == "scene" else [_typed(objective.central_weight)]))
+    if objective.mandatory:
+        yield from ("--require", *objective.mandatory)
     yield from _options(objective)
     scenarios = objective.scenarios
     if scenarios.errs:
-        yield "--pose-errors"
-        if scenarios.pose_errors != PoseErrors():
-            for name, value in as_json(scenarios.pose_errors).items():
-                yield from (f"--{name.removesuffix('_deg')}-error", f"{value:.12g}")
+        errors = as_json(scenarios.pose_errors)
+        usual = scenarios.pose_errors == PoseErrors()
+        yield from ("--pose-errors", *([] if usual else [_typed(errors[name]) for name in ("position", "tilt_deg")]))
         yield from _options(scenarios)
 
 
 def _of_survey(settings: RecordedSettings) -> Iterator[str]:
     default = RecordedSettings(settings.goal, settings.candidates)
-    for option, name in (
-        ("grid", "grid_spacing_m"),
-        ("engine", "engine"),
-        ("solver", "solver"),
-        ("time-limit", "time_limit_s"),
-        ("effort", "effort"),
-    ):
+    for option, name in (("grid", "grid_spacing_m"), ("solver", "solver"), ("effort", "effort")):
         value = getattr(settings, name)
         if value != getattr(default, name):
             yield from (f"--{option}", _typed(value))
-    for name in ("catalogue", "reflectivity"):
-        if getattr(settings, name):
-            yield from (f"--{name}", *getattr(settings, name))
+    if settings.catalogue:
+        yield from ("--catalogue", *settings.catalogue)
     if settings.weather.words():
         yield from ("--weather", *settings.weather.words())
     cost = settings.installed_cost

@@ -3,9 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated
 
-from ... import limits
 from ...errors import SeipError
 from ...storage.json_dataclass import from_json
 
@@ -16,9 +14,6 @@ MAIN_RULE = "bev_0.7"
 """Counts all road users; in every record."""
 FORMATS = ("kitti", "openpcdet")
 """Folders of the detections of each frame, beside ``detection.json``."""
-
-
-Share = Annotated[float, limits.SHARE]
 
 
 @dataclass(frozen=True)
@@ -35,9 +30,9 @@ class Precision:
         Number of road users that count, over all frames.
     """
 
-    average_precision: Share
-    interval: tuple[Share, Share] | None
-    road_users: Annotated[int, limits.COUNT]
+    average_precision: float
+    interval: tuple[float, float] | None
+    road_users: int
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,6 @@ from ...errors import SeipError
 from ...storage.files import save_json
 from ...storage.json_dataclass import from_json
 from .placement_record import SCHEMA, PlacementRecord
-from .record_check import check_consistency
 
 
 def save_placement(path: str | os.PathLike[str], record: PlacementRecord) -> None:
@@ -61,7 +60,6 @@ def _read(text: bytes, where: str) -> PlacementRecord:
         if schema == SCHEMA:
             record = from_json(PlacementRecord, content)
             _ = record.request, record.text().encode()  # refused if these cannot be read or written again
-            check_consistency(record)
             return record
     except (SeipError, ValueError, RecursionError) as error:
         raise SeipError(f"{where} is damaged or no placement: {error}; place the sensors again") from error

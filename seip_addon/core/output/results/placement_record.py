@@ -9,11 +9,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from ... import limits
 from ...arrays import Float, Integer
 from ...choosing.placement.deployment import GainBand, Sensor, TypeBand, price_text
 from ...choosing.placement.objective import FrontPoint, Solution
@@ -29,17 +28,8 @@ from ...storage.json_dataclass import from_json
 from .headings import degrees, tilt_degrees
 from .recorded_settings import RecordedSettings
 
-Coordinate = Annotated[float, limits.LOCAL_COORDINATE]
-MapCoordinate = Annotated[float, limits.MAP_COORDINATE]
-Point = tuple[Coordinate, Coordinate, Coordinate]
-MapPoint = tuple[MapCoordinate, MapCoordinate, MapCoordinate]
-Height = Annotated[float, limits.ABOVE_GROUND]
-Degrees = Annotated[float, limits.DEGREES]
-Dollars = Annotated[float, limits.PRICE]
-Share = Annotated[float, limits.SHARE]
-Total = Annotated[float, limits.TOTAL_WEIGHT]
-Count = Annotated[int, limits.COUNT]
-Seconds = Annotated[float, limits.DURATION]
+Point = tuple[float, float, float]
+MapPoint = tuple[float, float, float]
 
 SCHEMA = "seip-placement/3"
 
@@ -74,7 +64,7 @@ class RecordedGeoReference:
 
     projection: str
     header_offset_m: MapPoint
-    header_heading_deg: Degrees
+    header_heading_deg: float
 
     @property
     def geo_reference(self) -> GeoReference:
@@ -130,28 +120,28 @@ class RecordedSensor:
     """
 
     id: str
-    pose: Count | None
+    pose: int | None
     sensor: str
     sensor_name: str
     position: str
     on_pole: bool
     local_m: Point
     map_m: MapPoint
-    height_m: Height
-    yaw_deg: Degrees
-    tilt_deg: Degrees
-    price_usd: Dollars
-    coverage_alone: Share
-    coverage_added: Share
-    coverage_marginal: Share
-    roll_deg: Degrees | None = None
-    latitude_deg: Annotated[float, limits.LATITUDE] | None = None
-    longitude_deg: Annotated[float, limits.LONGITUDE] | None = None
-    altitude_m: MapCoordinate | None = None
-    easting_m: MapCoordinate | None = None
-    northing_m: MapCoordinate | None = None
+    height_m: float
+    yaw_deg: float
+    tilt_deg: float
+    price_usd: float
+    coverage_alone: float
+    coverage_added: float
+    coverage_marginal: float
+    roll_deg: float | None = None
+    latitude_deg: float | None = None
+    longitude_deg: float | None = None
+    altitude_m: float | None = None
+    easting_m: float | None = None
+    northing_m: float | None = None
     evidence: str = ""
-    installation_usd: Dollars | None = None
+    installation_usd: float | None = None
     location: str = ""
     all_round: bool = False
 
@@ -173,10 +163,10 @@ class RecordedCoverage:
     ``central`` is None without weighted regions, ``gain_band`` where all sensors are calibrated on sweeps.
     """
 
-    whole: Share
-    central: Share | None
-    weighted: Share
-    seen_twice: Share
+    whole: float
+    central: float | None
+    weighted: float
+    seen_twice: float
     gain_band: GainBand | None = None
 
 
@@ -186,9 +176,9 @@ class RecordedObjective:
 
     kind: Literal["vanilla", "weighted"]
     sought: Literal["most coverage", "most returns", "least price"]
-    value: Total
-    bound: Total | None
-    gap: Annotated[float, limits.RELATIVE_GAP] | None
+    value: float
+    bound: float | None
+    gap: float | None
     status: str
     solver: str
 
@@ -202,10 +192,10 @@ class RecordedObjective:
 class RecordedGreedy:
     """The greedy answer to the same question, and the share of the objective that it loses."""
 
-    value: Total
-    bound: Total | None
-    gap_to_placement: Annotated[float, limits.SIGNED_SHARE]
-    poses: tuple[Count, ...]
+    value: float
+    bound: float | None
+    gap_to_placement: float
+    poses: tuple[int, ...]
     notes: tuple[str, ...]
 
 
@@ -213,12 +203,12 @@ class RecordedGreedy:
 class RecordedCounts:
     """How many targets, positions and poses there were, and how many candidates were dropped, by reason."""
 
-    targets: Count
-    targets_central: Count
-    positions: Count
-    positions_on_poles: Count
-    poses: Count
-    dropped: Mapping[str, Count]
+    targets: int
+    targets_central: int
+    positions: int
+    positions_on_poles: int
+    poses: int
+    dropped: Mapping[str, int]
 
 
 @dataclass(frozen=True)
@@ -226,7 +216,7 @@ class RecordedTimes:
     """When a placement was made (ISO 8601), and how many seconds each step took."""
 
     created: str
-    durations_s: Mapping[str, Seconds]
+    durations_s: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -252,13 +242,13 @@ class PlacementRecord:
 
     site: RecordedSite
     sensors: tuple[RecordedSensor, ...]
-    price_usd: Dollars
+    price_usd: float
     coverage: RecordedCoverage
     objective: RecordedObjective
     greedy: RecordedGreedy | None
     counts: RecordedCounts
     settings: Mapping[str, object]
-    seeds: Mapping[str, Annotated[int, limits.SEED]]
+    seeds: Mapping[str, int]
     inputs: Mapping[str, str]
     notes: tuple[str, ...]
     warnings: tuple[str, ...]

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
 
-from ... import limits
 from ...choosing.placement.objective import Objective
 from ...choosing.placement.search_limits import DEFAULT_EFFORT
 from ...sensing.visibility.settings import Engine, VisibilitySettings
@@ -23,8 +21,6 @@ class RecordedSettings:
     goal : Objective
     catalogue : tuple of str
         Names of the user's own catalogues, without their folders.
-    time_limit_s : float, optional
-        None for no limit.
     render : bool
         Whether the result includes a rendered view.
     """
@@ -33,13 +29,10 @@ class RecordedSettings:
     candidates: CandidateSettings
     visibility: VisibilitySettings = VisibilitySettings()
     weather: Weather = Weather()
-    reflectivity: tuple[str, ...] = ()
-    grid_spacing_m: Annotated[float, limits.SIZE] = 1.0
+    grid_spacing_m: float = 1.0
     catalogue: tuple[str, ...] = ()
     engine: Engine = "auto"
     solver: str = "auto"
-    effort: Annotated[float, limits.EFFORT] = DEFAULT_EFFORT
-    time_limit_s: Annotated[float, limits.EFFORT] | None = None
+    effort: float = DEFAULT_EFFORT
     installed_cost: InstalledCost | None = None
     render: bool = False
-    spacings_because: str = ""

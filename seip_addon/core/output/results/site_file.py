@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import shapely
 
-from ... import limits
 from ...arrays import Boolean, Float
 from ...choosing.placement.objective import Solution
 from ...choosing.placement.problem import PlacementConstraints
 from ...site.scene_geometry import NamedArea, SceneGeometry
 from ...site.site import Site, Targets
-from ...storage.array_file import ArrayFile, ArrayRule, ContentError
+from ...storage.array_file import ArrayFile
 
 FILE = ArrayFile(
     "seip.site",
@@ -24,18 +22,18 @@ FILE = ArrayFile(
     "table of targets and poses",
     "place the sensors again",
     {
-        "targets": ArrayRule("f8", ("targets", 3), limits.LOCAL_COORDINATE),
-        "weight": ArrayRule("f8", ("targets",), limits.WEIGHT),
-        "central": ArrayRule("u1", ("targets",), limits.SHARE),
-        "within": ArrayRule("u1", ("areas", "targets"), limits.SHARE),
-        "seen": ArrayRule("u1", ("sensors", "targets"), limits.SHARE),
-        "counted": ArrayRule("f8", ("targets",), limits.TOTAL_WEIGHT),
-        "price": ArrayRule("f8", ("poses",), limits.PRICE),
-        "position": ArrayRule("i8", ("poses",), limits.COUNT),
-        "xyz": ArrayRule("f8", ("poses", 3), limits.LOCAL_COORDINATE),
-        "sensor": ArrayRule("U", ("poses",)),
-        "forbidden": ArrayRule("u1", ("poses",), limits.SHARE),
-        "mandatory": ArrayRule("u1", ("groups", "poses"), limits.SHARE),
+        "targets": "f8",
+        "weight": "f8",
+        "central": "u1",
+        "within": "u1",
+        "seen": "u1",
+        "counted": "f8",
+        "price": "f8",
+        "position": "i8",
+        "xyz": "f8",
+        "sensor": "U",
+        "forbidden": "u1",
+        "mandatory": "u1",
     },
 )
 WEIGHTED, PLACE = "weighted region", "place"
@@ -137,9 +135,6 @@ def load_site_file(path: str | os.PathLike[str]) -> SiteFile:
             arrays["targets"], arrays["weight"], arrays["central"].astype(bool), float(header["spacing_m"])
         )
         named = [(str(name), str(kind)) for name, kind in header["areas"]]
-        if len(named) != len(arrays["within"]) or not len(targets):
-            raise ContentError("its areas or targets are not those that it names")
-        _check_header(header, len(arrays["mandatory"]), len(arrays["price"]), len(arrays["seen"]))
         problem = PlacementConstraints(
             weights=arrays["counted"],
             prices=arrays["price"],
@@ -155,26 +150,6 @@ def load_site_file(path: str | os.PathLike[str]) -> SiteFile:
         )
         areas = tuple(Area(*one, row.astype(bool)) for one, row in zip(named, arrays["within"], strict=True))
         return SiteFile(str(header["key"]), targets, areas, arrays["seen"].astype(bool), problem)
-
-
-def _check_header(header: Mapping[str, Any], groups: int, poses: int, sensors: int) -> None:
-    """Raise `ContentError` where a number of the header is out of its limits or contradicts the arrays."""
-    count, budget = header["count"], header["budget_usd"]
-    checks = {
-        "spacing_m": limits.SIZE.fault(header["spacing_m"]),
-        "count": "" if count is None else limits.SENSORS.fault(count),
-        "budget_usd": "" if budget is None else limits.PRICE.fault(budget),
-        "min_distance_m": limits.DISTANCE.fault(header["min_distance_m"]),
-    }
-    for name, fault in checks.items():
-        if fault:
-            raise ContentError(f"{name} {fault}")
-    if count is not None and not isinstance(count, int):
-        raise ContentError(f"count is {count!r}, not a whole number")
-    if len(header["groups"]) != groups:
-        raise ContentError(f"it names {len(header['groups'])} mandatory groups and holds {groups}")
-    if sensors > poses:
-        raise ContentError(f"it has {sensors} sensors at {poses} poses")
 
 
 def _within(areas: Sequence[NamedArea], xyz: Float) -> Boolean:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-from ... import limits
 from ...errors import SeipError
 from ...sensing.recordings.figures import CoverageSteps, Gain, ReturnShare
 from ...storage.files import read_small
@@ -17,24 +16,19 @@ SCHEMA = "seip-verification/1"
 
 _MOST_BYTES = 1 << 26
 
-Coordinate = Annotated[float, limits.LOCAL_COORDINATE]
-Size = Annotated[float, limits.DISTANCE]
-Degrees = Annotated[float, limits.DEGREES]
-Share = Annotated[float, limits.SHARE]
-Count = Annotated[int, limits.COUNT]
-Vector = tuple[Coordinate, Coordinate, Coordinate]
-Angles = tuple[Degrees, Degrees, Degrees]
-Row = tuple[Annotated[float, limits.Limits(-1.001, 1.001)], ...]
-Box = tuple[Coordinate, Coordinate, Coordinate, Size, Size, Size, Annotated[float, limits.YAW]]
+Vector = tuple[float, float, float]
+Angles = tuple[float, float, float]
+Row = tuple[float, ...]
+Box = tuple[float, float, float, float, float, float, float]
 
 
 @dataclass(frozen=True)
 class RecordedBackground:
     """Sweeps that a background was learned from; see `Background`."""
 
-    sweeps: Count
-    seconds: Annotated[float, limits.DURATION]
-    uncertain: Share
+    sweeps: int
+    seconds: float
+    uncertain: float
 
 
 @dataclass(frozen=True)
@@ -60,10 +54,10 @@ class RecordedPose:
     local_m: Vector
     orientation: tuple[Row, Row, Row]
     shift_m: Vector
-    shift_half_width_m: tuple[Size, Size, Size]
+    shift_half_width_m: tuple[float, float, float]
     rotation_deg: Angles
     rotation_half_width_deg: Angles
-    match: Share
+    match: float
     background: RecordedBackground
     gain: Gain | None
     returns: tuple[ReturnShare, ...]
@@ -87,8 +81,8 @@ class RecordedChange:
     kind: Literal["new", "gone", "vehicle"]
     name: str
     box: Box
-    rays: Count
-    coverage_cost: Annotated[float, limits.SIGNED_SHARE] | None
+    rays: int
+    coverage_cost: float | None
 
 
 @dataclass(frozen=True)

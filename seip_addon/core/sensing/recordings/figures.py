@@ -1,18 +1,15 @@
 """Figures of a verification that its record keeps: gain, shares of returns, and coverage from plan to recording."""
 
 from dataclasses import dataclass
-from typing import Annotated
-
-from ... import limits
 
 
 @dataclass(frozen=True)
 class Gain:
     """Received power of a unit as a multiple of that in its model's law, with its 95 % interval."""
 
-    value: Annotated[float, limits.GAIN]
-    low: Annotated[float, limits.GAIN]
-    high: Annotated[float, limits.GAIN]
+    value: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -31,12 +28,12 @@ class ReturnShare:
     """
 
     surface: str
-    low: Annotated[float, limits.DISTANCE]
-    high: Annotated[float, limits.DISTANCE]
-    rays: Annotated[int, limits.COUNT]
-    predicted: Annotated[float, limits.SHARE]
-    fitted: Annotated[float, limits.SHARE]
-    measured: Annotated[float, limits.SHARE]
+    low: float
+    high: float
+    rays: int
+    predicted: float
+    fitted: float
+    measured: float
 
 
 @dataclass(frozen=True)
@@ -58,8 +55,8 @@ class CoverageSteps:
         where the surface differs from place to place, because one bright spot within δ is enough.
     """
 
-    promised: Annotated[float, limits.SHARE]
-    pose: Annotated[float, limits.SHARE]
-    obstacles: Annotated[float, limits.SHARE]
-    installed: Annotated[float, limits.SHARE]
-    returned: Annotated[float, limits.SHARE]
+    promised: float
+    pose: float
+    obstacles: float
+    installed: float
+    returned: float

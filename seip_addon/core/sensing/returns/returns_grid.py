@@ -11,12 +11,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import limits
 from ...arrays import Integer
 from ...errors import SeipError
 from ...progress import Progress
 from ...site.site import Site
-from ...storage.array_file import ArrayFile, ArrayRule, ContentError
+from ...storage.array_file import ArrayFile
 from ...storage.files import digest
 from ...storage.source_digest import source_digest
 from ..lidar.catalogue import find_models
@@ -32,8 +31,7 @@ FILE = ArrayFile(
     1,
     "returns grid",
     "delete it and compute it again",
-    {"returns": ArrayRule("f4", ("poses", "road users"), limits.COUNT)},
-    undigested=True,
+    {"returns": "f4"},
 )
 
 _POSES_AT_ONCE = 16
@@ -68,8 +66,6 @@ class ReturnsGrid:
             The file is missing, damaged or not a returns grid.
         """
         with FILE.reading(path) as (header, arrays):
-            if 0 in arrays["returns"].shape:
-                raise ContentError("it is empty")
             return cls(arrays["returns"], str(header["key"]))
 
 

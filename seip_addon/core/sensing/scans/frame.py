@@ -8,30 +8,28 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import limits
 from ...arrays import Boolean, Float, Integer, Text
-from ...storage.array_file import ArrayFile, ArrayRule, ContentError
-from ..traffic.trajectories import CATEGORIES
+from ...storage.array_file import ArrayFile
 
 _POINTS = {
-    "points": ArrayRule("f4", ("n", 3), limits.LOCAL_COORDINATE),
-    "sensor": ArrayRule("i2", ("n",), limits.COUNT),
-    "delay": ArrayRule("f4", ("n",), limits.DELAY),
-    "intensity": ArrayRule("f4", ("n",), limits.ROUNDED_SHARE),
-    "instance": ArrayRule("i4", ("n",), limits.INDEX),
-    "foreground": ArrayRule("b1", ("n",)),
+    "points": "f4",
+    "sensor": "i2",
+    "delay": "f4",
+    "intensity": "f4",
+    "instance": "i4",
+    "foreground": "b1",
 }
 _LABELS = {
-    "labels.user": ArrayRule("i8", ("k",), limits.COUNT),
-    "labels.category": ArrayRule("U", ("k",)),
-    "labels.centre": ArrayRule("f8", ("k", 3), limits.LOCAL_COORDINATE),
-    "labels.size": ArrayRule("f8", ("k", 3), limits.ROAD_USER_SIZE),
-    "labels.yaw": ArrayRule("f8", ("k",), limits.YAW),
-    "labels.pitch": ArrayRule("f8", ("k",), limits.PITCH),
-    "labels.speed": ArrayRule("f8", ("k",), limits.APPARENT_SPEED),
-    "labels.points": ArrayRule("i8", ("k", "s"), limits.COUNT),
-    "labels.visibility": ArrayRule("f8", ("k",), limits.ROUNDED_SHARE),
-    "labels.inside": ArrayRule("b1", ("k",)),
+    "labels.user": "i8",
+    "labels.category": "U",
+    "labels.centre": "f8",
+    "labels.size": "f8",
+    "labels.yaw": "f8",
+    "labels.pitch": "f8",
+    "labels.speed": "f8",
+    "labels.points": "i8",
+    "labels.visibility": "f8",
+    "labels.inside": "b1",
 }
 FILE = ArrayFile("seip.frame", 3, "frame of scans", "simulate it again", _POINTS | _LABELS, compressed=False)
 
@@ -167,25 +165,4 @@ class Frame:
         """
         with FILE.reading(path) as (header, arrays):
             labels = Labels(**{part.name: arrays[f"labels.{part.name}"] for part in fields(Labels)})
-            frame = cls(time=float(header["time"]), labels=labels, **{name: arrays[name] for name in _POINTS})
-            frame._check()
-            return frame
-
-    def _check(self) -> None:
-        """Raise `ContentError` where parts contradict each other."""
-        labels = self.labels
-        if not set(labels.category.tolist()) <= set(CATEGORIES):
-            raise ContentError("a label has an unknown category")
-        if (np.diff(labels.user) <= 0).any():
-            raise ContentError("road users are labelled twice")
-        if not np.isin(self.instance[self.instance != STATIC_INSTANCE], labels.user).all():
-            raise ContentError("points are on road users without a label")
-        if len(self) and int(self.sensor.max()) >= labels.points.shape[1]:
-            raise ContentError("points are from sensors that the labels do not have")
-        hits = self.instance != STATIC_INSTANCE
-        counted = np.zeros_like(labels.points)
-        np.add.at(counted, (np.searchsorted(labels.user, self.instance[hits]), self.sensor[hits]), 1)
-        if len(labels) and (counted != labels.points).any():
-            raise ContentError("the numbers of points in the labels are not those of the points")
-        if fault := limits.TIME.fault(self.time):
-            raise ContentError(f"its time {fault}")
+            return cls(time=float(header["time"]), labels=labels, **{name: arrays[name] for name in _POINTS})

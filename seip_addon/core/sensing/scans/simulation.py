@@ -45,16 +45,15 @@ class ScanSettings:
         none. Otherwise a revolution takes no time.
     engine : {"auto", "bvh", "embree"}
         Ray-casting engine.
-    weather, reflectivity : tuple of str
-        Descriptions of the weather and the reflectivities used, for the record.
+    weather : tuple of str
+        Description of the weather, for the record.
     """
 
     seed: int = setting(0, "seed of noise and lost returns", minimum=0)
     noise: bool = True
     rolling_shutter: bool = setting(default=False, help="traffic moves while a sensor turns")
-    engine: Engine = setting("auto", "ray caster")
+    engine: Engine = "auto"
     weather: tuple[str, ...] = ()
-    reflectivity: tuple[str, ...] = ()
 
 
 class Simulation:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -11,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ... import limits
 from ...arrays import Boolean, Float, Integer
-from ...storage.array_file import ArrayFile, ArrayRule, ContentError
+from ...storage.array_file import ArrayFile
 from ...storage.files import digest
 
 WARM_UP = 2.0  # seconds from the first sample of a run to the first instant that is used
@@ -21,17 +19,15 @@ MAX_BEND = 0.6  # largest bend of the lines of a body along one axis
 MAX_EXTENT = 1e6  # largest distance between two samples along each axis, metres
 
 _ARRAYS = {
-    "origin": ArrayRule("f8", (3,), limits.MAP_COORDINATE),
-    "first": ArrayRule("i8", ("users + 1",), limits.COUNT),
-    "time": ArrayRule("f8", ("samples",), limits.TIME),
-    "position": ArrayRule("f8", ("samples", 3), limits.MAP_COORDINATE),
-    "yaw": ArrayRule("f8", ("samples",), limits.UNWRAPPED_ANGLE),
-    "pitch": ArrayRule("f8", ("samples",), limits.PITCH),
-    "speed": ArrayRule("f8", ("samples",), limits.SPEED),
+    "origin": "f8",
+    "first": "i8",
+    "time": "f8",
+    "position": "f8",
+    "yaw": "f8",
+    "pitch": "f8",
+    "speed": "f8",
 }
-FILE = ArrayFile(
-    "seip.trajectories", 2, "file of trajectories", "import or simulate them again", _ARRAYS, undigested=True
-)
+FILE = ArrayFile("seip.trajectories", 2, "file of trajectories", "import or simulate them again", _ARRAYS)
 
 SAMPLED = ("time", "position", "yaw", "pitch", "speed")
 """Arrays of `Trajectories` with a row for each sample."""
@@ -244,10 +240,7 @@ class Trajectories:
         """
         with FILE.reading(path) as (header, arrays):
             users = tuple(_from_record(user) for user in header["users"])
-            read = cls(users=users, source=str(header["source"]), **{name: arrays[name] for name in _ARRAYS})
-            _check_users(users)
-            _check_samples(read)
-            return read
+            return cls(users=users, source=str(header["source"]), **{name: arrays[name] for name in _ARRAYS})
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,47 +281,7 @@ def _from_record(record: dict[str, Any]) -> RoadUser:
     return RoadUser(**{**record, "shape": tuple(record.get("shape", RoadUser.shape))})
 
 
-def _check_users(users: tuple[RoadUser, ...]) -> None:
-    """Raise `ContentError` if a road user is invalid."""
-    for user in users:
-        sizes = (user.length, user.width, user.height)
-        if not isinstance(user.name, str) or user.category not in CATEGORIES:
-            raise ContentError(f"road user {str(user.name)[:40]!r} is {str(user.category)[:40]!r}")
-        if not limits.ROAD_USER_SIZE.allow(sizes):
-            raise ContentError(f"road user {user.name[:40]!r} is {str(sizes)[:80]} m large")
-        if not limits.SHARE.allow(user.paint):
-            raise ContentError(f"the paint of road user {user.name[:40]!r} reflects {str(user.paint)[:40]}")
-        if not is_shape(user.shape):
-            raise ContentError(f"the shape of road user {user.name[:40]!r} is {str(user.shape)[:80]}")
-
-
 def is_shape(values: Sequence[object]) -> bool:
     """Return whether values are a shape of a road user."""
     bends = [abs(value) for value in values if isinstance(value, int | float)]
     return len(bends) == len(values) == 4 and sum(bends[:2]) <= MAX_BEND and sum(bends[2:]) <= MAX_BEND
-
-
-def _check_samples(read: Trajectories) -> None:
-    """Raise `ContentError` if samples contradict each other or the road users."""
-    count, first = len(read.time), read.first
-    if not len(read.users) or len(first) != len(read.users) + 1:
-        raise ContentError(f"it names {len(read.users)} road users and has the samples of {len(first) - 1}")
-    if first[0] != 0 or first[-1] != count or (np.diff(first) < 1).any():
-        raise ContentError("its samples are not those of its road users, one after the other")
-    within = np.ones(max(count - 1, 0), dtype=np.bool_)
-    within[first[1:-1] - 1] = False
-    late = within & (np.diff(read.time) <= 0)
-    if late.any():
-        user = int(np.searchsorted(first, np.flatnonzero(late)[0], side="right")) - 1
-        raise ContentError(f"the times of road user {read.users[user].name[:40]!r} do not ascend")
-    if (within & (np.abs(np.diff(read.yaw)) > math.pi + _TURN_TOLERANCE)).any():
-        raise ContentError("a heading changes by more than half a turn between two samples")
-    begin, end = read.span
-    if not limits.DURATION.allow(end - begin):
-        raise ContentError(f"it lasts {end - begin:g} s")
-    widest = float(np.ptp(read.position, axis=0).max())
-    if widest > MAX_EXTENT:
-        raise ContentError(f"its road users are up to {widest / 1e3:,.0f} km apart")
-
-
-_TURN_TOLERANCE = 1e-3  # largest error of a turn by rounding, radians

@@ -21,7 +21,7 @@ from ...arrays import Boolean, Float, Integer
 from ...errors import SeipError
 from ...progress import Progress
 from ...site.site import Site
-from ...storage.array_file import ArrayFile, ArrayRule, ContentError
+from ...storage.array_file import ArrayFile
 from ...storage.files import digest
 from ...storage.source_digest import source_digest
 from ..lidar.catalogue import find_models
@@ -37,8 +37,7 @@ FILE = ArrayFile(
     2,
     "visibility grid",
     "delete it and compute it again",
-    {"packed": ArrayRule("u1", ("poses", "bytes"))},
-    undigested=True,
+    {"packed": "u1"},
 )
 
 
@@ -110,13 +109,8 @@ class VisibilityGrid:
             The file is missing, damaged or not a visibility grid.
         """
         with FILE.reading(path) as (header, arrays):
-            packed = arrays["packed"]
             shape = (int(header["shape"][0]), int(header["shape"][1]))
-            if min(shape) < 1 or packed.shape != (shape[0], (shape[1] + 7) // 8):
-                raise ContentError(f"it has bits of the shape {packed.shape} for a grid of {shape}")
-            if shape[1] % 8 and (packed[:, -1] & (0xFF >> shape[1] % 8)).any():
-                raise ContentError("it has bits beyond its last target")
-            return cls(packed, shape, str(header["key"]), dict(header["parameters"]))
+            return cls(arrays["packed"], shape, str(header["key"]), dict(header["parameters"]))
 
 
 def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, engine: str) -> str:

@@ -40,13 +40,8 @@ class VisibilitySettings:
     """
 
     delta: float = setting(1.0, "distance from a target within which a return sees it", unit="m", maximum=MAX_DELTA)
-    min_intensity: float = setting(
-        0.0, "least intensity of a return that sees, of sensors of CARLA's model", minimum=0.0, maximum=1.0, metavar="I"
-    )
-
-    detection: float = setting(
-        0.9, "least probability of detection of a return that sees", minimum=0.01, maximum=0.98, metavar="P"
-    )
+    min_intensity: float = 0.0
+    detection: float = 0.9
 
     def __post_init__(self) -> None:
         if not 0 < self.delta <= MAX_DELTA:

@@ -10,11 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import limits
 from ...errors import SeipError
 from ...progress import Progress
 from ...site.site import Site
-from ...storage.array_file import ArrayFile, ArrayRule
+from ...storage.array_file import ArrayFile
 from ..lidar.model import LidarModel
 from .chunks import Rows
 from .grid import VisibilityGrid, compute_visibility, visibility_key
@@ -26,7 +25,7 @@ _CHUNK = ArrayFile(
     1,
     "chunk of a visibility grid",
     "delete it and compute it again",
-    {"packed": ArrayRule("u1", ("poses", "bytes")), "rays": ArrayRule("i8", (), limits.COUNT)},
+    {"packed": "u1", "rays": "i8"},
     compressed=False,
 )
 

@@ -12,7 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from seip_addon.core.choosing.placement import branch_and_bound
-from seip_addon.core.choosing.placement.branch_and_bound import BestPlacements, FirstInOrder, merit
+from seip_addon.core.choosing.placement.branch_and_bound import BestPlacements
 from seip_addon.core.choosing.placement.reduced_problem import make_instance
 from seip_addon.core.choosing.placement.search_limits import Clock
 from seip_addon.core.errors import SeipError
@@ -76,21 +76,6 @@ def test_all_best_placements_are_listed_or_proven_absent(problem, share):
     assert len(few.found) == 1
     np.testing.assert_array_equal(few.found[0], search.found[0])
     assert few.overflowed == (len(search.found) > 1)
-
-
-@cases(300)
-@given(small_problems())
-def test_the_first_in_order_is_found(problem):
-    instance = reduced(problem)
-    assume(instance is not None)
-    choices = [choice for choice in feasible(instance) if len(choice)]
-    assume(choices)
-    goal = max(map(instance.value, choices))
-    equal = [choice for choice in choices if instance.value(choice) >= goal - instance.slack]
-    first = min(equal, key=lambda choice: merit(instance, choice))
-    search = FirstInOrder(replace(instance, count=len(first)), goal)
-    assert finish(search.run(forever(), math.inf))
-    np.testing.assert_array_equal(search.best, first)
 
 
 def test_a_search_stops_at_its_limit():

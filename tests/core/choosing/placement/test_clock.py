@@ -39,12 +39,6 @@ def test_what_a_part_spends_is_spent_of_the_whole() -> None:
     assert whole.part(0.0, least=2.0).left == 2.0
 
 
-def test_a_part_of_a_limit_of_time_may_be_counted() -> None:
-    part = Clock(1000.0).counted_part(2.0)
-    assert part.counts_work
-    assert part.left == pytest.approx(2.0)
-
-
 def test_without_any_limit_given_a_search_is_limited_by_work_and_never_by_time(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = street_problem(60, 800, heights=1, count=6)
     alone = finish(solve(problem))

@@ -16,7 +16,7 @@ import numpy as np
 import pulp.apis.coin_api
 import pytest
 
-from seip_addon.core.choosing.placement import cheapest, integer_program, solver, tie_breaking
+from seip_addon.core.choosing.placement import cheapest, integer_program, solver
 from seip_addon.core.choosing.placement.cheapest import cheapest_for_coverage
 from seip_addon.core.choosing.placement.integer_program import Outcome, cover_by_cliques
 from seip_addon.core.choosing.placement.problem import PlacementProblem
@@ -287,7 +287,7 @@ def test_a_time_limit_is_positive(limit: float) -> None:
 @pytest.mark.parametrize("solver", ["highs", "cbc"])
 def test_there_may_be_no_time_limit(solver: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("seip_addon.core.choosing.placement.solver.is_worthwhile", lambda *_: False)
-    monkeypatch.setattr(tie_breaking, "is_worthwhile", lambda *_: False)
+    monkeypatch.setattr(cheapest, "is_worthwhile", lambda *_: False)
     problem = street_problem(12, 100, blocks=1, count=3)
     placement = finish(solve(problem, SolverLimits(solver=solver, time_limit=math.inf)))
     assert placement.status == "optimal"

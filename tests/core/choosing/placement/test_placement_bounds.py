@@ -12,12 +12,10 @@ from hypothesis import strategies as st
 
 from seip_addon.core.choosing.placement import bounds
 from seip_addon.core.choosing.placement.bounds import lagrangian_bound
-from seip_addon.core.choosing.placement.decomposition import decomposition_bound
 from seip_addon.core.choosing.placement.greedy import greedy
 from seip_addon.core.choosing.placement.local_search import composition_search
 from seip_addon.core.choosing.placement.reduced_problem import make_instance
 from seip_addon.core.choosing.placement.search_limits import Clock
-from seip_addon.core.choosing.placement.solver import Proof, lower_by_goals
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from tests.oracles.placement_oracle import small_problems
@@ -41,15 +39,6 @@ def feasible(instance):
     sizes = range(1, min(instance.count, len(instance)) + 1)
     choices = [np.array(choice) for size in sizes for choice in combinations(range(len(instance)), size)]
     return [choice for choice in choices if instance.feasible(choice)]
-
-
-@cases(150)
-@given(small_problems(), st.floats(0.0, 1.0))
-def test_no_placement_covers_more_than_the_districts_allow(problem, share):
-    instance = reduced(problem)
-    assume(instance is not None)
-    best = max(map(instance.value, feasible(instance)), default=0.0)
-    assert finish(decomposition_bound(instance, share * best, forever(), math.inf)) >= best - instance.slack
 
 
 @cases(150)
@@ -79,26 +68,6 @@ def test_a_descent_ends_where_the_relaxation_covers_everything():
     assert min(bound.value, instance.total) <= least.value * (1 + 2 * bounds.MIN_BOUND_LEFT)
 
 
-@pytest.mark.parametrize("effort", [math.inf, 0.002])
-@cases(150)
-@given(small_problems())
-def test_goals_out_of_reach_bound_the_best_placement(effort, problem):
-    instance = reduced(problem)
-    assume(instance is not None)
-    best = max(map(instance.value, feasible(instance)), default=0.0)
-    chosen = min(feasible(instance), key=instance.value, default=None)
-    assume(chosen is not None)
-    keep, bound = finish(lagrangian_bound(instance, instance.value(chosen), forever()))
-    assume(np.isin(chosen, keep).all())
-    instance, chosen = instance.part(keep), np.searchsorted(keep, chosen)
-    known, clock = Proof(chosen, bound.value, optimal=False), Clock(math.inf, effort)
-    proof = finish(lower_by_goals(instance, bound, known, clock))
-    assert proof.bound >= best - instance.slack
-    assert instance.feasible(proof.chosen)
-    if proof.optimal:
-        assert instance.value(proof.chosen) >= best - instance.slack
-
-
 @cases(100)
 @given(small_problems())
 def test_tabu_search_keeps_the_constraints_and_never_ends_worse(problem):
@@ -109,15 +78,3 @@ def test_tabu_search_keeps_the_constraints_and_never_ends_worse(problem):
     found = finish(composition_search(instance, choices[0], choices[0], forever()))
     assert instance.feasible(found)
     assert instance.value(found) >= instance.value(choices[0])
-
-
-@pytest.mark.slow
-def test_districts_and_exchanges_close_most_of_the_gap_of_many_sensors():
-    instance, _ = make_instance(street_problem(60, 800, blocks=2, count=7))
-    chosen = greedy(instance, NONE)
-    searched = finish(composition_search(instance, NONE, chosen, forever()))
-    _, bound = finish(lagrangian_bound(instance, instance.value(searched), forever()))
-    by_districts = finish(decomposition_bound(instance, instance.value(searched), forever(), math.inf))
-    assert instance.value(chosen) < instance.value(searched) <= by_districts < bound.value
-    again = finish(composition_search(instance, NONE, chosen, forever()))
-    np.testing.assert_array_equal(searched, again)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from unittest.mock import patch
 
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from seip_addon.core.choosing.placement import tie_breaking
 from seip_addon.core.choosing.placement.cheapest import cheapest_for_coverage
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
@@ -24,10 +22,9 @@ thorough = cases(150)
 quick = cases(40)
 
 
-@pytest.mark.parametrize("listed", [1, tie_breaking.MAX_SEARCHED_TIES], ids=["ties by programs", "ties listed"])
 @thorough
 @given(st.data())
-def test_equals_exhaustive_search_in_every_stage(listed: int, data: st.DataObject) -> None:
+def test_equals_exhaustive_search_in_every_stage(data: st.DataObject) -> None:
     problem = accepted(data, small_problems())
     feasible = all_placements(problem)
     if not feasible:
@@ -35,8 +32,7 @@ def test_equals_exhaustive_search_in_every_stage(listed: int, data: st.DataObjec
             finish(solve(problem))
         return
     best = min(feasible, key=lambda choice: merit(problem, choice))
-    with patch.object(tie_breaking, "MAX_SEARCHED_TIES", listed):
-        found = finish(solve(problem))
+    found = finish(solve(problem))
     assert found.status == "optimal"
     assert merit(problem, tuple(found.chosen)) == merit(problem, best)
     assert found.objective == found.bound == pytest.approx(covered(problem, best))

@@ -51,7 +51,7 @@ def test_the_front_has_the_bound_of_the_certificate_and_bounds_do_not_cross(exam
     whole = len(example.site.targets)
     assert (points[3].coverage, points[3].missed) == (best.covered / whole, room / whole)
     bounds = [point.coverage + point.missed for point in points.values()]
-    assert bounds == sorted(bounds)
+    assert (np.diff(bounds) >= -1e-12).all()  # up to rounding of the sum above
 
 
 def test_a_budget_that_any_choice_meets_does_not_loosen_the_bound(example):

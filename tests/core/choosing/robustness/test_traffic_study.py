@@ -15,14 +15,12 @@ from seip_addon.core.choosing.placement.objective import Objective, placement_pr
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.choosing.robustness.robust_placement import at_least
 from seip_addon.core.choosing.robustness.traffic_instants import NO_TRAFFIC, spread_instants
-from seip_addon.core.choosing.robustness.traffic_presence import road_user_seconds
-from seip_addon.core.choosing.robustness.traffic_study import LAYER_NAMES, traffic_scenarios, traffic_study
+from seip_addon.core.choosing.robustness.traffic_study import traffic_scenarios, traffic_study
 from seip_addon.core.choosing.robustness.visibility_in_traffic import visibility_in_traffic
-from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import IntervalEstimate, mean_of, mean_over_time
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.traffic.trajectories import WARM_UP, RoadUser
+from seip_addon.core.sensing.traffic.trajectories import RoadUser
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.surroundings import Surroundings
@@ -58,22 +56,21 @@ def laid_out():
     return around, replace(problem, forbidden=site.candidates.sensor == "hdl32e")
 
 
-@pytest.fixture(scope="module", params=["road", pytest.param("height", marks=pytest.mark.slow)])
-def study(request, laid_out):
+@pytest.fixture(scope="module")
+def study(laid_out):
     around, problem = laid_out
-    scenarios = finish(traffic_scenarios(around, problem, spread_instants([queue(1), queue(2)], 6, 0), request.param))
+    scenarios = finish(traffic_scenarios(around, problem, spread_instants([queue(1), queue(2)], 6, 0)))
     return scenarios, finish(traffic_study(around, problem, scenarios, spread_instants([queue(3)], 8, 1)))
 
 
 def test_the_empty_road_is_where_both_begin(laid_out, study):
     around, problem = laid_out
     scenarios, found = study
-    if scenarios.layer == "road":
-        assert (scenarios.empty[problem.allowed] == problem.visible[problem.allowed]).all()
+    assert (scenarios.empty[problem.allowed] == problem.visible[problem.allowed]).all()
     assert not scenarios.empty[problem.forbidden].any()
     static = finish(solve(replace(problem, visible=scenarios.empty)))
     assert found.empty.placement.chosen.tolist() == static.chosen.tolist()
-    assert found.empty.seen[scenarios.layer].empty == pytest.approx(static.covered / len(around.site.targets))
+    assert found.empty.seen.empty == pytest.approx(static.covered / len(around.site.targets))
 
 
 @pytest.mark.slow
@@ -82,22 +79,20 @@ def test_both_are_evaluated_at_instants_that_nothing_was_chosen_on(laid_out, stu
     _, found = study
     evaluated = spread_instants([queue(3)], 8, 1)
     for placed in (found.empty, found.traffic):
-        for layer, seen in placed.seen.items():
-            views = finish(visibility_in_traffic(around, placed.placement.chosen, evaluated.obstacles(), layer))
-            rows = np.array([views.seen(instant).any(axis=0) for instant in range(8)])
-            assert seen.at == pytest.approx(rows.mean(axis=1), abs=1e-12)
-            assert seen.time == pytest.approx(rows.mean(axis=0), abs=1e-12)
-            assert seen.hidden_at == pytest.approx((seen.empty_targets & ~rows).mean(axis=1), abs=1e-12)
-            assert seen.hidden.value == pytest.approx(seen.hidden_at.mean() / seen.empty, abs=1e-12)
-            assert seen.hidden.value * seen.empty >= seen.loss.value - 1e-12
-        assert (placed.seen["height"].at <= placed.seen["height"].empty + 1e-12).all()
+        seen, views = placed.seen, finish(visibility_in_traffic(around, placed.placement.chosen, evaluated.obstacles()))
+        rows = np.array([views.seen(instant).any(axis=0) for instant in range(8)])
+        assert seen.at == pytest.approx(rows.mean(axis=1), abs=1e-12)
+        assert seen.time == pytest.approx(rows.mean(axis=0), abs=1e-12)
+        assert seen.hidden_at == pytest.approx((seen.empty_targets & ~rows).mean(axis=1), abs=1e-12)
+        assert seen.hidden.value == pytest.approx(seen.hidden_at.mean() / seen.empty, abs=1e-12)
+        assert seen.hidden.value * seen.empty >= seen.loss.value - 1e-12
 
 
 def test_on_the_instants_that_it_was_chosen_on_it_loses_to_none(laid_out, study):
     around, problem = laid_out
     scenarios, found = study
     instants = spread_instants([queue(1), queue(2)], 6, 0)
-    assert (scenarios.views.packed[0] == look(around, problem, instants.of(np.array([0])), scenarios.layer)).all()
+    assert (scenarios.views.packed[0] == look(around, problem, instants.of(np.array([0])))).all()
 
     def mean(placed):
         return scenarios.views.seen_by_any(placed.placement.chosen).mean()
@@ -106,40 +101,38 @@ def test_on_the_instants_that_it_was_chosen_on_it_loses_to_none(laid_out, study)
     assert found.traffic.placement.objective == pytest.approx(mean(found.traffic) * len(around.site.targets))
 
 
-def look(around, problem, instants, layer):
-    return finish(traffic_scenarios(around, problem, instants, layer)).views.packed[0]
+def look(around, problem, instants):
+    return finish(traffic_scenarios(around, problem, instants)).views.packed[0]
 
 
 def test_it_says_what_traffic_hides(study):
     _, found = study
-    hidden = found.empty.seen["height"]
-    assert hidden.loss.value > 0.01
-    assert any(f"{hidden.loss.value:.1%} less" in sentence for sentence in found.messages())
-    nothing = replace(hidden, at=np.full_like(hidden.at, hidden.empty - 0.004))
-    quiet = replace(found, empty=replace(found.empty, seen={"road": nothing, "height": nothing}))
+    seen = found.empty.seen
+    costly = replace(seen, at=np.full_like(seen.at, seen.empty - 0.02))
+    costly = replace(found, empty=replace(found.empty, seen=costly))
+    assert any("2.0% less" in sentence for sentence in costly.messages())
+    nothing = replace(seen, at=np.full_like(seen.at, seen.empty - 0.004))
+    quiet = replace(found, empty=replace(found.empty, seen=nothing))
     quiet = replace(quiet, traffic=quiet.empty)
     assert quiet.messages()[1:] == ()
     other = replace(found.traffic, placement=replace(found.traffic.placement, chosen=np.array([0, 1])))
     doubtful = replace(quiet, traffic=replace(other, seen=quiet.empty.seen))
     assert ["not significantly better" in sentence for sentence in doubtful.messages()[1:]] == [True]
     better = replace(nothing, at=nothing.at + 0.1)
-    gains = replace(quiet, traffic=replace(other, seen={"road": better, "height": better}))
+    gains = replace(quiet, traffic=replace(other, seen=better))
     assert gains.messages()[1:] == ()
     rows = traffic_rows(found)
-    assert [row.method for row in rows[:2]] == ["view of the road", "view of the points 1.5 m above the road"]
     assert "24 road users at a time" in rows[0].regime
-    road = found.empty.seen["road"]
-    assert f"vehicles hide {road.hidden.describe()}" in rows[0].begins
-    assert f", {found.gain(found.layer).as_change()}" in rows[2].begins
+    assert f"vehicles hide {seen.hidden.describe()}" in rows[0].begins
+    assert f", {found.gain.as_change()}" in rows[1].begins
 
 
 def test_a_result_that_is_worse_in_traffic_is_called_worse(study):
     _, found = study
-    seen = found.empty.seen
-    worse = {layer: replace(one, at=one.at - 0.0071) for layer, one in seen.items()}
+    worse = replace(found.empty.seen, at=found.empty.seen.at - 0.0071)
     message = replace(found, traffic=replace(found.traffic, seen=worse)).messages()[0]
     assert "this placement sees 0.71 points [" in message
-    assert f"] less of the {LAYER_NAMES[found.layer]} than the best placement for the empty road" in message
+    assert "] less of the road than the best placement for the empty road" in message
     assert "-0.71" not in message
 
 
@@ -160,9 +153,8 @@ def test_without_anyone_on_the_road_nothing_is_lost(laid_out):
     scenarios = finish(traffic_scenarios(around, problem, spread_instants(runs, 2, 0)))
     found = finish(traffic_study(around, problem, scenarios, spread_instants(runs, 8, 1)))
     assert found.empty.placement.chosen.tolist() == found.traffic.placement.chosen.tolist()
-    for seen in found.empty.seen.values():
-        assert (seen.at == seen.empty).all()
-        assert seen.rarely_seen == 0.0
+    assert (found.empty.seen.at == found.empty.seen.empty).all()
+    assert found.empty.seen.rarely_seen == 0.0
     assert found.messages()[1:] == ()
     assert (scenarios.views.seen(0) == finish(visibility_in_traffic(around, np.arange(16), [NO_TRAFFIC])).seen(0))[
         problem.allowed
@@ -186,38 +178,6 @@ def test_the_interval_of_few_stretches_holds_as_often_as_it_says():
     assert np.mean([each.low <= 0.0 <= each.high for each in estimates]) == pytest.approx(0.95, abs=0.015)
 
 
-def test_weights_add_up_to_the_time_of_road_users():
-    site = junction_site(positions=1, spacing=1.0)
-    still = parked((0.0, 0.0, 0.0, 0.7, 0.0), (3.0, -2.0, 0.0, 0.0, 0.0))
-    seconds = finish(road_user_seconds(site.targets, [still]))
-    assert seconds.sum() == pytest.approx(2 * (10.0 - WARM_UP))
-    under = (np.abs(site.targets.xyz[:, 0] - 3.0) < 2.5) & (np.abs(site.targets.xyz[:, 1] + 2.0) < 1.5)
-    assert seconds[~under & (np.hypot(*site.targets.xyz[:, :2].T) > 3.5)].sum() == 0.0
-    twice = finish(road_user_seconds(site.targets, [still, still]))
-    assert twice == pytest.approx(2 * seconds)
-
-
-def test_a_road_user_that_is_half_off_the_road_counts_half():
-    site = junction_site(positions=1, spacing=1.0)
-    at_the_kerb = parked((40.0, 7.0, 0.0, 0.0, 0.0))
-    assert finish(road_user_seconds(site.targets, [at_the_kerb])).sum() == pytest.approx((10.0 - WARM_UP) / 2)
-
-
-def test_a_moving_road_user_is_everywhere_for_as_long():
-    site = junction_site(positions=1, spacing=1.0)
-    drive = make_trajectories([(0.0, -30.0, 2.5, 0, 0, 0), (32.0, 30.0, 2.5, 0, 0, 0)])
-    seconds = finish(road_user_seconds(site.targets, [drive]))
-    assert seconds.sum() == pytest.approx(32.0 - WARM_UP)
-    lane = (np.abs(site.targets.xyz[:, 1] - 2.5) < 0.1) & (np.abs(site.targets.xyz[:, 0]) < 20)
-    assert np.ptp(seconds[lane]) < 0.2 * seconds[lane].mean()
-
-
-def test_traffic_elsewhere_gives_no_weights():
-    site = junction_site(positions=1, spacing=4.0)
-    with pytest.raises(SeipError, match="no road user is ever over a target"):
-        finish(road_user_seconds(site.targets, [parked((500.0, 0.0, 0.0, 0.0, 0.0))]))
-
-
 @pytest.mark.slow
 def test_charts_are_drawn_and_the_same_twice(tmp_path, laid_out, study):
     around, problem = laid_out
@@ -230,12 +190,3 @@ def test_charts_are_drawn_and_the_same_twice(tmp_path, laid_out, study):
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
     assert (tmp_path / "chart one.png").read_bytes() == (tmp_path / "chart two.png").read_bytes()
     assert imread(tmp_path / "one.png")[..., :3].std() > 0.05
-
-
-def test_a_road_user_lies_the_way_it_heads():
-    site = junction_site(positions=1, spacing=1.0)
-    along_y = make_trajectories([(0.0, 0.0, 0.0, 0, math.pi / 2, 0), (10.0, 0.0, 0.0, 0, math.pi / 2, 0)], users=[BUS])
-    seconds = finish(road_user_seconds(site.targets, [along_y]))
-    x, y = np.abs(site.targets.xyz[:, :2].T)
-    assert seconds[(y > 4.0) & (x < 1.0)].sum() > 1.0
-    assert seconds[x > 2.0].sum() == 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 
-from headless.studies.full_scan import beam_directions, seen_by_tilted_full_scan
+from headless.studies.full_scan import seen_by_tilted_full_scan
 
 import numpy as np
 import pytest
@@ -19,12 +19,10 @@ from seip_addon.core.choosing.robustness.traffic_instants import (
     spread_instants,
 )
 from seip_addon.core.choosing.robustness.visibility_in_traffic import (
-    LAYER_HEIGHT,
     poses_in_traffic,
     visibility_in_traffic,
 )
 from seip_addon.core.errors import SeipError
-from seip_addon.core.geometry.orientation import rotated
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.lidar.rosette import Rosette
@@ -94,8 +92,8 @@ crowds = st.lists(
 )
 
 
-def views(instants, layer="road", around=AROUND):
-    seen = finish(visibility_in_traffic(around, POSES, instants, layer))
+def views(instants, around=AROUND):
+    seen = finish(visibility_in_traffic(around, POSES, instants))
     return np.array([seen.seen(instant) for instant in range(len(instants))])
 
 
@@ -126,25 +124,6 @@ def by_full_scan(bodies, engine=ANY, around=AROUND):
     )
 
 
-def beams_past(bodies, pose):
-    """Every beam, from the least range to its end, against every point above a target: its distance to each."""
-    caster = make_ray_caster(np.concatenate([SITE.triangles, bodies.triangles]), ANY)
-    place = place_of(pose, caster, AROUND, SITE.reflectivity)
-    (model,) = place.models
-    directions = beam_directions(model, place.yaw).reshape(-1, 3)
-    if SITE.candidates.tilt[pose] != 0:
-        directions = rotated(beam_directions(model).reshape(-1, 3), SITE.candidates.orientation(pose))
-    end = np.minimum(caster.cast(place.origin, directions, model.max_range)[0], model.max_range)
-    points = SITE.targets.xyz + np.array([0.0, 0.0, LAYER_HEIGHT])
-    passed = np.zeros(len(points), dtype=bool)
-    for number, point in enumerate(points):
-        ahead = directions @ (point - place.origin)
-        squared = ((point - place.origin) ** 2).sum() - ahead**2  # of the whole line
-        reach = np.sqrt(np.maximum(DELTA**2 - squared, 0.0))
-        passed[number] = ((squared < DELTA**2) & (ahead - reach < end) & (ahead + reach > model.min_range)).any()
-    return passed
-
-
 @pytest.mark.slow
 @each_engine
 @cases(15, 3)
@@ -165,60 +144,34 @@ def test_only_returns_that_are_strong_enough_count(bodies):
         assert (views([bodies], around=around)[0] == by_full_scan(bodies, around=around)).all()
 
 
-@pytest.mark.slow
-@cases(5, 1)
-@given(bodies=crowds)
-def test_points_above_the_road_are_seen_by_beams_that_pass(bodies):
-    found = views([bodies], "height")[0]
-    for pose in POSES:
-        assert (found[pose] == beams_past(bodies, pose)).all()
-
-
 def test_the_empty_road_is_the_visibility_grid():
     grid = finish(compute_visibility(SITE, MODELS, AROUND.sight, ANY))
     assert (views([NO_TRAFFIC])[0] == grid.visible).all()
 
 
 @pytest.mark.slow
-@cases(10, 3)
-@given(bodies=crowds, more=crowds)
-def test_where_more_vehicles_stand_less_is_seen_above_the_road(bodies, more):
-    both = replace(
-        bodies,
-        triangles=np.concatenate([bodies.triangles, more.triangles]),
-        hulls=np.concatenate([bodies.hulls, more.hulls]),
-    )
-    nobody, some, all_of_them = views([NO_TRAFFIC, bodies, both], "height")
-    assert (all_of_them <= some).all()
-    assert (some <= nobody).all()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("layer", ["road", "height"])
-def test_neither_order_nor_company_of_instants_matters(layer):
+def test_neither_order_nor_company_of_instants_matters():
     instants = [
         crowd([(12.0, 2.0, 0.0)], ["bus"]),
         NO_TRAFFIC,
         crowd([(2.0, 14.0, 1.5), (-20.0, 0.0, 0.2)], ["truck", "car"]),
         crowd([(0.0, 0.0, 0.8)], ["truck"]),
     ]
-    expected = views(instants, layer)
-    assert (views(instants, layer) == expected).all()
+    expected = views(instants)
+    assert (views(instants) == expected).all()
     for order in itertools.islice(itertools.permutations(range(4)), 5, 24, 9):
-        assert (views([instants[number] for number in order], layer) == expected[list(order)]).all()
-    assert (views([instants[2]], layer)[0] == expected[2]).all()
+        assert (views([instants[number] for number in order]) == expected[list(order)]).all()
+    assert (views([instants[2]])[0] == expected[2]).all()
 
 
 def test_a_truck_hides_the_lane_behind_it_and_shows_where_it_stands():
     pose = 0  # at (9, 9, 5)
     truck = crowd([(-4.0, 4.0, 0.0)], ["truck"])
-    nobody, before = views([NO_TRAFFIC, truck], "height")[:, pose]
     x, y = SITE.targets.xyz[:, 0], SITE.targets.xyz[:, 1]
+    road = nobody, before = views([NO_TRAFFIC, truck])[:, pose]
     behind = (np.abs(x + 9.0) <= 2.0) & (np.abs(y - 2.0) <= 2.0)
     assert (nobody & ~before)[behind].any()
-    away = x > 12.0
-    assert (nobody == before)[away].all()
-    road = views([NO_TRAFFIC, truck])[:, pose]
+    assert (nobody == before)[x > 12.0].all()
     under = (np.abs(x + 4.0) < 4.5) & (np.abs(y - 4.0) < 1.25 + DELTA)
     assert (road[1] & ~road[0])[under].any()
     assert not (road[1] & ~road[0])[~(np.hypot(x + 4.0, y - 4.0) < 5.0 + DELTA)].any()

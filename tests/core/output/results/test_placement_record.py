@@ -12,7 +12,7 @@ import pytest
 
 from seip_addon.core.choosing.placement.objective import MOVED, Objective, Solution
 from seip_addon.core.choosing.placement.problem import Placement
-from seip_addon.core.choosing.placement.returns_summary import CrossingReturns, ReturnsPoint, ReturnsSummary
+from seip_addon.core.choosing.placement.returns_summary import CrossingReturns, ReturnsSummary
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record, save_placement
@@ -175,41 +175,8 @@ def test_a_record_is_written_as_it_was_read(record, tmp_path):
     assert violations(content_of(read), SCHEMA) == []
 
 
-def test_the_schema_is_made_from_the_types_and_limits_of_the_record():
+def test_the_schema_is_made_from_the_types_of_the_record():
     assert FILE.read_text(encoding="utf-8") == text(), "run python -m tests.oracles.placement_schema"
-
-
-def test_every_number_of_the_schema_has_limits():
-    def numbers(part, where):
-        if isinstance(part, dict):
-            if part.get("type") in {"number", "integer"}:
-                yield where, part
-            for name, inner in part.items():
-                yield from numbers(inner, f"{where}.{name}")
-        elif isinstance(part, list):
-            for inner in part:
-                yield from numbers(inner, where)
-
-    found = dict(numbers(SCHEMA, "$"))
-    assert len(found) > 40
-    assert not {where for where, part in found.items() if not {"minimum", "maximum"} <= part.keys()}
-
-
-@pytest.mark.parametrize(
-    ("change", "beyond"),
-    [
-        (lambda content: content["site"]["origin_m"].__setitem__(0, 2e8), "site.origin_m"),
-        (lambda content: content["sensors"][0].__setitem__("price_usd", 2e9), "price_usd"),
-        (lambda content: content["site"].__setitem__("sources", [SOURCE | {"assumed": -1}]), "sources"),
-        (lambda content: content["seeds"].__setitem__("scan", -1), "seeds.scan"),
-    ],
-)
-def test_reader_and_schema_refuse_the_same(record, change, beyond):
-    content = json.loads(json.dumps(record.as_json()))
-    change(content)
-    assert any(beyond in found for found in violations(content, SCHEMA))
-    with pytest.raises(SeipError, match=beyond):
-        parsed_record(json.dumps(content))
 
 
 def test_the_keys_are_in_the_order_of_the_schema(record):
@@ -246,27 +213,14 @@ def test_keys_of_which_this_version_knows_nothing_are_passed_over(whole):
     assert content_of(parsed_record(json.dumps(content))) == whole
 
 
-CONTRADICTIONS = {
-    ("sensors", 0): "the prices of the sensors add up to 0",
-    ("returns", "crossings", 0): "returns.crossings and crossings contradict each other",
-}
-"""Parts without which the others contradict each other, which a schema cannot state."""
-
-
 def test_a_part_that_is_missing_is_missed(whole):
     for place in every_place(whole):
         changed = copy.deepcopy(whole)
         del parent(changed, place)[place[-1]]
-        contradiction = CONTRADICTIONS.get(place)
-        if contradiction:
-            assert contradiction in refusal(changed)
-        else:
-            assert bool(refusal(changed)) == bool(violations(changed, SCHEMA)), place
+        assert bool(refusal(changed)) == bool(violations(changed, SCHEMA)), place
 
 
-@pytest.mark.parametrize(
-    "value", [None, True, "text", 0.5, math.nan, math.inf, pytest.param(10**400, id="vast"), [], [0.5], {}, {"a": []}]
-)
+@pytest.mark.parametrize("value", [None, "text", math.nan, [0.5], {"a": []}])
 def test_a_part_of_another_type_is_refused(whole, value):
     for place in every_place(whole):
         changed = copy.deepcopy(whole)
@@ -303,7 +257,7 @@ def test_every_required_part_is_missed_when_it_is_absent(example, run):
 
 
 def test_settings_of_the_work_are_accepted_and_held_to_their_types(example, run):
-    work = {"engine": "auto", "solver": "highs", "catalogue": ["mine.toml"], "render": True, "time_limit_s": 60.0}
+    work = {"engine": "auto", "solver": "highs", "catalogue": ["mine.toml"], "render": True}
     record = content_of(make_record(example, {**run, "settings": {**run["settings"], **work}}))
     assert violations(record, SCHEMA) == []
     for name in work:
@@ -402,93 +356,3 @@ def test_versions_name_the_program_and_its_libraries():
     found = versions(blender="5.2.0")
     assert list(found) == ["seip", "python", "numpy", "shapely", "pulp", "highspy", "blender"]
     assert found["numpy"] == np.__version__
-
-
-FAULTS = {
-    "a height below all ground": (("sensors", 0, "height_m"), -1e308, r"height_m is -1e\+308, not -1,000 to 1,000 m"),
-    "a place beyond the site": (("sensors", 0, "local_m", 1), 1e30, "not -10,000,000 to 10,000,000 m"),
-    "a negative price": (("sensors", 0, "price_usd"), -5.0, "price_usd is -5, not 0 to"),
-    "another sum": (("price_usd",), 3.0, "price_usd is 3, but the prices of the sensors add up to"),
-    "an impossible share": (("coverage", "whole"), 3e29, r"whole is 3e\+29, not 0 to 1"),
-    "another coverage": (("coverage", "whole"), 0.999, "the sensors add up to"),
-    "more seen twice": (("coverage", "seen_twice"), 1.0, "seen_twice is above coverage.whole"),
-    "a marginal share above its own": (
-        ("sensors", 1, "coverage_marginal"),
-        0.9,
-        "the coverages of sensor 'S2' contradict each other",
-    ),
-    "a label twice": (("sensors", 1, "id"), "S1", "2 sensors have the id 'S1'"),
-    "a tilt of many turns": (("sensors", 0, "tilt_deg"), 1e6, "not -360 to 360 degrees"),
-    "another place of the map": (("sensors", 0, "map_m", 0), 7.0, "local_m and map_m of sensor 'S1'"),
-    "a value above its bound": (("objective", "bound"), 1.0, "objective.value .* is better than objective.bound 1"),
-    "a proof with a gap": (("objective", "status"), "optimal", "objective.status is 'optimal', but objective.bound"),
-    "another gap": (("objective", "gap"), 0.5, "objective.gap is 0.5, but the gap of value and bound is"),
-    "a greedy value above the bound": (("greedy", "value"), 9999.0, "greedy.value 9999 is above objective.bound"),
-    "no date": (("times", "created"), "x", "times.created is not a date and time: 'x'"),
-    "fewer than no targets": (("counts", "targets"), -1, "counts.targets is -1"),
-    "more central targets": (("counts", "targets_central"), 10**9, "targets_central is above counts.targets"),
-    "a planned sensor in the ground": (("sensors", 0, "height_m"), -5.0, "height_m of sensor 'S1' is -5"),
-    "no number of sensors": (("settings", "goal", "count"), -5, "the number of sensors must be 1 to 100,000, not -5"),
-    "more sensors than the objective allows": (("settings", "goal", "count"), 1, "3 sensors are more than settings"),
-    "a price above the budget": (("settings", "goal", "budget"), 1.0, "price_usd .* is above settings.goal.budget"),
-    "an objective of another kind": (("settings", "goal", "coverage"), 0.5, "not what settings.goal asks for"),
-    "a spacing beyond all": (("settings", "grid_spacing_m"), 3e29, r"grid_spacing_m is 3e\+29, not"),
-    "a negative height to choose from": (("settings", "candidates", "heights"), [-5.0], "a mounting height must be"),
-    "a setting in words": (("settings", "effort"), "x", "settings.effort must be a number"),
-    "a negative effort": (("settings", "effort"), -1e308, r"settings.effort is -1e\+308, not"),
-    "another delta": (("settings", "visibility"), {"delta": 3e29}, "delta must be a positive number of metres"),
-    "another greedy gap": (("greedy", "gap_to_placement"), 0.9, "greedy.gap_to_placement is 0.9, but greedy reaches"),
-    "a type that was not there": (("sensors", 0, "sensor"), "os2_128", "'os2_128' is not in settings.candidates"),
-    "an endless step": (("times", "durations_s", "visibility"), 1e300, "not 0 to 2,592,000 s"),
-}
-
-
-FRONT = (ReturnsPoint(1, 20.0, 10_000.0, 0.5), ReturnsPoint(2, 42.5, 20_000.0, 0.25), ReturnsPoint(3, 60.0, 3e4, None))
-FAULTS_OF_RETURNS = {
-    "another mean": (("returns", "typical"), 43.5, "returns.typical is 43.5, but objective.value is the logarithm"),
-    "another crossing": (("returns", "crossings", 0, "least"), 99.0, "returns.crossings and crossings contradict"),
-    "fewer returns of more sensors": (("returns", "front", 1, "returns"), 19.0, "returns.front .* at 2 sensors"),
-    "a lower bound of more sensors": (("returns", "front", 0, "gap"), 9.0, "returns.front .* at 2 sensors"),
-    "the same number twice": (("returns", "front", 1, "count"), 1, "returns.front contradicts itself at 1 sensors"),
-}
-
-
-@pytest.mark.parametrize("name", FAULTS_OF_RETURNS)
-def test_contradicting_returns_are_refused(example, run, name):
-    place, value, complaint = FAULTS_OF_RETURNS[name]
-    returns = replace(RETURNS, front=FRONT)
-    known = replace(example.deployment, returns=returns)
-    chosen = [sensor.pose for sensor in known.sensors]
-    best = solution(chosen, objective=math.log(43.5), bound=math.log(43.5), gap=0.0)
-    made = placement_record(example.site, Solution(GOAL, best, None, known, crossings=RETURNS.crossings), **run)
-    content = content_of(made)
-    assert not refusal(content)
-    parent(content, place)[place[-1]] = value
-    assert re.search(complaint, refusal(content)), refusal(content)
-
-
-def test_logarithms_of_returns_beyond_all_floats_are_refused(example, run):
-    made = make_record(example, run)
-    content = content_of(replace(made, returns=RETURNS, crossings=RETURNS.crossings))
-    content["objective"] |= {"sought": "most returns", "value": 1e6, "bound": None, "gap": None}
-    assert "but objective.value is the logarithm of 1.0142" in refusal(content)
-    content["objective"] |= {"value": math.log(43.5), "bound": 1e6}
-    content["greedy"] |= {"value": 1e6}
-    assert "greedy.gap_to_placement is" in refusal(content)
-
-
-def test_geographic_coordinates_that_contradict_the_map_are_refused(example, run):
-    for name in ("latitude_deg", "longitude_deg", "altitude_m", "easting_m"):
-        content = content_of(make_record(located(example), run))
-        assert not refusal(content)
-        content["sensors"][1][name] += 0.01
-        assert re.search(f"{name}.* of sensor 'S2' are not", refusal(content))
-
-
-@pytest.mark.parametrize("name", FAULTS)
-def test_figures_beyond_their_limits_or_in_contradiction_are_refused(example, run, name):
-    place, value, complaint = FAULTS[name]
-    content = content_of(make_record(example, run))
-    assert not refusal(content)
-    parent(content, place)[place[-1]] = value
-    assert re.search(complaint, refusal(content)), refusal(content)

@@ -46,7 +46,6 @@ def test_a_file_gives_what_was_written(tmp_path):
     ("changes", "says"),
     [
         ({"schema": "seip-verification/9"}, "has the schema 'seip-verification/9'"),
-        ({"coverage": as_json(STEPS) | {"pose": 1.5}}, r"coverage\.pose is 1\.5, not 0 to 1"),
         ({"sensors": [{}]}, r"sensors\[0\]\.id is missing"),
         ({"changes": [as_json(CHANGES[0]) | {"kind": "moved"}]}, "must be 'new' or 'gone' or 'vehicle'"),
         ({"changes": [as_json(CHANGES[0]) | {"box": [1.0]}]}, "must be a list of 7 values"),

@@ -12,17 +12,15 @@ import pytest
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.rosette import Rosette
-from seip_addon.core.sensing.scans.frame import FILE, Frame
+from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.core.sensing.scans.run_folder import (
     Run,
-    content_hash,
     frame_path,
     load_frames,
     load_manifest,
     write_run,
 )
 from seip_addon.core.sensing.scans.simulation import ScanSettings, prepare
-from tests.builders import npz_by_hand as npz
 from tests.builders.traffic_by_hand import box_body, ground, make_sensor, make_static, parked
 from tests.engines import ANY, needs_any
 
@@ -64,7 +62,6 @@ def test_a_run_says_what_it_is_made_of_and_reads_back(tmp_path) -> None:
     for entry in record["frames"]:
         frame = frames[entry["name"]]
         assert (entry["time_s"], entry["points"], entry["road_users"]) == (frame.time, len(frame), 2)
-        assert entry["sha256"] == content_hash(frame)
         assert set(frame.sensor.tolist()) == {0, 1}
 
 
@@ -140,122 +137,11 @@ def test_frames_of_nobody_knows_whom_are_refused(tmp_path) -> None:
         load_manifest(tmp_path)
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"schema": "seip-run/1"}', b"\xff\xfe"])
+@pytest.mark.parametrize("text", ["{", "[]", '{"schema": "seip-run/1"}', b"\xff\xfe"])
 def test_a_damaged_manifest_has_its_sentence(tmp_path, text) -> None:
     (tmp_path / "manifest.json").write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(SeipError, match="damaged"):
         load_manifest(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("part", "value"),
-    [
-        (("frames", 1, "name"), "../000001"),
-        (("frames", 1, "name"), "000002"),
-        (("frames", 0, "sha256"), 7),
-        (("frames",), []),
-        (("complete",), "yes"),
-        (("sensors", 0, "local_m"), [1.0, 2.0]),
-        (("sensors", 0, "local_m"), [1.0, 2.0, float("nan")]),
-        (("sensors", 0, "sensor"), None),
-        (("trajectories",), []),
-        (("key",), None),
-    ],
-)
-def test_a_manifest_that_cannot_be_is_refused(tmp_path, part, value) -> None:
-    record = finish(steps(tmp_path, make_run()))
-    inner = record
-    for step in part[:-1]:
-        inner = inner[step]
-    inner[part[-1]] = value
-    (tmp_path / "manifest.json").write_text(json.dumps(record))
-    with pytest.raises(SeipError, match="is damaged: delete the folder and simulate again"):
-        load_manifest(tmp_path)
-
-
-def test_a_frame_of_another_run_is_noticed(tmp_path) -> None:
-    finish(steps(tmp_path / "one", make_run()))
-    finish(steps(tmp_path / "two", make_run(settings=ScanSettings(seed=4, engine=ANY))))
-    frame_path(tmp_path / "two", 2).replace(frame_path(tmp_path / "one", 2))
-    with pytest.raises(SeipError, match=r"000002\.npz is a frame of another run"):
-        list(load_frames(tmp_path / "one"))
-
-
-def _wrong_labels(arrays):
-    arrays["labels.category"][0] = "tank"
-
-
-def _twice(arrays):
-    arrays["labels.user"][:] = 0
-
-
-def _foreign(arrays):
-    arrays["instance"][0] = 99
-
-
-def _uncounted(arrays):
-    arrays["sensor"][0] = 7
-
-
-def _nowhere(arrays):
-    arrays["points"][0, 0] = np.nan
-
-
-def _dazzling(arrays):
-    arrays["intensity"][0] = 1e9
-
-
-def _miscounted(arrays):
-    arrays["labels.points"][0, 0] += 1
-
-
-def _rocket(arrays):
-    arrays["labels.speed"][0] = 1e30
-
-
-@pytest.mark.parametrize(
-    ("change", "sentence"),
-    [
-        (_wrong_labels, "unknown category"),
-        (_twice, "labelled twice"),
-        (_foreign, "road users without a label"),
-        (_uncounted, "sensors that the labels do not have"),
-        (_nowhere, "points has the value nan"),
-        (_dazzling, "intensity has the value"),
-        (_miscounted, "the numbers of points in the labels are not those of the points"),
-        (_rocket, "labels.speed has the value"),
-    ],
-)
-def test_a_frame_that_contradicts_itself_is_refused(tmp_path, change, sentence) -> None:
-    finish(steps(tmp_path, make_run()))
-    path = frame_path(tmp_path, 0)
-    header, arrays = npz.contents(path)
-    change(arrays)
-    FILE.save(path, header, arrays)
-    with pytest.raises(SeipError, match=sentence):
-        Frame.load(path)
-
-
-@pytest.mark.parametrize(
-    ("change", "sentence"),
-    [
-        (lambda record: record["frames"][1].update(points=5), "contradicts 000001.npz"),
-        (lambda record: record["frames"][1].update(time_s=0.15), "contradicts 000001.npz"),
-        (lambda record: record["frames"][1].update(time_s=-3.0), "is damaged"),
-        (lambda record: record["frames"][1].update(time_s=1e300), "is damaged"),
-        (lambda record: record["frames"][1].update(points=-1), "is damaged"),
-        (lambda record: record["frames"][1].update(road_users=99), "is damaged"),
-        (lambda record: record["sensors"].append(record["sensors"][0]), "contradicts 000000.npz"),
-        (lambda record: record["sensors"][0].update(local_m=[1e30, 0.0, 0.0]), "is damaged"),
-    ],
-)
-def test_a_manifest_that_contradicts_its_frames_is_refused(tmp_path, change, sentence) -> None:
-    finish(steps(tmp_path, make_run()))
-    record = json.loads((tmp_path / "manifest.json").read_text())
-    change(record)
-    (tmp_path / "manifest.json").write_text(json.dumps(record))
-    with pytest.raises(SeipError, match=sentence):
-        list(load_frames(tmp_path))
 
 
 def test_a_run_is_not_written_into_the_folder_of_a_placement(tmp_path) -> None:

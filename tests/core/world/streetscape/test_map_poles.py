@@ -171,7 +171,8 @@ def test_objects_without_a_type_count_by_their_name_and_shape(tmp_path, kind, na
 
 def test_assumed_poles_are_no_candidates_unless_asked_for():
     scene = street(poles=(Pole("a", np.array((0.0, 9.0, 0.1)), source=ASSUMED), Pole("b", np.array((9.0, 9.0, 0.1)))))
-    plain, asked = generate_candidates(scene, PLAIN), generate_candidates(scene, replace(PLAIN, assumed_poles=True))
+    allowed = replace(PLAIN, allow=("assumed-poles",))
+    plain, asked = generate_candidates(scene, PLAIN), generate_candidates(scene, allowed)
     assert "a" not in plain.position_name
     assert plain.dropped["on an assumed pole"] == 1
     assert "1 pole is assumed" in assumed_pole_warnings(scene, plain)[0]

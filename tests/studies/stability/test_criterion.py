@@ -1,13 +1,10 @@
-"""The coarsest spacings within a tolerance, and the study of the criterion, on a small junction."""
+"""The study of the criterion, on a small junction."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
-from headless import convergence
-from headless.convergence import Answer, Evaluator, coarsest_settings
 from headless.studies.stability import charts
 from headless.studies.stability.criterion import (
     Draws,
@@ -21,8 +18,6 @@ from headless.studies.stability.criterion import (
 import numpy as np
 import pytest
 
-from seip_addon.core.choosing.placement.objective import Objective
-from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
@@ -35,72 +30,6 @@ from tests.builders.synthetic_junction import rectangle
 from tests.engines import ANY, needs_any
 
 GEOMETRY = make_geometry(24.0)
-SETTINGS = SurveySettings(candidates=CandidateSettings(sensors=("type2",), heights=(5.4,)), engine=ANY)
-
-
-def answers(evaluated: dict[float, float]):
-    """Stand in for answers: what they cover by spacing of the candidates."""
-
-    def answer(_, settings):
-        yield from ()
-        spacing = settings.candidates.spacing
-        value = evaluated[spacing]
-        return Answer(settings.grid_spacing, spacing, 100, 10, value, value)
-
-    return patch.object(Evaluator, "answer", answer)
-
-
-def picked(evaluated: dict[float, float], tolerance: float = 0.01) -> float:
-    with answers(evaluated):
-        return finish(coarsest_settings(GEOMETRY, SETTINGS, Objective(count=2), tolerance)).settings.candidates.spacing
-
-
-@needs_any
-def test_two_in_a_row_that_agree_by_luck_are_not_taken() -> None:
-    shares = (0.874, 0.874, 0.875, 0.892, 0.895, 0.891, 0.898)
-    assert picked(dict(zip(convergence.CANDIDATE_SPACINGS, shares, strict=True))) == 4.0
-
-
-@needs_any
-def test_the_coarsest_is_taken_where_nothing_is_gained_and_the_finest_where_all_gain() -> None:
-    assert picked(dict.fromkeys(convergence.CANDIDATE_SPACINGS, 0.5)) == 16.0
-    growing = {spacing: 0.5 + 0.05 * row for row, spacing in enumerate(convergence.CANDIDATE_SPACINGS)}
-    assert picked(growing) == convergence.CANDIDATE_SPACINGS[-1]
-
-
-@pytest.mark.slow
-@needs_any
-def test_on_a_junction_the_pick_is_within_the_tolerance_of_the_finest() -> None:
-    goal, tolerance = Objective(count=2), 0.02
-    found = finish(coarsest_settings(GEOMETRY, SETTINGS, goal, tolerance))
-    assert found.settings.spacings_because == found.message
-    evaluator = Evaluator(GEOMETRY, SETTINGS, goal)
-    taken = finish(evaluator.answer(found.settings))
-    finest = finish(
-        evaluator.answer(replace(SETTINGS, grid_spacing=0.5, candidates=replace(SETTINGS.candidates, spacing=2.0)))
-    )
-    assert finest.evaluated - taken.evaluated <= tolerance
-    assert abs(taken.own - taken.evaluated) <= tolerance
-
-
-@needs_any
-@pytest.mark.parametrize(
-    ("goal", "tolerance", "words"),
-    [
-        (Objective(count=2), 0.0, "above 0 and below 1"),
-        (Objective(coverage=0.5), 0.01, "a number of sensors or a budget"),
-        (Objective(count=2, forbidden=("sidewalk 3",)), 0.01, "'sidewalk 3' is not a pole"),
-    ],
-)
-def test_what_a_tolerance_cannot_do(goal: Objective, tolerance: float, words: str) -> None:
-    with pytest.raises(SeipError, match=words):
-        finish(coarsest_settings(GEOMETRY, SETTINGS, goal, tolerance))
-
-
-@needs_any
-def test_goals_that_no_spacing_can_meet_are_refused() -> None:
-    with pytest.raises(SeipError, match="positions"):
-        finish(coarsest_settings(GEOMETRY, SETTINGS, Objective(count=100_000), 0.01))
 
 
 @needs_any
@@ -155,7 +84,7 @@ def test_the_study_finds_the_border_of_the_rings(tmp_path: Path) -> None:
         patch("headless.studies.stability.criterion.GRID_SPACINGS", (2.0, 1.0)),
         patch("headless.studies.stability.criterion.CANDIDATE_SPACINGS", (16.0, 8.0)),
     ):
-        study = finish(criterion_study(GEOMETRY, settings, 2, tolerance=0.2, draws=8))
+        study = finish(criterion_study(GEOMETRY, settings, 2, draws=8))
     (by_ratio,) = study.by_ratio
     inside = [s.value for edge, s in zip(by_ratio.ratios, by_ratio.seen, strict=False) if s and 0.25 <= edge < 1]
     beyond = [s.value for edge, s in zip(by_ratio.ratios, by_ratio.seen, strict=False) if s and edge >= 1.5]
