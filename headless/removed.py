@@ -4,7 +4,12 @@ from collections.abc import Sequence
 
 from seip_addon.core.errors import SeipError
 
-REMOVED: dict[str, str] = {}
+_IMPORT = "import the file in Blender, and link its objects to the collection SEIP Occluders (docs/sources.md)"
+
+REMOVED: dict[str, str] = {
+    **dict.fromkeys(("--buildings", "--buildings-epsg", "--buildings-origin"), _IMPORT),
+    **dict.fromkeys(("--mesh", "--mesh-origin", "--mesh-up"), _IMPORT),
+}
 """By option, or by option and value as in ``--format opv2v``: what to do instead, as the end of a sentence."""
 
 

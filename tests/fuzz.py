@@ -15,7 +15,6 @@ then a result is a fault too. Status 1 where there was any.
 from __future__ import annotations
 
 import argparse
-import base64
 import gzip
 import io
 import json
@@ -674,38 +673,11 @@ def _read_run(path: Path, _: bytes) -> None:
     require_physical([frame for _, frame in load_frames(path.parent / "run")], most=1e11)
 
 
-# --- city models, elevation models and surveys
-
-
-def _cities(folder: Path) -> list[bytes]:
-    from tests.builders.city_text import CityModel, origin_at  # noqa: PLC0415
-
-    model = CityModel(origin_at(52.5, 13.4))
-    model.add("a", model.gabled(0, 0, 10, 8, 6, 9)).add("b", model.block(20, 0, 10, 8, 12))
-    return [model.write(folder / "sample.json").read_bytes()]
-
-
-def _read_city(path: Path, _: bytes) -> None:
-    from seip_addon.core.geometry.geo_reference import GeoReference  # noqa: PLC0415
-    from seip_addon.core.progress import finish  # noqa: PLC0415
-    from seip_addon.core.world.citymodel.at_place import BuildingsRequest, with_city_model  # noqa: PLC0415
-    from seip_addon.core.world.citymodel.cityjson import read_city_model  # noqa: PLC0415
-    from seip_addon.core.world.streetscape.description import SiteDescription  # noqa: PLC0415
-    from tests.builders.city_text import origin_at  # noqa: PLC0415
-
-    require_physical(read_city_model(path).vertices, "vertices", most=1e8)
-    x, y, _ = origin_at(52.5, 13.4)
-    place = GeoReference("+proj=utm +zone=33 +datum=WGS84", (x, y, 0.0, 0.0))
-    with np.errstate(all="raise", under="ignore"):
-        described, _ = finish(
-            with_city_model(SiteDescription(), BuildingsRequest(path), place, shapely.box(-100, -100, 100, 100))
-        )
-    require_physical([one.solid.vertices for one in described.solids], "buildings", most=1e5)
+# --- elevation models and surveys
 
 
 def _elevations(folder: Path) -> list[bytes]:
-    from tests.builders.city_text import origin_at  # noqa: PLC0415
-    from tests.builders.dem_files import sampled, write_dem  # noqa: PLC0415
+    from tests.builders.dem_files import origin_at, sampled, write_dem  # noqa: PLC0415
 
     x, y, _ = origin_at(52.5, 13.4)
     slope = sampled(lambda a, b: 30 + 0.01 * (a - x), x - 100, y + 100, 40, 5.0)
@@ -739,7 +711,7 @@ def _read_elevation(path: Path, _: bytes) -> None:
 
 def _surveys(suffix: str) -> Callable[[Path], list[bytes]]:
     def samples(folder: Path) -> list[bytes]:
-        from tests.builders.city_text import origin_at  # noqa: PLC0415
+        from tests.builders.dem_files import origin_at  # noqa: PLC0415
         from tests.builders.survey_files import block_points, ground_points, write_survey  # noqa: PLC0415
 
         random = np.random.default_rng(0)
@@ -906,82 +878,6 @@ def _read_simulation(path: Path, _: bytes) -> None:
     assert all(isinstance(name, str) for name in listed_runs(path))
 
 
-# --- meshes, which Blender's importers read
-
-
-def _meshes(suffix: str) -> Callable[[Path], list[bytes]]:
-    def samples(folder: Path) -> list[bytes]:
-        import headless.runtime  # noqa: F401, PLC0415
-
-        import bpy  # noqa: PLC0415
-
-        from seip_addon.scene.blend_file import new_file  # noqa: PLC0415
-
-        new_file()
-        bpy.ops.mesh.primitive_cube_add(size=4.0)
-        contents = []
-        for options in _EXPORTS[suffix]:
-            path = folder / f"sample{suffix}"
-            _exporter(suffix)(filepath=str(path), **options)
-            content = path.read_bytes()
-            if suffix == ".gltf":  # its buffer within it, as the file that is read lies alone in its folder
-                buffer = base64.b64encode((folder / "sample.bin").read_bytes()).decode()
-                content = content.replace(b"sample.bin", f"data:application/octet-stream;base64,{buffer}".encode())
-            contents.append(content)
-        return contents
-
-    return samples
-
-
-_EXPORTS: dict[str, list[dict[str, object]]] = {
-    ".ply": [{"ascii_format": True}, {"ascii_format": False}],
-    ".stl": [{"ascii_format": True}, {"ascii_format": False}],
-    ".obj": [{}],
-    ".glb": [{"export_format": "GLB"}],
-    ".gltf": [{"export_format": "GLTF_SEPARATE"}],
-    ".usda": [{}],
-    ".usdc": [{}],
-}
-
-
-def _exporter(suffix: str) -> Callable[..., object]:
-    import bpy  # noqa: PLC0415
-
-    if suffix in {".glb", ".gltf"}:
-        import addon_utils  # noqa: PLC0415
-
-        addon_utils.enable("io_scene_gltf2")
-        return bpy.ops.export_scene.gltf
-    if suffix.startswith(".usd"):
-        return bpy.ops.wm.usd_export
-    return {".ply": bpy.ops.wm.ply_export, ".stl": bpy.ops.wm.stl_export, ".obj": bpy.ops.wm.obj_export}[suffix]
-
-
-def _mutate_mesh(random: Random, content: bytes) -> Case:
-    if random.random() < 0.1 and b"element vertex" in content:
-        return Case(re.sub(rb"element vertex \d+", b"element vertex 2147483648", content), contradicts=True)
-    text = not (content[:4] == b"glTF" or b"\0" in content)
-    return Case(mutated_text(random, content) if text and random.random() < 0.7 else mutated_bytes(random, content))
-
-
-def _read_mesh(path: Path, _: bytes) -> None:
-    import headless.runtime  # noqa: F401, PLC0415
-
-    import bpy  # noqa: PLC0415
-
-    from seip_addon.core.world.streetscape.mesh_place import MeshPlace  # noqa: PLC0415
-    from seip_addon.scene.blend_file import new_file  # noqa: PLC0415
-    from seip_addon.scene.imported import import_mesh  # noqa: PLC0415
-
-    scene = new_file()
-    import_mesh(scene, path, MeshPlace((0.0, 0.0, 0.0), 0.0))
-    for mesh in bpy.data.meshes:
-        places = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
-        mesh.vertices.foreach_get("co", places)
-        if mesh.polygons:
-            require_physical(places, "vertices", most=20_000.0)
-
-
 # --- recordings of sensors
 
 
@@ -1108,7 +1004,6 @@ FORMATS = {
     "flows": Format((".xml",), _flows, _mutate_flow, _read_flow),
     "osm": Format((".osm",), _extracts, _mutate_extract, _read_extract),
     "osm.pbf": Format((".osm.pbf",), _pbf_extracts, _mutate_pbf, _read_extract),
-    "city": Format((".json",), _cities, _mutate_text, _read_city),
     "dem": Format((".tif",), _elevations, _mutate_elevation, _read_elevation),
     **{
         f"survey{suffix}": Format((suffix,), _surveys(suffix), _mutate_survey, _read_survey)
@@ -1126,9 +1021,6 @@ FORMATS = {
     "boxes": Format((".json",), _box_labels, _mutate_text, _read_box_labels),
     "manifest": Format((".json",), _manifests, _mutate_manifest, _read_manifest),
     "run": Format((".json",), _runs, _mutate_run, _read_run),
-    **{
-        f"mesh{suffix}": Format((suffix,), _meshes(suffix), _mutate_mesh, _read_mesh, share=0.05) for suffix in _EXPORTS
-    },
     "blend": Format((".blend",), _blends, _mutate_blend, _read_blend),
     "pt": Format((".pt",), _detectors, _mutate_detector, _read_detector),
 }

@@ -123,9 +123,6 @@ MAP_COORDINATE = Limits(-1e8, 1e8, "m")
 LOCAL_COORDINATE = Limits(-1e7, 1e7, "m")
 """Coordinate from the local origin of a site."""
 
-MODEL_COORDINATE = Limits(-20_000.0, 20_000.0, "m")
-"""Coordinate of a mesh from its own zero: beyond it 32 bits are coarser than a few millimetres."""
-
 GROUND = Limits(-500.0, 9_000.0, "m")
 """Elevation of the ground above sea level."""
 

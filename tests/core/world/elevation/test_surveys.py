@@ -16,12 +16,11 @@ from seip_addon.core.geometry.geo_reference import GeoReference, projection
 from seip_addon.core.geometry.height_raster import HeightRaster
 from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import FROM_EXTRACT, FROM_SURVEY
-from seip_addon.core.world.citymodel.at_place import BuildingsRequest, with_city_model
 from seip_addon.core.world.elevation import obstacles, point_cloud
 from seip_addon.core.world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
 from seip_addon.core.world.elevation.obstacles import ObstacleRaster, blocked, merged, of_boxes, random_rays
 from seip_addon.core.world.streetscape.description import Building, SiteDescription
-from tests.builders.city_text import CityModel, origin_at
+from tests.builders.dem_files import origin_at
 from tests.builders.survey_files import BUILDING, UNCLASSIFIED, VEGETATION, block_points, ground_points, write_survey
 
 laspy = pytest.importorskip("laspy")
@@ -74,7 +73,7 @@ def test_ground_and_what_stands_on_it(suffix, tmp_path):
     places = np.random.default_rng(4).uniform(-55, 55, (300, 2))
     assert np.abs(site.relief.rise(places) - slope(*places.T)).max() < 0.06  # the most under the house
     assert {one.name for one in site.solids} == {"Surveyed building", "Surveyed vegetation"}
-    assert {(one.source, one.on_ground) for one in site.solids} == {(FROM_SURVEY, False)}
+    assert {one.source for one in site.solids} == {FROM_SURVEY}
     low, high = bounds(site, "Surveyed building")
     assert low[:2] == pytest.approx([10, 10], abs=1.0)
     assert high == pytest.approx([30, 22, 52], abs=1.0)
@@ -96,16 +95,11 @@ def test_a_map_with_heights_keeps_them_and_gets_what_stands_there(tmp_path):
     assert "the map keeps its own heights" in notes[0]
 
 
-def test_buildings_of_an_extract_and_of_a_city_model_are_not_there_twice(tmp_path):
+def test_a_building_of_an_extract_is_not_there_twice(tmp_path):
     own = Building(shapely.box(10, 10, 30, 22), 9.0, source=FROM_EXTRACT)
     site, notes, _ = surveyed(tmp_path, town(np.random.default_rng(3)), description=SiteDescription(buildings=(own,)))
     assert not site.buildings
     assert notes[-1] == "1 building of the extract replaced by those of the survey"
-    model = CityModel((X, Y, 0.0), 25833)
-    path = model.add("a", model.block(*HOUSE, 12)).write(tmp_path / "model.json")
-    described, _ = finish(with_city_model(SiteDescription(), BuildingsRequest(path), MAP, AREA))
-    site, _, _ = surveyed(tmp_path, town(np.random.default_rng(3)), description=described)
-    assert {one.name for one in site.solids} == {"Building", "Surveyed vegetation"}
 
 
 def raster_of(kind, top, low=None):
