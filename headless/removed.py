@@ -9,6 +9,8 @@ _IMPORT = "import the file in Blender, and link its objects to the collection SE
 REMOVED: dict[str, str] = {
     **dict.fromkeys(("--buildings", "--buildings-epsg", "--buildings-origin"), _IMPORT),
     **dict.fromkeys(("--mesh", "--mesh-origin", "--mesh-up"), _IMPORT),
+    "--format opv2v": "use openpcdet, mmdetection3d, kitti or pcd",
+    "--format las": "use pcd, and convert its files with PDAL or CloudCompare",
 }
 """By option, or by option and value as in ``--format opv2v``: what to do instead, as the end of a sentence."""
 

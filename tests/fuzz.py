@@ -1013,10 +1013,6 @@ FORMATS = {
     "sweep.bin": Format((".bin",), _sweeps(".bin"), _mutate_numbers, _read_sweep),
     "sweep.pcd.bin": Format((".pcd.bin",), _sweeps(".pcd.bin"), _mutate_numbers, _read_sweep),
     "sweep.npz": Format((".npz",), _sweeps(".npz"), _mutate_npz, _read_sweep),
-    "sweep.csv": Format((".csv",), _sweeps(".csv"), _mutate_text, _read_sweep),
-    **{
-        f"sweep{suffix}": Format((suffix,), _sweeps(suffix), _mutate_survey, _read_sweep) for suffix in (".las", ".laz")
-    },
     "poses": Format((".json",), _sensor_poses, _mutate_text, _read_poses),
     "boxes": Format((".json",), _box_labels, _mutate_text, _read_box_labels),
     "manifest": Format((".json",), _manifests, _mutate_manifest, _read_manifest),

@@ -1,4 +1,4 @@
-"""Readers of sweeps: PCD, KITTI's and nuScenes' binary files, npz, LAS, LAZ and CSV."""
+"""Readers of sweeps: PCD, KITTI's and nuScenes' binary files, and npz."""
 
 from __future__ import annotations
 
@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 
 from ...arrays import Float
 from ...errors import SeipError
-from ...limits import SWEEP_POINTS
 from ...storage.array_file import read_npz
 from ...storage.files import read_small
-from ...storage.las_file import damaged_las, opened_las
-from .pcd_file import number_table, read_pcd
+from .pcd_file import read_pcd
 from .sweep import Sweep, sweep_of
 
 MAX_BYTES = 1 << 30  # largest size of the file of a sweep
@@ -28,8 +26,6 @@ _NAMES = {
     "time": ("time",),
 }
 """Names of each column in files, the preferred one first."""
-
-_POINTS_PER_STEP = 200_000
 
 
 def sweep_suffix(path: Path) -> str:
@@ -117,41 +113,9 @@ def _npz(path: Path) -> tuple[Columns, None]:
     return columns, None
 
 
-def _csv(path: Path) -> tuple[Columns, None]:
-    head, _, body = read_small(path, MAX_BYTES, _CURE).decode("utf-8-sig").partition("\n")
-    names = [name.strip().strip('"').lower() for name in head.split(",")]
-    found = _found(path, names)
-    table = number_table(body, ",", [names.index(name) for name in found.values()])
-    return dict(zip(found, table.T, strict=True)), None
-
-
-def _las(path: Path) -> tuple[Columns, None]:
-    with opened_las(path) as reader:
-        whole = int(reader.header.point_count)
-        SWEEP_POINTS.require(whole, path.name, "number of points", "export one revolution to a file")
-        try:
-            found = _found(path, ["x", "y", "z", *map(str, reader.header.point_format.dimension_names)])
-            chunks = [
-                np.column_stack([np.asarray(chunk[name], dtype=np.float64) for name in found.values()])
-                for chunk in reader.chunk_iterator(_POINTS_PER_STEP)
-            ]
-        except Exception as error:  # whatever a damaged file makes of laspy
-            raise damaged_las(path, error) from error
-    table = np.concatenate([np.empty((0, len(found))), *chunks])
-    if len(table) != whole:
-        raise damaged_las(path, ValueError(f"it announces {whole:,} points and has {len(table):,}"))
-    columns = dict(zip(found, table.T, strict=True))
-    if not columns["intensity"].any():  # a dimension that every file has
-        del columns["intensity"]
-    return columns, None
-
-
 _READERS: dict[str, Callable[[Path], tuple[Columns, Float | None]]] = {
     ".pcd.bin": _binary(("x", "y", "z", "intensity", "ring")),
     ".pcd": _pcd,
     ".bin": _binary(("x", "y", "z", "intensity")),
     ".npz": _npz,
-    ".las": _las,
-    ".laz": _las,
-    ".csv": _csv,
 }
