@@ -229,40 +229,34 @@ def test_a_damaged_survey_is_refused(suffix, tmp_path):
         finish(with_terrain(SiteDescription(), TerrainRequest(path), around()))
 
 
-HEADER = {
-    "variable-length records": (".las", 100, "<I", 2**32 - 1, "announces 4,294,967,295 variable-length records"),
-    "extended records": (".las", 243, "<I", 2**32 - 1, "announces 4,294,967,295 variable-length records"),
-    "points": (".las", 247, "<Q", 2**40, "announces 1,099,511,627,776 points"),
-    "packed points": (".laz", 247, "<Q", 2**40, "chunk table announces|packed bytes"),
-    "where points begin": (".las", 96, "<I", 2**31, "points begin at byte 2,147,483,648"),
-    "a scale": (".las", 131, "<d", float("nan"), "scale is nan"),
-    "an offset": (".las", 155, "<d", 1e300, r"offset is 1e\+300"),
+FIRST_CHUNK = 8 + 30 + 4  # bytes from where points begin to the layers of the first chunk: its offset, a point, a count
+DAMAGE = {
+    "variable-length records": (".las", 100, "<I", 2**32 - 1, "4,294,967,295 variable-length records"),
+    "points": (".las", 247, "<Q", 2**40, "1,099,511,627,776 points"),
+    "packed points": (".laz", 247, "<Q", 2**40, "1,099,511,627,776 points"),
+    "a scale": (".las", 131, "<d", float("nan"), "coordinate is nan"),
     "a bound": (".las", 179, "<d", float("inf"), "bound is inf"),
+    "chunks": (".laz", "table", "<xxxxI", 2**32 - 1, "4,294,967,295 chunks"),
+    "a layer that lazrs would reserve 4 GB for": (".laz", FIRST_CHUNK, "<I", 2**32 - 1, "a layer"),
+    "symbols that lazrs panics at": (".laz", FIRST_CHUNK + 9 * 4, "<I", 2**32 - 1, "not a readable"),
 }
 
 
-@pytest.mark.parametrize("name", HEADER)
-def test_a_header_that_the_file_does_not_bear_out_is_refused_at_once(name, tmp_path):
-    suffix, at, form, value, complaint = HEADER[name]
+@pytest.mark.parametrize("name", DAMAGE)
+def test_what_a_file_does_not_bear_out_is_refused_at_once(name, tmp_path, capfd):
+    suffix, at, form, value, complaint = DAMAGE[name]
     path = write_survey(tmp_path / f"survey{suffix}", ground_points(np.random.default_rng(3), slope, 5), (X, Y), WKT)
     content = bytearray(path.read_bytes())
+    (begin,) = struct.unpack_from("<I", content, 96)
+    if suffix == ".laz" and at != 247:
+        at = struct.unpack_from("<q", content, begin)[0] if at == "table" else begin + at
     struct.pack_into(form, content, at, value)
     path.write_bytes(content)
     begin = time.process_time()
     with pytest.raises(SeipError, match=complaint):
         finish(with_terrain(SiteDescription(), TerrainRequest(path), around()))
     assert time.process_time() - begin < 1.0
-
-
-def test_a_chunk_table_that_the_file_does_not_hold_is_refused(tmp_path):
-    path = write_survey(tmp_path / "survey.laz", ground_points(np.random.default_rng(3), slope, 5), (X, Y), WKT)
-    content = bytearray(path.read_bytes())
-    (data,) = struct.unpack_from("<I", content, 96)
-    (table,) = struct.unpack_from("<q", content, data)
-    struct.pack_into("<I", content, table + 4, 2**32 - 1)
-    path.write_bytes(content)
-    with pytest.raises(SeipError, match="chunk table announces 4,294,967,295 chunks"):
-        finish(with_terrain(SiteDescription(), TerrainRequest(path), around()))
+    assert capfd.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize("missing", ["laspy", "lazrs"])
