@@ -245,23 +245,7 @@ def _read_catalogue(path: Path, _: bytes) -> None:
         require_physical(replace(model, price_range=model.price_range))
 
 
-# --- calibration files of units, and measurements of sensors
-
-
-def _units(suffix: str) -> Callable[[Path], list[bytes]]:
-    def samples(_: Path) -> list[bytes]:
-        from tests.builders.unit_text import FILES  # noqa: PLC0415
-
-        return [text.encode() for name, text in FILES.items() if name.endswith(suffix)]
-
-    return samples
-
-
-def _read_unit(path: Path, _: bytes) -> None:
-    from seip_addon.core.sensing.lidar.unit_files import read_unit_file  # noqa: PLC0415
-
-    beams = read_unit_file(path)
-    assert np.isfinite([beams.elevations, beams.azimuth_offsets]).all(), "beams that are not finite"
+# --- measurements of sensors
 
 
 def _measurements(_: Path) -> list[bytes]:
@@ -986,10 +970,6 @@ FORMATS = {
     "map": Format((".xodr",), _maps, _mutate_map, _read_map),
     "site": Format((".toml",), _descriptions, _mutate_description, _read_description),
     "catalogue": Format((".toml",), _catalogues, _mutate_catalogue, _read_catalogue),
-    **{
-        f"unit{suffix}": Format((suffix,), _units(suffix), _mutate_text, _read_unit)
-        for suffix in (".json", ".xml", ".yaml", ".yml", ".csv")
-    },
     "measurements": Format((".json",), _measurements, _mutate_text, _read_measurements),
     "fcd": Format((".xml",), _floating_car_data, _mutate_floating_car_data, _read_floating_car_data),
     "routes": Format((".xml",), _routes, _mutate_routes, _read_routes),

@@ -232,9 +232,6 @@ ROTATION_RATE = Limits(0.01, 1_000.0, "Hz")
 CHANNELS = Limits(2, 10_000)
 """Channels at even elevations."""
 
-UNIT_BEAMS = Limits(2, 1_000)
-"""Beams of a calibration file."""
-
 BEAM_ELEVATION = Limits(-89.999, 89.999, "degrees")
 """Elevation of a beam, short of straight up and down, where it has no azimuth."""
 

@@ -60,7 +60,7 @@ class SurveySettings:
     weather: Weather = field(default_factory=Weather)
     reflectivity: tuple[str, ...] = ()
     grid_spacing: float = setting(1.0, "distance between neighbouring targets on the road", unit="m", option="grid")
-    catalogue: tuple[Path, ...] = setting((), "catalogues of your own; a unit's beams as KEY=FILE", metavar="FILE")
+    catalogue: tuple[Path, ...] = setting((), "catalogues of your own", metavar="FILE")
     engine: Engine = setting("auto", "ray caster")
     solver: str = setting("auto", "auto (HiGHS if it is installed, otherwise CBC), highs, cbc or gurobi")
     effort: float | None = setting(
