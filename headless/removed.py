@@ -9,6 +9,10 @@ _IMPORT = "import the file in Blender, and link its objects to the collection SE
 REMOVED: dict[str, str] = {
     **dict.fromkeys(("--buildings", "--buildings-epsg", "--buildings-origin"), _IMPORT),
     **dict.fromkeys(("--mesh", "--mesh-origin", "--mesh-up"), _IMPORT),
+    **dict.fromkeys(
+        ("--head", "--pillar", "--points", "--width", "--blocks", "--batch", "--threads"),
+        "`seip train` trains the network of the shipped detector",
+    ),
     "--format opv2v": "use openpcdet, mmdetection3d, kitti or pcd",
     "--format las": "use pcd, and convert its files with PDAL or CloudCompare",
 }

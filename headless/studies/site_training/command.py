@@ -59,6 +59,7 @@ TYPES = (
     "helios_5515",
     "at128",
 )
+NETWORK = NetworkSettings()
 ASIDE = 8  # one of this number of sites is set aside
 MIN_SITES = 2
 
@@ -68,7 +69,7 @@ Site = TypeVar("Site")
 def main(argv: list[str]) -> None:
     """Simulate scans of random placements at every site, and train a detector on them."""
     options = _parser().parse_args(argv)
-    network, training = read_settings(NetworkSettings, options), read_settings(TrainingSettings, options)
+    network, training = NETWORK, read_settings(TrainingSettings, options)
     every_type = tuple(load_catalogue(())) if options.field_conditions else TYPES
     learning = LearningSettings(
         tuple(options.sensor or every_type), options.placements, options.every, training.seed, options.field_conditions
@@ -210,8 +211,6 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="change half of the frames to be as recordings are, and vary groups and sizes of road users",
     )
-    net = parser.add_argument_group("network")
-    add_settings(net, NetworkSettings, "head", "pillar", "most_points", "width", "blocks")
     learning.add_argument(
         "--seed", type=int, default=default.seed, metavar="N", help="seed for placements, noise, weights and order"
     )
