@@ -26,12 +26,12 @@ from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.triangle_culling import culling_message
+from seip_addon.core.sensing.weather import weather_of
 from seip_addon.core.settings import settings_of
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
-from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.folder_contents import check_no_run
 from seip_addon.core.workflows.records import record_of
 from seip_addon.core.workflows.survey import Layout, Survey, lay_out, see

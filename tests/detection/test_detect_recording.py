@@ -221,7 +221,7 @@ def test_wrong_sensors_are_refused_before_anything_is_written(folder, tmp_path, 
 
 
 def _mix(other):
-    (other / "9.csv").write_text("x,y,z\n1,2,3\n")
+    (other / "9.bin").write_bytes(bytes(16))
 
 
 def _shorten(other):

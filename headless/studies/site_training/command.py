@@ -34,6 +34,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import TIME_STEP
 from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.model import fields_of_view
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.site_traffic import require_own_traffic
 from seip_addon.core.site.candidates import CandidateSettings
@@ -140,7 +141,11 @@ def read_site(scene: Path, learning: LearningSettings) -> TrainingSite:
     )
     models = survey_settings.models()
     candidates = make_site(
-        geometry, survey_settings.candidates, survey_settings.grid_spacing, survey_settings.reach(), models
+        geometry,
+        survey_settings.candidates,
+        survey_settings.grid_spacing,
+        survey_settings.reach(),
+        fields_of_view(models),
     ).candidates
     runs = sampled_runs(survey.runs_beside(scene), geometry.origin, learning.every)
     if not runs:

@@ -12,7 +12,6 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..errors import SeipError
 from ..geometry.geo_reference import GeoReference
-from ..sensing.lidar.model import LidarModel
 from .candidates import Candidates, CandidateSettings, generate_candidates
 from .far_objects import without_far_objects
 from .scene_geometry import SceneGeometry, joined, ordered_surfaces
@@ -71,7 +70,7 @@ def make_site(
     settings: CandidateSettings,
     grid_spacing: float = 1.0,
     reach: float = math.inf,
-    models: Mapping[str, LidarModel] = MappingProxyType({}),
+    fields_of_view: Mapping[str, float] = MappingProxyType({}),
 ) -> Site:
     """Make the site of a scene: its targets, candidates and static triangles.
 
@@ -81,8 +80,8 @@ def make_site(
         Distance between neighbouring targets.
     reach : float, metres
         Distance from the region beyond which surfaces are left out, because no relevant ray reaches them.
-    models : mapping of str to LidarModel
-        Sensor types; those missing have a full horizontal field of view.
+    fields_of_view : mapping of str to float, radians
+        Horizontal field of view of each sensor type; types that are missing see the full circle.
 
     Returns
     -------
@@ -122,7 +121,7 @@ def make_site(
         origin=geometry.origin,
         region=geometry.region,
         targets=targets,
-        candidates=with_yaws(candidates, models, settings.yaws, geometry.region, targets.xyz),
+        candidates=with_yaws(candidates, fields_of_view, settings.yaws, geometry.region, targets.xyz),
         triangles=triangles,
         reflectivity=reflectivity,
         geo_reference=geometry.geo_reference,

@@ -13,10 +13,10 @@ from ..choosing.placement.solvers import check_solver
 from ..sensing.lidar.catalogue import find_models, load_catalogue
 from ..sensing.lidar.model import LidarModel
 from ..sensing.visibility.settings import Engine, VisibilitySettings
+from ..sensing.weather import Weather
 from ..settings import setting
 from ..site.candidates import CandidateSettings
 from ..site.installed_cost import InstalledCost
-from ..site.weather import Weather
 from ..storage.json_dataclass import as_json
 
 
