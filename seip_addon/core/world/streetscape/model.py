@@ -661,7 +661,9 @@ def _spans(levels: Levels, lanes: Sequence[LaneSurface], origin: Float) -> Itera
         above, below = (_triangles(roads.get(road, [])) for road in (crossing.above, crossing.below))
         place = shapely.Point(np.array(crossing.place) - origin[:2])
         common = outline(above, road_surface.SNAP_GRID).intersection(outline(below, road_surface.SNAP_GRID))
-        part = min(shapely.get_parts(common), key=place.distance, default=None)
+        # Beyond the scene neither road has a surface, and nothing of the crossing is left.
+        parts = [part for part in shapely.get_parts(common) if part.area > 0.0]
+        part = min(parts, key=place.distance, default=None)
         if part is not None:
             low = float(Terrain(below).height(shapely.get_coordinates(part)).max())
             yield part.buffer(float(embankment_width(np.array(crossing.height)))), low + MIN_LEVEL_HEIGHT
