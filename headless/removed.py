@@ -13,6 +13,9 @@ REMOVED: dict[str, str] = {
         ("--head", "--pillar", "--points", "--width", "--blocks", "--batch", "--threads"),
         "`seip train` trains the network of the shipped detector",
     ),
+    "--begin": "use --start",
+    "--end": "use --duration",
+    **dict.fromkeys(("--turns", "--green"), "all simulations have the same shares of turns and the same signal plan"),
     "--format opv2v": "use openpcdet, mmdetection3d, kitti or pcd",
     "--format las": "use pcd, and convert its files with PDAL or CloudCompare",
 }

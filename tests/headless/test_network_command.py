@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from pathlib import Path
 
 from headless import network
 
@@ -114,3 +115,11 @@ def test_faulty_requests_are_refused_before_anything_is_built(tmp_path, options,
     table.write_text("source,latitude,longitude\na.blend,54,7\n", encoding="utf-8")
     with pytest.raises(SeipError, match=fault):
         network.main([str(table), "-o", str(tmp_path / "city"), *options])
+
+
+def test_an_area_off_the_earth_is_refused(tmp_path):
+    area = tmp_path / "area.geojson"
+    area.write_text('{"type": "Polygon", "coordinates": [[[0, 0], [1e21, 0], [1e21, 50], [0, 0]]]}', encoding="utf-8")
+    extract = Path(__file__).resolve().parents[2] / "scenes" / "harbour.osm"
+    with pytest.raises(SeipError, match=r"area\.geojson: a longitude is 1e\+21"):
+        network.main([str(extract), "--within", str(area), "--budget", "1000", "-o", str(tmp_path / "city")])

@@ -108,6 +108,21 @@ def test_missing_returns_are_dropped(suffix, tmp_path):
     same(read_sweep(content), {name: column[kept] for name, column in columns.items()})
 
 
+@pytest.mark.parametrize("more", [1, 2])
+def test_further_columns_of_bin_files_are_ignored(more, tmp_path):
+    columns = make_points(count=40)  # which is a whole number of points of four columns, too
+    table = np.column_stack([columns[name] for name in ("x", "y", "z", "intensity")] + [np.zeros(40)] * more)
+    same(read(tmp_path, "a.bin", table.astype("<f4").tobytes()), columns)
+
+
+def test_pcd_of_stored_bytes(tmp_path):
+    columns = make_points(count=30)
+    whole = b"".join(column.tobytes() for column in columns.values())
+    head = pcd_text(columns, "binary_compressed").partition(b"DATA binary_compressed\n")
+    content = head[0] + head[1] + struct.pack("<II", len(whole), len(whole)) + whole
+    same(read(tmp_path, "a.pcd", content), columns)
+
+
 def test_npz_of_points(tmp_path):
     columns = make_points()
     table = np.column_stack(list(columns.values()))
@@ -201,7 +216,7 @@ def test_a_compressed_pcd_of_too_many_bytes(tmp_path):
     [
         ("is empty", "a.bin", b""),
         ("is empty", "a.pcd", b""),
-        ("not whole points of 4", "a.bin", bytes(20)),
+        ("not whole points of 4 to 6", "a.bin", bytes(28)),
         ("not whole points of 5", "a.pcd.bin", bytes(16)),
         ("intensity is nan", "a.bin", np.array([1, 2, 3, np.nan], "<f4").tobytes()),
         ("map coordinates", "a.bin", np.array([1, 2e4, 3, 0], "<f4").tobytes()),
