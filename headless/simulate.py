@@ -59,7 +59,6 @@ def _settings(options: argparse.Namespace) -> RecordingSettings:
     scan = read_settings(
         ScanSettings,
         options,
-        noise=not options.no_noise,
         weather=tuple(options.weather),
         reflectivity=tuple(options.reflectivity),
     )
@@ -110,7 +109,6 @@ def _parser() -> argparse.ArgumentParser:
     add_settings(when, RecordingSettings, "start", "duration", "rate")
     how = parser.add_argument_group("measurement")
     add_settings(how, ScanSettings, "seed", "rolling_shutter")
-    how.add_argument("--no-noise", action="store_true", help="exact ranges without lost returns")
     add_optics(how)
     add_settings(how, ScanSettings, "engine")
     export = parser.add_argument_group("datasets")
