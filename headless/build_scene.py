@@ -5,7 +5,7 @@ seip build-scene place.osm --near-latlon 52.47391,13.44048 -o site.blend
 seip build-scene place.osm --junction "One Street" "Other Street" -o site.blend
 seip build-scene map.xodr --junction 53 --site site.toml -o site.blend
 seip build-scene site.toml -o site.blend
-seip build-scene place.osm --near-latlon 51.906 4.456 --buildings town.json --terrain dem.tif -o a.blend
+seip build-scene place.osm --near-latlon 51.906 4.456 --terrain dem.tif -o a.blend
 """
 
 import argparse
@@ -22,16 +22,12 @@ from headless.options import add_settings, new_parser
 from seip_addon.core.counts import counted
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.site.obstruction import NO_OBSTACLES_MESSAGE
-from seip_addon.core.site.sources import count_sources, source_lines
+from seip_addon.core.site.sources import source_lines
 from seip_addon.core.storage.files import locked_file
 from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
-from seip_addon.core.world.citymodel.at_place import BuildingsRequest
 from seip_addon.core.world.elevation.at_place import TerrainRequest
-from seip_addon.core.world.streetscape.mesh_place import mesh_place
 from seip_addon.scene.blend_file import check_name, new_file, save_blend
 from seip_addon.scene.build import build_scene
-from seip_addon.scene.imported import UP_AXES, check_mesh, import_mesh
 
 
 def main(argv: list[str]) -> None:
@@ -47,20 +43,11 @@ def _build(request: argparse.Namespace) -> None:
     for path in (request.output, map_path):
         if path.is_dir():
             raise SeipError(f"{path} is a folder, and a file of that name would be written; choose another name")
-    up, origins = request.mesh_up, request.mesh_origin
-    if len(request.mesh) != len(origins):
-        raise SeipError("give each --mesh its own --mesh-origin LAT LON [HEADING], in their order")
-    for path in request.mesh:
-        check_mesh(path, up)
     with runtime.progress_bar() as report:
         built = finish(build_site(request.source, _asked_site(request), map_path), report)
         model = built.model
         scene = new_file()
         finish(build_scene(scene, model, built.map_name), report)
-        places = [mesh_place(model, given, path.name) for path, given in zip(request.mesh, origins, strict=True)]
-        meshes = [
-            row for path, place in zip(request.mesh, places, strict=True) for row in import_mesh(scene, path, place, up)
-        ]
     save_map(built, map_path)
     save_blend(request.output)
     if any(one.boxes for one in built.merging):
@@ -69,8 +56,8 @@ def _build(request: argparse.Namespace) -> None:
         runtime.print_line(f"{chart}: boxes of the survey, and which share of lines of sight they change")
     for note in model.notes:
         runtime.print_line(f"note: {note}")
-    runtime.warn(warning for warning in model.warnings if not (meshes and warning == NO_OBSTACLES_MESSAGE))
-    for line in source_lines((*model.sources(), *count_sources(meshes))):
+    runtime.warn(model.warnings)
+    for line in source_lines(model.sources()):
         runtime.print_line(line)
     x, y, z = model.origin + 0.0  # no negative zero
     runtime.print_line(
@@ -91,20 +78,10 @@ def _asked_site(options: argparse.Namespace) -> SiteRequest:
         level=tuple(options.level),
         site=options.site,
         osm=options.osm,
-        buildings=_asked_buildings(options),
         terrain=None if options.terrain is None else TerrainRequest(options.terrain, options.terrain_epsg),
         service=options.service_roads,
         left_hand=None if options.traffic_keeps is None else options.traffic_keeps == "left",
     )
-
-
-def _asked_buildings(options: argparse.Namespace) -> BuildingsRequest | None:
-    if options.buildings is None:
-        if options.buildings_epsg is not None or options.buildings_origin is not None:
-            raise SeipError("--buildings-epsg and --buildings-origin say where a model lies: name it by --buildings")
-        return None
-    origin = None if options.buildings_origin is None else tuple(options.buildings_origin)
-    return BuildingsRequest(options.buildings, options.buildings_epsg, origin)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -153,31 +130,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--site", type=Path, metavar="TOML", help="site description with objects that the map lacks")
     add_settings(parser, SiteRequest, "osm")
-    add_settings(parser, BuildingsRequest, "path")
-    add_settings(parser.add_mutually_exclusive_group(), BuildingsRequest, "epsg", "origin")
     add_settings(parser, TerrainRequest, "path", "epsg")
-    parser.add_argument(
-        "--mesh",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="mesh that occludes (glTF, OBJ, PLY, STL, USD); may be given several times",
-    )
-    parser.add_argument(
-        "--mesh-origin",
-        type=float,
-        nargs="+",
-        action="append",
-        default=[],
-        metavar="NUMBER",
-        help="position of a mesh's origin, LAT LON or map X Y, and heading of its x axis in degrees from east",
-    )
-    parser.add_argument(
-        "--mesh-up",
-        choices=UP_AXES,
-        help="vertical axis of OBJ, PLY and STL files (default: y for OBJ, z for the others)",
-    )
     parser.add_argument(
         "--service-roads", action="store_true", help="treat driveways, aisles and alleys of an extract as streets"
     )

@@ -32,7 +32,7 @@ from headless.detection_results import (
     save_charts,
     save_detections,
 )
-from headless.options import add_rolling_shutter, add_settings, add_weather, new_parser, read_settings, real_number
+from headless.options import add_settings, add_weather, new_parser, read_settings, real_number
 from headless.scanned_scene import read_scanned_scene
 
 import bpy
@@ -49,8 +49,8 @@ from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.core.workflows.survey_settings import SurveySettings
 from seip_addon.scene.sensors import changed_beams
 
-_OF_SCENES = ("traffic", "every", "seed", "rolling_shutter", "weather")
-_OF_RECORDINGS = ("sensor", "poses", "site", "labels", "radius", "score")
+_OF_SCENES = ("traffic", "every", "seed", "weather")
+_OF_RECORDINGS = ("sensor", "poses", "site", "labels", "radius")
 
 
 def main(argv: list[str]) -> None:
@@ -75,7 +75,7 @@ def main(argv: list[str]) -> None:
     if len(runs) > 1:
         moved = [vehicle_positions(run.name, run.trajectories) for run in runs]
         runtime.LOG.info(require_independent(combinations(moved, 2)))
-    scans = read_settings(ScanSettings, options, weather=tuple(options.weather))
+    scans = read_settings(ScanSettings, options, rolling_shutter=True, weather=tuple(options.weather))
     simulator, placed = Simulator(geometry, scans, sensors), MountedSensors("sensors", tuple(sensors))
     check_runs([run.trajectories for run in runs], simulator.static.region)
     outcome = runtime.finish_with_bar(evaluate_detector(detector, simulator, placed, runs))
@@ -148,7 +148,6 @@ def _parser() -> argparse.ArgumentParser:
     add_recording_options(parser)
     how = parser.add_argument_group("measurement")
     add_settings(how, ScanSettings, "seed")
-    add_rolling_shutter(how)
     add_weather(how)
     return parser
 

@@ -110,13 +110,6 @@ def add_recording_options(parser: argparse.ArgumentParser) -> None:
         metavar="M",
         help="of the region around the sensors",
     )
-    group.add_argument(
-        "--score",
-        type=real_number(Limits(0.05, 1.0)),
-        default=RECOMMENDED_SCORE,
-        metavar="S",
-        help="least score of drawn and listed detections",
-    )
 
 
 def is_recording(source: Path | None) -> bool:
@@ -161,7 +154,7 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
     runtime.warn(doubts)
     pictures = [folder / "frames" / f"{number:06d}.png" for number in range(len(frames))]
     save_video(folder / "video.mp4", pictures, _rate(frames))
-    listed = _save_table(folder / "detections.csv", results, options.score, sensors.geometry)
+    listed = _save_table(folder / "detections.csv", results, RECOMMENDED_SCORE, sensors.geometry)
     outcome = _evaluated(results, fullest, scan) if labels is not None else None
     record: dict[str, Any] = {
         "schema": RECORDING_SCHEMA,
@@ -184,7 +177,7 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
             }
             for one in frames.sensors
         ],
-        "score": options.score,
+        "score": RECOMMENDED_SCORE,
         "detector": detector.description() | {"digest": digest(options.detector.read_bytes())},
         "warnings": doubts,
         "versions": versions(blender=bpy.app.version_string),
@@ -193,11 +186,11 @@ def detect_recording(options: argparse.Namespace, detector: Detector) -> None:
         save_charts(folder, outcome, site, frames.region, [one.mounted for one in frames.sensors])
         record["average_precision"] = {name: as_json(found) for name, found in outcome.precisions.items()}
         record["recall"] = {"score": outcome.score, "categories": outcome.recall}
-        record["listed"] = _listed(results, options.score)
+        record["listed"] = _listed(results, RECOMMENDED_SCORE)
         print_precision(outcome)
         _print_listed(record["listed"])
     save_json(folder / RECORD, record)
-    runtime.print_line(f"{listed:,} road users with a score of {options.score:g} or more in {len(frames):,} frames")
+    runtime.print_line(f"{listed:,} road users with a score of {RECOMMENDED_SCORE:g} or more in {len(frames):,} frames")
     runtime.print_line(f"written to {folder}/: detections.csv, video.mp4, frames/, kitti/, openpcdet/")
 
 
@@ -332,7 +325,7 @@ def _key(options: argparse.Namespace, recording: Recording, detector: Detector) 
     return digest(
         source_digest(__name__),
         detector.key,
-        repr((options.sensor, options.radius, options.score)),
+        repr((options.sensor, options.radius)),
         *(f"{path.name} {path.stat().st_size} {path.stat().st_mtime_ns}" for path in files),
         *(path.read_bytes() for path in sources),
     )
@@ -366,7 +359,7 @@ def _save_frame(  # what was found where, and how it is shown
     """Write the detections and the picture of a frame; the detections last, as they mark the frame as done."""
     first = [members[0] for members in CLASS_CATEGORIES.values()]
     categories = [first[category] for category in found.category.tolist()]
-    shown = found.score >= options.score
+    shown = found.score >= RECOMMENDED_SCORE
     west, south, east, north = frames.region.bounds
     picture = draw_birds_eye(
         frame.points,

@@ -29,7 +29,7 @@ from seip_addon.core.choosing.placement.objective import Objective
 from seip_addon.core.counts import counted
 from seip_addon.core.dask_client import connected
 from seip_addon.core.errors import SeipError
-from seip_addon.core.limits import PRICE, SENSORS, SHARE, SITE_RADIUS, Limits
+from seip_addon.core.limits import LATITUDE, LONGITUDE, PRICE, SENSORS, SHARE, SITE_RADIUS, Limits
 from seip_addon.core.output.network.write import write_network
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.visibility.ray_casting import engine_name
@@ -155,6 +155,9 @@ def _area(path: Path) -> shapely.Geometry:
         raise SeipError(f"{path} is not GeoJSON: {error}; write it again") from error
     if area.area <= 0.0:
         raise SeipError(f"{path} holds no area: draw a polygon")
+    longitude, latitude = shapely.get_coordinates(area).T
+    if fault := Limits.first_fault({"a longitude": (longitude, LONGITUDE), "a latitude": (latitude, LATITUDE)}):
+        raise SeipError(f"{path}: {fault}; GeoJSON has longitude before latitude, in degrees")
     return area
 
 

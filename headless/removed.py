@@ -6,6 +6,7 @@ from seip_addon.core.errors import SeipError
 
 _CONSTANT = "the value that it had by default is used; from Python, set it in the settings of a survey"
 _ERRORS = "give the standard deviations in metres and degrees as --pose-errors 0.3 2"
+_IMPORT = "import the file in Blender, and link its objects to the collection SEIP Occluders (docs/sources.md)"
 
 REMOVED: dict[str, str] = {
     "--assumed-poles": "use --allow assumed-poles",
@@ -36,6 +37,20 @@ REMOVED: dict[str, str] = {
     "--weights-from-traffic": "give regions a weight in the scene and add --weighted",
     "--yaw-error": _ERRORS,
     "--yaws": _CONSTANT,
+    **dict.fromkeys(("--buildings", "--buildings-epsg", "--buildings-origin"), _IMPORT),
+    **dict.fromkeys(("--mesh", "--mesh-origin", "--mesh-up"), _IMPORT),
+    **dict.fromkeys(
+        ("--head", "--pillar", "--points", "--width", "--blocks", "--batch", "--threads"),
+        "`seip train` trains the network of the shipped detector",
+    ),
+    "--no-noise": "noise is part of a sensor's model; from Python, set it in the settings of a scan",
+    **dict.fromkeys(("--rolling-shutter", "--no-rolling-shutter"), "traffic always moves while sensors turn"),
+    "--score": "detections.csv and the pictures show those with a score of 0.5 or more, kitti/ has all",
+    "--begin": "use --start",
+    "--end": "use --duration",
+    **dict.fromkeys(("--turns", "--green"), "all simulations have the same shares of turns and the same signal plan"),
+    "--format opv2v": "use openpcdet, mmdetection3d, kitti or pcd",
+    "--format las": "use pcd, and convert its files with PDAL or CloudCompare",
 }
 """By option, or by option and value as in ``--format opv2v``: what to do instead, as the end of a sentence."""
 

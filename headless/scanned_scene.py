@@ -7,7 +7,7 @@ import bpy
 
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.sensor import MountedSensor
-from seip_addon.core.site.weather import weather_of
+from seip_addon.core.sensing.weather import weather_of
 from seip_addon.scene.read import SceneReading, read_scene
 from seip_addon.scene.sensors import read_sensors
 

@@ -56,7 +56,7 @@ def main(argv: list[str]) -> None:
 
 
 def _settings(options: argparse.Namespace) -> RecordingSettings:
-    scan = read_settings(ScanSettings, options, noise=not options.no_noise, weather=tuple(options.weather))
+    scan = read_settings(ScanSettings, options, weather=tuple(options.weather))
     return read_settings(RecordingSettings, options, scan=scan, formats=tuple(options.format), split=options.split)
 
 
@@ -104,7 +104,6 @@ def _parser() -> argparse.ArgumentParser:
     add_settings(when, RecordingSettings, "start", "duration", "rate")
     how = parser.add_argument_group("measurement")
     add_settings(how, ScanSettings, "seed", "rolling_shutter")
-    how.add_argument("--no-noise", action="store_true", help="exact ranges without lost returns")
     add_weather(how)
     export = parser.add_argument_group("datasets")
     export.add_argument(

@@ -24,11 +24,11 @@ from seip_addon.core.output.results.placement_record import Provenance
 from seip_addon.core.output.results.versions import versions
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.visibility.triangle_culling import culling_message
+from seip_addon.core.sensing.weather import weather_of
 from seip_addon.core.settings import settings_of
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
 from seip_addon.core.site.site import Site
-from seip_addon.core.site.weather import weather_of
 from seip_addon.core.storage.folder_contents import check_no_run
 from seip_addon.core.workflows.records import record_of
 from seip_addon.core.workflows.survey import Layout, Survey, lay_out, see

@@ -10,7 +10,6 @@ or as plain Python on the bpy module::
 """
 
 import argparse
-import math
 import sys
 from pathlib import Path
 
@@ -23,6 +22,7 @@ from headless.options import add_settings, new_parser, read_settings
 import bpy
 
 from seip_addon.core.counts import counted
+from seip_addon.core.errors import SeipError
 from seip_addon.core.sensing.traffic.floating_car_data import listed
 from seip_addon.core.sensing.traffic.source import TrafficFiles, describe_categories, load_traffic
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
@@ -30,19 +30,32 @@ from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import locked_file
 from seip_addon.core.workflows.traffic_simulation import SimulationSettings
 from seip_addon.core.world.traffic_simulation.demand import Demand
-from seip_addon.core.world.traffic_simulation.simulation import SignalPlan
 from seip_addon.scene.blend_file import check_name, save_blend
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.traffic import animate
 
+_READING = ("routes", "net", "start")
+_SIMULATING = ("flow", "pedestrians", "seed", "warm_up")
+
 
 def main(argv: list[str]) -> None:
     """Read or simulate traffic, fit it to the road and write it."""
-    options = _parser().parse_args(argv)
+    options = _options(argv)
     if options.animate is not None:
         check_name(options.animate)
     with locked_file(options.output):
         _make(options)
+
+
+def _options(argv: list[str]) -> argparse.Namespace:
+    """Parse the arguments, and refuse options that do nothing for the chosen source."""
+    parser = _parser()
+    options = parser.parse_args(argv)
+    idle = _SIMULATING if options.fcd is not None else _READING
+    given = [f"--{name.replace('_', '-')}" for name in idle if getattr(options, name) != parser.get_default(name)]
+    if given:
+        raise SeipError(f"{given[0]} is for {'--simulate' if options.fcd is not None else '--fcd'}: leave it out")
+    return options
 
 
 def _make(options: argparse.Namespace) -> None:
@@ -57,15 +70,15 @@ def _make(options: argparse.Namespace) -> None:
 
 
 def _imported(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
-    files = TrafficFiles(options.fcd, tuple(options.routes), options.net, options.begin, options.end)
+    files = TrafficFiles(options.fcd, tuple(options.routes), options.net, options.start, options.duration)
     loaded = runtime.finish_with_bar(load_traffic(files, geometry))
     runtime.warn(loaded.warnings)
     return loaded.trajectories
 
 
 def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
-    demand, signals = read_settings(Demand, options), read_settings(SignalPlan, options)
-    settings = read_settings(SimulationSettings, options, demand=demand, signals=signals)
+    duration = SimulationSettings.duration if options.duration is None else options.duration
+    settings = SimulationSettings(read_settings(Demand, options), duration=duration, warm_up=options.warm_up)
     run = runtime.finish_with_bar(settings.run(options.simulate, options.seed, geometry))
     runtime.warn(run.warnings)
     if run.collided:
@@ -92,6 +105,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--animate", type=Path, metavar="BLEND", help="write the scene with this traffic as animated objects"
     )
+    parser.add_argument(
+        "--duration",
+        type=float,
+        metavar="S",
+        help=f"duration of the trajectories (of FCD all; simulated {SimulationSettings.duration:g})",
+    )
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument("--fcd", type=Path, metavar="FILE", help="SUMO's floating car data: .xml or .csv, also as .gz")
     source.add_argument(
@@ -102,15 +121,11 @@ def _parser() -> argparse.ArgumentParser:
         "--routes", nargs="+", type=Path, default=[], metavar="XML", help="files with the vehicle types"
     )
     reading.add_argument("--net", type=Path, metavar="XML", help=".net.xml with the offset from the map")
-    reading.add_argument(
-        "--begin", type=float, default=-math.inf, metavar="S", help="time at which the trajectories begin"
-    )
-    reading.add_argument("--end", type=float, default=math.inf, metavar="S", help="time at which the trajectories end")
+    reading.add_argument("--start", type=float, metavar="S", help="time at which the trajectories begin (the file's)")
     making = parser.add_argument_group("with --simulate")
-    add_settings(making, Demand, "flow", "turns", "pedestrians")
-    add_settings(making, SignalPlan, "green")
+    add_settings(making, Demand, "flow", "pedestrians")
     making.add_argument("--seed", type=int, default=0, metavar="N", help="random seed")
-    add_settings(making, SimulationSettings, "duration", "warm_up")
+    add_settings(making, SimulationSettings, "warm_up")
     return parser
 
 

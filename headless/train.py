@@ -18,13 +18,12 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime
 from headless.charts.detection import save_training_chart
-from headless.detection.average_precision import evaluate
 from headless.detection.detection_area import DetectionArea, area_of
 from headless.detection.detector import Detector, check_device
 from headless.detection.frame_results import FrameResult, frame_result
 from headless.detection.frames import SampledRecording, recording_of, require_independent_splits, require_separate
 from headless.detection.inference import detect
-from headless.detection.matching import Rule
+from headless.detection.rules import precisions
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import train
@@ -39,13 +38,14 @@ from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import save_json
 from seip_addon.scene.read import read_scene
 
-RULES = {"ap_iou_0.7": Rule(iou=0.7), "ap_iou_0.5": Rule(iou=0.5), "ap_3d_iou_0.7": Rule(iou=0.7, in_space=True)}
+NETWORK = NetworkSettings()
+"""The network of the shipped detector."""
 
 
 def main(argv: list[str]) -> None:
     """Train a detector, write it to a folder and evaluate it on the test runs."""
     options = _parser().parse_args(argv)
-    network, training = read_settings(NetworkSettings, options), read_settings(TrainingSettings, options)
+    network, training = NETWORK, read_settings(TrainingSettings, options)
     splits = {
         name: [recording_of(folder) for folder in getattr(options, name)] for name in ("train", "validation", "test")
     }
@@ -90,7 +90,8 @@ def _evaluated(
         doubts = suitability_warnings(detector, recording.sensors, area, recording.frames[0])
         runtime.warn(f"{folder}: {doubt}" for doubt in doubts)
         results = _results(detector, area, folder, geometry.region)
-        figures[str(folder)] = {name: evaluate(results, rule).average_precision for name, rule in RULES.items()}
+        by_rule = precisions(results).items()
+        figures[str(folder)] = {name: one.average_precision for name, one in by_rule if one.road_users}
         words = ", ".join(f"{name} {value:.1%}" for name, value in figures[str(folder)].items())
         runtime.print_line(f"{folder}: {words}")
     return figures
@@ -114,12 +115,9 @@ def _parser() -> argparse.ArgumentParser:
     runs.add_argument("--train", nargs="+", type=Path, required=True, metavar="RUN", help="runs for training")
     runs.add_argument("--validation", nargs="+", type=Path, required=True, metavar="RUN", help="runs for validation")
     runs.add_argument("--test", nargs="+", type=Path, default=[], metavar="RUN", help="runs for evaluation")
-    net = parser.add_argument_group("network")
-    add_settings(net, NetworkSettings, "head", "pillar", "most_points", "width", "blocks")
     work = parser.add_argument_group("training")
-    add_settings(work, TrainingSettings, "steps", "batch", "seed")
+    add_settings(work, TrainingSettings, "steps", "seed")
     work.add_argument("--device", default="cpu", help="torch device: cpu or cuda")
-    add_settings(work, TrainingSettings, "threads")
     return parser
 
 

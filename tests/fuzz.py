@@ -15,7 +15,6 @@ then a result is a fault too. Status 1 where there was any.
 from __future__ import annotations
 
 import argparse
-import base64
 import gzip
 import io
 import json
@@ -246,23 +245,7 @@ def _read_catalogue(path: Path, _: bytes) -> None:
         require_physical(replace(model, price_range=model.price_range))
 
 
-# --- calibration files of units, and measurements of sensors
-
-
-def _units(suffix: str) -> Callable[[Path], list[bytes]]:
-    def samples(_: Path) -> list[bytes]:
-        from tests.builders.unit_text import FILES  # noqa: PLC0415
-
-        return [text.encode() for name, text in FILES.items() if name.endswith(suffix)]
-
-    return samples
-
-
-def _read_unit(path: Path, _: bytes) -> None:
-    from seip_addon.core.sensing.lidar.unit_files import read_unit_file  # noqa: PLC0415
-
-    beams = read_unit_file(path)
-    assert np.isfinite([beams.elevations, beams.azimuth_offsets]).all(), "beams that are not finite"
+# --- measurements of sensors
 
 
 def _measurements(_: Path) -> list[bytes]:
@@ -426,38 +409,11 @@ def _read_detector(path: Path, _: bytes) -> None:
 # --- records of placements, and the arrays beside them
 
 
-# --- city models, elevation models and surveys
-
-
-def _cities(folder: Path) -> list[bytes]:
-    from tests.builders.city_text import CityModel, origin_at  # noqa: PLC0415
-
-    model = CityModel(origin_at(52.5, 13.4))
-    model.add("a", model.gabled(0, 0, 10, 8, 6, 9)).add("b", model.block(20, 0, 10, 8, 12))
-    return [model.write(folder / "sample.json").read_bytes()]
-
-
-def _read_city(path: Path, _: bytes) -> None:
-    from seip_addon.core.geometry.geo_reference import GeoReference  # noqa: PLC0415
-    from seip_addon.core.progress import finish  # noqa: PLC0415
-    from seip_addon.core.world.citymodel.at_place import BuildingsRequest, with_city_model  # noqa: PLC0415
-    from seip_addon.core.world.citymodel.cityjson import read_city_model  # noqa: PLC0415
-    from seip_addon.core.world.streetscape.description import SiteDescription  # noqa: PLC0415
-    from tests.builders.city_text import origin_at  # noqa: PLC0415
-
-    require_physical(read_city_model(path).vertices, "vertices", most=1e8)
-    x, y, _ = origin_at(52.5, 13.4)
-    place = GeoReference("+proj=utm +zone=33 +datum=WGS84", (x, y, 0.0, 0.0))
-    with np.errstate(all="raise", under="ignore"):
-        described, _ = finish(
-            with_city_model(SiteDescription(), BuildingsRequest(path), place, shapely.box(-100, -100, 100, 100))
-        )
-    require_physical([one.solid.vertices for one in described.solids], "buildings", most=1e5)
+# --- elevation models and surveys
 
 
 def _elevations(folder: Path) -> list[bytes]:
-    from tests.builders.city_text import origin_at  # noqa: PLC0415
-    from tests.builders.dem_files import sampled, write_dem  # noqa: PLC0415
+    from tests.builders.dem_files import origin_at, sampled, write_dem  # noqa: PLC0415
 
     x, y, _ = origin_at(52.5, 13.4)
     slope = sampled(lambda a, b: 30 + 0.01 * (a - x), x - 100, y + 100, 40, 5.0)
@@ -491,7 +447,7 @@ def _read_elevation(path: Path, _: bytes) -> None:
 
 def _surveys(suffix: str) -> Callable[[Path], list[bytes]]:
     def samples(folder: Path) -> list[bytes]:
-        from tests.builders.city_text import origin_at  # noqa: PLC0415
+        from tests.builders.dem_files import origin_at  # noqa: PLC0415
         from tests.builders.survey_files import block_points, ground_points, write_survey  # noqa: PLC0415
 
         random = np.random.default_rng(0)
@@ -631,82 +587,6 @@ def _read_costs(path: Path, _: bytes) -> None:
     require_physical(load_installed_cost(path), most=1e9)
 
 
-# --- meshes, which Blender's importers read
-
-
-def _meshes(suffix: str) -> Callable[[Path], list[bytes]]:
-    def samples(folder: Path) -> list[bytes]:
-        import headless.runtime  # noqa: F401, PLC0415
-
-        import bpy  # noqa: PLC0415
-
-        from seip_addon.scene.blend_file import new_file  # noqa: PLC0415
-
-        new_file()
-        bpy.ops.mesh.primitive_cube_add(size=4.0)
-        contents = []
-        for options in _EXPORTS[suffix]:
-            path = folder / f"sample{suffix}"
-            _exporter(suffix)(filepath=str(path), **options)
-            content = path.read_bytes()
-            if suffix == ".gltf":  # its buffer within it, as the file that is read lies alone in its folder
-                buffer = base64.b64encode((folder / "sample.bin").read_bytes()).decode()
-                content = content.replace(b"sample.bin", f"data:application/octet-stream;base64,{buffer}".encode())
-            contents.append(content)
-        return contents
-
-    return samples
-
-
-_EXPORTS: dict[str, list[dict[str, object]]] = {
-    ".ply": [{"ascii_format": True}, {"ascii_format": False}],
-    ".stl": [{"ascii_format": True}, {"ascii_format": False}],
-    ".obj": [{}],
-    ".glb": [{"export_format": "GLB"}],
-    ".gltf": [{"export_format": "GLTF_SEPARATE"}],
-    ".usda": [{}],
-    ".usdc": [{}],
-}
-
-
-def _exporter(suffix: str) -> Callable[..., object]:
-    import bpy  # noqa: PLC0415
-
-    if suffix in {".glb", ".gltf"}:
-        import addon_utils  # noqa: PLC0415
-
-        addon_utils.enable("io_scene_gltf2")
-        return bpy.ops.export_scene.gltf
-    if suffix.startswith(".usd"):
-        return bpy.ops.wm.usd_export
-    return {".ply": bpy.ops.wm.ply_export, ".stl": bpy.ops.wm.stl_export, ".obj": bpy.ops.wm.obj_export}[suffix]
-
-
-def _mutate_mesh(random: Random, content: bytes) -> Case:
-    if random.random() < 0.1 and b"element vertex" in content:
-        return Case(re.sub(rb"element vertex \d+", b"element vertex 2147483648", content), contradicts=True)
-    text = not (content[:4] == b"glTF" or b"\0" in content)
-    return Case(mutated_text(random, content) if text and random.random() < 0.7 else mutated_bytes(random, content))
-
-
-def _read_mesh(path: Path, _: bytes) -> None:
-    import headless.runtime  # noqa: F401, PLC0415
-
-    import bpy  # noqa: PLC0415
-
-    from seip_addon.core.world.streetscape.mesh_place import MeshPlace  # noqa: PLC0415
-    from seip_addon.scene.blend_file import new_file  # noqa: PLC0415
-    from seip_addon.scene.imported import import_mesh  # noqa: PLC0415
-
-    scene = new_file()
-    import_mesh(scene, path, MeshPlace((0.0, 0.0, 0.0), 0.0))
-    for mesh in bpy.data.meshes:
-        places = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
-        mesh.vertices.foreach_get("co", places)
-        if mesh.polygons:
-            require_physical(places, "vertices", most=20_000.0)
-
-
 # --- recordings of sensors
 
 
@@ -815,10 +695,6 @@ FORMATS = {
     "map": Format((".xodr",), _maps, _mutate_map, _read_map),
     "site": Format((".toml",), _descriptions, _mutate_description, _read_description),
     "catalogue": Format((".toml",), _catalogues, _mutate_catalogue, _read_catalogue),
-    **{
-        f"unit{suffix}": Format((suffix,), _units(suffix), _mutate_text, _read_unit)
-        for suffix in (".json", ".xml", ".yaml", ".yml", ".csv")
-    },
     "measurements": Format((".json",), _measurements, _mutate_text, _read_measurements),
     "fcd": Format((".xml",), _floating_car_data, _mutate_floating_car_data, _read_floating_car_data),
     "routes": Format((".xml",), _routes, _mutate_routes, _read_routes),
@@ -827,7 +703,6 @@ FORMATS = {
     "flows": Format((".xml",), _flows, _mutate_flow, _read_flow),
     "osm": Format((".osm",), _extracts, _mutate_extract, _read_extract),
     "osm.pbf": Format((".osm.pbf",), _pbf_extracts, _mutate_pbf, _read_extract),
-    "city": Format((".json",), _cities, _mutate_text, _read_city),
     "dem": Format((".tif",), _elevations, _mutate_elevation, _read_elevation),
     **{
         f"survey{suffix}": Format((suffix,), _surveys(suffix), _mutate_survey, _read_survey)
@@ -837,15 +712,8 @@ FORMATS = {
     "sweep.bin": Format((".bin",), _sweeps(".bin"), _mutate_numbers, _read_sweep),
     "sweep.pcd.bin": Format((".pcd.bin",), _sweeps(".pcd.bin"), _mutate_numbers, _read_sweep),
     "sweep.npz": Format((".npz",), _sweeps(".npz"), _mutate_npz, _read_sweep),
-    "sweep.csv": Format((".csv",), _sweeps(".csv"), _mutate_text, _read_sweep),
-    **{
-        f"sweep{suffix}": Format((suffix,), _sweeps(suffix), _mutate_survey, _read_sweep) for suffix in (".las", ".laz")
-    },
     "poses": Format((".json",), _sensor_poses, _mutate_text, _read_poses),
     "boxes": Format((".json",), _box_labels, _mutate_text, _read_box_labels),
-    **{
-        f"mesh{suffix}": Format((suffix,), _meshes(suffix), _mutate_mesh, _read_mesh, share=0.05) for suffix in _EXPORTS
-    },
     "blend": Format((".blend",), _blends, _mutate_blend, _read_blend),
     "pt": Format((".pt",), _detectors, _mutate_detector, _read_detector),
 }

@@ -14,12 +14,12 @@ Tracking. CVPR 2021, with three changes for few training steps on sparse clouds:
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from .heads import BoxProposals, TrainingTargets, cell_centres, inner_cells, matched_boxes
 from .losses import heat_map_loss, weighted_mean
 from .network import OUTPUT_STRIDE, convolution
 from .pillars import PillarGrid
@@ -40,6 +40,40 @@ MIN_HEAT = 0.2  # least heat of a cell that learns the box
 INITIAL_HEAT = 0.01  # predicted heat of every cell before training
 MAX_PEAKS = 500  # most peaks of a cloud that go into suppression, those of the highest heat
 OVERLAP_POWER = 0.5  # exponent p of the predicted overlap in the score heat^(1 − p) · overlap^p
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingTargets:
+    """The road users in one cloud; k boxes.
+
+    Parameters
+    ----------
+    boxes : (k, 7) float32 Tensor
+        As in `frame_results.Detections`.
+    category : (k,) int64 Tensor
+    learnable : (k,) bool Tensor
+        Whether it has enough points to learn from; cells near the others are left out of the loss.
+    """
+
+    boxes: Tensor
+    category: Tensor
+    learnable: Tensor
+
+
+@dataclass(frozen=True, eq=False)
+class BoxProposals:
+    """Boxes of one cloud before those that overlap better ones are removed; k boxes.
+
+    Parameters
+    ----------
+    boxes : (k, 7) float32 Tensor
+    score : (k,) float32 Tensor
+    category : (k,) int64 Tensor
+    """
+
+    boxes: Tensor
+    score: Tensor
+    category: Tensor
 
 
 class CentreHead(nn.Module):
@@ -64,12 +98,29 @@ class CentreHead(nn.Module):
 
     @property
     def branches(self) -> tuple[nn.Sequential, ...]:
-        """Networks side by side that make the output; see `heads.DetectionHead`."""
+        """Networks side by side whose outputs are those of the head, in order.
+
+        Each is one 3 × 3 convolution with batch normalisation and ReLU, then one of 1 × 1.
+        """
         return self.heat, self.box
 
     @staticmethod
     def target_maps(targets: list[TrainingTargets], grid: PillarGrid, margin: float) -> dict[str, Tensor]:
-        """Return heat, cells that count, and cells that learn a box; see `heads.DetectionHead`."""
+        """Return heat, cells that count, and cells that learn a box, by name; they depend on no weight.
+
+        Parameters
+        ----------
+        targets : list of b TrainingTargets
+            In the coordinates of the grid.
+        margin : float, metres
+            Width of a border that the loss ignores: it shows only parts of objects beyond it.
+
+        Returns
+        -------
+        dict of str to Tensor
+            Of each cell (b, …, rows, columns): its heat, and whether it counts in the loss. Of the m that learn a box:
+            their indices (dimensions, m), the boxes (m, 7), metres and radians, and their weights (m,).
+        """
         device = targets[0].boxes.device
         heat, owner = (
             torch.stack(part) for part in zip(*(_target_maps(wanted, grid, device) for wanted in targets), strict=True)
@@ -77,19 +128,27 @@ class CentreHead(nn.Module):
         # Cells near road users with too few points take no part: a detection there should be neither rewarded nor
         # punished. Cells near the window's border do not either, as they see only parts of road users.
         ignored = torch.stack([heat_of(wanted.boxes[~wanted.learnable], grid, device)[0] for wanted in targets])
-        counted = (ignored < MIN_HEAT) & inner_cells(grid, OUTPUT_STRIDE, margin, device)
+        counted = (ignored < MIN_HEAT) & _inner_cells(grid, OUTPUT_STRIDE, margin, device)
         cell = torch.stack(torch.nonzero((owner >= 0) & counted, as_tuple=True))
         cloud, row, column = cell
         return {
             "heat": heat,
             "counted": counted,
             "cell": cell,
-            "box": matched_boxes(targets, cloud, owner[cloud, row, column]),
+            "box": _matched_boxes(targets, cloud, owner[cloud, row, column]),
             "weight": heat.amax(dim=1)[cloud, row, column],
         }
 
     def loss(self, output: Tensor, maps: Mapping[str, Tensor], grid: PillarGrid) -> dict[str, Tensor]:
-        """Return the parts of the loss; see `heads.DetectionHead`."""
+        """Return the weighted terms of the loss; training minimises their sum.
+
+        Parameters
+        ----------
+        output : (b, channels, rows, columns) Tensor
+            What the head returns.
+        maps : mapping of str to Tensor
+            Result of `target_maps`, on the device of the output.
+        """
         heat_loss = heat_map_loss(output[:, : len(CLASSES)], maps["heat"], maps["counted"][:, None])
         cloud, row, column = maps["cell"]
         predicted = output[:, len(CLASSES) :].permute(0, 2, 3, 1)[cloud, row, column]
@@ -97,7 +156,7 @@ class CentreHead(nn.Module):
         return {"heat": heat_loss, **box_losses(predicted, maps["box"], reference, maps["weight"])}
 
     def candidates(self, output: Tensor, grid: PillarGrid, least_score: float) -> list[BoxProposals]:
-        """Return a box for each peak of heat; see `heads.DetectionHead`."""
+        """Return a box for each peak of heat in each cloud whose heat is not below ``least_score``."""
         heat = torch.sigmoid(output[:, : len(CLASSES)])
         # A cell is a peak if it equals the maximum of its 3 × 3 neighbourhood. This removes most of the many boxes of
         # one road user before suppression, which is quadratic in their number.
@@ -157,7 +216,7 @@ def _boxes(predicted: Tensor, reference: Tensor) -> Tensor:
 
 def reference_points(grid: PillarGrid, row: Tensor, column: Tensor) -> Tensor:
     """Return the points (m, 3) from which offsets are regressed: the cells' centres, at the bottom of the grid."""
-    x, y = cell_centres(grid, OUTPUT_STRIDE, row.device)
+    x, y = _cell_centres(grid, OUTPUT_STRIDE, row.device)
     return torch.stack((x[column], y[row], torch.full_like(x[column], grid.bottom)), dim=1)
 
 
@@ -177,7 +236,7 @@ def _target_maps(wanted: TrainingTargets, grid: PillarGrid, device: torch.device
 
 def heat_of(boxes: Tensor, grid: PillarGrid, device: torch.device) -> tuple[Tensor, Tensor]:
     """Return the greatest heat in each cell (rows, columns), 1 where a box has its centre, and that box's index."""
-    x, y = cell_centres(grid, OUTPUT_STRIDE, device)
+    x, y = _cell_centres(grid, OUTPUT_STRIDE, device)
     if len(boxes) == 0:
         nothing = torch.zeros((len(y), len(x)), device=device)
         return nothing, nothing.long()
@@ -195,3 +254,26 @@ def heat_of(boxes: Tensor, grid: PillarGrid, device: torch.device) -> tuple[Tens
     heat = torch.where(centre, torch.ones_like(heat), heat)
     most, owner = heat.max(dim=0)
     return most, owner
+
+
+def _matched_boxes(targets: list[TrainingTargets], cloud: Tensor, index: Tensor) -> Tensor:
+    """Return the boxes (m, 7) at indices (m,) of clouds (m,)."""
+    first = torch.tensor([0, *(len(part.boxes) for part in targets)]).cumsum(0)[:-1].to(cloud.device)
+    return torch.cat([part.boxes for part in targets])[first[cloud] + index]
+
+
+def _cell_centres(grid: PillarGrid, stride: int, device: torch.device) -> tuple[Tensor, Tensor]:
+    """Return x (columns,) and y (rows,) of the centres of the cells of a feature map, metres."""
+    side = grid.pillar * stride
+    x = grid.west + side * (torch.arange(grid.columns // stride, device=device) + 0.5)
+    y = grid.south + side * (torch.arange(grid.rows // stride, device=device) + 0.5)
+    return x, y
+
+
+def _inner_cells(grid: PillarGrid, stride: int, margin: float, device: torch.device) -> Tensor:
+    """Return which cells (rows, columns) of a feature map are ``margin`` or more from the border."""
+    x, y = _cell_centres(grid, stride, device)
+    wide, deep = grid.columns * grid.pillar, grid.rows * grid.pillar
+    across = (x - grid.west >= margin) & (x - grid.west <= wide - margin)
+    along = (y - grid.south >= margin) & (y - grid.south <= deep - margin)
+    return along[:, None] & across

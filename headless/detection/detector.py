@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -22,9 +22,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.storage.array_file import READ_ERRORS
 from seip_addon.core.storage.files import digest, whole_file
 
-from .anchor_head import AnchorHead
 from .centre_head import CentreHead
-from .heads import DetectionHead
 from .network import FeatureMap
 from .pillars import Pillars
 from .settings import NetworkSettings
@@ -88,18 +86,13 @@ class Detector(nn.Module):
             torch.manual_seed(seed)
             self.feature_map = FeatureMap(settings)
             channels = self.feature_map.channels
-            self.head = CentreHead(channels, settings.width) if settings.head == "centre" else AnchorHead(channels)
+            self.head = CentreHead(channels, settings.width)
         self.to(memory_format=torch.channels_last)  # type: ignore[call-overload]  # torch types do not know it
 
     @property
     def device(self) -> torch.device:
         """Device of the weights."""
         return next(self.parameters()).device
-
-    @property
-    def detection_head(self) -> DetectionHead:
-        """The head, typed by its interface rather than as a module."""
-        return cast("DetectionHead", self.head)
 
     def forward(self, pillars: Pillars, shape: tuple[int, int, int]) -> Tensor:
         """Return the head's output for a batch of clouds.
@@ -154,7 +147,10 @@ class Detector(nn.Module):
         """
         state = load_state(path)
         with reading_detector(path):
-            settings = NetworkSettings(**{**state["settings"], "blocks": tuple(state["settings"]["blocks"])})
+            known = dict(state["settings"])
+            if known.pop("head", "centre") != "centre":  # files of earlier versions name one of two heads
+                raise _ContentError("it has anchors, which are no longer supported")
+            settings = NetworkSettings(**{**known, "blocks": tuple(known["blocks"])})
             training_record = _training_record(state.get("experience", {}))
             if not all(bool(torch.isfinite(tensor).all()) for tensor in state["weights"].values()):
                 raise _ContentError("its weights are not finite numbers")

@@ -66,7 +66,7 @@ def detect_on_level(
     detector.eval()
     pillars = fill_pillars(cloud, grid, detector.settings.most_points)
     output = sparse_output(detector, pillars, grid.rows, grid.columns, grid.pillar)
-    (found,) = detector.detection_head.candidates(output, grid, least_score)
+    (found,) = detector.head.candidates(output, grid, least_score)
     stays = suppress(in_plan(found.boxes), found.score, MAX_OVERLAP)
     return Detections(
         boxes=found.boxes[stays].double().cpu().numpy(),

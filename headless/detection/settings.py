@@ -1,12 +1,9 @@
 """Settings of the detection network and its training, their limits, and the detector's classes."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.settings import setting
-
-Head = Literal["centre", "anchor"]
 
 CLASS_CATEGORIES = {
     "car": ("car", "van"),
@@ -40,7 +37,7 @@ def _is_integer(value: object, least: int, most: int) -> bool:
 
 @dataclass(frozen=True)
 class NetworkSettings:
-    """Settings of the network: pillars, widths, blocks and head.
+    """Settings of the network: pillars, widths and blocks.
 
     Parameters
     ----------
@@ -52,15 +49,12 @@ class NetworkSettings:
         Channels of the pillar features and of the first block, doubled in the second and in the third.
     blocks : tuple of three int
         Convolutions of each block after the one with stride 2.
-    head : str
-        ``centre``: a heat map of centres for each class and one box per cell (Yin, Zhou, Krähenbühl 2021).
-        ``anchor``: anchor boxes at 0 and 90 degrees in each cell (Lang et al. 2019).
     padded : bool
         Whether pillars are filled up with zero points that are not masked, as an ablation.
 
     Examples
     --------
-    >>> network = NetworkSettings(pillar=0.4, head="anchor")
+    >>> network = NetworkSettings(pillar=0.4)
     >>> round(network.pillar * GRID_STRIDE, 2)  # metres of road in a cell of the coarsest feature map
     3.2
     >>> [CLASSES[CLASS_OF[category]] for category in ("van", "bus", "bicycle")]
@@ -71,11 +65,10 @@ class NetworkSettings:
     seip_addon.core.errors.SeipError: detector: a pillar must be 0.05 to 2 m wide
     """
 
-    pillar: float = setting(0.32, "side of a pillar in metres", unit="m", minimum=0.05, maximum=2.0, metavar="M")
-    most_points: int = setting(16, "that a pillar keeps", minimum=1, maximum=32, option="points")
-    width: int = setting(40, "channels of the first block", minimum=8, maximum=256)
-    blocks: tuple[int, int, int] = setting((2, 3, 3), "convolutions in each", minimum=0, maximum=20, metavar="N")
-    head: Head = setting("centre", "centres, or anchors as published")
+    pillar: float = 0.32
+    most_points: int = 16
+    width: int = 40
+    blocks: tuple[int, int, int] = (2, 3, 3)
     padded: bool = False
 
     def __post_init__(self) -> None:
@@ -86,7 +79,6 @@ class NetworkSettings:
             "there must be three blocks of 0 to 20 convolutions": (
                 len(self.blocks) == 3 and all(_is_integer(count, 0, 20) for count in self.blocks)
             ),
-            "the head must be centre or anchor": self.head in {"centre", "anchor"},
             "padded must be true or false": isinstance(self.padded, bool),
         }
         _require(rules)

@@ -200,7 +200,7 @@ def _head_output(detector: Detector, plane: _Plane, cells: Tensor, pattern: Tens
 
 def _head_values(detector: Detector, plane: _Plane, cells: Tensor) -> Tensor:
     """Return the output of the head at cells, (n, channels) Tensor."""
-    branches = [list(branch) for branch in detector.detection_head.branches]
+    branches = [list(branch) for branch in detector.head.branches]
     where = functional.pad(cells, (1, 1, 1, 1))
     if len(branches[0]) == 1:
         values = [plane.values[plane.index[where]]] * len(branches)

@@ -27,11 +27,11 @@ from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
 
 from .average_precision import evaluate
+from .centre_head import TrainingTargets
 from .detection_area import DetectionArea
 from .detector import Detector, load_state, reading_detector, save_state
 from .frame_results import EvaluatedBoxes, FrameResult, GroundTruth
 from .frames import SampledRecording, TrainingSample, drawn, require_separate, spread, training_record_of
-from .heads import TrainingTargets
 from .inference import detect_on_level
 from .matching import Rule
 from .pillars import PillarGrid, Pillars, fill_pillars, grid_over, stacked
@@ -200,7 +200,7 @@ class _Run:
         pillars, maps = batch
         output = self.detector(pillars, (self.settings.batch, self.window.rows, self.window.columns))
         maps = {name: values.to(self.detector.device) for name, values in maps.items()}
-        loss = torch.stack(list(self.detector.detection_head.loss(output, maps, self.window).values())).sum()
+        loss = torch.stack(list(self.detector.head.loss(output, maps, self.window).values())).sum()
         self.optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self.detector.parameters(), MAX_GRADIENT_NORM)
@@ -297,7 +297,7 @@ class _Batches(Dataset[_Batch]):
     def __init__(self, run: _Run) -> None:
         self._recordings, self._settings, self._grid = run.training_set, run.settings, run.window
         self._most_points = run.detector.settings.most_points
-        self._target_maps = run.detector.detection_head.target_maps
+        self._target_maps = run.detector.head.target_maps
 
     def __len__(self) -> int:
         return self._settings.steps

@@ -9,28 +9,6 @@ from pathlib import Path
 from .progress import REPORT_INTERVAL, Progress
 
 
-def exit_status(command: Sequence[str], seconds: float) -> int | None:
-    """Run a program without output and return its exit status, None if it takes longer than `seconds`.
-
-    Raises
-    ------
-    OSError
-        It cannot be started.
-    """
-    try:
-        process = subprocess.run(  # noqa: S603  # callers name their own programs
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            timeout=seconds,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return None
-    return process.returncode
-
-
 def run_logged(
     command: Sequence[str],
     log: Path,

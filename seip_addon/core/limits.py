@@ -122,9 +122,6 @@ MAP_COORDINATE = Limits(-1e8, 1e8, "m")
 LOCAL_COORDINATE = Limits(-1e7, 1e7, "m")
 """Coordinate from the local origin of a site."""
 
-MODEL_COORDINATE = Limits(-20_000.0, 20_000.0, "m")
-"""Coordinate of a mesh from its own zero: beyond it 32 bits are coarser than a few millimetres."""
-
 GROUND = Limits(-500.0, 9_000.0, "m")
 """Elevation of the ground above sea level."""
 
@@ -214,9 +211,6 @@ POINT_RATE = Limits(1.0, 1e9)
 ROTATION_RATE = Limits(0.01, 1_000.0, "Hz")
 CHANNELS = Limits(2, 10_000)
 """Channels at even elevations."""
-
-UNIT_BEAMS = Limits(2, 1_000)
-"""Beams of a calibration file."""
 
 BEAM_ELEVATION = Limits(-89.999, 89.999, "degrees")
 """Elevation of a beam, short of straight up and down, where it has no azimuth."""

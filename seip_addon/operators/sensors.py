@@ -79,7 +79,7 @@ class _EditsCatalogues(Conditional):
 
 
 class SEIP_OT_add_catalogue(_EditsCatalogues, bpy.types.Operator):
-    """Add a catalogue of your own, or a unit's calibration file: docs/sensors.md describes both"""
+    """Add a catalogue of your own, which docs/sensors.md describes"""
 
     bl_idname = "seip.add_catalogue"
     bl_label = "Add Catalogue"

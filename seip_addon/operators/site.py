@@ -13,7 +13,6 @@ from ..core.errors import SeipError
 from ..core.output.results.placement_record import relevant_warnings
 from ..core.progress import Progress, finish
 from ..core.site.check import SceneContents, SiteCheck, check_site
-from ..core.site.obstruction import NO_OBSTACLES_MESSAGE
 from ..core.site.roles import Role
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
@@ -22,7 +21,6 @@ from ..core.workflows.site_places import SitePlaces, site_places
 from ..core.workflows.survey import lay_out
 from ..core.workflows.survey_settings import SurveySettings
 from ..core.world.streetscape.description import DESCRIPTION_SUFFIX
-from ..core.world.streetscape.mesh_place import MeshPlace, mesh_place
 from ..properties import traffic
 from ..properties.conversion import absolute
 from ..properties.site import ROLE_ITEMS, SEIP_PG_problem, SEIP_PG_site
@@ -30,7 +28,6 @@ from ..scene import contract, roles
 from ..scene.build import build_scene, remove_site
 from ..scene.changes import watch
 from ..scene.check import contents_of
-from ..scene.imported import MeshFiles, import_mesh
 from ..scene.startup import remove_startup_objects
 from ..scene.views import frame_site
 from ..session import CheckedScene, session
@@ -42,10 +39,7 @@ EXAMPLE = Path(__file__).resolve().parents[2] / "scenes" / f"junction{DESCRIPTIO
 EXTRACTS = "*.osm;*.osm.gz;*.osm.pbf"
 """Files of OpenStreetMap, as the file browser filters them."""
 NO_PLACE = "Choose a junction, or give latitude and longitude"
-COPIED = (
-    *("source", "position", "region_shape", "radius", "osm", "buildings", "buildings_epsg", "buildings_origin"),
-    *("terrain", "terrain_epsg", "meshes", "mesh_origin", "mesh_up"),
-)
+COPIED = ("source", "position", "region_shape", "radius", "osm", "terrain", "terrain_epsg")
 """Properties of a choice that a site in a new scene takes over."""
 SHARE_OF_VIEW = 0.6
 """Of a drawn area in the size of the view."""
@@ -126,28 +120,22 @@ class _BuildsSite(_WritesScene, LongWork[BuiltSite]):
     """A mixin for operators that build a site."""
 
     is_chosen = True
-    _meshes: MeshFiles | None = None
 
     def conclude(self, scene: bpy.types.Scene, result: BuiltSite) -> None:
         """Build the scene."""
         report = self.report  # type: ignore[attr-defined]  # of Blender's operators
-        origin = () if self._meshes is None else self._meshes.origin
-        paths = () if self._meshes is None else self._meshes.paths
-        places = [mesh_place(result.model, origin, path.name) for path in paths]  # fails before anything is built
         built = self._emptied(scene, result.model.name)
         finish(build_scene(built, result.model, result.map_name))
         if self.is_chosen:
             built[contract.BUILT] = built.seip.site.place()
         _keep_map(built, result)
-        added = self._add_meshes(built, dict(zip(paths, places, strict=True)))
         if not self.is_chosen:
             built.seip.traffic.file = built.seip.simulation.map = traffic.EXAMPLE
         _bring_to_front(built)
         for note in result.model.notes:
             report({"INFO"}, note)
         for warning in result.model.warnings:
-            if not (added and warning == NO_OBSTACLES_MESSAGE):
-                report({"WARNING"}, warning)
+            report({"WARNING"}, warning)
         report({"INFO"}, f"{counted(len(result.model.parts), 'object')}, region {result.model.region.area:,.0f} m²")
         if bpy.context.window is not None and not bpy.app.background:
             bpy.ops.seip.check_site("INVOKE_DEFAULT")
@@ -167,17 +155,6 @@ class _BuildsSite(_WritesScene, LongWork[BuiltSite]):
             self.report({"INFO"}, "Blender's cube, light and camera were removed")  # type: ignore[attr-defined]  # of Blender's operators
         return scene
 
-    def _add_meshes(self, scene: bpy.types.Scene, places: dict[Path, MeshPlace]) -> int:
-        """Add meshes at their places, report those that cannot be imported, and return how many objects were added."""
-        added = 0
-        for path, place in places.items():
-            up = None if self._meshes is None else self._meshes.up_of(path)
-            try:
-                added += len(import_mesh(scene, path, place, up))
-            except SeipError as error:
-                self.report({"ERROR"}, f"{error}; the site is built without this mesh")  # type: ignore[attr-defined]  # of Blender's operators
-        return added
-
 
 class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
     """Model the chosen place of the map: in this scene with its camera, light and units. A site of the same place is replaced, your own objects stay; a site of another place stays, and a new scene of this file is made. Blender's cube, light and camera are removed where they are all that the scene holds"""  # noqa: E501  # a tooltip is one line
@@ -193,7 +170,6 @@ class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
         """Take what was chosen."""
         site = scene.seip.site
-        self._meshes = site.mesh_files()
         return build_site(Path(bpy.path.abspath(site.source)), site.request())
 
 

@@ -110,19 +110,9 @@ def _draw_sources(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
     row = column.row()
     row.enabled = not site.is_extract()  # which has its own buildings, trees and posts
     row.prop(site, "osm")
-    column.prop(site, "buildings")
-    if site.buildings:
-        row = column.row()
-        row.enabled = not site.buildings_origin
-        row.prop(site, "buildings_epsg")
-        column.prop(site, "buildings_origin", placeholder="X Y Z")
     column.prop(site, "terrain")
     if site.terrain:
         column.prop(site, "terrain_epsg")
-    column.prop(site, "meshes")
-    if site.meshes:
-        column.prop(site, "mesh_origin", placeholder="Lat Lon, or X Y")
-        column.prop(site, "mesh_up")
 
 
 def _place_text(site: SEIP_PG_site) -> str:

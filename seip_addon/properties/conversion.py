@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -43,20 +42,6 @@ def of_setting(kind: type, field: str, name: str, **more: Any) -> Any:  # noqa: 
         return StringProperty(name=name, description=description, **more)
     arguments = {"default": default} | given | _UNITS.get(about.unit, {}) | more
     return _KINDS[type(default)](name=name, description=description, **arguments)
-
-
-def numbers(text: str, what: str) -> tuple[float, ...]:
-    """Return the numbers of a text, which blanks or commas part.
-
-    Raises
-    ------
-    SeipError
-        It holds something else.
-    """
-    try:
-        return tuple(float(part) for part in re.split(r"[\s,;°]+", text) if part)
-    except ValueError as error:
-        raise SeipError(f"{what} must be numbers with blanks between them, not {text!r}") from error
 
 
 def absolute(text: str) -> Path:

@@ -45,7 +45,7 @@ class SEIP_PG_sections(bpy.types.PropertyGroup):
     sensors: _step("sensors", "Sensors")
     placement: _step("placement", "Placement")
     change_site: _section("Change Site")
-    sources: _section("Buildings, Terrain and Meshes")
+    sources: _section("Surroundings and Terrain")
     roles: _section("Roles of Objects")
     contents: _section("Contents")
     about_sensor: _section("About the Sensor")

@@ -18,14 +18,12 @@ from ..core.errors import SeipError
 from ..core.site.scene_geometry import DEFAULT_WEIGHT
 from ..core.workflows.site_building import SiteRequest
 from ..core.workflows.site_places import parsed_position
-from ..core.world.citymodel.at_place import BuildingsRequest
 from ..core.world.elevation.at_place import TerrainRequest
 from ..core.world.openstreetmap.site import is_extract
 from ..core.world.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
 from ..preferences import sumo_folders
 from ..scene import contract, roles
-from ..scene.imported import UP_AXES, MeshFiles, check_mesh, meshes_in
-from .conversion import absolute, as_typed, numbers, of_setting
+from .conversion import absolute, as_typed, of_setting
 
 _FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 _CODE = {"min": 0, "max": 999_999}
@@ -91,30 +89,8 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
         step=1000,
     )
     osm: of_setting(SiteRequest, "osm", "Surroundings", **_FILE)
-    buildings: of_setting(BuildingsRequest, "path", "City Model", **_FILE)
-    buildings_epsg: of_setting(BuildingsRequest, "epsg", "EPSG", default=0, **_CODE)
-    buildings_origin: of_setting(BuildingsRequest, "origin", "Origin")
     terrain: of_setting(TerrainRequest, "path", "Terrain", **_FILE)
     terrain_epsg: of_setting(TerrainRequest, "epsg", "EPSG", default=0, **_CODE)
-    meshes: StringProperty(
-        name="Meshes",
-        description="Folder of meshes that occlude (glTF, OBJ, PLY, STL, USD), all with the same origin",
-        subtype="DIR_PATH",
-        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-    )
-    mesh_origin: StringProperty(
-        name="Origin",
-        description="Position of the meshes' origin, LAT LON or map X Y, and heading of its x axis in degrees from "
-        "east, 0 if left out",
-    )
-    mesh_up: EnumProperty(
-        name="Up",
-        description="Vertical axis of OBJ, PLY and STL files",
-        items=(
-            ("auto", "Automatic", "y for OBJ, z for the others"),
-            *((axis, axis.upper(), f"The {axis} axis points up") for axis in UP_AXES),
-        ),
-    )
     role: EnumProperty(name="Role", description="What objects mean to the placement", items=ROLE_ITEMS)
     checked: BoolProperty(name="Checked", description="Whether the check has looked at this scene")
     counts: CollectionProperty(type=SEIP_PG_count)
@@ -154,7 +130,7 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
         Raises
         ------
         SeipError
-            The position is none, or the origin of the city model is not three numbers.
+            The position is invalid.
         """
         size = None if self.is_described() else as_typed(self.radius)
         radius, approaches = (None, size) if self.follows_approaches() else (size, None)
@@ -169,33 +145,9 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
 
     def _sources(self) -> dict[str, Any]:
         """Return the fields of the request that name further files."""
-        buildings = terrain = None
-        if self.buildings:
-            origin = numbers(self.buildings_origin, "the origin of the city model") or None
-            if origin is not None and len(origin) != 3:
-                raise SeipError("the origin of the city model must be three numbers: X Y Z of the map, in metres")
-            code = None if origin else self.buildings_epsg or None
-            buildings = BuildingsRequest(absolute(self.buildings), code, origin)
-        if self.terrain:
-            terrain = TerrainRequest(absolute(self.terrain), self.terrain_epsg or None)
+        terrain = TerrainRequest(absolute(self.terrain), self.terrain_epsg or None) if self.terrain else None
         osm = absolute(self.osm) if self.osm and not self.is_extract() else None
-        return {"osm": osm, "buildings": buildings, "terrain": terrain}
-
-    def mesh_files(self) -> MeshFiles | None:
-        """Return the meshes to add, or None.
-
-        Raises
-        ------
-        SeipError
-            The folder has no mesh, or a file is not one that is read.
-        """
-        if not self.meshes:
-            return None
-        up = None if self.mesh_up == "auto" else self.mesh_up
-        files = MeshFiles(meshes_in(absolute(self.meshes)), numbers(self.mesh_origin, "the origin of the meshes"), up)
-        for path in files.paths:
-            check_mesh(path, files.up_of(path))
-        return files
+        return {"osm": osm, "terrain": terrain}
 
 
 def _region_weight(obj: bpy.types.Object) -> float:

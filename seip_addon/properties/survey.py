@@ -11,10 +11,10 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatPrope
 from ..core.choosing.placement.search_limits import DEFAULT_EFFORT
 from ..core.errors import SeipError
 from ..core.sensing.visibility.settings import VisibilitySettings
+from ..core.sensing.weather import Weather
 from ..core.site.candidates import DEFAULT_TYPE, MAX_SENSOR_HEIGHT, CandidateSettings, heights_of, tilts_of
 from ..core.site.installed_cost import InstalledCost, load_installed_cost
 from ..core.site.post_rules import ALLOWED, ASSUMED_POLES, RULES
-from ..core.site.weather import Weather
 from ..core.workflows.survey_settings import SurveySettings
 from ..preferences import catalogue_files
 from .conversion import absolute, as_typed, of_setting

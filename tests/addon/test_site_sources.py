@@ -11,21 +11,17 @@ import pytest
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.placement_file import parsed_record
 from seip_addon.core.site.installed_cost import load_installed_cost
-from seip_addon.core.world.citymodel.at_place import BuildingsRequest
 from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.panels import placement, site
 from seip_addon.scene import contract
-from tests.builders.city_text import CityModel, origin_at
-from tests.builders.dem_files import write_dem
+from tests.builders.dem_files import origin_at, write_dem
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.opendrive_text import document, geometry, lane, road, section
 from tests.builders.osm_text import Extract
 
 X, Y, _ = origin_at(52.5, 13.4)
 UTM33 = "+proj=utm +zone=33 +ellps=WGS84 +datum=WGS84 +units=m +no_defs"
-BOX = "".join(f"v {x} {y} {z}\n" for y in (0, 6) for x, z in ((0, 0), (10, 0), (10, -4), (0, -4)))
-BOX += "f 1 2 3 4\nf 5 8 7 6\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n"
 
 
 @pytest.fixture
@@ -44,15 +40,9 @@ def street(tmp_path):
 
 @pytest.fixture
 def files(tmp_path):
-    """A city model without a reference system, a slope, two meshes and an extract with a house."""
-    model = CityModel((0.0, 0.0, 3.0), None)
-    model.add("a", model.gabled(5, 12, 10, 8, 6, 9)).write(tmp_path / "town.city.json")
+    """A slope, and an extract with a house."""
     north, east = np.meshgrid(np.arange(400), np.arange(400), indexing="ij")
     write_dem(tmp_path / "dem.tif", 40.0 + 0.04 * east + 0.0 * north, X - 200, Y + 200)
-    (tmp_path / "meshes").mkdir()
-    for name in ("first.obj", "second.obj"):
-        (tmp_path / "meshes" / name).write_text(BOX, encoding="utf-8")
-    (tmp_path / "meshes" / "readme.txt").touch()
     extract = Extract(52.5, 13.4)
     extract.way([(-30, -20), (-20, -20), (-20, -30), (-30, -30), (-30, -20)], building="yes", height="7")
     extract.write(tmp_path / "around.osm")
@@ -78,22 +68,14 @@ def shapes(scene):
 def test_the_panel_builds_what_the_batch_command_builds_of_the_same_files(scene, street, files):
     chosen = choose(scene, street)
     chosen.osm, chosen.terrain = str(files / "around.osm"), str(files / "dem.tif")
-    chosen.buildings, chosen.buildings_origin = str(files / "town.city.json"), "0, 0 37"
-    chosen.meshes, chosen.mesh_origin, chosen.mesh_up = str(files / "meshes"), "-20 12 90", "z"
     assert bpy.ops.seip.build_site() == {"FINISHED"}
     by_panel = shapes(scene)
-    assert {"extract", "city model", "mesh file"} <= {source for _, source in by_panel}
+    assert "extract" in {source for _, source in by_panel}
     middle = map(str, read_map(street).middle())
-    place = ["--mesh-origin", "-20", "12", "90"]
-    meshes = [
-        each for name in ("first", "second") for each in ("--mesh", str(files / "meshes" / f"{name}.obj"), *place)
-    ]
     build_scene.main(
         [
             *(str(street), "--near", *middle, "--radius", "40", "-o", str(files / "site.blend")),
             *("--osm", str(files / "around.osm"), "--terrain", str(files / "dem.tif")),
-            *("--buildings", str(files / "town.city.json"), "--buildings-origin", "0", "0", "37"),
-            *(*meshes, "--mesh-up", "z"),
         ]
     )
     bpy.ops.wm.open_mainfile(filepath=str(files / "site.blend"))
@@ -102,62 +84,30 @@ def test_the_panel_builds_what_the_batch_command_builds_of_the_same_files(scene,
 
 def test_the_fields_are_those_of_the_request(scene, street):
     chosen = choose(scene, street)
-    chosen.buildings, chosen.buildings_epsg = "/town.json", 25833
     chosen.terrain, chosen.terrain_epsg = "/survey.laz", 25832
     request = chosen.request()
-    assert request.buildings == BuildingsRequest(street.parent.parent.parent.joinpath("/town.json"), 25833, None)
     assert request.terrain == TerrainRequest(street.joinpath("/survey.laz"), 25832)
-    chosen.buildings_origin = "1 2 3"
-    assert chosen.request().buildings.origin == (1.0, 2.0, 3.0)
-    assert chosen.request().buildings.epsg is None
-    chosen.buildings = chosen.terrain = ""
-    assert (chosen.request().buildings, chosen.request().terrain, chosen.request().osm) == (None, None, None)
+    chosen.terrain = ""
+    assert (chosen.request().terrain, chosen.request().osm) == (None, None)
 
 
-@pytest.mark.parametrize(("name", "value", "complaint"), [
-    ("buildings_origin", "1 2", "must be three numbers"),
-    ("buildings_origin", "here", "the origin of the city model must be numbers"),
-    ("mesh_origin", "here", "the origin of the meshes must be numbers"),
-    ("mesh_origin", "", "the origin of first.obj must be"),
-    ("mesh_origin", "9000 9000", "is not within 2,000 m of the site"),
-    ("meshes", "//nowhere", "has no file with a mesh"),
-    ("terrain", "//none.tif", "no such file"),
-])  # fmt: skip
-def test_a_mistake_leaves_the_scene_as_it_was(scene, street, files, name, value, complaint):
+def test_a_mistake_leaves_the_scene_as_it_was(scene, street, files):
     chosen = choose(scene, street)
-    chosen.buildings, chosen.buildings_origin = str(files / "town.city.json"), "0 0 0"
-    chosen.meshes, chosen.mesh_origin = str(files / "meshes"), "0 0"
-    setattr(chosen, name, value.replace("//", f"{files}/"))
-    with pytest.raises(RuntimeError, match=complaint):
+    chosen.terrain = str(files / "none.tif")
+    with pytest.raises(RuntimeError, match="no such file"):
         bpy.ops.seip.build_site()
     assert len(bpy.data.scenes) == 1
     assert not scene.collection.all_objects
 
 
-def test_a_damaged_mesh_is_named_and_the_site_stays(scene, street, files):
-    (files / "meshes" / "second.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n", encoding="utf-8")
-    chosen = choose(scene, street)
-    chosen.meshes, chosen.mesh_origin = str(files / "meshes"), "0 0"
-    with pytest.raises(RuntimeError, match=r"second.obj .*; the site is built without this mesh"):
-        bpy.ops.seip.build_site()
-    assert [obj.name for obj in scene.objects if obj.get(contract.SOURCE) == "mesh file"] == ["first"]
-
-
 def test_a_site_in_a_new_scene_takes_the_files_over(scene, street, files):
     chosen = choose(scene, street)
-    chosen.meshes, chosen.mesh_origin = str(files / "meshes"), "0 0"
+    chosen.osm = str(files / "around.osm")
     assert bpy.ops.seip.build_site() == {"FINISHED"}
-    assert bpy.ops.seip.build_site() == {"FINISHED"}  # replaces the site, meshes included
-    assert len(bpy.data.scenes) == 1
-    assert len([obj for obj in scene.objects if obj.get(contract.SOURCE) == "mesh file"]) == 2
     scene[contract.BUILT] = "another place"
     assert bpy.ops.seip.build_site() == {"FINISHED"}
     new = next(each for each in bpy.data.scenes if each != scene)
-    assert (new.seip.site.meshes, new.seip.site.mesh_origin) == (chosen.meshes, chosen.mesh_origin)
-    placed = [obj for obj in new.objects if obj.get(contract.SOURCE) == "mesh file"]
-    assert len(placed) == 2
-    before = [obj for obj in scene.objects if obj.get(contract.SOURCE) == "mesh file"]
-    assert [obj.matrix_world for obj in placed] == [obj.matrix_world for obj in before]
+    assert new.seip.site.osm == chosen.osm
 
 
 def test_the_section_shows_a_setting_where_its_file_is_named(scene, street):
@@ -170,10 +120,10 @@ def test_the_section_shows_a_setting_where_its_file_is_named(scene, street):
 
     assert "terrain" not in shown()
     scene.seip.sections.sources = True
-    assert {"osm", "buildings", "terrain", "meshes"} <= shown()
-    assert not {"buildings_epsg", "buildings_origin", "terrain_epsg", "mesh_origin"} & shown()
-    chosen.buildings = chosen.terrain = chosen.meshes = "/file"
-    assert {"buildings_epsg", "buildings_origin", "terrain_epsg", "mesh_origin", "mesh_up"} <= shown()
+    assert {"osm", "terrain"} <= shown()
+    assert "terrain_epsg" not in shown()
+    chosen.terrain = "/file"
+    assert "terrain_epsg" in shown()
 
 
 def test_installed_costs_are_in_the_survey(junction, tmp_path):

@@ -3,6 +3,8 @@
 import numpy as np
 from PIL import Image, TiffImagePlugin
 
+from seip_addon.core.geometry.geo_reference import projection
+
 SCALE, TIE_POINT, TRANSFORMATION, KEYS, NO_DATA, COPYRIGHT = 33550, 33922, 34264, 34735, 42113, 33432
 
 
@@ -35,3 +37,9 @@ def sampled(surface, west, north, size, step=1.0):
     x = west + step * (np.arange(size) + 0.5)
     y = north - step * (np.arange(size) + 0.5)
     return np.asarray(surface(*np.meshgrid(x, y)), dtype=np.float32)
+
+
+def origin_at(latitude, longitude, zone="EPSG:25833", height=30.0):
+    """Return easting, northing and a height (3,) at a place, whole metres."""
+    east, north = projection(zone)(np.radians(latitude), np.radians(longitude))
+    return (round(east), round(north), height)

@@ -52,12 +52,6 @@ def pcd_text(columns, data="binary", viewpoint="0 0 0 1 0 0 0", **changes):
     ).encode() + body
 
 
-def csv_text(columns):
-    """Return a table with a header."""
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    return ",".join(columns) + "\n" + "".join(",".join(map(repr, row)) + "\n" for row in rows)
-
-
 def write_sweep_file(path, columns):
     """Write x, y, z, intensity and ring in the format of a path's suffix, as far as it holds them."""
     table = np.column_stack([column.astype("<f4") for column in columns.values()])
@@ -68,25 +62,9 @@ def write_sweep_file(path, columns):
         path.write_bytes(np.ascontiguousarray(table[:, :4]).tobytes())
     elif name.endswith(".pcd"):
         path.write_bytes(pcd_text(columns))
-    elif name.endswith(".csv"):
-        path.write_text(csv_text(columns))
-    elif name.endswith(".npz"):
-        np.savez_compressed(path, **columns)
     else:
-        _write_las(path, columns)
+        np.savez_compressed(path, **columns)
     return path
-
-
-def _write_las(path, columns):
-    import laspy  # noqa: PLC0415  # an optional extra
-
-    header = laspy.LasHeader(version="1.4", point_format=6)
-    header.scales = np.full(3, 0.0001)
-    header.add_extra_dim(laspy.ExtraBytesParams("ring", np.uint16))
-    cloud = laspy.LasData(header)
-    cloud.x, cloud.y, cloud.z = columns["x"], columns["y"], columns["z"]
-    cloud.intensity, cloud.ring = columns["intensity"].astype(np.uint16), columns["ring"]
-    cloud.write(path)
 
 
 def openlabel_text(boxes, kinds, frames=1):

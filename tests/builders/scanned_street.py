@@ -79,14 +79,14 @@ def moved(sensor, random, distance=0.5, degrees=4.0):
 def street_ranges(surface, sensor, sweeps, seed, vehicles=0):
     """Return ranges (sweeps, rays) of a sensor, infinite without a return, and the intensity of each ray.
 
-    The seed is that of noise, losses, vehicles and deviations of surfaces.
+    The seed is that of noise, losses and vehicles.
 
     Each sweep has a number of ``vehicles`` at random places of the crossing, or the given ones: x, y, length, width,
     height, yaw.
     """
     model = sensor.model
     random = np.random.default_rng(seed)
-    scan = Scanner(sensor, surface, seed).scan(MovingTraffic((), (), np.zeros((0, 1, 3))), 0)
+    scan = Scanner(sensor, surface).scan(MovingTraffic((), (), np.zeros((0, 1, 3))), 0)
     directions = BeamPattern(model).directions(np.arange(len(scan.distance))) @ sensor.orientation.T
     ranges = np.full((sweeps, len(scan.distance)), np.inf, dtype=np.float32)
     for sweep in range(sweeps):

@@ -25,7 +25,6 @@ from headless.detection.average_precision import (
     too_few_runs,
 )
 from headless.detection.matching import NO_MATCH, VEHICLES, Rule, match
-from headless.studies.detection.kitti_precision import kitti
 
 from seip_addon.core.errors import SeipError
 
@@ -213,8 +212,6 @@ def test_perfect_detection_scores_one():
     ]
     for rule in (AT_07, Rule(iou=0.99), Rule(iou=0.99, in_space=True)):
         assert average_precision(told, rule) == 1
-    assert kitti(told, AT_07).ap40 == pytest.approx(1)
-    assert kitti(told, AT_07).ap11 == pytest.approx(1)
 
 
 seeds = st.integers(0, 2**31)
@@ -280,7 +277,6 @@ def test_moving_the_world_does_not_matter(seed, turn, east, north):
     ]
     for rule in (AT_07, Rule(in_space=True)):
         assert average_precision(moved, rule) == pytest.approx(average_precision(frames, rule), abs=1e-12)
-    assert kitti(moved, AT_07).ap40 == pytest.approx(kitti(frames, AT_07).ap40, abs=1e-12)
 
 
 def carried(boxes, turn, east, north):
@@ -381,72 +377,6 @@ def test_too_few_runs_give_no_interval_and_a_sentence():
     assert not too_few_runs(4)
     cars = np.array([10, 10, 10, 0, 0, 0])  # runs without any show nothing of how runs differ
     assert average_precision_interval(found_of(cars, cars)) is None
-
-
-# KITTI ------------------------------------------------------------------------------------------------------------
-
-
-def test_kitti_by_hand():
-    """Five cars in five frames; found with 0.9, 0.8, 0.7, 0.6, the fifth missed; false at 0.85 and 0.65.
-
-    Recall after each hit is 1/5, 2/5, 3/5, 4/5. A hit's score becomes a threshold unless the next hit's recall is
-    nearer to the recall due, which rises by 1/40 from 0 with each threshold: at the first hit 0 is due, and 1/5 is
-    nearer than 2/5. So each of the four becomes a threshold, and no other: with precisions 1/1, 2/3, 3/4 and 4/6 at
-    0.9, 0.8, 0.7 and 0.6. The best from each on: 1, 3/4, 3/4, 2/3, then nothing up to the 41st.
-    AP40 = (3/4 + 3/4 + 2/3)/40; AP11, from the 1st, 5th, 9th and so on, 1/11.
-    """
-    score = [0.9, 0.8, 0.7, 0.6]
-    frames = [frame(truth([box(0)]), detected([box(0)], [value])) for value in score]
-    frames.append(frame(truth([box(0)]), detected([box(FAR), box(-FAR)], [0.85, 0.65])))
-    figures = kitti(frames, AT_07)
-    assert figures.ap40 == pytest.approx((3 / 4 + 3 / 4 + 2 / 3) / 40, abs=1e-15)
-    assert figures.ap11 == pytest.approx(1 / 11, abs=1e-15)
-
-
-def test_kitti_takes_the_nearest_of_many_recalls():
-    """Eighty cars, all found: recall rises by 1/80, so that every other hit becomes a threshold.
-
-    The first (recall 1/80, 0 due) stands; 1/40 is due next and hit 2 has it; then 4, 6 … 80: 41 thresholds. The false
-    detection scores between hits 40 and 41, so that precision is 1 down to hit 40 and at last 80/81, its best.
-    Thresholds at hits 1, 2, 4 … 40 are 21, and 20 lie below: AP40 = (20 · 1 + 20 · 80/81)/40. AP11 takes
-    thresholds 1, 5 … 41, of which six are up to 21: (6 + 5 · 80/81)/11.
-    """
-    score = np.linspace(0.99, 0.2, 80)
-    frames = [frame(truth([box(0)]), detected([box(0)], [value])) for value in score]
-    frames.append(frame(truth([]), detected([box(0)], [(score[39] + score[40]) / 2])))
-    figures = kitti(frames, AT_07)
-    assert figures.ap40 == pytest.approx((20 + 20 * 80 / 81) / 40, abs=1e-15)
-    assert figures.ap11 == pytest.approx((6 + 5 * 80 / 81) / 11, abs=1e-15)
-    assert average_precision(frames) == pytest.approx((40 + 40 * 80 / 81) / 80, abs=1e-15)
-
-
-def test_kitti_takes_the_nearer_of_two_recalls():
-    """Forty-seven cars, all found: 1/5 is due after eight thresholds, and 9/47 = 0.191 is nearer than 10/47 = 0.213.
-
-    A false detection scores between hits 9 and 10. Nine thresholds lie before it, 32 after, whose best precision is
-    the last: AP40 = (8 + 32 · 47/48)/40.
-    """
-    score = np.linspace(0.99, 0.2, 47)
-    frames = [frame(truth([box(0)]), detected([box(0)], [value])) for value in score]
-    frames.append(frame(truth([]), detected([box(0)], [(score[8] + score[9]) / 2])))
-    assert kitti(frames, AT_07).ap40 == pytest.approx((8 + 32 * 47 / 48) / 40, abs=1e-15)
-
-
-def test_kitti_lets_be_who_does_not_count():
-    """Of each frame's five detections one is a hit, one is false, and three are let be: precision 1/2."""
-    boxes = [box(0), box(20), box(40)]
-    there = truth(boxes, category=["car", "pedestrian", "car"], inside=[True, True, False])
-    inside = [True, True, False, False, True]
-    told = [frame(there, detected([*boxes, box(FAR), box(-FAR)], [0.5, 0.9, 0.8, 0.95, 0.7], inside=inside))] * 50
-    assert kitti(told, AT_07).ap40 == pytest.approx(1 / 2)
-
-
-def test_kitti_is_near_the_interpolated_average():
-    frames = traffic(7, frames=60)
-    figures, plain = kitti(frames, AT_07), average_precision(frames)
-    assert figures.ap40 != plain
-    assert figures.ap40 == pytest.approx(plain, abs=0.04)
-    assert figures.ap11 == pytest.approx(plain, abs=0.08)
 
 
 def test_vehicles_are_what_the_study_compares():

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from headless.detection import detector as detector_module
 from headless.detection.detector import SHIPPED_DETECTOR, Detector
 from headless.detection.inference import detect_on_level
 from headless.detection.network import OUTPUT_STRIDE
@@ -16,6 +17,12 @@ from scipy import ndimage
 
 BORDER = 64  # pillars, more than any output sees
 GRID = PillarGrid(west=-12.8, south=-8.0, bottom=-1.0, top=4.0, columns=80, rows=48, pillar=0.32)
+
+
+@pytest.fixture(autouse=True)
+def _full_precision(monkeypatch):
+    """Some processors round dense convolutions to 16 bits."""
+    monkeypatch.setattr(detector_module, "has_bfloat16", lambda _device: False)
 
 
 def random_detector(seed, **settings) -> Detector:
@@ -60,9 +67,8 @@ def dense_output(detector, pillars) -> torch.Tensor:
 @pytest.mark.parametrize(
     "settings",
     [
-        {"head": "centre", "blocks": (2, 3, 3)},
-        {"head": "centre", "blocks": (0, 1, 2), "padded": True},
-        {"head": "anchor", "blocks": (1, 0, 1)},
+        {"blocks": (2, 3, 3)},
+        {"blocks": (0, 1, 2), "padded": True},
     ],
 )
 def test_near_returns_the_output_is_that_of_dense_convolutions_and_elsewhere_that_of_an_empty_cloud(settings, seeds):

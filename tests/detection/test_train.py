@@ -10,6 +10,7 @@ pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless import simulate, train
 from headless.detection.detector import Detector
+from headless.detection.settings import NetworkSettings
 
 import numpy as np
 
@@ -20,7 +21,12 @@ from seip_addon.scene.write import write_result
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import ORIGIN, make_example
 
-SMALL = ["--steps", "4", "--batch", "2", "--width", "8", "--blocks", "1", "1", "1", "--threads", "1"]
+SMALL = NetworkSettings(width=8, blocks=(1, 1, 1))
+
+
+@pytest.fixture(autouse=True)
+def _small_network(monkeypatch):
+    monkeypatch.setattr(train, "NETWORK", SMALL)
 
 
 def make_traffic(source, start) -> Trajectories:
@@ -55,7 +61,7 @@ def folder(tmp_path_factory):
 
 def arguments(folder, output, *, training="first", validation="second", test="third", more=()):
     runs = ["--train", str(folder / training), "--validation", str(folder / validation), "--test", str(folder / test)]
-    return [str(folder / "placed.blend"), *runs, "-o", str(folder / output), *SMALL, *more]
+    return [str(folder / "placed.blend"), *runs, "-o", str(folder / output), "--steps", "4", *more]
 
 
 def test_a_detector_its_curve_and_its_figures_are_written(folder, capsys):

@@ -55,12 +55,11 @@ def bytes_of(path):
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-@pytest.mark.parametrize(("head", "steps"), [("centre", 300), pytest.param("anchor", 400, marks=pytest.mark.slow)])
-def test_a_frame_can_be_memorised(head, steps):
+def test_a_frame_can_be_memorised():
     frame = street_frame(11, users=6, kinds=("car",))
     same, again = (sampled("frame", traffic, [frame]) for traffic in ("run 1", "run 1 by another name"))
-    network = replace(SMALL, head=head, width=24)
-    settings = replace(BRIEF, steps=steps, batch=4, window=25.6, learning_rate=1e-2, validate_every=100)
+    network = replace(SMALL, width=24)
+    settings = replace(BRIEF, steps=300, batch=4, window=25.6, learning_rate=1e-2, validate_every=100)
     result = trained([same], [again], settings, network)
     found = result_of_sample(result.detector, AREA, sample_of(frame, AREA, network.most_points))
     assert evaluate([found], Rule(iou=0.7)).average_precision == pytest.approx(1.0)
@@ -258,7 +257,6 @@ def test_what_is_no_detector_is_refused(tmp_path, content):
     [
         ({"most_points": 64}, "1 to 32 points"),
         ({"pillar": 0.0}, "0.05 to 2 m"),
-        ({"head": "point"}, "centre or anchor"),
         ({"blocks": (1, 1)}, "three blocks"),
     ],
 )

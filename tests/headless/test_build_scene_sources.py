@@ -10,8 +10,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
-from tests.builders.city_text import CityModel, origin_at
-from tests.builders.dem_files import sampled, write_dem
+from tests.builders.dem_files import origin_at, sampled, write_dem
 from tests.builders.opendrive_text import document, geometry, lane, road, section
 from tests.builders.osm_text import Extract
 from tests.sumo_here import needs_sumo
@@ -29,14 +28,6 @@ def street(tmp_path):
     return path
 
 
-@pytest.fixture
-def town(tmp_path):
-    model = CityModel((X, Y, 3.0), 25833)
-    contact = {"contactName": "City of Mills", "emailAddress": "mills@example.com"}
-    model.content["metadata"] |= {"title": "Mills in 3D", "referenceDate": "2020-05-01", "pointOfContact": contact}
-    return model.add("a", model.gabled(5, 12, 10, 8, 6, 9)).write(tmp_path / "town.city.json")
-
-
 def build(street, tmp_path, *more):
     output = tmp_path / "site.blend"
     build_scene.main(
@@ -46,34 +37,21 @@ def build(street, tmp_path, *more):
     return bpy.context.scene
 
 
-def test_buildings_and_ground_are_in_the_scene(street, town, tmp_path, capsys):
+def test_ground_of_a_terrain_file_is_in_the_scene(street, tmp_path, capsys):
     heights = sampled(lambda x, y: 40 + 0.04 * (x - X) + 0 * y, X - 200, Y + 200, 400)
     dem = write_dem(tmp_path / "dem.tif", heights, X - 200, Y + 200, credit="Surveyors of the State, 2021")
-    scene = build(street, tmp_path, "--buildings", town, "--terrain", dem)
-    assert read_scene(scene).geometry.attribution == (
-        "Mills in 3D, City of Mills, 2020-05-01",
-        "Surveyors of the State, 2021",
-    )
-    (house,) = [obj for obj in scene.objects if obj.get(contract.SOURCE) == "city model"]
-    assert house.name == "Building 1"
-    geometry_read = read_scene(scene).geometry
-    (mesh,) = [one for one in geometry_read.occluders if one.name == house.name]
-    corners = mesh.triangles.reshape(-1, 3) + geometry_read.origin
-    assert corners.min(axis=0) == pytest.approx([5, 12, 40 + 0.04 * 5], abs=1e-3)
-    assert np.ptp(corners, axis=0) == pytest.approx([10, 8, 9], abs=1e-3)
-    printed = capsys.readouterr().out
-    assert "city model" in printed
-    assert "smoothed by a Gaussian of 4 m" in printed
+    scene = build(street, tmp_path, "--terrain", dem)
+    found = read_scene(scene).geometry
+    assert found.attribution == ("Surveyors of the State, 2021",)
+    road = np.concatenate([mesh.triangles.reshape(-1, 3) for mesh in found.roads]) + found.origin
+    assert road[:, 2] == pytest.approx(40 + 0.04 * road[:, 0], abs=0.02)
+    assert "smoothed by a Gaussian of 4 m" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("more", "complaint"), [
-    (["--buildings-epsg", "25833"], "name it by --buildings"),
-    (["--buildings", "none.json"], "no such file"),
     (["--terrain", "none.tif"], "no such file"),
     (["--terrain", "none.laz"], "no such file"),
     (["--terrain", "street.xodr"], "is not a TIFF file"),
-    (["--buildings", "street.xodr"], "not readable JSON"),
-    (["--mesh", "none.obj", "--mesh-origin", "0", "0"], "no such file"),
 ])  # fmt: skip
 def test_a_mistake_leaves_nothing_behind(more, complaint, street, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

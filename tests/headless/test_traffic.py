@@ -55,7 +55,7 @@ def test_floating_car_data_is_put_on_the_road(tmp_path, capsys):
 
 def test_a_span_of_time_is_cut_out_and_missing_sizes_are_said(tmp_path, capsys):
     output = tmp_path / "t.npz"
-    traffic.main([str(JUNCTION), "--fcd", str(fcd(tmp_path)), "--begin", "1", "--end", "2", "-o", str(output)])
+    traffic.main([str(JUNCTION), "--fcd", str(fcd(tmp_path)), "--start", "1", "--duration", "1", "-o", str(output)])
     assert Trajectories.load(output).span == (1.0, 2.0)
     assert "warning: missing sizes: 1 of 1 road user is of" in capsys.readouterr().out
 
@@ -78,6 +78,15 @@ def test_a_missing_file_is_named(tmp_path):
 def test_senseless_times_are_refused(tmp_path, option, value):
     with pytest.raises(SeipError, match=r"--duration must be (above 0 s|a finite number)"):
         traffic.main([str(JUNCTION), "--simulate", "x.xodr", option, value, "-o", str(tmp_path / "t.npz")])
+
+
+@pytest.mark.parametrize("given", [
+    ["--simulate", "x.xodr", "--routes", "x.xml"], ["--simulate", "x.xodr", "--start", "1"],
+    ["--fcd", "x.xml", "--flow", "9"], ["--fcd", "x.xml", "--seed", "1"],
+])  # fmt: skip
+def test_options_of_the_other_source_are_refused(given, tmp_path):
+    with pytest.raises(SeipError, match=f"{given[2]} is for --"):
+        traffic.main([str(JUNCTION), *given, "-o", str(tmp_path / "t.npz")])
 
 
 @needs_sumo

@@ -96,7 +96,7 @@ def test_the_bridge_imports_neither_commands_nor_operators():
 
 
 LAYERS = ("storage", "geometry", "site", "sensing", "world", "choosing", "output", "workflows")
-"""Groups of packages of the core: each imports only those before it, but for the sensor models that a site names."""
+"""Groups of packages of the core: each imports only those before it."""
 
 
 def package_of(parts):
@@ -144,8 +144,7 @@ def test_groups_of_the_core_import_only_lower_ones():
         own, used = path.relative_to(ROOT / "seip_addon" / "core").parts[0], name.split(".")[2:]
         if not name.startswith("seip_addon.core.") or own not in LAYERS or used[0] not in LAYERS:
             return True
-        models = own == "site" and used[:2] == ["sensing", "lidar"]
-        return models or LAYERS.index(used[0]) <= LAYERS.index(own)
+        return LAYERS.index(used[0]) <= LAYERS.index(own)
 
     assert not offenders(["seip_addon/core"], allowed)
 

@@ -10,7 +10,8 @@ from mathutils import Vector
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
-from seip_addon.core.site.scene_geometry import NamedArea
+from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+from seip_addon.core.site.scene_geometry import NamedArea, joined
 from seip_addon.scene import contract
 from seip_addon.scene.named_places import places_text
 from seip_addon.scene.read import read_scene
@@ -144,6 +145,19 @@ def test_linked_collections_count(scene, tmp_path):
         target.collections = [contract.OCCLUDERS]
     scene.collection.children.link(target.collections[0])
     assert sorted(occluders(scene)) == ["linked wall", "own wall"]
+
+
+def test_an_imported_mesh_occludes_where_it_was_moved(scene, tmp_path):
+    corners = [(x, y, z) for z in (0, 6) for x, y in ((0, 0), (10, 0), (10, 4), (0, 4))]
+    faces = [(4, 3, 2, 1), (5, 6, 7, 8), (1, 2, 6, 5), (2, 3, 7, 6), (3, 4, 8, 7), (4, 1, 5, 8)]
+    lines = ["v {} {} {}".format(*corner) for corner in corners] + ["f {} {} {} {}".format(*face) for face in faces]
+    (tmp_path / "hall.obj").write_text("\n".join(lines), encoding="utf-8")
+    bpy.ops.wm.obj_import(filepath=str(tmp_path / "hall.obj"), forward_axis="Y", up_axis="Z")
+    (hall,) = bpy.context.selected_objects
+    put(scene, hall, (contract.OCCLUDERS,), (-20.0, 12.0, 0.0))
+    caster = make_ray_caster(joined(read_scene(scene).geometry.occluders))
+    distances, _ = caster.cast(np.array([-15.0, 0.0, 3.0]), np.array([[0.0, 1, 0], [1, 0, 0]]), 100.0)
+    assert distances.tolist() == pytest.approx([12.0, np.inf], abs=1e-5)
 
 
 def test_an_object_in_two_collections_is_cast_against_once(scene):

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer
-from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.lidar.model import LidarModel, fields_of_view
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY, Mesh, SceneGeometry
 from seip_addon.core.site.site import Site, make_site
@@ -120,7 +120,7 @@ def _coarser(
 ) -> Approximation:
     """Return a coarser grid of targets; the nearest coarse target represents each target of the exact grid."""
     spacing = site.targets.spacing * factor
-    coarse = make_site(geometry, layout, spacing, models=models)
+    coarse = make_site(geometry, layout, spacing, fields_of_view=fields_of_view(models))
     offset = site.targets.xyz[:, None, :2] - coarse.targets.xyz[None, :, :2]
     nearest = (offset**2).sum(axis=2).argmin(axis=1)
     return Approximation(f"grid of {spacing:g} m", "grid", coarse, models, nearest)

@@ -45,7 +45,7 @@ import numpy as np
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
-from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.lidar.model import LidarModel, fields_of_view
 from seip_addon.core.sensing.scans.static_scene import static_scene
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
@@ -114,7 +114,7 @@ def measure(
     """Measure everything; return the findings and the names of the synthetic instances."""
     layout, settings = scope.layout, VisibilitySettings()
     models = find_models(load_catalogue(), layout.sensors)
-    site = make_site(geometry, layout, models=models)
+    site = make_site(geometry, layout, fields_of_view=fields_of_view(models))
     simpler = approximations(geometry, site, models, layout)
     LOG.info(f"{site.name}: full and lazy scans from {samples} positions")
     costs = visibility_costs(site, models, settings, samples, simpler)
@@ -230,11 +230,13 @@ def growth(
     """Measure growth with one size at a time, then with all: copies of the scene side by side."""
     LOG.info("growth, each size in a process of its own")
     models = find_models(load_catalogue(), scope.layout.sensors)
-    site = make_site(geometry, scope.layout, models=models)
+    site = make_site(geometry, scope.layout, fields_of_view=fields_of_view(models))
     rows = {copies: repeated(site, copies) for copies in scope.copies}
     pitch = float(np.ptp(site.triangles[:, :, 0])) / 1000
     every = len(sampled_places(site, len(site.candidates)))
-    finer = [make_site(geometry, scope.layout, spacing, models=models) for spacing in scope.spacings]
+    finer = [
+        make_site(geometry, scope.layout, spacing, fields_of_view=fields_of_view(models)) for spacing in scope.spacings
+    ]
     positions, targets, blocks = scope.street
     posts = [positions * times // scope.multiples[-1] for times in scope.multiples]
     points = [targets * times // 2 for times in scope.multiples]

@@ -45,7 +45,7 @@ def simulation_by(
     sensors : sequence of MountedSensor
         Mounted sensors of the model's LiDAR type.
     seed : int
-        Seed of noise, losses and surfaces.
+        Seed of noise and losses.
     """
     bodies = [fitted_body(user) for user in traffic.users]
     casters = {
@@ -53,7 +53,7 @@ def simulation_by(
     }
     shapes = [BodySurface(casters[id(body.triangles)], body.reflectivity) for body in bodies]
     ground = ReflectiveSurface(model.caster(static.triangles), static.reflectivity)
-    scanners = [Scanner(replace(sensor, model=model.lidar), ground, seed) for sensor in sensors]
+    scanners = [Scanner(replace(sensor, model=model.lidar), ground) for sensor in sensors]
     return Simulation(static, scanners, traffic, shapes, ScanSettings(seed=seed))
 
 

@@ -35,7 +35,6 @@ from seip_addon.core.sensing.traffic.run_overlap import MATCH_RADIUS, require_in
 from seip_addon.core.workflows.survey import Survey
 
 from .claims import SeedResult
-from .kitti_precision import Kitti, kitti
 from .shared_bays import shared_bays
 
 MIN_RUNS = 4  # one to learn from, one for validation, two for tests
@@ -190,11 +189,6 @@ class DetectorOutcome:
     def precisions(self) -> dict[str, Precision]:
         """Average precision by every rule."""
         return precisions(self.frames)
-
-    @cached_property
-    def kitti(self) -> Kitti:
-        """KITTI's figures by the study's own rule."""
-        return kitti(self.frames, MAIN_RULE)
 
 
 def model_configurations(

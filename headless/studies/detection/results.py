@@ -156,7 +156,7 @@ def save_table(path: Path, results: StudyResults) -> None:
 
 
 def _row(outcome: DetectorOutcome) -> dict[str, str]:
-    seed_result, by_kitti = outcome.seed_result, outcome.kitti
+    seed_result = outcome.seed_result
     return {
         "detector": outcome.model.name,
         "sensor": seed_result.sensor,
@@ -173,8 +173,6 @@ def _row(outcome: DetectorOutcome) -> dict[str, str]:
             )
         },
         **{f"road_users_{name}": f"{found.road_users}" for name, found in outcome.precisions.items()},
-        "ap_kitti_ap40": f"{by_kitti.ap40:.4f}",
-        "ap_kitti_ap11": f"{by_kitti.ap11:.4f}",
         "score": f"{outcome.score:.4f}",
         "false_positives_per_frame": f"{seed_result.false_positives:.4f}",
         "false_positives_in_sparse_places": "" if np.isnan(seed_result.sparse) else f"{seed_result.sparse:.4f}",

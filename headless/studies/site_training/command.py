@@ -34,6 +34,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import TIME_STEP
 from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.lidar.model import fields_of_view
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.traffic.site_traffic import require_own_traffic
 from seip_addon.core.site.candidates import CandidateSettings
@@ -59,6 +60,7 @@ TYPES = (
     "helios_5515",
     "at128",
 )
+NETWORK = NetworkSettings()
 ASIDE = 8  # one of this number of sites is set aside
 MIN_SITES = 2
 
@@ -68,7 +70,7 @@ Site = TypeVar("Site")
 def main(argv: list[str]) -> None:
     """Simulate scans of random placements at every site, and train a detector on them."""
     options = _parser().parse_args(argv)
-    network, training = read_settings(NetworkSettings, options), read_settings(TrainingSettings, options)
+    network, training = NETWORK, read_settings(TrainingSettings, options)
     every_type = tuple(load_catalogue(())) if options.field_conditions else TYPES
     learning = LearningSettings(
         tuple(options.sensor or every_type), options.placements, options.every, training.seed, options.field_conditions
@@ -139,7 +141,11 @@ def read_site(scene: Path, learning: LearningSettings) -> TrainingSite:
     )
     models = survey_settings.models()
     candidates = make_site(
-        geometry, survey_settings.candidates, survey_settings.grid_spacing, survey_settings.reach(), models
+        geometry,
+        survey_settings.candidates,
+        survey_settings.grid_spacing,
+        survey_settings.reach(),
+        fields_of_view(models),
     ).candidates
     runs = sampled_runs(survey.runs_beside(scene), geometry.origin, learning.every)
     if not runs:
@@ -210,8 +216,6 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="change half of the frames to be as recordings are, and vary groups and sizes of road users",
     )
-    net = parser.add_argument_group("network")
-    add_settings(net, NetworkSettings, "head", "pillar", "most_points", "width", "blocks")
     learning.add_argument(
         "--seed", type=int, default=default.seed, metavar="N", help="seed for placements, noise, weights and order"
     )

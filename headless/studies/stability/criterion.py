@@ -19,7 +19,7 @@ from seip_addon.core.choosing.placement.objective import Objective, Solution
 from seip_addon.core.estimates import NORMAL_QUANTILE, IntervalEstimate
 from seip_addon.core.geometry.plan import surface_height
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.sensing.lidar.model import LidarModel
+from seip_addon.core.sensing.lidar.model import LidarModel, fields_of_view
 from seip_addon.core.sensing.scans.sensor import level_orientation
 from seip_addon.core.sensing.visibility.ray_casting import RayCaster, make_ray_caster
 from seip_addon.core.sensing.visibility.ring_resolution import unresolved_from
@@ -180,7 +180,7 @@ def criterion_study(
     """
     objective, random = Objective(count=count), np.random.default_rng(seed)
     models = settings.models()
-    site = make_site(geometry, settings.candidates, settings.grid_spacing, models=models)
+    site = make_site(geometry, settings.candidates, settings.grid_spacing, fields_of_view=fields_of_view(models))
     reach = float(np.hypot(*np.ptp(site.targets.xyz[:, :2], axis=0)))
     heights = sorted(set(settings.candidates.heights))
     borders = ring_borders(models, heights, DELTAS, reach)
@@ -307,7 +307,9 @@ def _by_delta(
 ) -> Generator[Progress, None, list[DeltaAnswer]]:
     """Vary δ for one sensor type at one height."""
     evaluator = Evaluator(geometry, settings, objective)
-    site = make_site(geometry, settings.candidates, settings.grid_spacing, models=settings.models())
+    site = make_site(
+        geometry, settings.candidates, settings.grid_spacing, fields_of_view=fields_of_view(settings.models())
+    )
     caster = make_ray_caster(site.triangles, settings.engine)
     (sensor,), (height,) = settings.candidates.sensors, settings.candidates.heights
     requested = yield from within(Progress(0, 0, f"{sensor}: requested δ"), evaluator.solve(site, settings))

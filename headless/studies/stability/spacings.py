@@ -10,6 +10,7 @@ from seip_addon.core.choosing.placement.deployment import weighted_share
 from seip_addon.core.choosing.placement.objective import Objective, Solution, target_weights
 from seip_addon.core.choosing.placement.optimisation import optimise
 from seip_addon.core.progress import Progress
+from seip_addon.core.sensing.lidar.model import fields_of_view
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel, visibility_model
 from seip_addon.core.site.scene_geometry import SceneGeometry
@@ -60,14 +61,15 @@ class Evaluator:
         spacing = max(EVALUATION_SPACING, math.sqrt(geometry.region.area / MAX_EVALUATION_TARGETS))
         wide = replace(settings.candidates, spacing=max(CANDIDATE_SPACINGS))
         self._models = settings.models()
-        self.site = make_site(geometry, wide, spacing, settings.reach(), self._models)
+        self._fields = fields_of_view(self._models)
+        self.site = make_site(geometry, wide, spacing, settings.reach(), self._fields)
         self.weights = target_weights(self.site, objective)
         self.geometry, self._objective = geometry, objective
         self._visibility: VisibilityModel = visibility_model(self.site, settings.visibility, settings.engine)
 
     def answer(self, settings: SurveySettings) -> Generator[Progress, None, Answer]:
         """Find the best placement under some settings, and evaluate it."""
-        site = make_site(self.geometry, settings.candidates, settings.grid_spacing, settings.reach(), self._models)
+        site = make_site(self.geometry, settings.candidates, settings.grid_spacing, settings.reach(), self._fields)
         solution = yield from self.solve(site, settings)
         seen = solution.deployment.seen_by > 0
         return Answer(

@@ -20,8 +20,8 @@ from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.sensing.scans.static_scene import static_scene
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
+from seip_addon.core.sensing.weather import Weather, weather_of
 from seip_addon.core.site.scene_geometry import SceneGeometry
-from seip_addon.core.site.weather import Weather, weather_of
 from seip_addon.core.workflows.survey import Layout, Survey, grid_key, lay_out, with_grid
 from seip_addon.core.workflows.survey_settings import SurveySettings
 

@@ -24,9 +24,8 @@ OTHER_LEVELS = "Roads on other levels"
 """Name of the ground made of roads on other levels than the studied one; plans show it."""
 
 FROM_MAP, DESCRIBED, ASSUMED = "map", "site description", "assumed"
-FROM_EXTRACT, FROM_CITY_MODEL, FROM_SURVEY = "extract", "city model", "survey"
-FROM_MESH = "mesh file"
-"""Source of an object: the map, the site description, an assumption, OpenStreetMap, a city model, a survey, a mesh."""
+FROM_EXTRACT, FROM_SURVEY = "extract", "survey"
+"""Source of an object: the map, the site description, an assumption, OpenStreetMap, a survey."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,6 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..errors import SeipError
 from ..geometry.geo_reference import GeoReference
-from ..sensing.lidar.model import LidarModel
 from .candidates import Candidates, CandidateSettings, generate_candidates
 from .far_objects import without_far_objects
 from .scene_geometry import SceneGeometry, joined, ordered_surfaces
@@ -74,7 +73,7 @@ def make_site(
     settings: CandidateSettings,
     grid_spacing: float = 1.0,
     reach: float = math.inf,
-    models: Mapping[str, LidarModel] = MappingProxyType({}),
+    fields_of_view: Mapping[str, float] = MappingProxyType({}),
 ) -> Site:
     """Make the site of a scene: its targets, candidates and static triangles.
 
@@ -84,8 +83,8 @@ def make_site(
         Distance between neighbouring targets.
     reach : float, metres
         Distance from the region beyond which surfaces are left out, because no relevant ray reaches them.
-    models : mapping of str to LidarModel
-        Sensor types; those missing have a full horizontal field of view.
+    fields_of_view : mapping of str to float, radians
+        Horizontal field of view of each sensor type; types that are missing see the full circle.
 
     Returns
     -------
@@ -119,7 +118,7 @@ def make_site(
     near, _ = without_far_objects(geometry, geometry.region, reach)
     triangles, reflectivity = ordered_surfaces((*near.roads, *near.ground, *near.occluders))
     targets = generate_targets(geometry.region, road, grid_spacing, geometry.weighted_regions)
-    one_way = any(not model.all_round for model in models.values())
+    one_way = any(angle < math.tau for angle in fields_of_view.values())
     most = MOST_PAIRS / (max(1, len(targets)) * (settings.yaws if one_way else 1))
     candidates = generate_candidates(geometry, settings, most)
     return Site(
@@ -127,7 +126,7 @@ def make_site(
         origin=geometry.origin,
         region=geometry.region,
         targets=targets,
-        candidates=with_yaws(candidates, models, settings.yaws, geometry.region, targets.xyz),
+        candidates=with_yaws(candidates, fields_of_view, settings.yaws, geometry.region, targets.xyz),
         triangles=triangles,
         reflectivity=reflectivity,
         geo_reference=geometry.geo_reference,

@@ -11,7 +11,6 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Boolean, Float
 from ..errors import SeipError
-from ..sensing.lidar.model import LidarModel
 from .candidates import Candidates, headings
 
 NOTHING_BEFORE = "looking past all targets"
@@ -19,7 +18,7 @@ NOTHING_BEFORE = "looking past all targets"
 
 
 def with_yaws(
-    candidates: Candidates, models: Mapping[str, LidarModel], yaws: int, region: BaseGeometry, targets: Float
+    candidates: Candidates, fields_of_view: Mapping[str, float], yaws: int, region: BaseGeometry, targets: Float
 ) -> Candidates:
     """Repeat poses of sensors with a limited field of view for several yaws, evenly and the first towards the region.
 
@@ -29,8 +28,8 @@ def with_yaws(
     ----------
     candidates : Candidates
         Candidates with one yaw at each position, height and tilt.
-    models : mapping of str to LidarModel
-        Sensor types; those missing have a full horizontal field of view.
+    fields_of_view : mapping of str to float, radians
+        Horizontal field of view of each sensor type; types that are missing see the full circle.
     yaws : int
         Number of yaws over the circle.
     region : shapely geometry
@@ -49,7 +48,7 @@ def with_yaws(
         No pose is left, or none at the positions of which one must carry a sensor.
     """
     kinds, kind = np.unique(candidates.sensor, return_inverse=True)
-    one_way = np.array([key in models and not models[key].all_round for key in kinds], dtype=bool)
+    one_way = np.array([fields_of_view.get(str(key), math.tau) < math.tau for key in kinds], dtype=bool)
     if not one_way.any():
         return candidates
     # Repeat each pose once for each of its yaws; `turn` counts the repeats of a pose from 0.
@@ -65,7 +64,7 @@ def with_yaws(
     _, first = np.unique(candidates.position_of, return_index=True)
     for number in np.flatnonzero(one_way):
         own = kind == number
-        seen = _any_within(candidates.xyz[first], ahead, models[str(kinds[number])].field_of_view, targets)
+        seen = _any_within(candidates.xyz[first], ahead, fields_of_view[str(kinds[number])], targets)
         looks[own] = seen[position[own], turn[own]]
     if not looks.any():
         raise SeipError(f"no candidate is left ({len(pose)} {NOTHING_BEFORE}): use more yaws, or a wider field of view")

@@ -10,7 +10,7 @@ from ..child_process import run_logged
 from ..errors import SeipError
 from ..output.results.detection_record import FORMATS, parsed_detection
 from ..progress import Progress
-from ..site.weather import Weather
+from ..sensing.weather import Weather
 
 RECORD, ERRORS = "detection.json", "errors.png"
 """Files of the result: its figures, and the picture of correct, missed and false detections."""

@@ -86,7 +86,6 @@ def make_run(
         times=frame_times(trajectories, sensors, start=settings.start, duration=settings.duration, rate=settings.rate),
         settings=replace(settings.scan, engine=engine_name(settings.scan.engine)),
         versions=versions,
-        geo_reference=geometry.geo_reference,
     )
 
 
@@ -146,7 +145,6 @@ def _traffic_run(folder: Path, run: Run, settings: RecordingSettings) -> Traffic
         key=run.key,
         sensors=tuple(run.sensors),
         origin=run.origin,
-        geo_reference=run.geo_reference,
         record=run.record(),
     )
 

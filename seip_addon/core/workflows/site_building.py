@@ -15,7 +15,6 @@ from ..geometry.geo_reference import GeoReference
 from ..progress import Progress
 from ..settings import setting
 from ..storage.files import whole_file
-from ..world.citymodel.at_place import BuildingsRequest, with_city_model
 from ..world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
 from ..world.elevation.obstacles import Merging
 from ..world.opendrive.junctions import STREETS
@@ -59,8 +58,6 @@ class SiteRequest:
         Site description for a map.
     osm : Path or None
         Extract whose buildings, trees and posts are added to an OpenDRIVE map.
-    buildings : BuildingsRequest or None
-        City model whose buildings are added.
     terrain : TerrainRequest or None
         Elevation model or laser survey that gives the ground its heights.
     service : bool
@@ -83,7 +80,6 @@ class SiteRequest:
     osm: Path | None = setting(
         None, "OpenStreetMap extract with buildings, trees and posts for a map", metavar="EXTRACT"
     )
-    buildings: BuildingsRequest | None = None
     terrain: TerrainRequest | None = None
     service: bool = False
     left_hand: bool | None = None
@@ -137,7 +133,7 @@ def build_site(
     if request.osm is not None:
         middle, reach = _where(road_map, description)
         description, notes = yield from surroundings_of_map(request.osm, road_map, description, middle, reach)
-    description, more, merging = yield from _with_sources(road_map, description, request)
+    description, more, merging = yield from _with_terrain(road_map, description, request)
     model = yield from site_model(road_map, description)
     return BuiltSite(map_path.name, replace(model, notes=(*notes, *more, *model.notes)), None, merging, map_path)
 
@@ -186,7 +182,7 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
         name=described.name or found.name,
         level=request.level,
     )
-    description, more, merging = yield from _with_sources(site.road_map, description, request)
+    description, more, merging = yield from _with_terrain(site.road_map, description, request)
     yield Progress(0, 0, "heights of streets")
     site = replace(site, description=description).on_ground()
     try:
@@ -200,26 +196,18 @@ def _of_extract(source: Path, request: SiteRequest, map_path: Path | None) -> Ge
     return BuiltSite(source.name, replace(model, notes=(*site.notes, *more, *model.notes)), map_text, merging)
 
 
-def _with_sources(
+def _with_terrain(
     road_map: RoadMap, description: SiteDescription, request: SiteRequest
 ) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...], tuple[Merging, ...]]]:
-    """Add buildings and terrain from further files to a description."""
-    if request.buildings is None and request.terrain is None:
+    """Add ground and objects from a terrain file to a description."""
+    if request.terrain is None:
         return description, (), ()
     middle, reach = _where(road_map, description)
     area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
     x, y, z, heading = road_map.header_offset.tolist()
     reference = GeoReference(road_map.geo_reference or "", (x, y, z, heading))
-    notes: list[str] = []
-    merging: tuple[Merging, ...] = ()
-    if request.buildings is not None:
-        description, more = yield from with_city_model(description, request.buildings, reference, area)
-        notes += more
-    if request.terrain is not None:
-        surroundings = MapSurroundings(reference, area, *_roads(road_map, area))
-        description, more, merging = yield from with_terrain(description, request.terrain, surroundings)
-        notes += more
-    return description, tuple(notes), merging
+    surroundings = MapSurroundings(reference, area, *_roads(road_map, area))
+    return (yield from with_terrain(description, request.terrain, surroundings))
 
 
 def _roads(road_map: RoadMap, area: BaseGeometry) -> tuple[Float, BaseGeometry]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..progress import Progress
 from ..sensing.lidar.carla_dropoff import CarlaDropoff
-from ..sensing.lidar.model import LidarModel
+from ..sensing.lidar.model import LidarModel, fields_of_view
 from ..sensing.visibility.float32_precision import rounding_warnings
 from ..sensing.visibility.grid import VisibilityGrid, visibility_key
 from ..sensing.visibility.ray_casting import engine_name
@@ -19,12 +19,12 @@ from ..sensing.visibility.road_range import range_warnings, road_reflectivity
 from ..sensing.visibility.settings import VisibilitySettings
 from ..sensing.visibility.store import stored_visibility
 from ..sensing.visibility.surroundings import Surroundings
+from ..sensing.weather import Weather
 from ..site.candidates import assumed_pole_warnings
 from ..site.far_objects import without_far_objects
 from ..site.obstruction import bareness_warnings
 from ..site.scene_geometry import SceneGeometry
 from ..site.site import Site, make_site
-from ..site.weather import Weather
 from .survey_settings import SurveySettings
 
 
@@ -83,7 +83,7 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
     models = settings.models()
     reach = settings.reach(models)
     geometry = settings.weather.over(geometry)
-    site = make_site(geometry, settings.candidates, settings.grid_spacing, reach, models)
+    site = make_site(geometry, settings.candidates, settings.grid_spacing, reach, fields_of_view(models))
     if settings.installed_cost is not None:
         candidates = settings.installed_cost.over(site.candidates, settings.candidates.bracket)
         site = replace(site, candidates=candidates)

@@ -13,10 +13,10 @@ from ..choosing.placement.solvers import check_solver
 from ..sensing.lidar.catalogue import find_models, load_catalogue
 from ..sensing.lidar.model import LidarModel
 from ..sensing.visibility.settings import Engine, VisibilitySettings
+from ..sensing.weather import Weather
 from ..settings import setting
 from ..site.candidates import CandidateSettings
 from ..site.installed_cost import InstalledCost
-from ..site.weather import Weather
 from ..storage.json_dataclass import as_json
 
 
@@ -55,7 +55,7 @@ class SurveySettings:
     visibility: VisibilitySettings = field(default_factory=VisibilitySettings)
     weather: Weather = field(default_factory=Weather)
     grid_spacing: float = setting(1.0, "distance between neighbouring targets on the road", unit="m", option="grid")
-    catalogue: tuple[Path, ...] = setting((), "catalogues of your own; a unit's beams as KEY=FILE", metavar="FILE")
+    catalogue: tuple[Path, ...] = setting((), "catalogues of your own", metavar="FILE")
     engine: Engine = "auto"
     solver: str = setting("auto", "auto (HiGHS if it is installed, otherwise CBC), highs, cbc or gurobi")
     effort: float | None = setting(

@@ -1,1 +1,1 @@
-"""From a map, an extract, a city model or an elevation model to the model of a street."""
+"""From a map, an extract or an elevation model to the model of a street."""

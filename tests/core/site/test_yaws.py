@@ -30,7 +30,9 @@ def looking(degrees, key="one-way", **changes):
 
 
 def site_of(settings, *models, spacing=4.0, **changes):
-    return make_site(street(**changes), settings, spacing, models={model.key: model for model in models})
+    return make_site(
+        street(**changes), settings, spacing, fields_of_view={model.key: model.field_of_view for model in models}
+    )
 
 
 BOTH = replace(PLAIN, sensors=("type1", "one-way"), spacing=12.0)

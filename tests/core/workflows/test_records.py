@@ -12,8 +12,8 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.placement_file import load_placement, save_placement
 from seip_addon.core.output.results.placement_record import Provenance
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.weather import Weather
 from seip_addon.core.site.scene_geometry import NamedArea
-from seip_addon.core.site.weather import Weather
 from seip_addon.core.workflows import records
 from seip_addon.core.workflows.placing import place, with_context
 from seip_addon.core.workflows.records import inputs_of, record_of, restored_solution

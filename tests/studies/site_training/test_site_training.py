@@ -1,5 +1,6 @@
 """Training on random placements at several sites."""
 
+from dataclasses import replace
 from shutil import copyfile
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless.detection.detector import Detector
+from headless.detection.settings import NetworkSettings
 from headless.studies.simulated_recordings import poses_key
 from headless.studies.site_training import command as train_on_sites
 from headless.studies.site_training.random_placements import MAX_SENSORS, random_placement
@@ -16,22 +18,13 @@ import numpy as np
 from seip_addon.core.errors import SeipError
 from tests.builders.small_junction import make_example
 
-BRIEF = [
-    "--steps",
-    "2",
-    "--batch",
-    "2",
-    "--width",
-    "8",
-    "--blocks",
-    "0",
-    "0",
-    "0",
-    "--every",
-    "15",
-    "--sensor",
-    "type1",
-]
+BRIEF = ["--steps", "2", "--batch", "2", "--every", "15", "--sensor", "type1"]
+SMALL = NetworkSettings(width=8, blocks=(0, 0, 0))
+
+
+@pytest.fixture(autouse=True)
+def _small_network(monkeypatch):
+    monkeypatch.setattr(train_on_sites, "NETWORK", SMALL)
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +51,7 @@ def test_a_detector_is_trained_and_the_same_again(sites, tmp_path):
     assert (weights == weights.half().float()).all()
 
 
-def test_field_conditions_change_the_training_and_it_continues_from_a_detector(sites, tmp_path):
+def test_field_conditions_change_the_training_and_it_continues_from_a_detector(sites, tmp_path, monkeypatch):
     train_on_sites.main([*sites, *BRIEF, "type1", "-o", str(tmp_path / "plain")])
     plain = tmp_path / "plain" / "detector.pt"
     again = [*sites, *BRIEF, "type1", "--start", str(plain), "--learning-rate", "0.0001", "--field-conditions"]
@@ -69,10 +62,9 @@ def test_field_conditions_change_the_training_and_it_continues_from_a_detector(s
     name = "feature_map.encoder.linear.weight"
     near, far = (Detector.load(path).state_dict()[name] for path in (plain, tmp_path / "one" / "detector.pt"))
     assert 0 < (near - far).abs().max() < 0.01
+    monkeypatch.setattr(train_on_sites, "NETWORK", replace(SMALL, width=16))
     with pytest.raises(SeipError, match="is of another network"):
-        train_on_sites.main(
-            [*sites, *BRIEF, "type1", "--start", str(plain), "--width", "16", "-o", str(tmp_path / "x")]
-        )
+        train_on_sites.main([*sites, *BRIEF, "type1", "--start", str(plain), "-o", str(tmp_path / "x")])
 
 
 def test_random_placements_are_of_different_positions_and_all_poses():

@@ -161,12 +161,11 @@ def _new_entry(run: TrafficRun, kind: Format) -> Record:
     parts = [
         part for sensor in run.sensors for part in (sensor.label, sensor.model.name, sensor.xyz, sensor.orientation)
     ]
-    place = [repr(run.geo_reference)] if run.geo_reference.projection else []
     return {
         "name": run.name,
         "split": run.split,
         "finished": False,
-        "key": digest(SCHEMA, kind.key, run.key, run.origin, *place, *parts),
+        "key": digest(SCHEMA, kind.key, run.key, run.origin, *parts),
         "simulation_key": run.key,
         "simulation": dict(run.record),
         "origin_m": run.origin.tolist(),

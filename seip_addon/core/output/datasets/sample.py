@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ...arrays import Boolean, Float
 from ...errors import SeipError
-from ...geometry.geo_reference import GeoReference
 from ...sensing.scans.frame import Frame, Labels
 from ...sensing.scans.sensor import MountedSensor
 
@@ -43,8 +42,6 @@ class TrafficRun:
         In the order of the frames' sensor numbers.
     origin : (3,) float64, metres
         Map coordinates of the local origin: map = local + origin.
-    geo_reference : GeoReference
-        Where on the Earth the map is.
     record : mapping
         What else the manifest shall say of the simulation (seeds, settings, versions): values that JSON can hold.
     """
@@ -54,7 +51,6 @@ class TrafficRun:
     key: str
     sensors: tuple[MountedSensor, ...]
     origin: Float
-    geo_reference: GeoReference = field(default_factory=GeoReference)
     record: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from ...choosing.placement.objective import Objective
 from ...choosing.placement.search_limits import DEFAULT_EFFORT
 from ...sensing.visibility.settings import Engine, VisibilitySettings
+from ...sensing.weather import Weather
 from ...site.candidates import CandidateSettings
 from ...site.installed_cost import InstalledCost
-from ...site.weather import Weather
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Catalogue of LiDAR models: the shipped TOML file, TOML files of users, and calibration files of single units."""
+"""Catalogue of LiDAR models: the shipped TOML file, and TOML files of users."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from .carla_dropoff import CarlaDropoff
 from .model import DetectionLaw, LidarModel
 from .range_equation import MAKER_PROBABILITY, RangeEquation
 from .rosette import Rosette
-from .unit_files import is_unit_file, read_unit_file
 
 
 def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, LidarModel]:
@@ -30,9 +29,7 @@ def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, Li
     Parameters
     ----------
     extra : iterable of path-like
-        TOML files in the form of the shipped ``catalogue.toml``, and calibration files of units (`unit_files`). The
-        beams of a unit replace those of the model given by ``KEY=`` before the path, or by the product's name in the
-        file, or by the file's name.
+        TOML files in the form of the shipped ``catalogue.toml``.
 
     Returns
     -------
@@ -56,11 +53,14 @@ def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, Li
     """
     catalogue = dict(_shipped())
     for path in map(Path, extra):
-        if is_unit_file(path):
-            model = _unit(path, catalogue)
-            catalogue[model.key] = model
-            continue
-        catalogue |= _parse(toml_text(path, "LiDAR catalogue"), str(path), catalogue)
+        if path.suffix.lower() in _CALIBRATION_SUFFIXES:
+            raise SeipError(
+                f"{path} is not a catalogue (.toml): write the elevations of your unit into a table of a catalogue"
+            )
+        models = _parse(toml_text(path, "LiDAR catalogue"), str(path), catalogue)
+        if not models:
+            raise SeipError(f"{path} has no sensor: write [KEY] and its values below it")
+        catalogue |= models
     return catalogue
 
 
@@ -88,18 +88,6 @@ def _shipped() -> dict[str, LidarModel]:
         model.elevations.setflags(write=False)
         model.azimuth_offsets.setflags(write=False)
     return models
-
-
-def _unit(named: Path, catalogue: Mapping[str, LidarModel]) -> LidarModel:
-    """Return a model of the catalogue with the beams of a unit, which is given as a path or as ``KEY=path``."""
-    key, _, rest = str(named).partition("=")
-    path = named if named.exists() or not rest else Path(rest)
-    beams = read_unit_file(path)
-    if path is named:
-        key = beams.key or path.stem.lower()
-        if key not in catalogue:
-            raise SeipError(f"{path} does not say which LiDAR it is of: name one, as in KEY={path.name}")
-    return beams.as_model(find_models(catalogue, [key])[key], path.name)
 
 
 def _parse(content: str, file: str, known: Mapping[str, LidarModel]) -> dict[str, LidarModel]:
@@ -286,6 +274,8 @@ def _channels(value: object) -> int:
         raise ValueError(f"must be a whole number from {CHANNELS}, not {value!r}")
     return value
 
+
+_CALIBRATION_SUFFIXES = {".json", ".xml", ".yaml", ".yml", ".csv"}  # of single units, as makers deliver them
 
 CALIBRATED = (1.0, 1.0)
 SHEET_GAINS = (0.3, 2.3)

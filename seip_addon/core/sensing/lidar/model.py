@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -225,6 +226,11 @@ class LidarModel:
     def in_air(self, extinction: float) -> LidarModel:
         """Return the sensor in air with additional extinction, in 1/m, on the way out and back."""
         return replace(self, law=self.law.in_air(extinction))
+
+
+def fields_of_view(models: Mapping[str, LidarModel]) -> dict[str, float]:
+    """Return the horizontal field of view of each model by its key, radians."""
+    return {key: model.field_of_view for key, model in models.items()}
 
 
 MAX_RAYS = 50_000_000

@@ -11,7 +11,7 @@ from ...arrays import Float, Integer
 from .model import LidarModel
 
 
-def return_chance(model: LidarModel, distance: Float, reflected: Float, deviation: Float | None = None) -> Float:
+def return_chance(model: LidarModel, distance: Float, reflected: Float) -> Float:
     """Return the probability that each hit returns: zero out of range, otherwise by the model's law.
 
     Parameters
@@ -20,8 +20,6 @@ def return_chance(model: LidarModel, distance: Float, reflected: Float, deviatio
         Distance of each hit; infinite on a miss.
     reflected : (n,) float64, 0 to 1
         Reflectivity of the surface times the cosine of the angle of incidence.
-    deviation : (n,) float64, optional
-        Deviation of the surface; see `surface_deviation`.
 
     Returns
     -------
@@ -29,7 +27,7 @@ def return_chance(model: LidarModel, distance: Float, reflected: Float, deviatio
         Probability of each return.
     """
     within = (distance >= model.min_range) & (distance <= model.max_range)
-    return np.where(within, model.law.chance(distance, reflected, deviation), 0.0)
+    return np.where(within, model.law.chance(distance, reflected), 0.0)
 
 
 def measured_returns(

@@ -16,15 +16,6 @@ From a diffuse (Lambertian) surface that fills the beam, a LiDAR receives the po
 normal distribution. c is below 1 because some returns are lost whatever their power; s is the standard deviation of ln
 p about the value from reflectivity and angle. m is computed from the data sheet: from the range at which a surface of
 10 % is detected.
-
-Most of the spread belongs to the surface and is the same for every ray that meets it at the same point: a share
-`SURFACE_SHARE` of the variance s² is that of surfaces. If a point deviates from its material by z standard deviations,
-
-.. math::
-
-    P(z) = c \, Φ\left(\frac{\ln p + z s \sqrt{q} - m}{s \sqrt{1 - q}}\right),
-
-whose mean over z is P again.
 """
 
 from __future__ import annotations
@@ -44,9 +35,6 @@ from .carla_dropoff import CarlaDropoff
 CEILING = 0.985
 SPREAD = 0.9
 """c and s of sensors without a measurement: sweeps of three makes have c of 0.98 to 1.00 and s of 0.5 to 1.3."""
-
-SURFACE_SHARE = 0.95
-"""q, chosen so that detection of a ray on a road is as repeatable from sweep to sweep as in real sweeps."""
 
 MAKER_PROBABILITY = 0.9
 """Probability of detection for ranges of data sheets that state none."""
@@ -212,7 +200,7 @@ class RangeEquation:
         above = 2 * self.extinction * far
         return np.where(below < 0, begin - below * (far - begin) / np.maximum(above - below, _TINY), far)
 
-    def chance(self, distance: Float, reflected: Float, deviation: Float | float | None = None) -> Float:
+    def chance(self, distance: Float, reflected: Float) -> Float:
         """Return the probability that each hit is detected, (n,) float64, 0 to `ceiling`.
 
         Parameters
@@ -221,17 +209,10 @@ class RangeEquation:
             Distance of each hit; infinite on a miss, which is never detected.
         reflected : (n,) float64
             ρ · |cos θ|.
-        deviation : (n,) float64, optional
-            Deviation of the surface at each hit, in standard deviations; by default the mean over all surfaces is used.
         """
         with np.errstate(divide="ignore"):
             power = np.log(self.strength(distance, reflected))
-        if deviation is None:
-            return self.ceiling * _normal_cdf((power - self.threshold) / self.spread)
-        shift = deviation * self.spread * math.sqrt(SURFACE_SHARE)
-        return self.ceiling * _normal_cdf(
-            (power + shift - self.threshold) / (self.spread * math.sqrt(1 - SURFACE_SHARE))
-        )
+        return self.ceiling * _normal_cdf((power - self.threshold) / self.spread)
 
     def reach(self, reflectivity: float, probability: float) -> float:
         """Return the range in metres up to which a surface that faces the sensor is detected with a probability."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -137,6 +138,15 @@ def _of_openlabel(content: dict[str, Any]) -> Iterator[_Box]:
         cuboids = data.get("cuboid", [])
         kind = data.get("type") or content.get("objects", {})[key]["type"]
         for cuboid in [cuboids] if isinstance(cuboids, dict) else cuboids:
-            x, y, z, *quaternion, length, width, height = (float(number) for number in cuboid["val"])
-            turn = quaternion_rotation(np.roll(quaternion, 1).reshape(4))
-            yield str(kind), [x, y, z, length, width, height, np.arctan2(turn[1, 0], turn[0, 0])]
+            x, y, z, *rotation, length, width, height = (float(number) for number in cuboid["val"])
+            yield str(kind), [x, y, z, length, width, height, _yaw_of(rotation)]
+
+
+def _yaw_of(rotation: Sequence[float]) -> float:
+    """Return the heading of an OpenLABEL cuboid: from a quaternion x y z w, or from Euler angles about x, y and z."""
+    if len(rotation) == 4:
+        turn = quaternion_rotation(np.roll(rotation, 1))
+        return float(np.arctan2(turn[1, 0], turn[0, 0]))
+    if len(rotation) == 3:  # radians; x is turned first, z last
+        return rotation[2] if math.cos(rotation[1]) >= 0.0 else rotation[2] + math.pi
+    raise ValueError(f"a cuboid has {len(rotation) + 6} numbers, not 10 with a quaternion or 9 with Euler angles")

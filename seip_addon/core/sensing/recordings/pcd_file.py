@@ -118,7 +118,12 @@ def _compressed_fields(body: bytes, point: np.dtype[Any], count: int) -> list[ND
     size = count * point.itemsize
     if packed > len(body) - 8 or unpacked != size or size > _MAX_LZF_RATIO * packed:
         raise ValueError(f"it announces {packed:,} bytes for {count:,} points in {len(body):,} compressed bytes")
-    content = lzf_decompressed(body[8 : 8 + packed], size)
+    content = body[8 : 8 + packed]
+    try:
+        content = lzf_decompressed(content, size)
+    except ValueError:
+        if packed != size:  # some writers store bytes that LZF does not make shorter
+            raise
     kinds = [point[name] for name in point.names or ()]
     parts = np.split(np.frombuffer(content, np.uint8), np.cumsum([count * kind.itemsize for kind in kinds])[:-1])
     return [part.view(kind.base).reshape(count, *kind.shape) for part, kind in zip(parts, kinds, strict=True)]

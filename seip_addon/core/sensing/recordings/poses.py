@@ -20,6 +20,7 @@ Pose = Float
 """Transform (4, 4) float64 from a sensor's axes to those of the site."""
 
 _MAX_BYTES = 1 << 22
+_MAX_NAME = 100  # characters of a sensor's name
 _CURE = "give each sensor's name and a 4 × 4 matrix, as JSON"
 _NUMBER = re.compile(r"(?<![\w.])[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?(?![\w.])")
 _CAMERA_TO_SITE = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
@@ -88,6 +89,8 @@ def _of_kitti(text: str) -> Float:
 
 
 def _pose(name: str, matrix: Any) -> Pose:  # noqa: ANN401  # lists of numbers, if all is well
+    if not 0 < len(name) <= _MAX_NAME or not name.isprintable():
+        raise ValueError(f"the name {name[:40]!r} of a sensor does not have 1 to {_MAX_NAME} printable characters")
     pose = np.array(matrix, dtype=np.float64)
     if pose.size != 16 or not LOCAL_COORDINATE.allow(pose):
         raise ValueError(f"the pose of {name[:40]!r} does not have 16 numbers of at most 10,000 km")

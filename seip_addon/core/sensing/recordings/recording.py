@@ -72,9 +72,7 @@ def open_recording(path: Path, rate: float) -> Recording:
     found = {folder.name: _content(folder)[0] for folder in folders if folder.name.lower() != MERGED}
     sensors = tuple(_sensor(name, paths, rate) for name, paths in found.items() if paths)
     if not sensors:
-        raise SeipError(
-            f"{path} has no sweeps: name a folder of .pcd, .bin, .npz, .las, .laz or .csv files, or a .pcap"
-        )
+        raise SeipError(f"{path} has no sweeps: name a folder of .pcd, .bin or .npz files, or a .pcap")
     return Recording(path.name, sensors)
 
 

@@ -1,4 +1,4 @@
-"""Readers of sweeps: PCD, KITTI's and nuScenes' binary files, npz, LAS, LAZ and CSV."""
+"""Readers of sweeps: PCD, KITTI's and nuScenes' binary files, and npz."""
 
 from __future__ import annotations
 
@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from ...arrays import Float
 from ...errors import SeipError
-from ...limits import SWEEP_POINTS
 from ...storage.array_file import read_npz
 from ...storage.files import read_small
-from ...storage.las_file import damaged_las, opened_las
-from .pcd_file import number_table, read_pcd
+from .pcd_file import read_pcd
 from .sweep import Sweep, sweep_of
 
 MAX_BYTES = 1 << 30  # largest size of the file of a sweep
+_BIN_COLUMNS = (4, 5, 6)  # of a .bin: KITTI's four, and a ring and a time
 
 Columns = dict[str, NDArray[Any]]
 
@@ -28,8 +27,6 @@ _NAMES = {
     "time": ("time",),
 }
 """Names of each column in files, the preferred one first."""
-
-_POINTS_PER_STEP = 200_000
 
 
 def sweep_suffix(path: Path) -> str:
@@ -41,8 +38,9 @@ def sweep_suffix(path: Path) -> str:
 def read_sweep(path: Path) -> Sweep:
     """Read a sweep in the format of the file's suffix.
 
-    ``.bin`` holds four float32 for each point (KITTI), ``.pcd.bin`` five (nuScenes). Point clouds with named columns
-    need ``x``, ``y`` and ``z``; the names of intensity are those of `_NAMES`.
+    ``.bin`` holds four to six float32 for each point, of which x, y, z and intensity are read (KITTI), and ``.pcd.bin``
+    five (nuScenes). Point clouds with named columns need ``x``, ``y`` and ``z``; the names of intensity are those of
+    `_NAMES`.
 
     Raises
     ------
@@ -84,20 +82,28 @@ def _found(path: Path, names: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def _binary(names: Sequence[str]) -> Callable[[Path], tuple[Columns, None]]:
-    """Return a reader of float32 files with the given columns and no header."""
+def _kitti(path: Path) -> tuple[Columns, None]:
+    """Read float32 points: x, y, z, intensity, and up to two further columns, which are ignored."""
+    content = read_small(path, MAX_BYTES, _CURE)
+    values = np.frombuffer(content[: len(content) // 4 * 4], "<f4")
+    whole = [count for count in _BIN_COLUMNS if len(content) % (4 * count) == 0]
+    if not whole:
+        raise ValueError(
+            f"{len(content):,} bytes are not whole points of {_BIN_COLUMNS[0]} to {_BIN_COLUMNS[-1]} float32"
+        )
+    # The file does not give the number of columns. With a wrong one, coordinates are taken for intensity, and some of
+    # them are negative.
+    count = next((count for count in whole if (values[3::count] >= 0.0).all()), whole[0])
+    points = values.reshape(-1, count)
+    return dict(zip(("x", "y", "z", "intensity"), points.T, strict=False)), None
 
-    def read(path: Path) -> tuple[Columns, None]:
-        content = read_small(path, MAX_BYTES, _CURE)
-        if len(content) % (4 * len(names)):
-            raise ValueError(
-                f"{len(content):,} bytes are not whole points of {len(names)} float32; files that end in .bin have "
-                "four, in .pcd.bin five"
-            )
-        points = np.frombuffer(content, "<f4").reshape(-1, len(names))
-        return dict(zip(names, points.T, strict=True)), None
 
-    return read
+def _nuscenes(path: Path) -> tuple[Columns, None]:
+    content = read_small(path, MAX_BYTES, _CURE)
+    if len(content) % 20:
+        raise ValueError(f"{len(content):,} bytes are not whole points of 5 float32")
+    points = np.frombuffer(content, "<f4").reshape(-1, 5)
+    return dict(zip(("x", "y", "z", "intensity"), points.T, strict=False)), None
 
 
 def _npz(path: Path) -> tuple[Columns, None]:
@@ -117,41 +123,9 @@ def _npz(path: Path) -> tuple[Columns, None]:
     return columns, None
 
 
-def _csv(path: Path) -> tuple[Columns, None]:
-    head, _, body = read_small(path, MAX_BYTES, _CURE).decode("utf-8-sig").partition("\n")
-    names = [name.strip().strip('"').lower() for name in head.split(",")]
-    found = _found(path, names)
-    table = number_table(body, ",", [names.index(name) for name in found.values()])
-    return dict(zip(found, table.T, strict=True)), None
-
-
-def _las(path: Path) -> tuple[Columns, None]:
-    with opened_las(path) as reader:
-        whole = int(reader.header.point_count)
-        SWEEP_POINTS.require(whole, path.name, "number of points", "export one revolution to a file")
-        try:
-            found = _found(path, ["x", "y", "z", *map(str, reader.header.point_format.dimension_names)])
-            chunks = [
-                np.column_stack([np.asarray(chunk[name], dtype=np.float64) for name in found.values()])
-                for chunk in reader.chunk_iterator(_POINTS_PER_STEP)
-            ]
-        except Exception as error:  # whatever a damaged file makes of laspy
-            raise damaged_las(path, error) from error
-    table = np.concatenate([np.empty((0, len(found))), *chunks])
-    if len(table) != whole:
-        raise damaged_las(path, ValueError(f"it announces {whole:,} points and has {len(table):,}"))
-    columns = dict(zip(found, table.T, strict=True))
-    if not columns["intensity"].any():  # a dimension that every file has
-        del columns["intensity"]
-    return columns, None
-
-
 _READERS: dict[str, Callable[[Path], tuple[Columns, Float | None]]] = {
-    ".pcd.bin": _binary(("x", "y", "z", "intensity", "ring")),
+    ".pcd.bin": _nuscenes,
     ".pcd": _pcd,
-    ".bin": _binary(("x", "y", "z", "intensity")),
+    ".bin": _kitti,
     ".npz": _npz,
-    ".las": _las,
-    ".laz": _las,
-    ".csv": _csv,
 }

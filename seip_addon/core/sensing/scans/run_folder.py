@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,6 @@ import numpy as np
 
 from ...arrays import Float
 from ...errors import SeipError
-from ...geometry.geo_reference import GeoReference
 from ...progress import Progress
 from ...storage.files import digest, save_json
 from ...storage.folder_contents import MANIFEST, check_no_placement
@@ -48,8 +47,6 @@ class Run:
         Settings of the scans, with the engine's name instead of ``auto``.
     versions : mapping of str to str
         Versions of this program and of its dependencies.
-    geo_reference : GeoReference
-        Position of the map on the Earth; frames do not depend on it, datasets may.
     """
 
     static: StaticScene
@@ -60,7 +57,6 @@ class Run:
     times: Float
     settings: ScanSettings
     versions: Mapping[str, str]
-    geo_reference: GeoReference = field(default_factory=GeoReference)
 
     @property
     def key(self) -> str:

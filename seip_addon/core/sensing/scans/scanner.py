@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from ...arrays import Boolean, Float, Integer
 from ..lidar.beams import BeamPattern
 from ..lidar.noisy_returns import return_chance
-from ..lidar.range_equation import RangeEquation
-from ..lidar.surface_patches import surface_deviation
 from ..visibility.ray_casting import RayCaster
 from .beam_culling import BeamWindows
 from .frame import STATIC_INSTANCE
@@ -193,8 +191,6 @@ class Scanner:
     ----------
     ground : ReflectiveSurface
         Static scene, in site axes.
-    seed : int
-        Seed of the deviations of surfaces from their materials.
 
     Attributes
     ----------
@@ -208,8 +204,8 @@ class Scanner:
         Useful number of scanners that scan at once.
     """
 
-    def __init__(self, sensor: MountedSensor, ground: ReflectiveSurface, seed: int) -> None:
-        self.sensor, self._ground, self._seed, self.threads = sensor, ground, seed, ground.caster.threads
+    def __init__(self, sensor: MountedSensor, ground: ReflectiveSurface) -> None:
+        self.sensor, self._ground, self.threads = sensor, ground, ground.caster.threads
         self.delay = sensor.model.delay(np.arange(sensor.model.channels * sensor.model.azimuth_count))
         self._model = sensor.model
         self._cast_at_ground()
@@ -306,20 +302,15 @@ class Scanner:
         # the hull covers the whole revolution; the box at each ray's own time is much smaller
         passing = np.flatnonzero(shape.may_hit(origin, directions, self._model.max_range))
         start = origin[:, 0] if motion.is_still else origin[:, passing].T
-        return self._cast(shape, start, directions[:, passing].T, ray[passing], motion.user + 1)
+        return self._cast(shape, start, directions[:, passing].T, ray[passing])
 
-    def _cast(self, surface: ReflectiveSurface, origin: Float, directions: Float, ray: Integer, of: int = 0) -> _Hits:
-        """Cast rays at a surface in its axes; ``of`` is 0 for the static scene, else a road user's number plus 1."""
+    def _cast(self, surface: ReflectiveSurface, origin: Float, directions: Float, ray: Integer) -> _Hits:
+        """Cast rays at a surface in its axes."""
         distance, triangle = surface.caster.cast(origin, directions, self._model.max_range)
         hit = np.flatnonzero(triangle >= 0)
         distance, directions = distance[hit], directions[hit]
         reflected = surface.reflected(directions, triangle[hit])
-        # Deviations from the material belong to places on the surface: computed in its own axes, they move with it
-        deviation = None
-        if isinstance(self._model.law, RangeEquation):
-            start = origin if origin.ndim == 1 else origin[hit]
-            deviation = surface_deviation(start + distance[:, None] * directions, (self._seed, of))
-        return _Hits(ray[hit], distance, reflected, return_chance(self._model, distance, reflected, deviation))
+        return _Hits(ray[hit], distance, reflected, return_chance(self._model, distance, reflected))
 
 
 def returns_by_user(instance: NDArray[np.int32], users: int) -> Integer:

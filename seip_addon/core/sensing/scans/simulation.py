@@ -228,7 +228,7 @@ def prepare(
     scanners = []
     for number, sensor in enumerate(sensors):
         yield Progress(number, len(sensors), "scanning the static scene")
-        scanners.append(Scanner(sensor, ground, settings.seed))
+        scanners.append(Scanner(sensor, ground))
     yield Progress(len(sensors), len(sensors), "scanning the static scene")
     return Simulation(static, scanners, trajectories, shapes, settings)
 

@@ -20,7 +20,7 @@ import numpy as np
 from ...arrays import Boolean, Float, Integer
 from ...counts import counted
 from ...errors import SeipError
-from ...limits import MAP_COORDINATE, SPEED, TIME
+from ...limits import LATITUDE, LONGITUDE, MAP_COORDINATE, SPEED, TIME
 from ...progress import Progress
 from ...storage.files import digest
 from ...storage.xml_stream import Attributes, opened, quoted, read_tags, short
@@ -28,6 +28,7 @@ from .trajectories import RoadUser, Trajectories
 from .vehicle_types import CAR, PERSON, VehicleType
 
 _MAX_NAMED = 5  # largest number of road users named in a message, which gives the number of the others
+_MIN_DRIVEN, _MOST_MOVED = 10.0, 1e-3  # metres by speed, and share of them in coordinates that are degrees
 _LINES_PER_REPORT = 20_000  # lines of csv between two reports of progress
 
 
@@ -53,6 +54,8 @@ class FloatingCarData:
         Speed at each sample.
     elsewhere : int
         Number of further road users in the file that are never within the bounds.
+    riders, containers : int
+        Number of persons in vehicles, and of containers, which are left out.
     """
 
     names: tuple[str, ...]
@@ -64,14 +67,20 @@ class FloatingCarData:
     yaw: Float
     speed: Float
     elsewhere: int = 0
+    riders: int = 0
+    containers: int = 0
 
 
 class Extent(NamedTuple):
-    """Part of a file to read: a span of the simulation in seconds, and a rectangle of the map in metres."""
+    """Part of a file to read: a span of the simulation in seconds, and a rectangle of the map in metres.
+
+    The span ends ``duration`` after it begins, or after the first step of the file if it has no beginning.
+    """
 
     begin: float = -math.inf
     end: float = math.inf
     bounds: tuple[float, float, float, float] = (-math.inf, -math.inf, math.inf, math.inf)
+    duration: float = math.inf
 
 
 def read_floating_car_data(
@@ -121,7 +130,7 @@ def read_trajectories(
     trajectories : Trajectories
         Trajectories that are not fitted to the road yet: pitch is zero, and heights are those of the file or NaN.
     warnings : tuple of str
-        Warning about road users without a size.
+        Warnings about road users without a size, and about what is left out.
 
     Raises
     ------
@@ -155,7 +164,7 @@ def read_trajectories(
         source=source,
     )
     unknown = [name for name, kind in zip(data.names, data.types, strict=True) if kind not in types]
-    return trajectories, _missing_sizes(unknown, len(users))
+    return trajectories, (*_missing_sizes(unknown, len(users)), *_left_out(data))
 
 
 def listed(names: Sequence[str]) -> str:
@@ -193,13 +202,18 @@ class _Rows:
 
     def __init__(self, file: str, net_offset: Float, window: Extent) -> None:
         self._file = file
-        self._window = window
+        self._window, self._end = window, window.end
         self._shift_x, self._shift_y = net_offset.tolist()
         self._numbers: dict[tuple[str, bool], int] = {}  # a vehicle and a person may share an id
         self._types: list[str] = []
         self._outside: set[tuple[str, bool]] = set()
         self._steps = 0
         self._time = -math.inf
+        self._vehicles_here: set[tuple[str, str]] = set()  # places of vehicles in this step, as the file writes them
+        self._persons_here: list[tuple[str, tuple[str, str]]] = []
+        self._riders: set[str] = set()
+        self._containers: set[str] = set()
+        self._degrees: _Degrees | None = _Degrees()  # until a coordinate is none of a place on the Earth
         self._user = array("q")
         self._columns = [array("d") for _ in range(6)]
 
@@ -209,6 +223,8 @@ class _Rows:
             self.begin(attributes.get("time", ""))
         elif tag in ("vehicle", "person") and self._steps:
             self.add(attributes, walks=tag == "person")
+        elif tag == "container":
+            self._containers.add(attributes.get("id", ""))
 
     def begin(self, text: str) -> None:
         """Begin a step of the simulation."""
@@ -218,16 +234,34 @@ class _Rows:
                 f"{self._file}: times run backwards, {time:g} s comes after {self._time:g} s; "
                 "use the output of a single simulation, in its order"
             )
+        if not self._steps:
+            begin = self._window.begin if math.isfinite(self._window.begin) else time
+            self._end = min(self._window.end, begin + self._window.duration)
+        if time > self._time:
+            self._note_riders()
         self._time = time
         self._steps += 1
 
+    def _note_riders(self) -> None:
+        """Note the persons of the step before that are in vehicles: they have the place of one."""
+        self._riders |= {name for name, place in self._persons_here if place in self._vehicles_here}
+        self._vehicles_here.clear()
+        self._persons_here.clear()
+
     def add(self, row: Attributes, *, walks: bool) -> None:
         """Add the position of a road user."""
-        if not self._window.begin <= self._time <= self._window.end:
+        if not self._window.begin <= self._time <= self._end:
             return
-        name = row.get("id", "")
-        x = self._number(row.get("x", ""), "x", name, MAP_COORDINATE.most) - self._shift_x
-        y = self._number(row.get("y", ""), "y", name, MAP_COORDINATE.most) - self._shift_y
+        name, place = row.get("id", ""), (row.get("x", ""), row.get("y", ""))
+        x, y = (self._number(text, axis, name, MAP_COORDINATE.most) for text, axis in zip(place, "xy", strict=True))
+        speed = self._number(row.get("speed") or "0", "speed", name, SPEED.most)
+        if self._degrees is not None and not self._degrees.add((name, walks), self._time, x, y, speed):
+            self._degrees = None
+        x, y = x - self._shift_x, y - self._shift_y
+        if walks:
+            self._persons_here.append((name, place))
+        else:
+            self._vehicles_here.add(place)
         left, low, right, high = self._window.bounds
         key = (name, walks)
         if not (left <= x <= right and low <= y <= high):
@@ -244,7 +278,7 @@ class _Rows:
             y,
             math.nan if z == "nan" else self._number(z, "z", name, MAP_COORDINATE.most),
             self._number(row.get("angle", ""), "angle", name, 1e4),
-            self._number(row.get("speed") or "0", "speed", name, SPEED.most),
+            speed,
         )
         for column, value in zip(self._columns, values, strict=True):
             column.append(value)
@@ -255,12 +289,20 @@ class _Rows:
             raise SeipError(
                 f"{self._file} is not floating car data: it has no time steps; use the output of SUMO's --fcd-output"
             )
-        user = np.frombuffer(self._user, dtype=np.int64)
-        order = np.argsort(user, kind="stable")
+        self._note_riders()
+        if self._degrees is not None and self._degrees.are_likely:
+            raise SeipError(
+                f"{self._file}: x and y are degrees, not metres; simulate without --fcd-output.geo, or convert them"
+            )
+        keys = [key for key in self._numbers if not (key[1] and key[0] in self._riders)]
+        numbers = np.full(len(self._numbers), -1)
+        numbers[np.array([self._numbers[key] for key in keys], dtype=np.int64)] = np.arange(len(keys))
+        user = numbers[np.frombuffer(self._user, dtype=np.int64)]
+        order = np.argsort(user, kind="stable")[np.count_nonzero(user < 0) :]  # riders come first
         user = user[order]
         time, x, y, z, angle, speed = (np.array(column, dtype=np.float64)[order] for column in self._columns)
-        vehicles = {name for name, walks in self._numbers if not walks}
-        names = tuple(f"person {name}" if walks and name in vehicles else name for name, walks in self._numbers)
+        vehicles = {name for name, walks in keys if not walks}
+        names = tuple(f"person {name}" if walks and name in vehicles else name for name, walks in keys)
         twice = (np.diff(user) == 0) & (np.diff(time) <= 0)
         if twice.any():
             number = int(np.flatnonzero(twice)[0])
@@ -271,14 +313,16 @@ class _Rows:
         first = np.searchsorted(user, np.arange(len(names) + 1))
         return FloatingCarData(
             names=names,
-            types=tuple(self._types),
-            person=np.array([walks for _, walks in self._numbers], dtype=np.bool_),
+            types=tuple(self._types[self._numbers[key]] for key in keys),
+            person=np.array([walks for _, walks in keys], dtype=np.bool_),
             first=first.astype(np.int64),
             time=time,
             position=np.stack([x, y, z], axis=1),
             yaw=unwrapped(np.radians(90.0 - angle), first),
             speed=speed,
             elsewhere=len(self._outside.difference(self._numbers)),
+            riders=len(self._numbers) - len(keys),
+            containers=len(self._containers),
         )
 
     def _number(self, text: str, what: str, where: str, most: float) -> float:
@@ -293,6 +337,27 @@ class _Rows:
                 f"{self._file}: {what}={quoted(text)} of {quoted(where)}{known} {fault}; write the file again"
             )
         return value
+
+
+class _Degrees:
+    """Whether coordinates may be degrees: road users move much less in them than their speeds say."""
+
+    def __init__(self) -> None:
+        self._last: dict[tuple[str, bool], tuple[float, float, float]] = {}
+        self._moved = self._driven = 0.0
+
+    def add(self, key: tuple[str, bool], time: float, x: float, y: float, speed: float) -> bool:
+        """Add a sample of a road user, and return whether its coordinates may be longitude and latitude."""
+        before, self._last[key] = self._last.get(key), (time, x, y)
+        if before is not None:
+            self._driven += speed * (time - before[0])
+            self._moved += math.hypot(x - before[1], y - before[2])
+        return LONGITUDE.allow(x) and LATITUDE.allow(y)
+
+    @property
+    def are_likely(self) -> bool:
+        """Whether the coordinates of all samples are degrees rather than metres."""
+        return self._driven > _MIN_DRIVEN and self._moved < _MOST_MOVED * self._driven
 
 
 def _read_csv(path: str | os.PathLike[str], rows: _Rows) -> Generator[Progress, None, None]:
@@ -326,6 +391,8 @@ def _take_line(cells: Attributes, rows: _Rows) -> None:
     rows.begin(cells["timestep_time"])
     if cells.get("person_id"):
         rows.add(_part(cells, "person_"), walks=True)
+    if cells.get("container_id"):
+        rows.take("container", _part(cells, "container_"))
     if cells.get("vehicle_id"):
         walks = bool(cells.get("vehicle_edge")) and not cells.get("vehicle_lane")
         rows.add(_part(cells, "vehicle_"), walks=walks)
@@ -351,3 +418,9 @@ def _missing_sizes(unknown: list[str], count: int) -> tuple[str, ...]:
         f"for vehicles {CAR.length:g} × {CAR.width:g} × {CAR.height:g} m; name their route file"
     )
     return (sentence,)
+
+
+def _left_out(data: FloatingCarData) -> tuple[str, ...]:
+    found = [(data.riders, "person in a vehicle", "persons in vehicles"), (data.containers, "container", "containers")]
+    named = [counted(number, one, several) for number, one, several in found if number]
+    return (f"left out: {' and '.join(named)}",) if named else ()

@@ -39,15 +39,15 @@ class TrafficFiles:
         Files with the vehicle types, for floating car data.
     net : path, optional
         The ``.net.xml``, which contains the offset from the map.
-    begin, end : float, seconds
-        Time span of floating car data to read.
+    start, duration : float, seconds, optional
+        Time span of floating car data to read; by default all.
     """
 
     path: Path
     routes: tuple[Path, ...] = ()
     net: Path | None = None
-    begin: float = -math.inf
-    end: float = math.inf
+    start: float | None = None
+    duration: float | None = None
 
     @property
     def trajectories(self) -> bool:
@@ -66,7 +66,11 @@ def load_traffic(files: TrafficFiles, geometry: SceneGeometry) -> Generator[Prog
     if files.trajectories:
         yield Progress(0, 0, "trajectories")
         return LoadedTraffic(load_trajectories(files.path, geometry), ())
-    window = Extent(files.begin, files.end, road_bounds(geometry, ROAD_MARGIN))
+    window = Extent(
+        begin=-math.inf if files.start is None else files.start,
+        bounds=road_bounds(geometry, ROAD_MARGIN),
+        duration=math.inf if files.duration is None else files.duration,
+    )
     read = yield from read_sumo(files, window, geometry, files.path.name)
     fit = fit_to_road(read.trajectories, geometry)
     overlaps = yield from overlap_warnings(fit.trajectories)

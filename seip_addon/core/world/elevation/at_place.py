@@ -29,7 +29,6 @@ from .obstacles import (
     MIN_ABOVE,
     RAYS,
     UNCLASSIFIED,
-    VEGETATION,
     Merging,
     chosen_boxes,
     chosen_merging,
@@ -43,7 +42,6 @@ CELL, MAX_CELLS = 1.0, 1500  # metres of a cell, and cells along a side at most:
 POINTS_PER_CELL, MAX_CELL = 2.0, 5.0  # least mean number of survey points in a cell, and largest cell in metres
 GROUND = 2  # class of ground points in a survey
 TRAFFIC_MARGIN = 1.0  # metres around the carriageway within which unclassified points are traffic
-MODEL_MARGIN = 1.0  # metres around a building of a city model within which survey points belong to it
 MIN_COVERED = 0.5  # least share of the place with known heights; otherwise the file belongs to a different place
 FLAT, MIN_FLAT = 0.25, 0.6  # a map is flat if at least this share of its lanes is within this (metres) of one height
 
@@ -140,7 +138,7 @@ def with_terrain(
     points, classes = yield from _survey_points(request, around)
     smooth = _surveyed_ground(points, classes, around.area, path.name).smoothed(SMOOTHING)
     yield Progress(0, 0, "boxes of the survey")
-    standing = _standing(points, classes, around, description)
+    standing = _standing(points, classes, around)
     raster = obstacle_raster(smooth, points[standing], classes[standing])
     boxes, tried = chosen_boxes(raster, np.random.default_rng(_SEED))
     # A map with heights may use a different zero: objects move by the median difference between lanes and ground.
@@ -211,23 +209,19 @@ def _surveyed_ground(points: Float, classes: Integer, area: BaseGeometry, name: 
     return replace(raster, heights=heights.reshape(rows, columns))
 
 
-def _standing(points: Float, classes: Integer, around: MapSurroundings, description: SiteDescription) -> Boolean:
-    """Return which points belong to objects, excluding traffic and buildings that a city model contains."""
+def _standing(points: Float, classes: Integer, around: MapSurroundings) -> Boolean:
+    """Return which points belong to objects, excluding traffic."""
     road = around.carriageway.buffer(TRAFFIC_MARGIN)
     shapely.prepare(road)
     traffic: Boolean = np.isin(classes, UNCLASSIFIED) & shapely.contains_xy(road, points[:, :2])
-    # Vegetation stays: a tree above the roof of a modelled building is not part of the building.
-    modelled = shapely.union_all([one.outline for one in description.solids]).buffer(MODEL_MARGIN)
-    shapely.prepare(modelled)
-    known: Boolean = shapely.contains_xy(modelled, points[:, :2]) & ~np.isin(classes, VEGETATION)
-    return ~(traffic | known)
+    return ~traffic
 
 
 def _placed(name: str, solid: Solid, raised: float) -> PlacedSolid:
     plan = outline(solid.vertices[[face[:3] for face in solid.faces]])
     boxes = shapely.union_all([plan, outline(solid.vertices[[(face[0], *face[2:]) for face in solid.faces]])])
     moved = replace(solid, vertices=solid.vertices + np.array([0.0, 0.0, raised]))
-    return PlacedSolid(name, moved, boxes, FROM_SURVEY, on_ground=False, is_building=name == KINDS[-1])
+    return PlacedSolid(name, moved, boxes, FROM_SURVEY, is_building=name == KINDS[-1])
 
 
 def _level(lanes: Float) -> tuple[float, bool]:

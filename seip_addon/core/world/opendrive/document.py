@@ -127,7 +127,7 @@ def _refuse_other_formats(path: str | os.PathLike[str], name: str) -> None:
             raise SeipError(f"{name} {cure}")
     if start.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"["):
         kind = "CityJSON, a model of buildings" if b'"CityJSON"' in start else "JSON"
-        raise SeipError(f"{name} is {kind}, not OpenDRIVE; choose an .xodr file")
+        raise SeipError(f"{name} is {kind}, not OpenDRIVE: choose an .xodr file")
 
 
 def read_document(path: str | os.PathLike[str]) -> Node:

@@ -17,6 +17,7 @@ from .sampling import sample
 
 _MIN_TRIANGLE_AREA = 1e-9  # square metres
 _MAX_HEIGHT, _MAX_WIDTH = ELEVATION.most, 1_000.0  # metres; values beyond are errors of the map
+_MAX_OFFSET = 5_000.0  # metres of a lane's edge from the reference line; likewise
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,21 +107,24 @@ def lane_surfaces(road: Road, tolerance: float = 0.02) -> tuple[LaneSurface, ...
             continue
         s, points = sample(partial(_edges, road, section), _knots(road, section), tolerance, place)
         points = points.reshape(-1, len(lanes), 2, 3)
-        _check_size(points, place)
+        _check_size(points, np.stack(road.reference_line(s)[:2], axis=-1), place)
         for lane, edges in zip(lanes, np.moveaxis(points, 1, 0), strict=True):
             of_road = (road.id, road.junction_id, number, lane.id, lane.type, road.keeps_left)
             surfaces.append(LaneSurface(*of_road, s, edges[:, 0], edges[:, 1]))
     return tuple(surface for surface in surfaces if len(surface.triangles))
 
 
-def _check_size(points: Float, place: str) -> None:
-    """Raise an error if edges of lanes, (k, lanes, 2, 3), have an implausible height or distance."""
+def _check_size(points: Float, centre: Float, place: str) -> None:
+    """Raise an error if edges of lanes, (k, lanes, 2, 3), are implausibly high, or far from each other or the road."""
     highest = float(np.abs(points[..., 2]).max(initial=0.0))
     if highest > _MAX_HEIGHT:
         raise SeipError(f"{place}: it lies at {highest:,.0f} m above or below zero; correct the elevation in the map")
     widest = float(np.linalg.norm(points[:, :, 0] - points[:, :, 1], axis=-1).max(initial=0.0))
     if widest > _MAX_WIDTH:
         raise SeipError(f"{place}: a lane is {widest:,.0f} m wide; correct its width in the map")
+    farthest = float(np.linalg.norm(points[..., :2] - centre[:, None, None], axis=-1).max(initial=0.0))
+    if farthest > _MAX_OFFSET:
+        raise SeipError(f"{place}: a lane lies {farthest:,.0f} m beside the road; correct its <laneOffset> in the map")
 
 
 def _knots(road: Road, section: LaneSection) -> list[float]:

@@ -16,7 +16,7 @@ from ... import limits
 from ...errors import SeipError
 from .document import Node, read_document
 from .profile import ZERO_PROFILE, Profile, lateral_shape, profile
-from .reference_line import Clothoid, Piece, ReferenceLine, param_poly3, poly3
+from .reference_line import Clothoid, Cubic, Piece, ReferenceLine, param_poly3, poly3
 from .road_map import (
     Corner,
     Junction,
@@ -45,6 +45,8 @@ _MAX_ROAD_LENGTH = limits.ROAD_LENGTH.most
 _MAX_OBJECT_DISTANCE = limits.SITE_RADIUS.most  # metres that an object reaches, and stands from its road
 _MAX_OBJECT_HEIGHT = limits.ABOVE_GROUND.most
 _MAX_TURN = 200.0 * math.pi  # radians within one geometry; a hundred turns
+_MAX_STRETCH, _SLACK = 2.0, 10.0
+"""Multiple of its length, and metres, from its start beyond which no point of a road lies unless a number is wrong."""
 
 
 def read_map(path: str | os.PathLike[str]) -> RoadMap:
@@ -138,6 +140,14 @@ def _reference_line(road: Node) -> ReferenceLine:
     )
     if line.end > _MAX_ROAD_LENGTH:
         raise SeipError(f"{road.place}: its <geometry> reaches {line.end:g} m, longer than any road; correct the map")
+    away = np.hypot(*(line.start[:, :2] - line.start[0, :2]).T)
+    wrong = np.flatnonzero(away > _MAX_STRETCH * (line.s - line.s[0]) + _SLACK)
+    if len(wrong):
+        s, metres = line.s[wrong[0]], away[wrong[0]]
+        raise SeipError(
+            f"{road.place}: its <geometry> at s={s:g} begins {metres:,.0f} m from the start of the road; correct its x "
+            "and y in the map"
+        )
     return line
 
 
@@ -153,7 +163,8 @@ def _piece(geometry: Node) -> Piece:
             case "spiral":
                 return _clothoid(node, node.number("curvStart"), node.number("curvEnd"), length)
             case "poly3":
-                return poly3((node.number("a"), node.number("b"), node.number("c"), node.number("d")), length)
+                coefficients = node.number("a"), node.number("b"), node.number("c"), node.number("d")
+                return _within_reach(poly3(coefficients, length), node, length)
             case "paramPoly3":
                 return _param_poly3(node, length)
     raise SeipError(
@@ -177,6 +188,24 @@ def _param_poly3(node: Node, length: float) -> Piece:
     curve = param_poly3(u, v, length if node.text("pRange", "normalized") == "arcLength" else 1.0, length)
     if not (math.isfinite(curve.stretch) and curve.stretch > 0.0):
         raise SeipError(f"{node.place}: a <paramPoly3> has no extent; correct its coefficients")
+    return _within_reach(curve, node, length)
+
+
+def _within_reach(curve: Cubic, node: Node, length: float) -> Cubic:
+    """Return a curve whose points lie within its length of its start.
+
+    Raises
+    ------
+    SeipError
+        They do not: a coefficient is wrong.
+    """
+    x, y, _ = curve(np.linspace(0.0, length, 65))
+    away = float(np.hypot(x, y).max())
+    if not away <= _MAX_STRETCH * length + _SLACK:
+        raise SeipError(
+            f"{node.place}: a <{node.tag}> of {length:g} m reaches {away:,.0f} m from its start; correct its "
+            "coefficients"
+        )
     return curve
 
 

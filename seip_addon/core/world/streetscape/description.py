@@ -153,20 +153,18 @@ class Slab:
 
 @dataclass(frozen=True, eq=False)
 class PlacedSolid:
-    """A solid from a separate file, such as a city model or a survey.
+    """A solid from a separate file, such as a survey.
 
     Parameters
     ----------
     name : str
         Kind of the solid, such as ``Building``.
     solid : Solid
-        Shape with map coordinates in plan; its heights count from the ground under it, or are those of the map.
+        Shape in map coordinates.
     outline : shapely geometry
         Outline in plan, map coordinates.
     source : str
         See `Building`.
-    on_ground : bool
-        Whether its heights count from the lowest ground under its outline.
     is_building : bool
         Whether it replaces buildings of the map and of an extract.
     """
@@ -175,7 +173,6 @@ class PlacedSolid:
     solid: Solid
     outline: BaseGeometry
     source: str
-    on_ground: bool = True
     is_building: bool = True
 
 
@@ -234,7 +231,7 @@ class SiteDescription:
     slabs, posts, ways : tuple
         Plates, plain posts, and ways next to the road, from an extract.
     solids : tuple of PlacedSolid
-        Solids from a city model or a survey; buildings among them replace those of the map.
+        Solids from a survey; buildings among them replace those of the map.
     keep_off_areas : tuple of KeepOffArea
         Areas from which rules exclude new posts, map coordinates.
     relief : Relief or None

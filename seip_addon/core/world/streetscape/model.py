@@ -337,9 +337,8 @@ def _local_way(way: SideWay, plan: Float) -> SideWay:
 
 
 def _local_solid(placed: PlacedSolid, origin: Float) -> PlacedSolid:
-    """Return a solid in local axes; heights that count from the ground stay as they are."""
-    shift = origin * [1, 1, 0] if placed.on_ground else origin
-    solid = replace(placed.solid, vertices=placed.solid.vertices - shift)
+    """Return a solid in local axes."""
+    solid = replace(placed.solid, vertices=placed.solid.vertices - origin)
     return replace(placed, outline=shifted(placed.outline, -origin), solid=solid)
 
 
@@ -418,14 +417,14 @@ def _hides(part: Part, area: BaseGeometry) -> bool:
 def _without_covered(
     objects: tuple[PlacedObject, ...], described: SiteDescription
 ) -> tuple[tuple[PlacedObject, ...], tuple[str, ...]]:
-    """Return the objects of a map without buildings that a city model or a survey contains, and a note on these."""
+    """Return the objects of a map without buildings that a survey contains, and a note on these."""
     modelled = [one.outline for one in described.solids if one.is_building]
     if not modelled:
         return objects, ()
     tree = shapely.STRtree(modelled)
     kept = tuple(one for one in objects if kind_of(one) is not Kind.BUILDING or not _is_covered(one, tree))
     count = len(objects) - len(kept)
-    note = f"{counted(count, 'building')} of the map replaced by those of the city model or the survey"
+    note = f"{counted(count, 'building')} of the map replaced by those of the survey"
     return kept, (note,) if count else ()
 
 
@@ -662,7 +661,9 @@ def _spans(levels: Levels, lanes: Sequence[LaneSurface], origin: Float) -> Itera
         above, below = (_triangles(roads.get(road, [])) for road in (crossing.above, crossing.below))
         place = shapely.Point(np.array(crossing.place) - origin[:2])
         common = outline(above, road_surface.SNAP_GRID).intersection(outline(below, road_surface.SNAP_GRID))
-        part = min(shapely.get_parts(common), key=place.distance, default=None)
+        # Beyond the scene neither road has a surface, and nothing of the crossing is left.
+        parts = [part for part in shapely.get_parts(common) if part.area > 0.0]
+        part = min(parts, key=place.distance, default=None)
         if part is not None:
             low = float(Terrain(below).height(shapely.get_coordinates(part)).max())
             yield part.buffer(float(embankment_width(np.array(crossing.height)))), low + MIN_LEVEL_HEIGHT
@@ -856,7 +857,7 @@ def _described_parts(description: SiteDescription, street: _Surroundings) -> lis
     for number, building in enumerate(description.buildings, start=1):
         parts += _building_parts(building, number, street)
     names = Counter[str]()
-    parts += _solid_parts(description, street, len(description.buildings))
+    parts += _solid_parts(description)
     for wall in description.walls:
         names[wall.name] += 1
         foot = _on_ground(wall.line, street) + np.array([0.0, 0.0, wall.base])
@@ -888,16 +889,12 @@ def _building_parts(building: Building, number: int, street: _Surroundings) -> l
     return [_with_item_source(part, building) for part in made]
 
 
-def _solid_parts(description: SiteDescription, street: _Surroundings, buildings: int) -> Iterator[Part]:
-    """Yield the solids of separate files, with buildings numbered after those of the description."""
-    numbers = Counter({"Building": buildings})
+def _solid_parts(description: SiteDescription) -> Iterator[Part]:
+    """Yield the solids of separate files, numbered by name."""
+    numbers = Counter[str]()
     for one in description.solids:
         numbers[one.name] += 1
-        vertices = one.solid.vertices.copy()
-        if one.on_ground:
-            vertices[:, 2] += float(street.terrain.height(shapely.get_coordinates(one.outline)).min())
-        solid = replace(one.solid, vertices=vertices)
-        yield Part(f"{one.name} {numbers[one.name]}", solid, (Role.OCCLUDERS,), source=one.source)
+        yield Part(f"{one.name} {numbers[one.name]}", one.solid, (Role.OCCLUDERS,), source=one.source)
 
 
 def _with_item_source(part: Part, item: Building | Wall | Slab | Trees | Poles) -> Part:

@@ -17,7 +17,7 @@ from ..opendrive.lanes import LaneSurface
 from ..opendrive.road_map import Junction, RoadMap
 from . import road_surface
 from .approaches import approach_lanes
-from .description import DEFAULT_RADIUS, SiteDescription
+from .description import DEFAULT_RADIUS, MAX_RADIUS, SiteDescription
 from .geographic_position import looks_like_degrees
 from .intersections import JUNCTION_REACH, box_along, filled, intersection, ring_roads, with_other_carriageways
 from .levels import Levels, split_levels
@@ -70,10 +70,27 @@ class Place:
         if self.description.along is None:
             return shapely.Point(self.centre).buffer(self.description.radius or DEFAULT_RADIUS, quad_segs=32)
         lanes = self._approach_lanes()
+        self._check_spread(lanes)
         if self.description.from_centre_lines:
             driving = road_surface.in_groups(self.surfaces, ["driving"])
             return with_other_carriageways(lanes, driving, self._names).convex_hull
         return shapely.union_all([shapely.make_valid(lane.polygon) for lane in lanes]).convex_hull
+
+    def _check_spread(self, lanes: Sequence[LaneSurface]) -> None:
+        """Check that the lanes of a junction and its approaches lie near each other.
+
+        Raises
+        ------
+        SeipError
+            A lane is farther from the first one than any site reaches.
+        """
+        for lane in lanes:
+            away = float(np.hypot(*(lane.left[0, :2] - lanes[0].left[0, :2])))
+            if away > 2 * MAX_RADIUS:
+                raise SeipError(
+                    f"road {lane.road_id} lies {away:,.0f} m from road {lanes[0].road_id} of the same junction: "
+                    "correct its <planView> in the map"
+                )
 
     def levels(self) -> Levels:
         """Return the lanes on the level of the place, and those on other levels."""

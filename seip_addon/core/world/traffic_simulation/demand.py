@@ -118,9 +118,7 @@ class Demand:
     """
 
     flow: float = setting(600.0, "vehicles per hour and arm", maximum=MAX_FLOW, metavar="N")
-    turns: tuple[float, float, float] = setting(
-        (0.2, 0.6, 0.2), "shares of turns", metavar=("LEFT", "STRAIGHT", "RIGHT")
-    )
+    turns: tuple[float, float, float] = (0.2, 0.6, 0.2)
     pedestrians: float = setting(200.0, "persons per hour and arm", minimum=0.0, maximum=MAX_FLOW, metavar="N")
     shares: Mapping[str, float] = field(default_factory=VEHICLE_SHARES.copy)
 

@@ -11,7 +11,6 @@ from ...arrays import Float
 from ...errors import SeipError
 from ...progress import Progress
 from ...sensing.traffic.source import TrafficFiles
-from ...settings import setting
 from ...storage.files import whole_file
 from ...sumo_programs import Sumo, find_sumo, run
 from ..opendrive.read import read_map
@@ -42,7 +41,7 @@ _LANES = {lane: _PERMISSIONS.get(group, 'disallow="all"') for lane, group in GRO
 class SignalPlan:
     """Fixed plan of every traffic light, with green for opposite arms together; seconds of each state."""
 
-    green: int = setting(25, "green time of each signal phase", metavar="S")
+    green: int = 25
     amber: int = 3
     all_red: int = 2
 

@@ -11,41 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from seip_addon.core.output.datasets import kitti, mmdetection3d, openpcdet, opv2v, pcd
+from seip_addon.core.output.datasets import kitti, mmdetection3d, openpcdet, pcd
 from seip_addon.core.output.datasets.label_files import read_labels
-from seip_addon.core.output.datasets.opv2v import left_handed_pose
 from seip_addon.core.output.datasets.sample import make_sample
-from tests.builders.scan_frames import make_frame, make_frames, make_run, make_sensors, rotation, write
+from tests.builders.scan_frames import make_frame, make_frames, make_run, rotation, write
 
 angles = st.floats(-math.pi, math.pi)
 places = st.tuples(*[st.floats(-500, 500)] * 3).map(np.array)
 KITTI_COLUMNS = 15
-
-
-def left_handed(roll, yaw, pitch):
-    """OpenCOOD's rotation from its three turns, degrees."""
-    (cr, sr), (cy, sy), (cp, sp) = ((math.cos(a), math.sin(a)) for a in map(math.radians, (roll, yaw, pitch)))
-    turn = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    nod = np.array([[cp, 0, -sp], [0, 1, 0], [sp, 0, cp]])
-    lean = np.array([[1, 0, 0], [0, cr, sr], [0, -sr, cr]])
-    return turn @ nod @ lean
-
-
-@given(angles, st.one_of(st.floats(-math.pi / 2, math.pi / 2), st.sampled_from([-math.pi / 2, math.pi / 2])), angles)
-def test_a_left_handed_pose_puts_points_where_the_right_handed_one_does(yaw, pitch, roll):
-    xyz, own = np.array([3.0, -4.0, 6.0]), np.array([1.0, 2.0, 3.0])
-    turn = rotation(yaw, pitch, roll)
-    x, y, z, *degrees = left_handed_pose(xyz, turn)
-    mirror = np.array([1.0, -1.0, 1.0])
-    there = left_handed(*degrees) @ (own * mirror) + (x, y, z)
-    assert there * mirror == pytest.approx(turn @ own + xyz, abs=1e-7)
-
-
-def test_known_poses():
-    assert left_handed_pose(np.array([1.0, 2.0, 3.0]), np.eye(3)) == pytest.approx([1, -2, 3, 0, 0, 0])
-    # turned to the left here is turned by a negative yaw there; nose up is up in both
-    assert left_handed_pose(np.zeros(3), rotation(0.3)) == pytest.approx([0, 0, 0, 0, -math.degrees(0.3), 0])
-    assert left_handed_pose(np.zeros(3), rotation(0.0, 0.2)) == pytest.approx([0, 0, 0, 0, 0, math.degrees(0.2)])
 
 
 @given(st.lists(st.tuples(places, st.tuples(*[st.floats(0.1, 20)] * 3).map(np.array), angles), max_size=6))
@@ -167,26 +140,6 @@ def test_the_viewpoint_of_a_sensors_cloud_is_its_pose():
             assert np.abs(np.array([x, y, z]) - sensor.xyz).max() < 1e-9
             turn = Rotation.from_quat([qx, qy, qz, qw]).as_matrix()
             assert np.abs(turn - sensor.orientation).max() < 1e-8
-
-
-def test_opv2v_numbers_are_never_taken_for_text(tmp_path):
-    frame = make_frame(2, users=4)
-    tiny = replace(frame.labels, centre=frame.labels.centre * 1e-12, speed=np.full(4, 1e-9))
-    write("opv2v", [("0", replace(frame, labels=tiny))], make_run(), tmp_path, min_points=0)
-    found = yaml.safe_load((tmp_path / "train/a/0/0.yaml").read_text())
-    for vehicle in found["vehicles"].values():
-        numbers = [*vehicle["angle"], *vehicle["center"], *vehicle["extent"], *vehicle["location"], vehicle["speed"]]
-        assert all(isinstance(number, float) for number in numbers)
-
-
-def test_opv2v_notes_name_the_agents_that_would_be_left_out():
-    near = make_sensors(8)
-    assert opv2v.notes(make_run(sensors=near[:7])) == ()
-    assert "there are 8 agents" in opv2v.notes(make_run(sensors=near))[0]
-    far = replace(near[1], xyz=near[0].xyz + np.array([70.1, 0.0, 0.0]))
-    assert opv2v.notes(make_run(sensors=(near[0], far)))[0].startswith("S2: farther than 70 m from S1")
-    high = replace(near[1], xyz=near[0].xyz + np.array([69.9, 0.0, 50.0]))
-    assert opv2v.notes(make_run(sensors=(near[0], high))) == ()
 
 
 def _sample(frame, kind):

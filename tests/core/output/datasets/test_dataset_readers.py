@@ -2,7 +2,7 @@
 
 What a reader's library does is done by the library where there is one to install: ``.ci/readers`` runs these tests
 with all of them.
-OpenPCDet, OpenCOOD and mmdetection3d cannot: there the test takes the steps that their documentation and sources
+OpenPCDet and mmdetection3d cannot: there the test takes the steps that their documentation and sources
 describe, and says which.
 """
 
@@ -12,10 +12,8 @@ import warnings
 
 import numpy as np
 import pytest
-import yaml
 
-from seip_addon.core.geometry.geo_reference import GeoReference
-from tests.builders.scan_frames import ORIGIN, make_frame, make_frames, make_run, make_sensors, rotation, write
+from tests.builders.scan_frames import make_frames, make_run, rotation, write
 
 HALF_A_LEVEL = 0.5 / 255 + 1e-6
 IN_FLOAT32 = 1e-5  # metres, of places within 100 m that a reader keeps in float32
@@ -203,164 +201,9 @@ def test_pcd_by_pypcd4(frames, tmp_path):
         assert (found.numpy(("x", "y", "z", "intensity")) == cloud(frame)).all()
 
 
-@pytest.mark.parametrize("kind", ["pcd", "opv2v"])
-def test_an_empty_cloud_by_pypcd4(kind, tmp_path):
+def test_an_empty_cloud_by_pypcd4(tmp_path):
     pypcd4 = reader("pypcd4")
-    write(kind, make_frames(users=0, static=0), make_run(), tmp_path)
+    write("pcd", make_frames(users=0, static=0), make_run(), tmp_path)
     paths = list(tmp_path.rglob("*.pcd"))
     assert paths
     assert all(pypcd4.PointCloud.from_path(path).points == 0 for path in paths)
-
-
-def pose_matrix(pose):
-    """opencood.utils.transformation_utils.x_to_world, composed of its three turns."""
-    x, y, z, roll, yaw, pitch = pose
-    (cr, sr), (cy, sy), (cp, sp) = ((math.cos(a), math.sin(a)) for a in map(math.radians, (roll, yaw, pitch)))
-    matrix = np.eye(4)
-    matrix[:3, :3] = (
-        np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-        @ np.array([[cp, 0, -sp], [0, 1, 0], [sp, 0, cp]])
-        @ np.array([[1, 0, 0], [0, cr, sr], [0, -sr, cr]])
-    )
-    matrix[:3, 3] = x, y, z
-    return matrix
-
-
-def opencood_agents(folder):
-    """BaseDataset: folders as agents sorted by name, the first that is not negative as ego; yaml files sorted."""
-    agents = sorted(path.name for path in folder.iterdir() if path.is_dir())
-    assert int(agents[0]) >= 0
-    return agents
-
-
-def opencood_boxes(agents, name, folder, ego):
-    """project_world_objects: each box from its own axes into the ego's, as a (4, 4) matrix and its half sizes."""
-    objects = {}
-    for agent in agents:
-        objects.update(yaml.safe_load((folder / agent / f"{name}.yaml").read_text())["vehicles"])
-    boxes = {}
-    for user, found in objects.items():
-        middle = np.add(found["location"], found["center"])
-        boxes[user] = (np.linalg.inv(ego) @ pose_matrix([*middle, *found["angle"]]), np.array(found["extent"]))
-    return boxes
-
-
-def require_opencood(folder, frames, read_cloud, two_wheelers=("motorcycle", "bicycle", "pedestrian")):
-    """EarlyFusionDataset: every agent's cloud and boxes in the ego's axes, boxes of several agents once."""
-    agents = opencood_agents(folder)
-    for name, frame in frames:
-        poses = {agent: yaml.safe_load((folder / agent / f"{name}.yaml").read_text()) for agent in agents}
-        ego = pose_matrix(poses[agents[0]]["lidar_pose"])
-        boxes = opencood_boxes(agents, name, folder, ego)
-        assert sorted(boxes) == kept(frame, two_wheelers).tolist()
-        for number, agent in enumerate(agents):
-            points, intensity = read_cloud(folder / agent / f"{name}.pcd")
-            mine = frame.sensor == number
-            to_ego = np.linalg.inv(ego) @ pose_matrix(poses[agent]["lidar_pose"])
-            there = points @ to_ego[:3, :3].T + to_ego[:3, 3]
-            world = (there @ ego[:3, :3].T + ego[:3, 3]) * [1, -1, 1]
-            assert world == pytest.approx(frame.points[mine], abs=1e-4)
-            assert intensity == pytest.approx(frame.intensity[mine], abs=HALF_A_LEVEL)
-            for user, (box, half) in boxes.items():
-                own = there[frame.instance[mine] == user]
-                require_around(box[:3, 3], 2 * half, box[:3, :3], own)
-            seen = np.flatnonzero(frame.labels.points[:, number])
-            assert set(poses[agent]["vehicles"]) == set(seen) & set(boxes)
-        for user, (_, half) in boxes.items():
-            assert 2 * half == pytest.approx(frame.labels.size[user], abs=1e-8)
-        for agent in agents:
-            for user, found in poses[agent]["vehicles"].items():
-                assert found["speed"] == pytest.approx(frame.labels.speed[user] * 3.6, abs=1e-8)
-
-
-@pytest.mark.parametrize("tilt", [0.0, 0.3])
-def test_opv2v_by_opencoods_steps_with_pypcd4(frames, tilt, tmp_path):
-    pypcd4 = reader("pypcd4")
-
-    def read(path):
-        found = pypcd4.PointCloud.from_path(path)
-        packed = np.ascontiguousarray(found.pc_data["rgb"]).view(np.uint32)
-        return found.numpy(("x", "y", "z")).astype(float), ((packed >> 16) & 255) / 255
-
-    write("opv2v", frames, make_run(sensors=make_sensors(2, tilt)), tmp_path)
-    require_opencood(tmp_path / "train" / "a", frames, read)
-
-
-@pytest.mark.parametrize("tilt", [0.0, 0.3])
-def test_opv2v_by_opencoods_steps_with_open3d(tilt, tmp_path):
-    """opencood.utils.pcd_utils.pcd_to_np: points, and the first of the colours as intensity."""
-    open3d = reader("open3d")
-
-    def read(path):
-        found = open3d.io.read_point_cloud(str(path))
-        return np.asarray(found.points), np.asarray(found.colors)[:, 0]
-
-    sloping = make_frames(5, count=3, users=14, sensors=3, pitch=0.1)
-    write("opv2v", sloping, make_run(split="val", sensors=make_sensors(3, tilt)), tmp_path)
-    require_opencood(tmp_path / "validate" / "a", sloping, read)
-
-
-def test_an_empty_cloud_by_open3d(tmp_path):
-    open3d = reader("open3d")
-    write("opv2v", make_frames(users=0, static=0, count=1), make_run(), tmp_path)
-    found = open3d.io.read_point_cloud(str(tmp_path / "train/a/0/000000.pcd"))
-    assert np.asarray(found.points).shape == (0, 3)
-    assert np.asarray(found.colors)[:, 0].shape == (0,)
-
-
-def test_las_by_laspy(frames, tmp_path):
-    laspy = reader("laspy")
-    reader("lazrs")
-    write("las", frames, make_run(), tmp_path)
-    for name, frame in frames:
-        found = laspy.read(tmp_path / f"train/a/{name}.laz")
-        assert found.header.are_points_compressed
-        assert (str(found.header.version), found.header.point_format.id) == ("1.4", 6)
-        assert found.header.creation_date is None
-        expected = frame.points.astype(np.float64) + ORIGIN
-        assert np.abs(found.xyz - expected).max(initial=0) <= 0.0005 + 1e-9
-        assert (found.intensity == np.round(frame.intensity * 65535)).all()
-        assert (found.point_source_id == frame.sensor + 1).all()
-        assert (found.instance == frame.instance).all()
-        assert (found.gps_time == frame.time + frame.delay.astype(float)).all()
-        assert (np.array(found.return_number) == 1).all()
-
-
-@pytest.mark.parametrize(
-    ("projection", "code"), [("+proj=utm +zone=32", "32632"), ("+proj=tmerc +lat_0=52.5 +lon_0=13.4", None)]
-)
-def test_las_says_where_on_the_earth_it_is(frames, tmp_path, projection, code):
-    laspy = reader("laspy")
-    reader("lazrs")
-    place = GeoReference(projection, (500_000.0, 5_000_000.0, 30.0, 0.0))
-    write("las", frames, make_run(geo_reference=place), tmp_path)
-    name, frame = frames[0]
-    path = tmp_path / f"train/a/{name}.laz"
-    found = laspy.read(path)
-    expected = frame.points.astype(np.float64) + ORIGIN + (500_000.0, 5_000_000.0, 30.0)
-    assert np.abs(found.xyz - expected).max() <= 0.0005 + 1e-9
-    assert found.header.global_encoding.wkt
-    (record,) = [one for one in found.header.vlrs if one.user_id == "LASF_Projection"]
-    content = record.record_data_bytes()
-    assert (record.record_id, content[-1:], content.count(b"\0")) == (2112, b"\0", 1)
-    text = content[:-1].decode("ascii")
-    assert text.startswith('PROJCS["WGS 84 / ')
-    assert text.count("[") == text.count("]")
-    assert (f'AUTHORITY["EPSG","{code}"]]' in text) is (code is not None)
-    assert 'PARAMETER["central_meridian",' in text
-
-
-def test_las_of_a_map_without_a_projection_claims_none(frames, tmp_path):
-    laspy = reader("laspy")
-    reader("lazrs")
-    write("las", frames, make_run(geo_reference=GeoReference("+proj=merc")), tmp_path)
-    found = laspy.read(tmp_path / f"train/a/{frames[0][0]}.laz")
-    assert not [one for one in found.header.vlrs if one.user_id == "LASF_Projection"]
-    assert np.abs(found.xyz - frames[0][1].points.astype(np.float64) - ORIGIN).max() <= 0.0005 + 1e-9
-
-
-def test_an_empty_cloud_by_laspy(tmp_path):
-    laspy = reader("laspy")
-    reader("lazrs")
-    write("las", [("0", make_frame(users=0, static=0))], make_run(), tmp_path)
-    assert len(laspy.read(tmp_path / "train/a/0.laz")) == 0

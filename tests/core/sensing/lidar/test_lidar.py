@@ -225,6 +225,11 @@ def test_files_that_are_no_catalogue(tmp_path: Path) -> None:
     (tmp_path / "flat.toml").write_text("mine = 1")
     with pytest.raises(SeipError, match="is not a table"):
         load_catalogue([tmp_path / "flat.toml"])
+    (tmp_path / "empty.toml").touch()
+    with pytest.raises(SeipError, match="has no sensor"):
+        load_catalogue([tmp_path / "empty.toml"])
+    with pytest.raises(SeipError, match="not a catalogue"):
+        load_catalogue(["pandar64=unit.csv"])
 
 
 def test_an_unknown_sensor_names_close_ones() -> None:

@@ -56,13 +56,6 @@ def test_a_miss_is_never_detected_and_no_number_is_lost_at_no_distance():
     assert law.chance(distance, reflected).tolist() == [0.0, law.ceiling, 0.0]
 
 
-@given(law=laws, distance=st.floats(1.0, 200.0))
-def test_the_mean_over_surfaces_is_the_probability(law, distance):
-    deviation = np.array([NormalDist().inv_cdf((number + 0.5) / 4000) for number in range(4000)])
-    over = law.chance(np.full(4000, distance), np.full(4000, 0.2), deviation)
-    assert over.mean() == pytest.approx(law.chance(np.array([distance]), np.array([0.2]))[0], abs=1e-3)
-
-
 def test_light_lost_in_air_shortens_the_range():
     clear = RangeEquation.of_ranges(40.0, 110.0)
     assert clear.in_air(0.01).reach(0.1, 0.9) < 30.0 < clear.reach(0.1, 0.9)

@@ -231,13 +231,6 @@ def test_each_fault_of_a_rosette_has_its_sentence(tmp_path: Path, changes: dict[
     assert "\n" not in str(caught.value)
 
 
-def test_beams_of_a_unit_do_not_fit_a_rosette(tmp_path: Path) -> None:
-    unit = tmp_path / "unit.csv"
-    unit.write_text("Channel,Elevation,Azimuth\n1,1.0,0.0\n2,2.0,0.0\n", encoding="utf-8")
-    with pytest.raises(SeipError, match="has the beams of channels, but LiDAR 'mid40' draws a rosette"):
-        load_catalogue([f"mid40={unit}"])
-
-
 def test_a_rosette_begins_at_a_finite_time() -> None:
     with pytest.raises(SeipError, match="the time at which the rosette begins is inf, not"):
         EVEN.later(math.inf)

@@ -55,6 +55,19 @@ def test_the_formats_hold_the_same(tmp_path_factory, seed, count):
     same(read(folder, dair_text(rows, [names.get(one, one.title()) for one in categories])), boxes, categories)
 
 
+def test_openlabel_has_quaternions_or_euler_angles(tmp_path):
+    boxes, categories = make_boxes(count=3)
+    content = json.loads(openlabel_text(boxes.tolist(), categories))
+    for entry, box in zip(content["openlabel"]["frames"]["0"]["objects"].values(), boxes.tolist(), strict=True):
+        entry["object_data"]["cuboid"]["val"] = [*box[:3], 0.0, 0.0, box[6], *box[3:6]]
+    same(read(tmp_path, json.dumps(content)), boxes, categories)
+    for entry in content["openlabel"]["frames"]["0"]["objects"].values():
+        entry["object_data"]["cuboid"]["val"].append(0.0)
+        entry["object_data"]["cuboid"]["val"].append(0.0)
+    with pytest.raises(SeipError, match="11 numbers"):
+        read(tmp_path, json.dumps(content))
+
+
 @pytest.mark.parametrize("kind", ["kitti", "openpcdet"])
 def test_labels_of_datasets(kind, tmp_path):
     frames = make_frames(users=9)

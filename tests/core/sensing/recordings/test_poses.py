@@ -119,6 +119,8 @@ def changed(at, value):
         ("no readable poses", json.dumps({"rotation": 1, "translation": 2})),
         ("its structure is another one", "[1, 2]"),
         ("names no sensor", "{}"),
+        ("printable characters", json.dumps({"": np.eye(4).tolist()})),
+        ("printable characters", json.dumps({"S" * 4000: np.eye(4).tolist()})),
         ("no readable poses", "[" * 100_000),
         ("no readable poses", '{"S1": '),
         ("as JSON", yaml.safe_dump(LISTS, default_flow_style=True)),

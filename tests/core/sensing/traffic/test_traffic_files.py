@@ -63,6 +63,29 @@ def test_every_form_says_the_same(tmp_path, name, text):
     assert data.speed.tolist() == [10, 10, 1.3, 5, 5]
 
 
+def test_riders_and_containers_are_left_out_and_counted(tmp_path):
+    """A bus with a passenger and a lorry with a container: the passenger stands in the bus, wherever it is."""
+    steps = "".join(
+        f'<timestep time="{k}"><vehicle id="bus" x="{9 * k}.50" y="3" angle="90" speed="9"/>'
+        f'<person id="rider" x="{9 * k}.50" y="3" angle="90" speed="9"/><person id="walker" x="{k}" y="8" angle="90" '
+        f'speed="1"/><container id="box" x="1" y="1" angle="0" speed="0"/></timestep>'
+        for k in range(3)
+    )
+    data = read(written(tmp_path, "f.xml", f"<fcd-export>{steps}</fcd-export>"))
+    assert (data.names, data.person.tolist()) == (("bus", "walker"), [False, True])
+    assert (data.riders, data.containers) == (1, 1)
+    assert data.position[:, 0].tolist() == [0.5, 9.5, 18.5, 0, 1, 2]
+    _, warnings = read_trajectories(data, {}, np.zeros(3), "by hand")
+    assert any("1 person in a vehicle and 1 container" in one for one in warnings)
+
+
+def test_degrees_for_metres_are_named_with_the_cure(tmp_path):
+    rows = [f'<vehicle id="a" x="{10 + k * 1e-4}" y="50.0" angle="90" speed="8"/>' for k in range(4)]
+    steps = "".join(f'<timestep time="{k}">{row}</timestep>' for k, row in enumerate(rows))
+    with pytest.raises(SeipError, match=r"degrees.*--fcd-output\.geo"):
+        read(written(tmp_path, "f.xml", f"<fcd-export>{steps}</fcd-export>"))
+
+
 def test_the_middle_is_half_a_length_behind_the_bumper(tmp_path):
     data = read(written(tmp_path, "f.xml", FCD))
     types = finish(read_vehicle_types([written(tmp_path, "r.xml", ROUTES)]))

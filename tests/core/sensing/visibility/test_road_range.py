@@ -14,9 +14,9 @@ from seip_addon.core.sensing.visibility.road_range import (
     upright_range,
 )
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
+from seip_addon.core.sensing.weather import Weather
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import Mesh
-from seip_addon.core.site.weather import Weather
 from seip_addon.core.workflows.survey import carla_warnings
 from seip_addon.core.workflows.survey_settings import SurveySettings
 from tests.builders.synthetic_junction import junction_site

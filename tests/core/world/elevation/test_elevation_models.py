@@ -15,8 +15,7 @@ from seip_addon.core.world.elevation import geotiff
 from seip_addon.core.world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
 from seip_addon.core.world.elevation.geotiff import read_geotiff
 from seip_addon.core.world.streetscape.description import SiteDescription
-from tests.builders.city_text import origin_at
-from tests.builders.dem_files import KEYS, SCALE, TIE_POINT, sampled, write_dem
+from tests.builders.dem_files import KEYS, SCALE, TIE_POINT, origin_at, sampled, write_dem
 
 X, Y, _ = origin_at(52.5, 13.4)
 UTM33 = "+proj=utm +zone=33 +datum=WGS84 +units=m"

@@ -9,8 +9,7 @@ from seip_addon.core.site.roles import Role
 from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.opendrive.read import read_map
-from tests.builders.city_text import origin_at
-from tests.builders.dem_files import sampled, write_dem
+from tests.builders.dem_files import origin_at, sampled, write_dem
 from tests.builders.opendrive_text import document, geometry, lane, road, section
 from tests.builders.osm_text import bridge_above, crossing
 from tests.sumo_here import needs_sumo

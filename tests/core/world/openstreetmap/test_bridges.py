@@ -16,8 +16,7 @@ from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.opendrive.lanes import lane_surfaces
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.terrain import MAX_ROADSIDE
-from tests.builders.city_text import origin_at
-from tests.builders.dem_files import sampled, write_dem
+from tests.builders.dem_files import origin_at, sampled, write_dem
 from tests.builders.osm_text import Extract, corner_houses
 from tests.sumo_here import needs_sumo
 

@@ -1,5 +1,6 @@
 """Roads above roads: a scene has one level, told by how roads connect, or by the user."""
 
+import math
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import SiteDescription, read_site_description
 from seip_addon.core.world.streetscape.levels import Crossing
 from seip_addon.core.world.streetscape.model import site_model
+from seip_addon.core.world.streetscape.terrain import FlatLand
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 
 MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[5] / "shared" / "opendrive")
@@ -239,3 +241,12 @@ def test_a_site_of_roads_that_all_climb_is_built(tmp_path):
     bridge = road(geometry(length=200.0, x=-100.0, y=0.0), LANES, number="1", elevation=hump)
     model = built(tmp_path, (0, 0), ("1",), document(bridge, street("2", 0, -100, 200, np.pi / 2)), radius=80.0)
     assert any("road 1 lies 6.0 m above road 2" in note for note in model.notes)
+
+
+def test_roads_that_cross_beyond_the_scene_and_not_in_it_are_built(tmp_path):
+    """Parts of both lie in the scene, on land of known height, but their crossing does not."""
+    low = street("1", -52, 0, 52), street("4", -88, 0, 100, math.atan2(60, 23))
+    text = document(*low, street("5", -58, 12, 90, math.atan2(48, -7), z=DECK))
+    place = SiteDescription(near=(0.0, 0.0), radius=50.0, level=("1", "4"), flat_land=FlatLand(0.0))
+    model = finish(site_model(read_text(tmp_path, text), place))
+    assert model.region.area > 300

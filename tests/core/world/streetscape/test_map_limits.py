@@ -63,9 +63,37 @@ def test_what_no_object_measures_is_named(tmp_path, furniture, complaint):
         read_text(tmp_path, street_map(furniture=furniture))
 
 
+STRAY = '<paramPoly3 aU="0" bU="{b}" cU="0" dU="0" aV="0" bV="0" cV="0" dV="0" pRange="normalized"/>'
+
+
+@pytest.mark.parametrize(
+    ("plan", "complaint"),
+    [
+        (geometry(STRAY.format(b=-1_000_000), 20.0), "<paramPoly3> of 20 m reaches 1,000,000 m"),
+        (geometry(STRAY.format(b=-32_769), 20.0), "<paramPoly3> of 20 m reaches 32,769 m"),
+        (geometry('<poly3 a="90000" b="0" c="0" d="0"/>', 20.0), "<poly3> of 20 m reaches 90,000 m"),
+        (geometry(length=20.0) + geometry(s=20.0, x=1e6, length=20.0), "at s=20 begins 1,000,000 m from"),
+    ],
+)
+def test_a_road_farther_from_its_start_than_its_length_is_named(tmp_path, plan, complaint):
+    tracemalloc.start()
+    with pytest.raises(SeipError, match=rf"road 1: .*{complaint}"):
+        read_text(tmp_path, document(road(plan)))
+    assert tracemalloc.get_traced_memory()[1] < 50e6
+    tracemalloc.stop()
+
+
+def test_roads_of_a_junction_far_from_each_other_are_named(tmp_path):
+    far = road(geometry(x=1e6), number="2", junction="7")
+    text = document(road(junction="7"), far, rest='<junction id="7"/>')
+    with pytest.raises(SeipError, match=r"road 2 lies 1,000,000 m from road 1"):
+        finish(site_model(read_text(tmp_path, text), SiteDescription(junction="7")))
+
+
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
+        ({"offset": '<laneOffset s="0" a="1e6" b="0" c="0" d="0"/>'}, r"lies 1,000,00\d m beside the road"),
         ({"elevation": '<elevation s="0" a="1e8" b="0" c="0" d="0"/>'}, r"100,000,000 m above or below zero"),
         ({"elevation": '<elevation s="0" a="0" b="1e6" c="0" d="0"/>'}, r"m above or below zero"),
         ({"sections": section(lane(-1, 1e6))}, r"a lane is 1,000,000 m wide"),

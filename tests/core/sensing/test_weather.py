@@ -7,8 +7,8 @@ import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.weather import WET_FACTOR, Weather, weather_of
 from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY
-from seip_addon.core.site.weather import WET_FACTOR, Weather, weather_of
 from tests.builders.plain_street import street
 
 

@@ -2,10 +2,8 @@
 
 import math
 
-from headless.detection import anchor_head, centre_head
-from headless.detection.anchor_head import ANCHOR_SIZES, BACKGROUND, IGNORED, AnchorHead, anchor_boxes, assignment
-from headless.detection.centre_head import CentreHead
-from headless.detection.heads import TrainingTargets
+from headless.detection import centre_head
+from headless.detection.centre_head import CentreHead, TrainingTargets
 from headless.detection.losses import focal_loss, heat_map_loss
 from headless.detection.pillars import PillarGrid
 from headless.detection.rotated_boxes import in_plan, paired_iou
@@ -18,7 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 GRID = PillarGrid(west=-8.0, south=-6.4, bottom=-1.0, top=4.0, columns=40, rows=32, pillar=0.4)
-CAR, TRUCK, CYCLE, PEDESTRIAN = range(4)
+CAR = 0
+SIZES = ((4.5, 1.8, 1.6), (8.0, 2.5, 3.3), (1.9, 0.7, 1.7), (0.6, 0.6, 1.75))  # of each class, metres
 
 
 def targets(*rows, trained=None):
@@ -34,8 +33,7 @@ def random_targets(seed, count=4):
     rows = []
     for _ in range(count):
         category = int(random.integers(4))
-        size = ANCHOR_SIZES[[s.category for s in ANCHOR_SIZES].index(CLASSES[category])]
-        shape = np.array([size.length, size.width, size.height]) * random.uniform(0.8, 1.25, 3)
+        shape = np.array(SIZES[category]) * random.uniform(0.8, 1.25, 3)
         place = random.uniform([-7.5, -6.0], [7.5, 6.0])
         rows.append((category, *place, shape[2] / 2, *shape, random.uniform(-math.pi, math.pi)))
     return targets(*rows)
@@ -43,86 +41,6 @@ def random_targets(seed, count=4):
 
 def losses(head, output, wanted, margin):
     return head.loss(output, head.target_maps(wanted, GRID, margin), GRID)
-
-
-def standing(x, y, length, width):
-    return x - length / 2, y - width / 2, x + length / 2, y + width / 2
-
-
-def plain_iou(a, b):
-    wide = max(0.0, min(a[2], b[2]) - max(a[0], b[0]))
-    deep = max(0.0, min(a[3], b[3]) - max(a[1], b[1]))
-    areas = [(r[2] - r[0]) * (r[3] - r[1]) for r in (a, b)]
-    return wide * deep / (sum(areas) - wide * deep)
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_anchors_are_assigned_as_a_slow_loop_does(seed):  # noqa: C901  # a loop for each thing to choose among
-    wanted = random_targets(seed)
-    got = assignment(wanted, GRID)
-    expected = torch.full_like(got, BACKGROUND)
-    best = dict.fromkeys(range(len(wanted.boxes)), (0.0, None))
-    for anchor in range(2 * len(ANCHOR_SIZES)):
-        size = ANCHOR_SIZES[anchor // 2]
-        sides = (size.length, size.width) if anchor % 2 == 0 else (size.width, size.length)
-        for row in range(16):
-            for column in range(20):
-                here = standing(-8 + 0.8 * (column + 0.5), -6.4 + 0.8 * (row + 0.5), *sides)
-                most, owner = 0.0, None
-                for box, (x, y, _, length, width, _, yaw) in enumerate(wanted.boxes.tolist()):
-                    if CLASSES[wanted.category[box]] != size.category:
-                        continue
-                    across = abs((yaw + math.pi / 4) % math.pi) > math.pi / 2
-                    iou = plain_iou(here, standing(x, y, *((width, length) if across else (length, width))))
-                    if iou > best[box][0] + 1e-6:
-                        best[box] = (iou, (anchor, row, column))
-                    if iou > most:
-                        most, owner = iou, box
-                if most >= size.positive:
-                    expected[anchor, row, column] = owner
-                elif most >= size.negative:
-                    expected[anchor, row, column] = IGNORED
-    for box, (_, place) in best.items():
-        if place is not None:
-            expected[place] = box
-    # A best anchor may tie with its mirror image: then either will do.
-    assert (got != expected).sum() <= 2
-    for box, (_, place) in best.items():
-        assert place is None or (got == box).any()
-
-
-def test_no_anchor_is_held_against_a_road_user_that_nobody_saw():
-    hidden = targets((CAR, 0.4, 0.0, 0.8, 4.5, 1.8, 1.6, 0.0), trained=[False])
-    got = assignment(hidden, GRID)
-    assert (got != BACKGROUND).any()
-    assert (got[got != BACKGROUND] == IGNORED).all()
-
-
-@given(st.integers(0, 10_000))
-def test_anchors_become_the_boxes_they_are_told_to(seed):
-    random = np.random.default_rng(seed)
-    count = 5
-    places = [torch.from_numpy(random.integers(0, top, count)) for top in (2 * len(ANCHOR_SIZES), 16, 20)]
-    anchors = anchor_boxes(GRID, *places)
-    boxes = anchors.clone()
-    boxes[:, :3] += torch.from_numpy(random.uniform(-2, 2, (count, 3)).astype(np.float32))
-    boxes[:, 3:6] *= torch.from_numpy(random.uniform(0.5, 2, (count, 3)).astype(np.float32))
-    boxes[:, 6] = torch.from_numpy(random.uniform(-3.1, 3.1, count).astype(np.float32))
-    direction = torch.nn.functional.one_hot(anchor_head.direction_of(boxes[:, 6]), 2).float()
-    told = torch.cat((anchor_head.encoded(boxes, anchors), direction), dim=1)
-    back = anchor_head.decoded(told, anchors)
-    torch.testing.assert_close(back[:, :6], boxes[:, :6], atol=1e-4, rtol=1e-4)
-    turn = torch.remainder(back[:, 6] - boxes[:, 6] + math.pi, 2 * math.pi) - math.pi
-    assert turn.abs().max() < 1e-4
-
-
-def test_a_heading_turned_by_half_a_circle_is_mended_by_the_direction_alone():
-    anchors = anchor_boxes(GRID, *(torch.tensor([value]) for value in (0, 5, 5)))
-    told = torch.zeros(1, 9)
-    told[0, 8] = 1.0
-    assert abs(abs(float(anchor_head.decoded(told, anchors)[0, 6])) - 0.0) < 1e-6
-    told[0, 7] = 2.0
-    assert abs(abs(float(anchor_head.decoded(told, anchors)[0, 6])) - math.pi) < 1e-6
 
 
 def perfect_output(wanted, grid):
@@ -177,10 +95,9 @@ def test_heat_lies_along_the_road_user():
     assert float(heat[aside]) < 0.05
 
 
-@pytest.mark.parametrize("make", [lambda: CentreHead(6, 8), lambda: AnchorHead(6)])
-def test_losses_are_finite_and_lead_downhill(make):
+def test_losses_are_finite_and_lead_downhill():
     torch.manual_seed(1)
-    head, features = make(), torch.randn(2, 6, 16, 20)
+    head, features = CentreHead(6, 8), torch.randn(2, 6, 16, 20)
     wanted = [random_targets(1), targets()]
     optimiser = torch.optim.Adam(head.parameters(), lr=0.02)
     values = []
@@ -195,10 +112,9 @@ def test_losses_are_finite_and_lead_downhill(make):
 
 
 @pytest.mark.parametrize("places", [6, pytest.param(40, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("make", [lambda: CentreHead(3, 4), lambda: AnchorHead(3)])
-def test_gradients_of_the_losses_are_their_slopes(make, places):
+def test_gradients_of_the_losses_are_their_slopes(places):
     torch.manual_seed(2)
-    head = make().double().eval()
+    head = CentreHead(3, 4).double().eval()
     wanted = TrainingTargets(
         *(part.double() if part.is_floating_point() else part for part in vars(random_targets(3)).values())
     )
@@ -220,10 +136,9 @@ def test_gradients_of_the_losses_are_their_slopes(make, places):
         assert output.grad.view(-1)[index] == pytest.approx((higher - lower) / (2 * step), abs=1e-5, rel=1e-4)
 
 
-@pytest.mark.parametrize("make", [lambda: CentreHead(3, 4), lambda: AnchorHead(3)])
-def test_the_border_and_the_unseen_are_trained_on_by_nobody(make):
+def test_the_border_and_the_unseen_are_trained_on_by_nobody():
     torch.manual_seed(3)
-    head = make()
+    head = CentreHead(3, 4)
     output = head(torch.randn(1, 3, 16, 20)).detach().requires_grad_()
     hidden = targets((CAR, 0.4, 0.0, 0.8, 4.5, 1.8, 1.6, 0.0), trained=[False])
     torch.stack(list(losses(head, output, [hidden], 1.6).values())).sum().backward()
@@ -231,8 +146,7 @@ def test_the_border_and_the_unseen_are_trained_on_by_nobody(make):
     assert (slope[:2] == 0).all()
     assert (slope[:, -2:] == 0).all()
     assert (slope[4] > 0).any()
-    scores = output.grad[0, : len(CLASSES)] if isinstance(head, CentreHead) else output.grad[0, :40:10]
-    assert (scores[0, 8, 10] == 0).all()
+    assert output.grad[0, CAR, 8, 10] == 0
 
 
 def test_focal_losses_by_hand():

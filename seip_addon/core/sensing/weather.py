@@ -11,9 +11,9 @@ import numpy as np
 
 from ..counts import typed_number
 from ..errors import SeipError
-from ..sensing.lidar.model import LidarModel
 from ..settings import setting
-from .scene_geometry import DEFAULT_REFLECTIVITY, Mesh, SceneGeometry
+from ..site.scene_geometry import DEFAULT_REFLECTIVITY, Mesh, SceneGeometry
+from .lidar.model import LidarModel
 
 RAIN_EXTINCTION, RAIN_EXPONENT = 3.65e-4, 0.63
 """Extinction of rain of 1 mm/h in 1/m, and its exponent: drops of Marshall and Palmer (1948), efficiency 2."""
