@@ -26,22 +26,6 @@ def heat_map_loss(logits: Tensor, heat: Tensor, counted: Tensor) -> Tensor:
     return whole.sum() / peak.sum().clamp(min=1)
 
 
-def focal_loss(logits: Tensor, positive: Tensor, counted: Tensor, alpha: float = 0.25, gamma: float = 2.0) -> Tensor:
-    """Return the focal loss for each positive (Lin et al. 2017).
-
-    Parameters
-    ----------
-    logits : Tensor
-        Before the sigmoid.
-    positive, counted : bool Tensor of the same shape
-        What is true, and what takes part.
-    """
-    share = torch.sigmoid(logits)
-    hit = alpha * (1 - share).pow(gamma) * functional.softplus(-logits)
-    false = (1 - alpha) * share.pow(gamma) * functional.softplus(logits)
-    return (torch.where(positive, hit, false) * counted).sum() / (positive & counted).sum().clamp(min=1)
-
-
 def weighted_mean(values: Tensor, weight: Tensor) -> Tensor:
     """Return Σ weight · value / Σ weight; zero where nothing weighs."""
     return (values * weight).sum() / weight.sum().clamp(min=1e-6)

@@ -4,7 +4,6 @@ import math
 
 from headless.detection import centre_head
 from headless.detection.centre_head import CentreHead, TrainingTargets
-from headless.detection.losses import focal_loss, heat_map_loss
 from headless.detection.pillars import PillarGrid
 from headless.detection.rotated_boxes import in_plan, paired_iou
 from headless.detection.settings import CLASSES
@@ -147,17 +146,6 @@ def test_the_border_and_the_unseen_are_trained_on_by_nobody():
     assert (slope[:, -2:] == 0).all()
     assert (slope[4] > 0).any()
     assert output.grad[0, CAR, 8, 10] == 0
-
-
-def test_focal_losses_by_hand():
-    logits = torch.tensor([[0.0, math.log(3.0)]])  # shares of 1/2 and 3/4
-    everywhere = torch.ones(1, 2, dtype=torch.bool)
-    # hit: 0.25 · (1/2)² · ln 2; false: 0.75 · (3/4)² · ln 4; one positive
-    expected = 0.25 * 0.25 * math.log(2) + 0.75 * 0.5625 * math.log(4)
-    assert float(focal_loss(logits, torch.tensor([[True, False]]), everywhere)) == pytest.approx(expected)
-    # peak: (1/2)² · ln 2; beside it: (1 − 1/2)⁴ · (3/4)² · ln 4
-    expected = 0.25 * math.log(2) + 0.0625 * 0.5625 * math.log(4)
-    assert float(heat_map_loss(logits, torch.tensor([[1.0, 0.5]]), everywhere)) == pytest.approx(expected)
 
 
 def test_the_predicted_overlap_is_taught_the_true_one():

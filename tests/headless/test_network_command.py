@@ -14,7 +14,8 @@ from headless import network
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.network.network_record import load_network
+from seip_addon.core.output.network.network_record import NetworkRecord
+from seip_addon.core.storage.json_dataclass import from_json
 from tests.builders.small_scene import save_small_scene
 
 TYPES = ("--sensor", "type1", "type2", "--heights", "4", "--grid", "4", "--spacing", "25")
@@ -22,7 +23,9 @@ TYPES = ("--sensor", "type1", "type2", "--heights", "4", "--grid", "4", "--spaci
 
 def run(table, output, *more):
     network.main([str(table), "-o", str(output), "--workers", "1", *TYPES, *more])
-    return load_network(output / "network.json")
+    record = from_json(NetworkRecord, json.loads((output / "network.json").read_text(encoding="utf-8")))
+    assert isinstance(record, NetworkRecord)
+    return record
 
 
 def content(folder):

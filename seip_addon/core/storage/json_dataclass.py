@@ -7,9 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache, partial
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from ..limits import Limits
 from ..settings import settings_of
 
 Value = TypeVar("Value")
@@ -30,9 +29,8 @@ def from_json(kind: type[Value], content: object, where: str = "") -> Value:
     """Return a dataclass from a JSON value whose keys are the names of the fields.
 
     Fields are ``str``, ``bool``, ``int``, ``float`` (whole numbers stay as they are), ``object`` (anything), literals,
-    dataclasses, and tuples, mappings by name and unions of these. Values of a type annotated with `Limits` must lie
-    within them: ``Annotated[float, PRICE]``. Keys without a field are ignored. Settings in radians are in degrees in
-    JSON, under their name with ``_deg``.
+    dataclasses, and tuples, mappings by name and unions of these. Keys without a field are ignored. Settings in radians
+    are in degrees in JSON, under their name with ``_deg``.
 
     Parameters
     ----------
@@ -95,8 +93,6 @@ def _read(kind: Any, value: Any, where: str) -> Any:  # noqa: ANN401 -- types an
         read = value
     elif is_dataclass(kind):
         read = _object(kind, _plain(dict, value, where), where)
-    elif get_origin(kind) is Annotated:
-        read = _limited(parts, value, where)
     elif get_origin(kind) in {Union, UnionType}:
         read = _first_of(parts, value, where)
     elif get_origin(kind) is tuple:
@@ -107,14 +103,6 @@ def _read(kind: Any, value: Any, where: str) -> Any:  # noqa: ANN401 -- types an
         read = _one_of(parts, value, where)
     else:
         read = _plain(kind, value, where)
-    return read
-
-
-def _limited(parts: tuple[Any, ...], value: object, where: str) -> Any:  # noqa: ANN401 -- as above
-    read = _read(parts[0], value, where)
-    for limits in parts[1:]:
-        if isinstance(limits, Limits) and (fault := limits.fault(read)):
-            raise ValueError(f"{where} {fault}")
     return read
 
 

@@ -69,52 +69,6 @@ def visibility_in_traffic(
     return ScenarioVisibility(packed, len(setting.wanted))
 
 
-class PosesInTraffic:
-    """Visibility of the road from poses at any instant of traffic, with their rays on the empty road kept.
-
-    Parameters
-    ----------
-    around : Surroundings
-    poses : sequence of _PoseInTraffic
-        The poses; see `poses_in_traffic`.
-    """
-
-    def __init__(self, around: Surroundings, poses: Sequence[_PoseInTraffic]) -> None:
-        self._around, self._poses = around, poses
-
-    def seen_by(self, present: TrafficObstacles) -> Integer:
-        """Return the number of poses that see each target while road users are present, (t,) int64."""
-        vehicles = _vehicle_caster(self._around, present)
-        count = np.zeros(len(self._around.site.targets), dtype=np.int64)
-        for pose in self._poses:
-            count += pose.seen(vehicles)
-        return count
-
-
-def poses_in_traffic(around: Surroundings, poses: Integer) -> Generator[Progress, None, PosesInTraffic]:
-    """Cast the rays of poses on the empty road, for their visibility at any instant of traffic.
-
-    Parameters
-    ----------
-    poses : (s,) int64
-        Indices among the site's candidates.
-
-    Yields
-    ------
-    Progress
-        Progress after each pose.
-    """
-    setting = _Setting(around)
-    found: dict[int, _PoseInTraffic] = {}
-
-    def compute(number: int) -> None:
-        found[number] = _PoseInTraffic(setting, int(poses[number]))
-
-    threads = setting.caster.threads
-    yield from each_in_threads(compute, range(len(poses)), threads, "casting rays on the empty road")
-    return PosesInTraffic(around, [found[number] for number in range(len(poses))])
-
-
 class _Setting:
     """Parts that all poses share: ray caster of the scene, and the points that may be seen."""
 

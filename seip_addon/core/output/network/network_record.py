@@ -2,28 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from ... import limits
-from ...errors import SeipError
-from ...storage.files import read_small
-from ...storage.json_dataclass import as_json, from_json
+from ...storage.json_dataclass import as_json
 
 SCHEMA = "seip-network/2"
 
 PROVEN = 1e-9
 """Gap up to which a network is proven optimal: smaller differences are rounding, as in `problem.TIE_TOLERANCE`."""
-_MOST_BYTES = 1 << 28
-
-Money = Annotated[float, limits.PRICE]
-Latitude = Annotated[float, limits.Limits(-90.0, 90.0, "degrees")]
-Longitude = Annotated[float, limits.Limits(-360.0, 360.0, "degrees")]
-Value = Annotated[float, limits.Limits(0.0, 1e6)]
-Length = Annotated[float, limits.DISTANCE]
 
 
 @dataclass(frozen=True)
@@ -39,9 +27,9 @@ class NetworkPoint:
         No placement within that money has a larger value.
     """
 
-    price_usd: Money
-    value: Value
-    bound: Value
+    price_usd: float
+    value: float
+    bound: float
 
 
 @dataclass(frozen=True)
@@ -62,11 +50,11 @@ class NetworkSensor:
 
     id: str
     sensor: str
-    latitude: Latitude
-    longitude: Longitude
-    height_m: Length
+    latitude: float
+    longitude: float
+    height_m: float
     position: str
-    price_usd: Money
+    price_usd: float
 
 
 @dataclass(frozen=True)
@@ -94,15 +82,15 @@ class NetworkSite:
 
     name: str
     folder: str
-    latitude: Latitude
-    longitude: Longitude
-    weight: Annotated[float, limits.WEIGHT]
+    latitude: float
+    longitude: float
+    weight: float
     status: Literal["equipped", "without sensor", "failed"]
     message: str = ""
-    price_usd: Money = 0.0
-    value: Value = 0.0
-    bound: Value = 0.0
-    coverage: Annotated[float, limits.SHARE] = 0.0
+    price_usd: float = 0.0
+    value: float = 0.0
+    bound: float = 0.0
+    coverage: float = 0.0
     sensors: tuple[NetworkSensor, ...] = ()
     frontier: tuple[NetworkPoint, ...] = ()
 
@@ -132,18 +120,18 @@ class NetworkRecord:
 
     name: str
     criterion: Literal["road", "returns"]
-    budget_usd: Money
-    price_usd: Money
-    value: Value
-    bound: Value
+    budget_usd: float
+    price_usd: float
+    value: float
+    bound: float
     sites: tuple[NetworkSite, ...]
     curve: tuple[NetworkPoint, ...]
     sensor_types: tuple[str, ...]
     attribution: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     created: str = ""
-    goal: Annotated[float, limits.SHARE] | None = None
-    least_usd: Money = 0.0
+    goal: float | None = None
+    least_usd: float = 0.0
 
     @property
     def gap(self) -> float:
@@ -183,22 +171,3 @@ def network_gap(criterion: Literal["road", "returns"], value: float, bound: floa
 def network_json(record: NetworkRecord) -> dict[str, Any]:
     """Return a record as a JSON value with its schema."""
     return {"schema": SCHEMA, **as_json(record)}
-
-
-def load_network(path: Path) -> NetworkRecord:
-    """Read ``network.json``.
-
-    Raises
-    ------
-    SeipError
-        It is damaged, or of a version that this program cannot read.
-    """
-    text = read_small(path, _MOST_BYTES, "run seip network again")
-    try:
-        content = json.loads(text)
-        schema = content.get("schema") if isinstance(content, dict) else None
-        if schema == SCHEMA:
-            return from_json(NetworkRecord, content)
-    except (ValueError, RecursionError) as error:
-        raise SeipError(f"{path} is damaged or not a network: {error}; run seip network again") from error
-    raise SeipError(f"{path} has the schema {schema!r}, not {SCHEMA!r}: run seip network again")

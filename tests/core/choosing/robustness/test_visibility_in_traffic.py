@@ -9,7 +9,7 @@ from headless.studies.full_scan import seen_by_tilted_full_scan
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.choosing.robustness.traffic_instants import (
@@ -19,7 +19,6 @@ from seip_addon.core.choosing.robustness.traffic_instants import (
     spread_instants,
 )
 from seip_addon.core.choosing.robustness.visibility_in_traffic import (
-    poses_in_traffic,
     visibility_in_traffic,
 )
 from seip_addon.core.errors import SeipError
@@ -95,14 +94,6 @@ crowds = st.lists(
 def views(instants, around=AROUND):
     seen = finish(visibility_in_traffic(around, POSES, instants))
     return np.array([seen.seen(instant) for instant in range(len(instants))])
-
-
-@settings(max_examples=6, deadline=None)
-@given(st.lists(crowds, min_size=1, max_size=3))
-def test_one_instant_at_a_time_gives_what_all_together_give(instants):
-    poses = finish(poses_in_traffic(AROUND, POSES))
-    for instant, seen in zip(instants, views(instants), strict=True):
-        assert poses.seen_by(instant).tolist() == seen.sum(axis=0).tolist()
 
 
 def place_of(pose, caster, around, reflectivity):
