@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.workflows.site_building import SiteRequest, build_site
@@ -83,16 +82,6 @@ def test_roads_follow_hills_within_the_smoothing(tmp_path):
     kerbs = over(named(model, "Kerbs"), model, hill)
     assert (kerbs.min(), kerbs.max()) == (pytest.approx(0.12 - 0.35, abs=0.1), pytest.approx(0.12, abs=0.1))
     assert any("smoothed by a Gaussian of 4 m" in note for note in model.notes)
-
-
-def test_a_map_of_its_own_heights_is_refused(tmp_path):
-    path = street(tmp_path)
-    sloping = path.read_text(encoding="utf-8").replace('b="0"', 'b="0.05"', 1)
-    path.write_text(sloping, encoding="utf-8")
-    with pytest.raises(SeipError, match="own heights"):
-        finish(
-            build_site(path, SiteRequest(near=(0.0, 0.0), radius=60.0, terrain=TerrainRequest(ground(tmp_path, plane))))
-        )
 
 
 @needs_sumo

@@ -1,8 +1,6 @@
 """Laser surveys: the ground, what stands on it, boxes that keep lines of sight, and what is refused."""
 
-import importlib
 import struct
-import sys
 import time
 
 import numpy as np
@@ -16,14 +14,13 @@ from seip_addon.core.geometry.geo_reference import GeoReference, projection
 from seip_addon.core.geometry.height_raster import HeightRaster
 from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import FROM_EXTRACT, FROM_SURVEY
-from seip_addon.core.world.elevation import obstacles, point_cloud
+from seip_addon.core.world.elevation import obstacles
 from seip_addon.core.world.elevation.at_place import MapSurroundings, TerrainRequest, with_terrain
-from seip_addon.core.world.elevation.obstacles import ObstacleRaster, blocked, merged, of_boxes, random_rays
+from seip_addon.core.world.elevation.obstacles import ObstacleRaster, blocked, merged, random_rays
 from seip_addon.core.world.streetscape.description import Building, SiteDescription
 from tests.builders.dem_files import origin_at
-from tests.builders.survey_files import BUILDING, UNCLASSIFIED, VEGETATION, block_points, ground_points, write_survey
+from tests.builders.survey_files import UNCLASSIFIED, VEGETATION, block_points, ground_points, write_survey
 
-laspy = pytest.importorskip("laspy")
 pytest.importorskip("lazrs")
 
 X, Y, _ = origin_at(52.5, 13.4)
@@ -86,15 +83,6 @@ def test_ground_and_what_stands_on_it(suffix, tmp_path):
     assert any("of 4,000 random lines of sight" in note for note in notes)
 
 
-def test_a_map_with_heights_keeps_them_and_gets_what_stands_there(tmp_path):
-    lanes = np.column_stack([np.linspace(-50, 50, 60), np.zeros((60, 2))])
-    lanes[:, 2] = 7 + 0.02 * lanes[:, 0]
-    site, notes, _ = surveyed(tmp_path, town(np.random.default_rng(3)), lanes=lanes)
-    assert site.relief is None
-    assert bounds(site, "Surveyed building")[1][2] == pytest.approx(52 - 33, abs=0.05)
-    assert "the map keeps its own heights" in notes[0]
-
-
 def test_a_building_of_an_extract_is_not_there_twice(tmp_path):
     own = Building(shapely.box(10, 10, 30, 22), 9.0, source=FROM_EXTRACT)
     site, notes, _ = surveyed(tmp_path, town(np.random.default_rng(3)), description=SiteDescription(buildings=(own,)))
@@ -125,16 +113,6 @@ def test_boxes_cover_each_cell_once_and_no_other_within_the_tolerance(seed, fill
     assert (covered == (kind >= 0)).all()
 
 
-def test_equal_heights_are_one_box_and_change_no_ray():
-    kind = np.full((80, 90), -1)
-    kind[20:40, 30:70] = 2
-    raster = raster_of(kind, np.where(kind >= 0, 9.0, 0.0))
-    boxes = merged(raster, 0.0)
-    assert [(box.rows, box.columns, box.top) for box in boxes] == [((20, 40), (30, 70), 9.0)]
-    begin, end = random_rays(raster, np.random.default_rng(1))
-    assert (blocked(raster, begin, end) == blocked(of_boxes(raster, boxes), begin, end)).all()
-
-
 def test_a_ray_is_blocked_where_a_block_stands_in_it():
     """Against the crossing of a segment and a box in closed form."""
     kind = np.full((60, 60), -1)
@@ -152,49 +130,11 @@ def test_a_ray_is_blocked_where_a_block_stands_in_it():
     assert found[(last - first) * length > 2 * obstacles.RAY_STEP].all()
 
 
-def test_fewer_boxes_change_more_rays(tmp_path):
-    rng = np.random.default_rng(5)
-    kind = np.where(rng.random((120, 120)) < 0.3, 0, -1)
-    raster = raster_of(kind, 2 + 6 * rng.random(kind.shape))
-    boxes, tried = obstacles.chosen_boxes(raster, np.random.default_rng(6))
-    assert [one.boxes for one in tried] == sorted(one.boxes for one in tried)
-    chosen = next(one for one in tried if one.changed <= obstacles.MAX_CHANGED)
-    assert len(boxes) == chosen.boxes
-    assert (tried[-1].tolerance, tried[-1].changed) == (0.0, 0.0)
-
-
-def test_the_same_survey_makes_the_same_boxes(tmp_path):
-    first, second = (surveyed(tmp_path, town(np.random.default_rng(3)))[0] for _ in range(2))
-    for one, other in zip(first.solids, second.solids, strict=True):
-        assert one.solid.vertices.tobytes() == other.solid.vertices.tobytes()
-
-
-def test_a_survey_without_ground_is_refused(tmp_path):
-    points = town(np.random.default_rng(3))
-    with pytest.raises(SeipError, match=r"no points of class 2 \(ground\) at the place: classify it"):
-        surveyed(tmp_path, points[points[:, 3] == BUILDING])
-
-
 def test_a_survey_without_a_system_asks_for_it(tmp_path):
     points = town(np.random.default_rng(3))
     with pytest.raises(SeipError, match="give the EPSG code of the terrain"):
         surveyed(tmp_path, points, wkt=None)
     assert surveyed(tmp_path, points, wkt=None, epsg=25833)[0].solids
-
-
-def test_the_system_in_plan_of_a_compound_one_counts(tmp_path):
-    heights = 'VERT_CS["DHHN2016",VERT_DATUM["x",2005,AUTHORITY["EPSG","1170"]],AUTHORITY["EPSG","7837"]]'
-    compound = f'COMPD_CS["both",{WKT},{heights},AUTHORITY["EPSG","9932"]]'
-    assert surveyed(tmp_path, town(np.random.default_rng(3)), wkt=compound)[0].solids
-
-
-def test_geokeys_of_older_files_name_the_system(tmp_path):
-    path = tmp_path / "survey.las"
-    header = laspy.LasHeader(version="1.2", point_format=1)
-    keys = np.array([1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 25833], dtype="<u2").tobytes()
-    header.vlrs.append(laspy.VLR("LASF_Projection", 34735, "", keys))
-    laspy.LasData(header).write(path)
-    assert point_cloud.survey_system(path)[0] == 25833
 
 
 def test_a_survey_of_another_place_is_refused_with_both(tmp_path):
@@ -205,12 +145,6 @@ def test_a_survey_of_another_place_is_refused_with_both(tmp_path):
     points[:, 0] -= 9000 - 130
     with pytest.raises(SeipError, match=r"has points on \d+% of the place"):
         surveyed(tmp_path, points)
-
-
-def test_too_many_points_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(point_cloud, "MAX_POINTS", 1000)
-    with pytest.raises(SeipError, match="holds more than 1,000 points at the place: thin it"):
-        surveyed(tmp_path, town(np.random.default_rng(3)))
 
 
 @pytest.mark.parametrize("suffix", [".las", ".laz"])
@@ -257,12 +191,3 @@ def test_what_a_file_does_not_bear_out_is_refused_at_once(name, tmp_path, capfd)
         finish(with_terrain(SiteDescription(), TerrainRequest(path), around()))
     assert time.process_time() - begin < 1.0
     assert capfd.readouterr() == ("", "")
-
-
-@pytest.mark.parametrize("missing", ["laspy", "lazrs"])
-def test_without_laspy_the_cure_is_named(missing, tmp_path, monkeypatch):
-    path = write_survey(tmp_path / "survey.laz", town(np.random.default_rng(3)), (X, Y), WKT)
-    monkeypatch.setitem(sys.modules, missing, None)
-    with pytest.raises(SeipError, match=f"needs {missing}, .*pip install laspy lazrs"):
-        finish(with_terrain(SiteDescription(), TerrainRequest(path), around()))
-    importlib.invalidate_caches()

@@ -1,16 +1,14 @@
 """Back from metres of a map to latitude and longitude."""
 
 import math
-import re
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.geometry.geo_reference import GeoReference, projection
+from seip_addon.core.geometry.geo_reference import projection
 
-TURNED_BY = 0.1
 BERLIN = "+proj=tmerc +lat_0=52.5 +lon_0=13.4 +k=1 +x_0=1000 +y_0=-500 +datum=WGS84 +units=m"
 
 
@@ -44,25 +42,3 @@ def test_known_places_are_where_proj_says(reference, latitude, longitude, eastin
     )
     back = np.degrees(mercator.inverse(np.array([easting]), np.array([northing]))).ravel()
     np.testing.assert_allclose(back, [latitude, longitude], rtol=0, atol=1e-11)
-
-
-def test_the_header_offset_is_added_to_map_coordinates():
-    mercator = projection(BERLIN)
-    easting, northing = mercator(math.radians(52.55), math.radians(13.45))
-    reference = GeoReference(BERLIN, (4000.0, -3000.0, 30.0, 0.0))
-    places = reference.geographic(np.array([[easting - 4000.0, northing + 3000.0, 5.0]]))
-    np.testing.assert_allclose(places, [[13.45, 52.55, 35.0]], rtol=0, atol=1e-11)
-    assert not reference.obstacle
-
-
-@pytest.mark.parametrize(
-    ("reference", "says"),
-    [
-        (GeoReference(), "names no projection"),
-        (GeoReference("+proj=merc"), r"'\+proj=merc'"),
-        (GeoReference(BERLIN, (0.0, 0.0, 0.0, TURNED_BY)), "turns its coordinates"),
-    ],
-)
-def test_where_there_is_no_projection_nothing_is_guessed(reference, says):
-    assert reference.geographic(np.zeros((1, 3))) is None
-    assert re.search(says, reference.obstacle)

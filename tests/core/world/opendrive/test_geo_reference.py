@@ -37,36 +37,11 @@ def test_on_its_meridian_the_projection_keeps_lengths(degrees):
     assert northing == pytest.approx(0.9996 * length, abs=0.2)
 
 
-@given(st.floats(-75, 75), st.floats(-6, 6))
-def test_the_projection_keeps_angles(degrees, east):
-    """With the lengths on its meridian this defines it."""
-    to_metres = projection("+proj=tmerc +lat_0=10 +lon_0=9 +k=0.9996")
-    latitude, longitude, step = math.radians(degrees), math.radians(9 + east), 1e-5
-    meridian, across = radii(latitude)
-    up, down = (np.array(to_metres(latitude + side * step, longitude)) for side in (1, -1))
-    right, left = (np.array(to_metres(latitude, longitude + side * step)) for side in (1, -1))
-    north = (up - down) / (2 * step * meridian)
-    easting = (right - left) / (2 * step * across * math.cos(latitude))
-    np.testing.assert_allclose(easting, [north[1], -north[0]], atol=1e-6)
-
-
 def test_a_known_place_is_where_it_is():
     """The Eiffel tower in UTM zone 31."""
     for text in ("+proj=utm +zone=31 +datum=WGS84", "EPSG:32631", "EPSG:25831"):
         place = projection(text)(math.radians(48.85822), math.radians(2.2945))
         np.testing.assert_allclose(place, [448_251, 5_411_943], atol=30)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        *(None, "", "+proj=merc", "+lat_0=49 +lon_0=8", "+proj=utm +zone=77", "+proj=tmerc +ellps=bessel +lon_0=9"),
-        *("+proj=tmerc +lon_0=9 +towgs84=598.1,73.7,418.2,0,0,0,0", "+proj=tmerc +lon_0=nine", "no projection"),
-        "+proj=utm +zone=32 +units=us-ft",
-    ],
-)
-def test_other_references_are_not_guessed_at(text):
-    assert projection(text) is None
 
 
 def street(tmp_path, reference, *, x=0.0, y=0.0, offset=""):
@@ -90,22 +65,6 @@ def test_latitude_and_longitude_are_converted_by_the_maps_projection(tmp_path, t
     east = math.radians(0.002) * radii(math.radians(52.5))[1] * math.cos(math.radians(52.5))
     np.testing.assert_allclose(model.origin[:2], [east - offset[0], -offset[1]], atol=1.0)
     assert "taken as latitude and longitude" in model.notes[0]
-
-
-@pytest.mark.parametrize("near", [(0.0, 0.0), (52.5, 0.0), (-60.0, 1.5), (120.25, 2.0)])
-def test_metres_stay_metres(tmp_path, near):
-    model = built(street(tmp_path, BERLIN), near)
-    np.testing.assert_array_equal(model.origin[:2], np.round(near))
-    assert not any("latitude" in note for note in model.notes)
-
-
-def test_without_a_projection_they_are_refused(tmp_path):
-    road_map = street(tmp_path, "+lat_0=49 +lon_0=8")
-    with pytest.raises(SeipError, match=r"look like latitude and longitude.*names no projection"):
-        built(road_map, (49.001, 8.002))
-    assert built(road_map, (49.0, 8.0)).origin[0] == 49  # whole metres are metres
-    with pytest.raises(SeipError, match=r"give metres of the map, not latitude and longitude"):
-        built(street(tmp_path, "", x=500_000.0, y=5_000_000.0), (52.51, 13.4))
 
 
 CITY = b'{"type": "CityJSON", "version": "1.1", "CityObjects": {}}'

@@ -10,7 +10,7 @@ from numpy.polynomial import Polynomial
 from scipy.integrate import quad, solve_ivp
 from scipy.special import fresnel
 
-from seip_addon.core.world.opendrive.profile import ZERO_PROFILE, profile
+from seip_addon.core.world.opendrive.profile import profile
 from seip_addon.core.world.opendrive.reference_line import Clothoid, ReferenceLine, param_poly3, poly3
 from tests.oracles.random_cases import cases
 
@@ -20,10 +20,6 @@ lengths = st.floats(1e-6, 300.0)
 
 def at(piece, distance):
     return np.array([values[0] for values in piece(np.array([distance]))])
-
-
-def test_a_line_goes_straight_on():
-    np.testing.assert_array_equal(at(Clothoid(0.0, 0.0), 1234.5), [1234.5, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("curvature", [0.02, -0.3, 1e-9])
@@ -97,19 +93,6 @@ def test_a_normalised_parametric_cubic_is_walked_by_its_arc(u, v, share, misstat
     np.testing.assert_allclose(at(curve, length), end, atol=1e-9)
 
 
-def test_a_parametric_cubic_over_its_arc_length_ends_where_it_says():
-    length, u, v = 50.0, (0.0, 1.0, 0.0, -1e-5), (0.0, 0.0, 5e-3, 0.0)
-    curve = param_poly3(u, v, length, length)
-    np.testing.assert_allclose(at(curve, length)[:2], [Polynomial(u)(length), Polynomial(v)(length)], atol=1e-9)
-
-
-def test_a_parametric_cubic_that_stops_and_turns_back_is_still_found():
-    # u = 3p - 6p² + 4p³ stands still at p = 1/2; along the straight line s is u.
-    curve = param_poly3((0.0, 3.0, -6.0, 4.0), (0.0, 0.0, 0.0, 0.0), 1.0, 1.0)
-    distance = np.linspace(0.0, 1.0, 101)
-    np.testing.assert_allclose(curve(distance)[0], distance, atol=1e-9)
-
-
 def test_pieces_follow_their_own_starts_far_from_the_origin():
     line = ReferenceLine(
         s=np.array([0.0, 10.0]),
@@ -128,13 +111,3 @@ def test_each_record_of_a_profile_counts_from_its_own_start():
     s = np.array([0.0, 2.0, 4.0, 10.0, 12.0])
     np.testing.assert_allclose(records(s), [1.0, 1.0, 3.0, 7.0, 13.0])
     np.testing.assert_allclose(records.slope(s), [0.0, 0.0, 2.0, 2.0, 5.0])
-
-
-def test_the_zeros_of_a_profile_are_found_within_its_records():
-    records = profile([(0.0, (2.0, -1.0, 0.0, 0.0)), (5.0, (-1.0, 0.0, 1.0, 0.0)), (8.0, (1.0, 1e-300, 0.0, 0.0))])
-    np.testing.assert_allclose(np.sort(records.zeros(9.0)), [2.0, 6.0])
-    assert ZERO_PROFILE.zeros(9.0).tolist() == []
-
-
-def test_a_profile_without_records_is_zero():
-    np.testing.assert_array_equal(ZERO_PROFILE(np.array([0.0, 5.0])), [0.0, 0.0])

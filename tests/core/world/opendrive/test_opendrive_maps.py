@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.world.opendrive.junctions import find_junction, junction_area, nearest_junctions
 from seip_addon.core.world.opendrive.objects import placed_objects
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.opendrive.signals import placed_signals
@@ -48,15 +47,6 @@ def test_a_real_map_has_sound_surfaces_objects_and_signals(name):
     assert all(np.isfinite(signal.position).all() for signal in placed_signals(road_map))
 
 
-@pytest.mark.parametrize(
-    ("name", "objects", "signals"),
-    [("Town01", 22, 36), ("Town05", 0, 0), ("crest-curve", 9, 0), ("stationary_objects", 7, 1)],
-)
-def test_all_objects_and_signals_are_there(name, objects, signals):
-    road_map, _ = loaded(name)
-    assert (len(placed_objects(road_map)), len(placed_signals(road_map))) == (objects, signals)
-
-
 def areas(named_polygons):
     """Return summed and united area by lane type."""
     by_type = defaultdict(list)
@@ -86,28 +76,6 @@ def test_the_figures_of_town05():
     found = areas((surface.lane_type, surface.polygon) for surface in surfaces)
     assert found["driving"] == pytest.approx((82_184, 71_979), rel=5e-3)
     assert found["sidewalk"][1] == pytest.approx(26_443, rel=5e-3)
-
-
-def test_the_junction_of_town05_near_the_origin():
-    road_map, surfaces = loaded("Town05")
-    (junction, distance), *others = nearest_junctions(road_map, surfaces, -49.0, -1.0, 3)
-    assert distance == 0.0
-    assert all(further > 0 for _, further in others)
-    assert find_junction(road_map, surfaces, junction.id) == junction
-    area = junction_area(surfaces, junction.id)
-    assert area.geom_type == "Polygon"
-    assert area.contains(shapely.Point(-49, -1))
-
-
-def test_the_lights_of_town01_stand_beside_the_carriageway():
-    road_map, surfaces = loaded("Town01")
-    carriageway = shapely.union_all([surface.polygon for surface in surfaces if surface.lane_type == "driving"])
-    posts = [signal for signal in placed_signals(road_map) if signal.kind == "1000001"]
-    assert len(posts) == 36
-    assert all(signal.dynamic for signal in posts)
-    distances = shapely.distance(carriageway, shapely.points([signal.position[:2] for signal in posts]))
-    assert distances.min() > 0.0
-    assert distances.max() < 5.0
 
 
 @pytest.mark.slow

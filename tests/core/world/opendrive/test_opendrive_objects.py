@@ -12,7 +12,6 @@ from seip_addon.core.world.opendrive.signals import placed_signals
 from tests.builders.opendrive_text import document, geometry, read_text, road
 
 UPHILL = '<elevation s="0" a="5" b="0.1" c="0" d="0"/>'
-TILTED = '<superelevation s="0" a="0.1" b="0" c="0" d="0"/>'
 
 
 def objects(folder, inner, area=None, **options):
@@ -32,12 +31,6 @@ def test_a_box_stands_upright_beside_a_sloping_road(tmp_path):
     assert hall.outlines == ()
 
 
-def test_superelevation_tilts_the_t_axis(tmp_path):
-    (pole,) = objects(tmp_path, '<object id="1" s="10" t="5" radius="0.1" height="6"/>', lateral=TILTED)
-    np.testing.assert_allclose(pole.position, [10, 5 * math.cos(0.1), 5 * math.sin(0.1)])
-    assert (pole.kind, pole.radius, pole.height) == ("none", 0.1, 6)
-
-
 @pytest.mark.parametrize("wrap", ["{}", "<outlines>{}</outlines>"])
 def test_local_corners_turn_with_the_object(tmp_path, wrap):
     corners = '<cornerLocal u="2" v="0" z="-0.5" height="3"/><cornerLocal u="0" v="1" z="0"/>'
@@ -49,18 +42,6 @@ def test_local_corners_turn_with_the_object(tmp_path, wrap):
     # The second corner says nothing: the object's height holds.
     assert found.height.tolist() == [3, 9]
     assert not found.closed
-
-
-def test_pitch_and_roll_turn_about_the_new_axes(tmp_path):
-    corners = '<cornerLocal u="1" v="0" z="0"/><cornerLocal u="0" v="1" z="0"/><cornerLocal u="0" v="0" z="1"/>'
-    text = (
-        f'<object id="1" s="0" t="0" hdg="{math.pi / 2}" pitch="{math.pi / 2}" roll="{math.pi / 2}">'
-        f"<outline>{corners}</outline></object>"
-    )
-    (obj,) = objects(tmp_path, text)
-    # Yaw: x ahead to +y. Pitch, right-handed about the new y (-x): x ahead to -z. Roll about that x.
-    np.testing.assert_allclose(obj.outlines[0].base, [[0, 0, -1], [0, 1, 0], [1, 0, 0]], atol=1e-12)
-    assert obj.outlines[0].closed
 
 
 def test_corners_on_the_road_follow_its_bend_and_slope(tmp_path):
@@ -85,51 +66,6 @@ def test_a_row_has_a_copy_at_each_step_between_its_ends(tmp_path):
     assert {tree.radius for tree in trees} == {0.2}
 
 
-@pytest.mark.parametrize(
-    "corner",
-    ['<cornerRoad s="2" t="3"/><cornerRoad s="4" t="3"/>', '<cornerLocal u="-3" v="2"/><cornerLocal u="-1" v="2"/>'],
-)
-def test_the_outline_moves_along_with_each_copy(tmp_path, corner):
-    text = (
-        f'<object id="1" s="5" t="1"><repeat s="20" length="10" distance="5" tStart="-1" tEnd="-1"/>'
-        f"<outline>{corner}</outline></object>"
-    )
-    copies = objects(tmp_path, text)
-    expected = [[[17 + 5 * i, 1, 0], [19 + 5 * i, 1, 0]] for i in range(3)]
-    np.testing.assert_allclose([copy.outlines[0].base for copy in copies], expected)
-
-
-def test_a_row_has_from_its_object_what_it_does_not_say(tmp_path):
-    text = (
-        '<object id="1" s="30" t="2" zOffset="0.5" height="4" width="1" length="3" radius="0.5">'
-        '<repeat length="10" distance="10"/></object>'
-    )
-    first, last = objects(tmp_path, text)
-    np.testing.assert_allclose([first.position, last.position], [[30, 2, 0.5], [40, 2, 0.5]])
-    for copy in (first, last):
-        assert (copy.height, copy.width, copy.length, copy.radius) == (4, 1, 3, 0.5)
-
-
-def test_a_row_ends_with_its_road(tmp_path):
-    text = '<object id="1" s="0" t="0"><repeat s="90" length="1000" distance="4"/></object>'
-    assert [obj.position[0] for obj in objects(tmp_path, text)] == pytest.approx([90, 94, 98])
-
-
-def test_a_strip_without_width_is_a_wall_along_a_line(tmp_path):
-    text = (
-        '<object id="1" type="barrier" s="0" t="0"><repeat s="0" length="31.4159" distance="0" tStart="2" tEnd="2"'
-        ' heightStart="1" heightEnd="2"/></object>'
-    )
-    (wall,) = objects(tmp_path, text, plan=geometry('<arc curvature="0.1"/>'))
-    (outline,) = wall.outlines
-    assert not outline.closed
-    np.testing.assert_allclose(np.hypot(outline.base[:, 0], outline.base[:, 1] - 10), 8)
-    np.testing.assert_allclose(outline.base[0], [0, 2, 0], atol=1e-9)
-    assert np.hypot(*np.diff(outline.base[:, :2], axis=0).T).sum() == pytest.approx(8 * math.pi, rel=3e-3)
-    assert outline.height[[0, -1]] == pytest.approx([1, 2])
-    assert wall.length == pytest.approx(31.4159)
-
-
 def test_a_strip_with_width_is_a_closed_outline(tmp_path):
     text = (
         '<object id="1" type="vegetation" s="40" t="1" height="1.5"><repeat s="10" length="50" distance="0" tStart="-5"'
@@ -141,12 +77,6 @@ def test_a_strip_with_width_is_a_closed_outline(tmp_path):
     expected = shapely.Polygon([(10, -4.5), (10, -5.5), (60, -11.5), (60, -8.5)])
     assert shapely.Polygon(outline.base[:, :2]).symmetric_difference(expected).area < 1e-6
     assert set(outline.height) == {1.5}
-
-
-def test_a_row_without_end_is_refused(tmp_path):
-    text = '<object id="6" s="0" t="0"><repeat s="0" length="100" distance="1e-9"/></object>'
-    with pytest.raises(SeipError, match="road 1: object 6 is repeated too often"):
-        objects(tmp_path, text)
 
 
 def test_an_area_keeps_what_stands_in_it_or_reaches_into_it(tmp_path):
@@ -175,20 +105,6 @@ def test_signals_have_a_place_and_a_direction(tmp_path):
     assert lamp.yaw == pytest.approx(0.5 + math.pi)
     assert not lamp.dynamic
     assert placed_signals(road_map, area=shapely.Point(lamp.position[:2]).buffer(1))[0].id == "2"
-
-
-def test_a_signal_stands_where_its_post_is_said_to_be(tmp_path):
-    here = (
-        '<signal id="1" s="50" t="0" orientation="-"><positionRoad roadId="2" s="10" t="-4" zOffset="1" hOffset="0.1"/>'
-        '</signal><signal id="2" s="50" t="1"><positionInertial x="7" y="8" z="9" hdg="0.5"/></signal>'
-    )
-    roads = road(signals=here, elevation=UPHILL), road(geometry(y=100.0), number="2")
-    on_other, on_map = placed_signals(read_text(tmp_path, document(*roads)))
-    assert on_other.road_id == "2"
-    np.testing.assert_allclose(on_other.position, [10, 96, 1], atol=1e-12)
-    assert on_other.yaw == pytest.approx(math.pi + 0.1)
-    assert on_map.position.tolist() == [7, 8, 9]
-    assert on_map.yaw == pytest.approx(0.5)
 
 
 def test_a_signal_on_a_road_that_is_not_there_is_named(tmp_path):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.world.opendrive.junctions import find_junction, nearest_junctions
+from seip_addon.core.world.opendrive.junctions import find_junction
 from seip_addon.core.world.opendrive.objects import placed_objects
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.opendrive.signals import placed_signals
@@ -26,29 +26,6 @@ def test_the_header_is_kept_and_not_applied(tmp_path):
     np.testing.assert_array_equal(road_map.header_offset, [1.5, -2, 3, 0.25])
     assert map_lanes(road_map)[0].left[0].tolist() == [0, 0, 0]
     assert [(junction.id, junction.name) for junction in road_map.junctions] == [("5", "Market")]
-
-
-def test_a_bare_file_has_its_name_and_zeros(tmp_path):
-    road_map = read_text(tmp_path, f"<OpenDRIVE>{road()}</OpenDRIVE>", "village.xodr")
-    assert (road_map.name, road_map.geo_reference, road_map.junctions) == ("village", None, ())
-    np.testing.assert_array_equal(road_map.header_offset, np.zeros(4))
-
-
-@pytest.mark.parametrize(
-    "opening",
-    ['<OpenDRIVE xmlns="http://code.asam.net/simulation/standard/opendrive_schema">', '<o:OpenDRIVE xmlns:o="urn:o">'],
-)
-def test_namespaces_do_not_matter(tmp_path, opening):
-    text = document(road()).replace("<OpenDRIVE>", opening)
-    if "o:" in opening:
-        text = text.replace("</OpenDRIVE>", "</o:OpenDRIVE>")
-    assert len(map_lanes(read_text(tmp_path, text))) == 1
-
-
-def test_a_byte_order_mark_and_crlf_are_fine(tmp_path):
-    path = tmp_path / "map.xodr"
-    path.write_bytes(b"\xef\xbb\xbf" + document(road()).replace("><", ">\r\n<").encode())
-    assert len(read_map(path).roads) == 1
 
 
 def test_sections_and_geometries_may_come_in_any_order(tmp_path):
@@ -100,14 +77,6 @@ def refused(path, message):
         read_map(path)
 
 
-def test_a_missing_file_is_named(tmp_path):
-    refused(tmp_path / "nowhere.xodr", "no such file: .*nowhere.xodr")
-
-
-def test_a_folder_is_no_map(tmp_path):
-    refused(tmp_path, "cannot read ")
-
-
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -143,12 +112,6 @@ def test_hostile_xml_is_refused(tmp_path, declared):
         read_text(tmp_path, text)
 
 
-def test_an_external_document_type_is_refused(tmp_path):
-    text = '<!DOCTYPE OpenDRIVE SYSTEM "http://localhost:9/o.dtd">' + document(road())
-    with pytest.raises(SeipError, match="declares a document type or entities"):
-        read_text(tmp_path, text)
-
-
 @pytest.fixture
 def three_junctions(tmp_path):
     roads = [road(geometry(length=20.0, x=100.0 * i), number=str(i), junction=f"70{i}") for i in range(3)]
@@ -161,33 +124,6 @@ def three_junctions(tmp_path):
 def test_a_junction_is_found_by_its_id_or_its_name(three_junctions):
     assert find_junction(*three_junctions, "702").id == "702"
     assert find_junction(*three_junctions, "North gate").id == "700"
-
-
-@pytest.mark.parametrize(
-    ("asked", "message"),
-    [
-        ("Nort gate", "no junction 'Nort gate' in map 'map'; the closest: North gate"),
-        ("zzz", "the closest: 700, North gate, 701"),
-        ("South gate", "several junctions are called 'South gate'; choose one by its id: 701, 702"),
-        ("800", "junction '800' has no lanes"),
-    ],
-)
-def test_a_junction_that_is_not_there_has_its_neighbours_named(three_junctions, asked, message):
-    with pytest.raises(SeipError, match=message):
-        find_junction(*three_junctions, asked)
-
-
-def test_a_map_without_junctions_says_so(tmp_path):
-    road_map = read_text(tmp_path, document(road()))
-    with pytest.raises(SeipError, match="the map has no junctions"):
-        find_junction(road_map, map_lanes(road_map), "1")
-
-
-def test_the_nearest_junctions_come_first(three_junctions):
-    found = nearest_junctions(*three_junctions, 150.0, 4.0, 2)
-    assert [junction.id for junction, _ in found] == ["701", "702"]
-    assert [distance for _, distance in found] == pytest.approx([np.hypot(30, 4), np.hypot(50, 4)])
-    assert len(nearest_junctions(*three_junctions, 0.0, 0.0, 99)) == 3
 
 
 EVERYTHING = document(

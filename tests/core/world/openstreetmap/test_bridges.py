@@ -1,7 +1,6 @@
 """Bridges and underpasses of extracts: their height, the grade of their ramps, and what has no room for them."""
 
 import math
-import re
 
 import numpy as np
 import pytest
@@ -15,9 +14,8 @@ from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.opendrive.lanes import lane_surfaces
 from seip_addon.core.world.opendrive.read import read_map
-from seip_addon.core.world.streetscape.terrain import MAX_ROADSIDE
 from tests.builders.dem_files import origin_at, sampled, write_dem
-from tests.builders.osm_text import Extract, corner_houses
+from tests.builders.osm_text import Extract
 from tests.sumo_here import needs_sumo
 
 pytestmark = needs_sumo
@@ -145,39 +143,6 @@ def test_slip_roads_of_an_exit_climb_to_the_bridge(tmp_path):
     assert not any("flat" in note for note in site.model.notes)
 
 
-def test_a_bridge_without_room_for_ramps_is_built_flat_and_named(tmp_path):
-    extract = Extract()
-    bridge(extract, 12.0)
-    trunk(extract)
-    extract.way([(30, 0), (20, 15), (0, 30)], highway="trunk_link")  # 6 m in 40 m
-    extract.lines = [line.replace('<nd ref="4"/><nd ref="6"/>', "") for line in extract.lines]
-    extract.way([(12, 0), (30, 0)], highway="primary", name="High Road", lanes=2)
-    extract.way([(0, 0.5), (0, 30)], highway="trunk", name="Trunk Road")
-    site, road_map = built(extract, tmp_path)
-    assert any(note.startswith("High Road over Trunk Road is built flat") for note in site.model.notes)
-    assert max(abs(lane.left[:, 2]).max() for lane in lanes_of(road_map)) < 0.01
-
-
-@pytest.mark.parametrize(
-    ("below", "rise"),
-    [
-        ({"railway": "rail"}, RAIL_CLEARANCE),
-        ({"railway": "rail", "cutting": "yes"}, 0.0),
-        ({"highway": "footway"}, PATH_CLEARANCE),
-        ({"highway": "primary", "tunnel": "yes", "layer": "-1"}, 0.0),
-        ({"waterway": "river"}, 0.0),
-    ],
-)
-def test_the_height_is_that_of_what_is_crossed(tmp_path, below, rise):
-    extract = Extract()
-    bridge(extract, 20.0)
-    extract.way([(200, 0), (200, 100)], highway="residential", name="Side Street")
-    extract.way([(0, -100), (0, 100)], **below)
-    _, road_map = built(extract, tmp_path)
-    check(road_map)
-    assert max(lane.left[:, 2].max() for lane in lanes_of(road_map)) == pytest.approx(rise, abs=0.02)
-
-
 def test_an_underpass_is_lowered_under_a_street_that_stays(tmp_path):
     extract = Extract()
     extract.way([(-300, 0), (300, 0)], highway="primary", name="High Road", lanes=2)
@@ -248,40 +213,6 @@ def test_a_place_on_two_levels_is_asked_for_by_street(tmp_path):
         assert road.max() + site.model.origin[2] == pytest.approx(z, abs=0.05)
     with pytest.raises(SeipError, match=r"no road 'Low Road' at this place: name a street .*: High Road, Trunk Road"):
         built(extract, tmp_path, level=("Low Road",))
-
-
-def test_a_place_without_a_junction_on_its_level_is_titled_by_its_street(tmp_path):
-    """High Road has a junction 75 m from the middle, Trunk Road none."""
-    extract = Extract()
-    bridge(extract, 20.0, 75.0)
-    extract.way([(75, 0), (300, 0)], highway="primary", name="High Road", lanes=2)
-    trunk(extract)
-    extract.way([(75, 0), (75, 150)], highway="residential", name="Side Street")
-    for level, radius, name in (
-        ("trunk road", 60.0, "Trunk Road"),
-        ("trunk road", 90.0, "Trunk Road"),
-        ("High Road", 60.0, "High Road"),
-        ("High Road", 90.0, "High Road / Side Street"),
-    ):
-        site, _ = built(extract, tmp_path, level=(level,), radius=radius)
-        assert site.model.name == name
-
-
-def test_a_level_that_is_a_tunnel_is_named_in_a_note(tmp_path):
-    extract = corner_houses(Extract())
-    extract.way([(-200, 0), (40, 0), (200, 0)], highway="primary", name="Top Road")
-    extract.way([(40, 0), (40, 150)], highway="residential", name="Side Road")
-    dip = {"highway": "secondary", "name": "Dip Road", "lanes": 2}
-    extract.way([(0, -20), (0, 20)], tunnel="yes", layer="-1", **dip)
-    with pytest.raises(SeipError, match=r"Dip Road lies in a tunnel at this place, and scenes leave tunnels out"):
-        built(extract, tmp_path, level=("dip road",), radius=60.0)
-    extract.way([(0, -200), (0, -20)], **dip)
-    extract.way([(0, 20), (0, 200)], **dip)
-    site, _ = built(extract, tmp_path, level=("dip road",), radius=60.0)
-    assert site.model.name == "Top Road / Side Road"
-    assert any(note.startswith("Dip Road lies in a tunnel at this place") for note in site.model.notes)
-    site, _ = built(extract, tmp_path, radius=60.0)
-    assert not any("tunnel" in note for note in site.model.notes)
 
 
 def random_exit(seed):
@@ -361,30 +292,6 @@ def surfaces(model, *names):
     return np.array(corners).reshape(-1, 3, 3)
 
 
-@pytest.mark.parametrize("level", ["High Road", "Trunk Road"])
-@pytest.mark.parametrize("half", [2.0, 15.0])
-def test_the_ground_lies_on_the_land_and_slopes_lead_up_to_ramps(tmp_path, level, half):
-    extract = corner_houses(Extract(), near=40.0)
-    bridge(extract, half=half)
-    trunk(extract)
-    site, _ = built(extract, tmp_path, level=(level,))
-    model, land = site.model, -site.model.origin[2]
-    verge = surfaces(model, "Verge").reshape(-1, 3)
-    roads = surfaces(model, "Driving lanes", "Pavements", "Pavements beyond", OTHER_LEVELS, "Roads above")
-    away = shapely.distance(shapely.multipolygons(shapely.polygons(roads[:, :, :2])), shapely.points(verge[:, :2]))
-    np.testing.assert_allclose(verge[away > MAX_ROADSIDE, 2], land, atol=0.05)
-    assert (away > MAX_ROADSIDE).sum() > 50
-    low, high = verge[:, 2].min(), verge[:, 2].max()
-    assert low > land - 0.2
-    assert high > land + ROAD_CLEARANCE - 1.5  # the ramps lie on embankments
-    houses = [
-        part.foot[2] + part.solid.vertices[:, 2].min()
-        for part in model.parts
-        if re.fullmatch(r"Building \d+", part.name)
-    ]
-    np.testing.assert_allclose(houses, land, atol=0.05)
-
-
 def test_the_ground_beside_and_below_a_bridge_is_closed(tmp_path):
     """Under the deck there is ground or the lower road; beside it the surface has no holes and no cliffs."""
     extract = Extract()
@@ -404,21 +311,6 @@ def test_the_ground_beside_and_below_a_bridge_is_closed(tmp_path):
     over = np.isfinite(deck) & (np.abs(places[:, 0] - trunk_at.x) < 3.0)
     assert over.any()
     assert (deck - below)[over].min() > ROAD_CLEARANCE - 0.1
-
-
-def test_a_street_in_an_underpass_lies_in_a_cutting(tmp_path):
-    extract = corner_houses(Extract(), near=40.0)
-    extract.way([(-300, 0), (0, 0), (300, 0)], highway="secondary", name="High Road", lanes=2)
-    low = {"highway": "primary", "name": "Low Road", "lanes": 2}
-    extract.way([(0, -300), (0, -30)], **low)
-    extract.way([(0, -30), (0, 30)], layer="-1", **low)
-    extract.way([(0, 30), (0, 300)], **low)
-    site, _ = built(extract, tmp_path, level=("Low Road",))
-    verge = surfaces(site.model, "Verge").reshape(-1, 3) + np.array([0, 0, site.model.origin[2]])
-    assert verge[:, 2].max() == pytest.approx(0.0, abs=0.13)  # up to the pavements
-    assert verge[:, 2].min() < -4.0
-    (deck,) = [part for part in site.model.parts if part.name == "Roads above"]
-    assert deck.solid.vertices[:, 2] + site.model.origin[2] == pytest.approx(0.0, abs=0.05)
 
 
 def faces_in_plan(model, name):

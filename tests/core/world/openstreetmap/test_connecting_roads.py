@@ -113,22 +113,6 @@ def test_of_two_lanes_that_lead_into_one_the_outer_tapers_to_nothing(tmp_path):
     assert last[-3].right[-1, :2] == pytest.approx(next_lanes[-2].right[0, :2], abs=0.01)
 
 
-def test_a_sharp_turn_back_keeps_its_line():
-    """A curve that starts eastwards and ends far in the west would swing out over the corner."""
-    west = LINE.format(s=0, x=-20, y=-15, hdg=math.pi, length=20)
-    chord = LINE.format(s=0, x=20, y=0, hdg=math.atan2(-15, -40), length=math.hypot(15, 40))
-    lanes = lane(-1, (3.2, 0))
-    own = lane(-1, (3.2, 0), before=-1, after=-1)
-    connecting = road("3", chord, own, junction="7", links=joined(), length=math.hypot(15, 40))
-    text = mended_text(map_text(road("1", EAST, lanes), road("2", west, lanes), connecting))
-    assert "paramPoly3" not in text
-
-
 def test_a_connecting_road_that_fits_keeps_its_line(tmp_path):
     text = mended_text(quarter(EAST))
     assert re.findall(r"<planView>.*?</planView>", mended_text(text)) == re.findall(r"<planView>.*?</planView>", text)
-
-
-def test_roads_without_links_are_left_as_they_are():
-    text = map_text(road("1", EAST, lane(-1, (3.2, 0))), road("3", EAST, lane(-1, (3.2, 0)), junction="7"))
-    assert mended_text(text) == text

@@ -1,17 +1,15 @@
 """Crossings by the names of their streets, and places as people type them."""
 
-import re
 from pathlib import Path
 
 import pytest
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.site_places import parsed_position, site_places
 from seip_addon.core.world.openstreetmap import extract as reading
 from seip_addon.core.world.openstreetmap.crossings import named_crossings
 from seip_addon.core.world.openstreetmap.extract import read_extract
-from tests.builders.osm_text import JUNCTIONS, Extract, crossing
+from tests.builders.osm_text import JUNCTIONS, crossing
 
 SCENES = Path(__file__).resolve().parents[4] / "scenes"
 
@@ -45,58 +43,10 @@ def test_streets_that_meet_twice_have_two_crossings(tmp_path):
     ]
 
 
-def test_pieces_of_one_street_and_streets_without_names_make_no_crossing(tmp_path):
-    extract = Extract()
-    middle = extract.node(0, 0)
-    extract.way([(-100, 0), middle], highway="residential", name="Long Street")
-    extract.way([middle, (100, 0)], highway="residential", name="Long Street")
-    extract.way([middle, (0, 100)], highway="residential")
-    extract.way([(0, -100), middle], railway="tram", name="Line 5")
-    assert crossings(extract, tmp_path) == ()
-
-
-def test_a_node_that_was_cut_off_is_no_crossing(tmp_path):
-    text = crossing().text()
-    cut = re.sub(r'<node id="1" .*?</node>', "", text, count=1)
-    (tmp_path / "cut.osm").write_text(cut, encoding="utf-8")
-    assert named_crossings(finish(read_extract(tmp_path / "cut.osm"))) == ()
-
-
-@pytest.mark.parametrize(
-    ("text", "place"),
-    [
-        ("52.47391, 13.44048", (52.47391, 13.44048)),
-        (" -31.95;115.86 ", (-31.95, 115.86)),
-        ("52.5 13.4", (52.5, 13.4)),
-        ("52.5°, -13.4°", (52.5, -13.4)),
-    ],
-)
-def test_a_place_is_read_as_people_copy_it(text, place):
-    assert parsed_position(text) == place
-
-
-@pytest.mark.parametrize("text", ["", "52.5", "here", "52,5, 13,4", "1e400, 2", "nan, 1"])
-def test_what_is_no_place_is_refused(text):
-    with pytest.raises(SeipError, match="is not a position: give latitude and longitude"):
-        parsed_position(text)
-
-
-@pytest.mark.parametrize("text", ["89.0, 10", "115.86, -31.95", "10, 181"])
-def test_a_place_without_streets_is_refused(text):
-    with pytest.raises(SeipError, match="give the latitude first"):
-        parsed_position(text)
-
-
 def test_junctions_of_a_map_have_their_streets_names():
     found = finish(site_places(SCENES / "corridor.xodr"))
     assert [place.key for place in found.places] == ["100", "200", "300"]
     assert found.places[1].name == "200 · School Street junction · High Street / School Street"
-
-
-def test_a_description_brings_its_own_radius():
-    described = finish(site_places(SCENES / "junction.toml"))
-    assert len(described.places) == 1
-    assert described.radius > 0
 
 
 def test_a_node_with_a_negative_id_is_not_taken_for_a_roundabout():

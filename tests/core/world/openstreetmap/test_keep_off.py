@@ -55,23 +55,6 @@ def test_a_mapped_crossing_has_landings_wherever_it_ends(tmp_path):
         assert kept_off(extract, tmp_path, x, y) == ({"landings"} if landing else set()), (x, y)
 
 
-def test_a_crossing_of_a_driveway_beside_the_street_has_no_landing(tmp_path):
-    extract = Extract()
-    extract.way([(-3, 5), (3, 5)], highway="footway", footway="crossing")
-    assert kept_off(extract, tmp_path, 6, 5) == set()
-
-
-def test_a_crossing_that_is_a_point_of_its_street_has_landings_at_both_kerbs(tmp_path):
-    extract = Extract()
-    here = extract.node(10, 0, highway="crossing", crossing="marked")
-    none = extract.node(60, 0, highway="crossing", crossing="no")
-    extract.way([(-100, 0), here, none, (100, 0)], highway="residential")
-    for x, y in ((10, 5), (10, -5), (11.5, 5.9)):
-        assert kept_off(extract, tmp_path, x, y) == {"landings"}
-    for x, y in ((60, 5), (13, 5), (10, 6.3)):
-        assert kept_off(extract, tmp_path, x, y) == set()
-
-
 @pytest.mark.parametrize(
     ("tags", "private"),
     [
@@ -102,18 +85,3 @@ def test_ground_behind_a_fence_is_private_and_a_pavement_behind_a_guard_rail_is_
     assert kept_off(extract, tmp_path, -20, 5.5) == set()
     assert kept_off(extract, tmp_path, 30, 6) == set()
     assert kept_off(extract, tmp_path, 0, -7) == set()
-
-
-def test_power_poles_are_no_street_lights(tmp_path):
-    extract = Extract()
-    extract.node(0, 6, power="pole")
-    extract.node(10, 6, man_made="utility_pole")
-    extract.node(20, 6, man_made="mast")
-    extract.node(30, 6, power="pole", highway="street_lamp")
-    site = found(extract, tmp_path)
-    assert [(row.name, row.keep_off) for row in site.posts] == [
-        ("Power pole", "power-poles"),
-        ("Power pole", "power-poles"),
-        ("Post", None),
-    ]
-    assert [row.keep_off for row in site.street_lights] == [None]

@@ -57,20 +57,6 @@ def test_the_extract_s_crossings_replace_guessed_ones(tmp_path, how, depth):
     assert not any("crossings of pedestrians" in note for note in site.model.notes)
 
 
-@pytest.mark.parametrize("how", [{}, {"crossing": {"highway": "crossing", "crossing": "no"}}])
-def test_guessed_crossings_are_called_assumed(tmp_path, how):
-    site = built(streets(**how), tmp_path)
-    found = crossings(site)
-    assert sorted(found) == [
-        f"Crossing of {street} Road, {arm} arm (assumed)"
-        for street, arm in (("East", "east"), ("East", "west"), ("North", "north"), ("North", "south"))
-    ]
-    for name, area in found.items():
-        x, y = {"east": (1, 0), "west": (-1, 0), "north": (0, 1), "south": (0, -1)}[name.split()[-3]]
-        assert area.centroid.x * x + area.centroid.y * y > 5.0
-    assert "4 crossings of pedestrians at junctions are assumed: the extract maps none there" in site.model.notes
-
-
 def test_a_crossing_within_the_map_s_junction_lies_where_the_extract_has_it(tmp_path):
     extract = Extract(52.5, 15.0)
     node = extract.node(9, 0, highway="crossing")
@@ -89,30 +75,3 @@ def test_the_written_map_has_the_same_crossings(tmp_path):
     place = crossing.position[:2] - site.model.origin[:2]
     assert place == pytest.approx(np.array([30.0, 0.0]), abs=ORIGIN_ROUNDING)
     assert (crossing.length, crossing.width) == pytest.approx((4.0, 6.4), abs=0.1)
-
-
-def test_where_streets_meet_no_place_of_a_crossing_is_told(tmp_path):
-    extract = Extract(52.5, 15.0)
-    middle = extract.node(0, 0, highway="crossing")
-    extract.way([(-200, 0), middle, (200, 0)], highway="secondary", name="East Road", lanes=2)
-    extract.way([(0, -200), middle, (0, 200)], highway="secondary", name="North Road", lanes=2)
-    assert all(name.endswith("(assumed)") for name in crossings(built(corner_houses(extract), tmp_path)))
-
-
-def test_no_crossing_is_assumed_where_a_street_only_goes_on(tmp_path):
-    """Its number of lanes changes where a driveway joins it, which is not a street here."""
-    extract = Extract(52.5, 15.0)
-    usual = {"highway": "secondary", "maxspeed": "30", "sidewalk": "both"}
-    extract.way([(-200, 0), (0, 0), (70, 0)], name="East Road", lanes=2, **usual)
-    extract.way([(70, 0), (200, 0)], name="East Road", lanes=4, **usual)
-    extract.way([(0, -200), (0, 0), (0, 200)], name="North Road", lanes=2, **usual)
-    extract.way([(70, 0), (70, 40)], highway="service", service="driveway")
-    site = built(corner_houses(extract), tmp_path)
-    assert len(crossings(site)) == 4
-    path = tmp_path / "again.xodr"
-    path.write_text(site.map_text, encoding="utf-8")
-    places = [
-        one.position[:2] - site.model.origin[:2] for one in placed_objects(read_map(path)) if one.kind == "crosswalk"
-    ]
-    assert len(places) == 4
-    assert max(np.hypot(*place) for place in places) < 20.0

@@ -72,27 +72,8 @@ def test_the_direction_of_signals_counts(tmp_path, direction, arms, at_junction)
     assert bool(result.lone_signals) is not at_junction
 
 
-def test_signals_of_a_one_way_street_are_those_of_the_junction_ahead(tmp_path):
-    for oneway, ahead in (("yes", (60, 0)), ("-1", (0, 0))):
-        extract = Extract()
-        signal = extract.node(25, 0, highway="traffic_signals")
-        extract.way([(-100, 0), (0, 0), signal, (60, 0), (200, 0)], highway="secondary", oneway=oneway)
-        for x in (0, 60):
-            extract.way([(x, -100), (x, 0), (x, 100)], highway="residential")
-        numbers, _ = written(extract, tmp_path)
-        assert numbers == [extract.node(*ahead)]
-
-
 def test_signals_that_stand_behind_a_junction_are_its(tmp_path):
     for away, number in ((10.0, 1), (30.0, 0)):
         extract = approached(away, ("east",), traffic_signals__direction="forward")
         numbers, _ = written(extract, tmp_path)
         assert numbers.count(extract.node(0, 0)) == number
-
-
-def test_signals_of_a_pedestrian_crossing_away_from_a_junction_are_not_its(tmp_path):
-    for away, number in ((10.0, 1), (30.0, 0)):
-        extract = approached(away, ("east",), crossing="traffic_signals")
-        numbers, result = written(extract, tmp_path)
-        assert numbers.count(extract.node(0, 0)) == number
-        assert len(result.lone_signals) == 1 - number

@@ -20,7 +20,6 @@ from tests.builders.osm_text import (
     crossing,
     dual_carriageway,
     left_hand,
-    plaza,
     roundabout,
     slope,
 )
@@ -28,7 +27,6 @@ from tests.oracles.face_areas import check_surfaces
 from tests.sumo_here import needs_sumo
 
 pytestmark = needs_sumo
-CORNER_HOUSE = 24.0 * 24.0
 
 
 def built(extract, tmp_path, **asked):
@@ -73,10 +71,6 @@ def test_the_map_and_the_model_of_an_extract_carry_its_credit(tmp_path):
     assert read_map(again).attribution == site.model.attribution
 
 
-def test_the_same_extract_makes_the_same_map(tmp_path):
-    assert built(crossing(), tmp_path).map_text == built(crossing(), tmp_path).map_text
-
-
 def test_what_stands_at_the_road_s_edge_in_the_extract_stands_there_in_the_scene(tmp_path):
     extract = crossing()
     edges = [(x, side * 3.2) for x in (-70, -45, 45, 70) for side in (-1, 1)]
@@ -88,15 +82,6 @@ def test_what_stands_at_the_road_s_edge_in_the_extract_stands_there_in_the_scene
     assert len(trees) == len(edges)
     for tree in trees:
         assert road.boundary.distance(shapely.Point(tree.foot[:2])) < 0.3
-
-
-def test_footprints_keep_their_area(tmp_path):
-    model = built(crossing(), tmp_path).model
-    houses = [part for part in model.parts if part.name.startswith("Building") and Role.OCCLUDERS in part.roles]
-    assert len(houses) == 4
-    for house in houses:
-        hull = shapely.MultiPoint(house.solid.vertices[:, :2]).convex_hull
-        assert hull.area == pytest.approx(CORNER_HOUSE, rel=0.01)
 
 
 def test_the_region_follows_the_approaches_and_holds_both_carriageways(tmp_path):
@@ -172,39 +157,6 @@ def test_a_place_can_be_named_by_its_streets(tmp_path):
 def test_a_place_that_is_none_is_refused_in_a_sentence(asked, complaint, tmp_path):
     with pytest.raises(SeipError, match=complaint):
         built(crossing(), tmp_path, **asked)
-
-
-def test_streets_that_do_not_meet_are_named(tmp_path):
-    extract = crossing()
-    extract.way([(-100, 300), (100, 300)], highway="residential", name="Far Lane")
-    with pytest.raises(SeipError, match="'East Road' and 'Far Lane' do not meet"):
-        built(extract, tmp_path, near_latlon=None, junction=("East Road", "Far Lane"))
-
-
-def test_an_extract_without_streets_is_refused(tmp_path):
-    extract = Extract()
-    extract.house(0, 0, 10, 10)
-    with pytest.raises(SeipError, match=r"has no street within 590 m of 52\.50000, 13\.40000"):
-        built(extract, tmp_path)
-
-
-def test_a_place_between_junctions_needs_a_radius(tmp_path):
-    extract = Extract()
-    extract.way([(-400, 0), (400, 0)], highway="residential", name="Long Street")
-    extract.house(-20, 10, 20, 10)
-    with pytest.raises(SeipError, match="give a radius for a place between junctions"):
-        built(extract, tmp_path)
-    assert built(extract, tmp_path, radius=60.0).model.region.area == pytest.approx(120 * 6.4, rel=0.05)
-
-
-def test_a_square_and_a_canopy(tmp_path):
-    model = built(plaza(), tmp_path).model
-    names = {row.kind: row for row in model.sources()}
-    assert names["Shelter"].assumed == 1
-    assert names["Tree"].assumed == 0
-    assert names["Footways"].count == 1
-    canopy = [part for part in model.parts if part.name.startswith("Building") and part.solid.vertices[:, 2].min() > 4]
-    assert len(canopy) == 1
 
 
 def test_without_sumo_the_cure_is_named(tmp_path, monkeypatch):
@@ -315,19 +267,6 @@ def test_slip_lanes_leave_islands_and_the_weighted_box_lies_along_the_roads(tmp_
     assert box.area == pytest.approx((high_x - low_x) * (high_y - low_y), rel=0.1)
 
 
-def test_no_holes_are_left_where_the_number_of_lanes_changes(tmp_path):
-    extract = Extract()
-    usual = {"highway": "secondary", "name": "East Road"}
-    extract.way([(-200, 0), (-50, 0)], lanes=2, **usual)
-    extract.way([(-50, 0), (-40, 0)], lanes=3, **usual)
-    extract.way([(-40, 0), (0, 0), (200, 0)], lanes=2, **usual)
-    extract.way([(0, -200), (0, 0), (0, 200)], highway="tertiary", name="North Road")
-    model = built(corner_houses(extract), tmp_path).model
-    road = plan(model, "Driving lanes")
-    assert sum(shapely.Polygon(ring).area for ring in road.interiors) < 1.0
-    assert not model.region.interiors
-
-
 @pytest.mark.parametrize("radius", [30, 60])
 def test_a_roundabout_is_one_place_with_all_its_approaches(radius, tmp_path):
     extract = Extract()
@@ -373,18 +312,6 @@ def test_the_other_carriageway_is_whole_beside_a_junction_that_does_not_reach_it
         assert model.region.distance(shapely.Point(x, 18)) < 5.0  # the middle is that of the other carriageway
 
 
-def test_a_crossing_at_the_date_line_and_one_whose_next_nodes_are_far(tmp_path):
-    for latitude, longitude, length in ((-16.8, 179.999, 300), (38.5, -99.0, 2400)):
-        extract = Extract(latitude, longitude)
-        extract.way([(-length, 0), (0, 0), (length, 0)], highway="secondary", name="East Road")
-        extract.way([(0, -length), (0, 0), (0, length)], highway="secondary", name="North Road")
-        path = corner_houses(extract).write(tmp_path / "place.osm")
-        text = re.sub(r'"180\.\d+"', lambda found: f'"{float(found[0][1:-1]) - 360}"', path.read_text(encoding="utf-8"))
-        path.write_text(text, encoding="utf-8")
-        model = finish(build_site(path, SiteRequest(near_latlon=(latitude, longitude)))).model
-        assert model.region.bounds == pytest.approx((-87, -87, 87, 87), abs=3)
-
-
 def test_of_several_places_where_streets_meet_one_counts_and_the_others_are_named(tmp_path):
     extract = Extract()
     extract.way([(-300, 0), (-150, 0), (150, 0), (300, 0)], highway="secondary", name="East Road")
@@ -413,36 +340,6 @@ def test_names_of_streets_are_as_in_the_extract(name, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("asked", "name"),
-    [
-        ({}, "Avenue / Main Street"),
-        ({"near_latlon": None, "junction": ("Mill Lane", "Main Street")}, "Mill Lane / Main Street"),
-        ({"near_latlon": None, "junction": ("main street", "B 5")}, "Main Street / B 5"),
-        ({"near_latlon": None, "junction": ("Hauptweg", "Mill Lane")}, "Hauptweg / Mill Lane"),
-    ],
-)
-def test_the_title_is_what_was_asked_for_else_the_highest_classes(asked, name, tmp_path):
-    """A slip road and a lane come before the streets that they belong to, in the file and beside the middle."""
-    extract = Extract()
-    middle = extract.node(0, 0)
-    extract.way([(-45, 0), (-6, -22), (0, -45)], highway="primary_link", oneway="yes", name="Avenue Slip")
-    extract.way([middle, (140, 140)], highway="residential", name="Mill Lane")
-    extract.way([(-200, 0), (-45, 0), middle, (200, 0)], highway="tertiary", name="Main Street", alt_name="Hauptweg")
-    extract.way([(0, -200), (0, -45), middle, (0, 200)], highway="primary", name="Avenue", ref="B 5")
-    model = built(corner_houses(extract, near=60), tmp_path, **asked).model
-    assert model.name == name
-
-
-def test_a_place_between_junctions_is_titled_by_its_street(tmp_path):
-    extract = Extract()
-    extract.way([(-200, 0), (90, 0), (200, 0)], highway="primary", name="Long Road")
-    extract.way([(90, 0), (90, 150)], highway="residential", name="Side Street")
-    extract = corner_houses(extract)
-    assert built(extract, tmp_path, radius=60.0).model.name == "Long Road"
-    assert built(extract, tmp_path, radius=100.0).model.name == "Long Road / Side Street"
-
-
-@pytest.mark.parametrize(
     ("tags", "said"),
     [
         (
@@ -460,29 +357,6 @@ def test_an_implausible_number_of_lanes_is_named_in_a_note(tags, said, tmp_path)
     notes = [note for note in built(corner_houses(extract), tmp_path).model.notes if "lanes" in note]
     (note,) = notes
     assert said in note
-
-
-def test_two_sections_of_one_street_are_not_the_title(tmp_path):
-    extract = Extract()
-    extract.way([(-200, 0), (0, 0)], highway="primary", name="Ring Road Section 1")
-    extract.way([(0, 0), (200, 0)], highway="primary", name="Ring Road Section 2")
-    extract.way([(0, -200), (0, 0), (0, 200)], highway="tertiary", name="Side Street")
-    assert built(corner_houses(extract), tmp_path).model.name == "Ring Road Section 1 / Side Street"
-
-
-def test_no_id_of_netconvert_is_the_name_of_a_street(tmp_path):
-    """The number of lanes changes before the junction, and so makes a joint there."""
-    extract = Extract()
-    extract.way([(-200, 0), (-50, 0)], highway="primary", lanes=2, name="Main Street")
-    extract.way([(-50, 0), (0, 0)], highway="primary", lanes=4, name="Main Street")
-    extract.way([(0, 0), (200, 0)], highway="primary", lanes=2, name="Main Street")
-    extract.way([(0, -200), (0, 0), (0, 60)], highway="residential", name="Side Street")
-    extract.way([(0, 60), (0, 200)], highway="residential", name="Back Street")
-    extract.way([(0, 0), (100, 100)], highway="unclassified")
-    site = built(corner_houses(extract, near=20), tmp_path)
-    assert 'name=":' not in site.map_text
-    names = {place.name for place in site.model.places if not place.name.startswith("Crossing")}
-    assert names == {"Main Street", "Side Street", "Back Street", "Unnamed street"}
 
 
 def test_an_outline_that_is_drawn_twice_counts_once(tmp_path):
@@ -505,17 +379,6 @@ def test_a_bridge_without_a_layer_lies_above(tmp_path):
     assert above[0].solid.vertices[:, 2].max() > 5
 
 
-def test_a_site_without_street_names_is_named_by_road_number_or_position(tmp_path):
-    for ref, name in (({"ref": "B 1"}, "B 1"), ({}, "Junction at 52.50000, 13.40000")):
-        extract = Extract()
-        usual = {"highway": "primary", "oneway": "yes", "lanes": 2} | ref
-        extract.way([(-250, -8), (0, -8), (250, -8)], **usual)
-        extract.way([(250, 8), (0, 8), (-250, 8)], **usual)
-        extract.way([(0, -200), (0, -8), (0, 8), (0, 200)], highway="unclassified")
-        model = built(corner_houses(extract, near=24), tmp_path).model
-        assert model.name == name
-
-
 PARALLEL = {
     "a street of the same name": ([(60, 0), (66, 14), (240, 14)], "Avenue"),
     "a street that forks off": ([(60, 0), (85, 10), (110, 14), (240, 16)], "Little Row"),
@@ -534,27 +397,6 @@ def test_a_residential_street_along_an_approach_is_not_studied(tmp_path, points,
     region = built(corner_houses(extract, near=30.0), tmp_path).model.region
     assert region.intersection(shapely.box(points[0][0] - 5, 8, 200, 30)).area < 5
     assert region.bounds[2] > 75
-
-
-def test_tracks_of_light_rail_are_laid(tmp_path):
-    extract = crossing()
-    extract.way([(-60, -200), (-60, 200)], railway="light_rail")
-    extract.way([(60, -200), (60, 200)], railway="light_rail", tunnel="yes")
-    tracks = plan(built(extract, tmp_path).model, "Tracks")
-    assert tracks.intersection(shapely.box(-70, 20, -50, 100)).area > 100
-    assert tracks.intersection(shapely.box(50, 20, 70, 100)).area == 0
-
-
-@pytest.mark.parametrize("kind", ["trunk", "primary", "secondary"])
-def test_a_street_without_a_number_of_lanes_has_one_each_way(tmp_path, kind):
-    extract = Extract()
-    extract.way([(-200, 0), (0, 0), (200, 0)], highway=kind, name="East Road", sidewalk="no")
-    extract.way([(0, -200), (0, 0), (0, 200)], highway="residential", name="North Road", lanes=2, sidewalk="no")
-    site = built(corner_houses(extract), tmp_path)
-    across = shapely.LineString([(50, -30), (50, 30)])
-    assert plan(site.model, "Driving lanes").intersection(across).length == pytest.approx(6.4, abs=0.1)
-    note = "one lane is assumed in each direction of streets without a number of lanes in the extract: East Road"
-    assert note in site.model.notes
 
 
 RINGS = {
@@ -614,81 +456,3 @@ def test_the_island_and_the_pavements_of_a_small_roundabout_are_whole(tmp_path, 
     around = shapely.Point(0, 0).buffer(28)
     rounded = street.buffer(1.0, join_style="mitre").buffer(-1.0, join_style="mitre")
     assert rounded.difference(street).intersection(around).difference(island).area < 0.5
-
-
-@pytest.mark.parametrize(("width", "assumed"), [({}, 1), ({"width": "8"}, 0)])
-def test_lanes_whose_width_the_extract_does_not_give_are_assumed(tmp_path, width, assumed):
-    model = built(crossing(**width), tmp_path).model
-    rows = {row.kind: row for row in model.sources()}
-    assert rows["Driving lanes"].assumed == assumed
-    assert rows["Pavements"].assumed == 1
-
-
-def test_arms_of_streets_without_a_name_are_told_apart(tmp_path):
-    extract = Extract(52.5, 15.0)
-    extract.way([(-200, 0), (0, 0), (200, 0)], highway="secondary", lanes=2)
-    extract.way([(0, 0), (0, 200)], highway="residential", name="North Road", lanes=2)
-    model = built(corner_houses(extract), tmp_path).model
-    found = {place.name: place.polygon.centroid for place in model.places if "Crossing" not in place.name}
-    assert set(found) == {"Unnamed street, west arm", "Unnamed street, east arm", "North Road"}
-    assert found["Unnamed street, east arm"].x > 30 > -30 > found["Unnamed street, west arm"].x
-
-
-def test_streets_that_assumed_ramps_raise_are_named(tmp_path):
-    extract = Extract()
-    extract.way([(-200, 0), (0, 0), (200, 0)], highway="secondary", name="Low Road", lanes=2)
-    over = {"highway": "primary", "name": "High Road", "lanes": 2}
-    extract.way([(60, -200), (60, -30)], **over)
-    extract.way([(60, -30), (60, 30)], bridge="yes", layer="1", **over)
-    extract.way([(60, 30), (60, 200)], **over)
-    extract.way([(0, 0), (0, 45), (60, 60)], highway="residential", name="Side Road", lanes=2)
-    model = built(corner_houses(extract), tmp_path)
-    (note,) = [note for note in model.model.notes if "ramps are assumed" in note]
-    assert re.search(r"High Road by up to \d\.\d\d m upwards", note)
-    assert re.search(r"Side Road by up to \d\.\d\d m upwards", note)
-    assert "Low Road" not in note
-
-
-def test_bridges_that_begin_at_the_place_are_among_the_assumed_heights(tmp_path):
-    extract = Extract()
-    extract.way([(-200, 0), (0, 0)], highway="secondary", name="Low Road", lanes=2)
-    extract.way([(0, -200), (0, 0), (0, 200)], highway="residential", name="Side Road", lanes=2)
-    extract.way([(0, 0), (120, 0)], highway="secondary", name="Viaduct", lanes=2, bridge="yes", layer="1")
-    extract.way([(120, 0), (300, 0)], highway="secondary", name="Far Road", lanes=2)
-    extract.way([(60, -200), (60, 200)], highway="primary", name="Under Road", lanes=2)
-    model = built(corner_houses(extract), tmp_path)
-    (note,) = [note for note in model.model.notes if "ramps are assumed" in note]
-    assert re.search(r"Viaduct by up to \d\.\d\d m upwards", note)
-
-
-def test_a_weighted_region_without_street_names_is_named_once(tmp_path):
-    extract = Extract()
-    extract.way([(-200, 0), (0, 0), (200, 0)], highway="secondary", lanes=2)
-    extract.way([(0, -200), (0, 0), (0, 200)], highway="residential", lanes=2)
-    model = built(corner_houses(extract), tmp_path).model
-    (name,) = [part.name for part in model.parts if Role.WEIGHTED_REGIONS in part.roles]
-    assert name.startswith("Junction at ")
-
-
-@pytest.mark.parametrize("radius", [14, 24])
-def test_the_weighted_region_of_a_roundabout_has_all_of_its_ring(radius, tmp_path):
-    extract = Extract()
-    ring = [extract.node(radius * np.cos(at), radius * np.sin(at)) for at in np.arange(24) * np.pi / 12]
-    extract.way([*ring, ring[0]], highway="secondary", junction="roundabout", name="Circus")
-    for name, index, end in (("East", 0, (200, 0)), ("North", 5, (40, 200)), ("Slip", 3, (150, 150))):
-        extract.way([ring[index], end], highway="secondary", name=f"{name} Street", lanes=2)
-    model = built(corner_houses(extract), tmp_path).model
-    weighted = next(part for part in model.parts if Role.WEIGHTED_REGIONS in part.roles)
-    area = shapely.MultiPoint(weighted.solid.vertices[:, :2]).convex_hull.buffer(0.01)
-    (island,) = map(shapely.Polygon, model.region.interiors)
-    ring = plan(model, "Driving lanes").intersection(island.buffer(2.5))
-    assert ring.difference(area).area == pytest.approx(0.0, abs=0.1)
-
-
-def test_the_message_on_a_place_without_streets_does_not_tell_the_window_as_the_extent(tmp_path):
-    extract = Extract()
-    extract.way([(5000, 0), (5200, 0)], highway="residential", name="Far Street")
-    extract.node(0, 0)
-    with pytest.raises(SeipError, match="no street within 590 m") as raised:
-        built(extract, tmp_path)
-    assert "latitude and" not in str(raised.value)

@@ -7,7 +7,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.world.openstreetmap.extract import read_extract, window
 from seip_addon.core.world.openstreetmap.handedness import drives_on_the_left
 from seip_addon.core.world.openstreetmap.streets import has_lane_count, is_street, lane_counts, write_streets
-from tests.builders.osm_text import Extract, dual_carriageway, left_hand, roundabout
+from tests.builders.osm_text import Extract, dual_carriageway, roundabout
 
 
 def streets(extract, tmp_path, **options):
@@ -41,10 +41,6 @@ def streets(extract, tmp_path, **options):
 )
 def test_what_a_street_is(tags, street):
     assert is_street(tags) is street
-
-
-def test_driveways_are_streets_where_they_are_asked_for():
-    assert is_street({"highway": "service"}, service=True)
 
 
 @pytest.mark.parametrize(
@@ -103,15 +99,6 @@ def test_widths_are_shared_out_over_lanes_beside_pavements_and_cycle_lanes(tmp_p
     assert tags["cycleway:left"] == tags["cycleway:right"] == "lane"
 
 
-def test_an_absurd_width_is_kept_within_what_lanes_have(tmp_path):
-    extract = Extract()
-    extract.way([(-100, 0), (100, 0)], highway="residential", width="50", sidewalk="no")
-    extract.way([(-100, 50), (100, 50)], highway="residential", width="1e9", sidewalk="no")
-    _, (wide, absurd), _ = streets(extract, tmp_path)
-    assert wide["width:lanes:forward"] == "6.00"
-    assert not any(key.startswith("width") for key in absurd)
-
-
 @pytest.mark.parametrize(
     ("tags", "side"),
     [
@@ -135,16 +122,6 @@ def test_pavements_are_those_of_the_tags_or_usual_for_the_street(tmp_path, tags,
 def test_a_dual_carriageway_has_pavements_at_its_outer_sides(tmp_path):
     _, ways, _ = streets(dual_carriageway(), tmp_path)
     assert [way["sidewalk"] for way in ways] == ["right", "right", "both"]
-
-
-def test_traffic_on_the_left_changes_the_sides(tmp_path):
-    result, ways, _ = streets(left_hand(), tmp_path)
-    assert result.left_hand
-    assert [way["sidewalk"] for way in ways] == [
-        "both",
-        "right",
-    ]  # netconvert mixes them up there: the left is its right
-    assert streets(left_hand(), tmp_path, left_hand=False)[1][1]["sidewalk"] == "left"
 
 
 def test_a_roundabout_shows_the_side_and_stays_whole(tmp_path):
@@ -182,30 +159,9 @@ def test_where_nothing_shows_the_side_the_country_does(tmp_path, place, left):
     assert drives_on_the_left(finish(read_extract(extract.write(tmp_path / "place.osm"))))[0] is left
 
 
-def test_a_street_that_leaves_the_window_comes_in_pieces(tmp_path):
-    extract = Extract()
-    extract.way([(-50, 0), (0, 0), (300, 0), (400, 50), (300, 100), (0, 100), (-50, 100)], highway="residential")
-    result, ways, root = streets(extract, tmp_path, reach=100.0)
-    assert result.streets == len(ways) == 2
-    ids = [way.get("id") for way in root.iter("way")]
-    assert len(set(ids)) == 2
-    nodes = {node.get("id") for node in root.iter("node")}
-    assert {ref.get("ref") for ref in root.iter("nd")} <= nodes
-
-
 def test_elevations_count_where_nearly_all_nodes_have_one(tmp_path):
     extract = Extract()
     extract.way([extract.node(0, 0, ele="50"), extract.node(100, 0, ele="56")], highway="residential")
     assert streets(extract, tmp_path)[0].elevated
     extract.way([(0, 50), (100, 50)], highway="residential")
     assert not streets(extract, tmp_path)[0].elevated
-
-
-def test_a_name_without_letters_in_the_pictures_is_in_english(tmp_path):
-    extract = Extract()
-    extract.way([(-100, 0), (100, 0)], highway="residential", name="中山北路", name__en="Zhongshan North Road")
-    extract.way([(-100, 50), (100, 50)], highway="residential", name="Straße", name__en="Street")
-    extract.way([(-100, 90), (100, 90)], highway="residential", name="南京東路")
-    extract.way([(-100, 120), (100, 120)], highway="primary", ref="B 1")
-    names = [tags["name"] for tags in streets(extract, tmp_path)[1]]
-    assert names == ["Zhongshan North Road", "Straße", "南京東路", "B 1"]

@@ -12,7 +12,7 @@ from seip_addon.core.geometry.geo_reference import projection
 from seip_addon.core.progress import finish
 from seip_addon.core.world.openstreetmap.buildings import USUAL_HEIGHT
 from seip_addon.core.world.openstreetmap.extract import read_extract
-from seip_addon.core.world.openstreetmap.plan_shapes import MENDED, PlanShapes
+from seip_addon.core.world.openstreetmap.plan_shapes import PlanShapes
 from seip_addon.core.world.openstreetmap.street_objects import surroundings
 from tests.builders.osm_text import Extract
 
@@ -68,25 +68,6 @@ def test_heights_are_those_of_the_tags(tmp_path, tags, height, base, roof, assum
     assert got == (pytest.approx(height), pytest.approx(base), pytest.approx(roof), assumed)
 
 
-def test_an_unknown_height_is_the_median_of_those_known(tmp_path):
-    extract = Extract()
-    for i, height in enumerate((8, 10, 20, 21, 22)):
-        extract.house(40 * i, 20, 30, 12, height=str(height))
-    extract.house(0, 60, 30, 12, height="")
-    assert found(extract, tmp_path)[0].buildings[-1].height == 20
-
-
-def test_what_is_no_building_is_left_out(tmp_path):
-    extract = Extract()
-    for tags in (
-        {"building": "no"},
-        {"building": "yes", "location": "underground"},
-        {"building": "yes", "layer": "-1"},
-    ):
-        extract.house(10, 20, 30, 12, **tags)
-    assert not found(extract, tmp_path)[0].buildings
-
-
 def test_parts_stand_in_place_of_their_outline(tmp_path):
     extract = Extract()
     extract.house(0, 20, 30, 10, height="10")
@@ -120,35 +101,6 @@ def test_a_relation_has_courtyards_and_its_ways_count_once(tmp_path):
     assert len(building.outline.interiors) == 1
 
 
-def test_a_relation_that_contains_itself_or_nothing_harms_nobody(tmp_path):
-    extract = Extract()
-    own = extract.house(10, 20, 30, 12) + 1
-    extract.relation([("relation", own, "outer")], type="multipolygon", building="yes")
-    extract.relation([("way", 999, "outer"), ("way", 998, "")], type="multipolygon", building="yes")
-    extract.relation([], type="multipolygon", building="yes")
-    assert len(found(extract, tmp_path)[0].buildings) == 1
-
-
-def test_a_cut_outline_is_closed_or_left_out_and_counted(tmp_path):
-    extract = Extract()
-    extract.way([(0, 20), (20, 20), (20, 30), 9999, (0, 30), (0, 20)], building="yes", height="9")
-    extract.way([(50, 20), 9998, 9997, 9996, (50, 30)], building="yes", height="9")
-    extract.way([(80, 20), (100, 20), (100, 30), (80, 30)], building="yes", height="9")
-    site, shapes = found(extract, tmp_path)
-    assert len(site.buildings) == 2
-    assert all(one.outline.area == pytest.approx(200, rel=0.01) for one in site.buildings)
-    assert sorted(shapes.dropped.values()) == [1, 1]
-
-
-def test_an_outline_that_crosses_itself_is_mended(tmp_path):
-    extract = Extract()
-    extract.area([(0, 20), (20, 40), (20, 20), (0, 40)], building="yes", height="9")
-    site, shapes = found(extract, tmp_path)
-    assert sum(one.outline.area for one in site.buildings) == pytest.approx(200, rel=0.01)
-    assert all(one.outline.is_valid for one in site.buildings)
-    assert shapes.dropped[MENDED] == 1
-
-
 def test_trees_lamps_posts_and_walls(tmp_path):
     extract = Extract()
     extract.node(10, 10, natural="tree", height="11", diameter_crown="5")
@@ -177,26 +129,6 @@ def test_trees_lamps_posts_and_walls(tmp_path):
         ("Hedge", 1.5, "leaves"),
     ]
     assert [(slab.name, slab.top) for slab in site.slabs] == [("Hedge", 1.5)]
-
-
-def test_a_shelter_has_its_back_to_the_road_s_other_side(tmp_path):
-    extract = Extract()
-    extract.node(0, 6, highway="bus_stop", shelter="yes")
-    roof, back = found(extract, tmp_path)[0].slabs
-    assert roof.top == 2.5
-    assert roof.outline.area == pytest.approx(6.0, rel=0.02)
-    assert roof.outline.distance(ROAD) > 0.9
-    assert back.outline.centroid.y > roof.outline.centroid.y
-
-
-def test_only_what_reaches_into_the_area_counts(tmp_path):
-    extract = Extract()
-    extract.house(10, 20, 30, 12)
-    extract.house(310, 20, 30, 12)
-    extract.node(300, 300, natural="tree")
-    site, _ = found(extract, tmp_path, shapely.Point(0, 0).buffer(100))
-    assert len(site.buildings) == 1
-    assert not site.trees
 
 
 VALUES = ["yes", "no", "nan", "gabled", "hipped", "part", "roof", "wall", "tree", "3;4", "-5", "1e9", "∞"]

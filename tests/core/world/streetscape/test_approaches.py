@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.world.opendrive.read import read_map
-from seip_addon.core.world.streetscape.description import SiteDescription, describe_place, read_site_description
+from seip_addon.core.world.streetscape.description import SiteDescription
 from seip_addon.core.world.streetscape.model import site_model
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 from tests.builders.street_map import street_map
@@ -56,17 +55,6 @@ def test_it_ends_at_a_distance_along_the_road(tmp_path):
     assert region(tmp_path, town(), approaches=40.0).symmetric_difference(expected).area < 0.1
 
 
-def test_a_circle_stays_possible_and_takes_a_lens_of_the_street_behind(tmp_path):
-    circle = region(tmp_path, town(), radius=40.0)
-    assert len(shapely.get_parts(circle)) == 2
-    assert len(shapely.get_parts(region(tmp_path, town(), approaches=40.0))) == 1
-
-
-def test_without_a_size_a_junction_has_its_approaches_and_another_place_a_circle(tmp_path):
-    assert region(tmp_path, town()).bounds == pytest.approx((-90, -3.5, 90, 3.5), abs=0.1)
-    assert region(tmp_path, town(), junction=None, near=(0.0, 0.0)).bounds[3] > 30
-
-
 def test_it_goes_straight_on_through_other_junctions(tmp_path):
     """Not into their side streets, nor along lanes that turn into these."""
     expected = shapely.box(-10 - 120, -3.5, 10 + 120, 3.5)
@@ -87,29 +75,6 @@ def test_it_does_not_climb_onto_a_bridge_over_the_end_of_a_road(tmp_path):
     over = straight(9, 50, -60, 120, np.pi / 2, z=6.0)
     text = town().replace("</OpenDRIVE>", f"{over}</OpenDRIVE>")
     assert region(tmp_path, text, approaches=60.0).bounds == pytest.approx((-70, -3.5, 70, 3.5), abs=0.1)
-
-
-def test_a_road_that_turns_against_the_way_is_walked_from_its_other_end(tmp_path):
-    text = document(
-        straight(1, -10, 0, 20, junction="7"), straight(2, 110, 0, 100, np.pi), straight(3, 110, 0, 50), rest=JUNCTIONS
-    )
-    expected = shapely.box(-10, -3.5, 130, 3.5)
-    assert region(tmp_path, text, approaches=120.0).symmetric_difference(expected).area < 0.1
-
-
-def test_sizes_that_contradict_each_other_are_refused(tmp_path):
-    path = tmp_path / "site.toml"
-    path.write_text('map = "map.xodr"\njunction = "7"\nradius = 50\napproaches = 50\n', encoding="utf-8")
-    with pytest.raises(SeipError, match="either radius or approaches"):
-        read_site_description(path)
-    path.write_text('map = "map.xodr"\njunction = "7"\napproaches = 50\n', encoding="utf-8")
-    assert describe_place(path)[1].along == 50.0
-    assert describe_place(path, near=(0.0, 0.0))[1].along is None
-    assert describe_place(path, radius=30.0)[1].along is None
-    with pytest.raises(SeipError, match="the approaches are those of a junction"):
-        describe_place(tmp_path / "map.xodr", near=(0.0, 0.0), approaches=50.0)
-    with pytest.raises(SeipError, match=r"length of the approaches must be 0\.1 to 5,000 m"):
-        describe_place(path, approaches=-1.0)
 
 
 def test_far_coordinates_change_nothing(tmp_path):

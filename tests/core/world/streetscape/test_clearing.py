@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from seip_addon.core.site.scene_geometry import FROM_EXTRACT
-from seip_addon.core.world.streetscape.clearing import NEAR_EDGE, SETBACK, clear
+from seip_addon.core.world.streetscape.clearing import SETBACK, clear
 from seip_addon.core.world.streetscape.description import SiteDescription, Trees
 
 ROAD = shapely.box(-50.0, -3.5, 50.0, 3.5)
@@ -23,12 +23,3 @@ def cleared(*positions):
 def test_a_tree_is_set_back_by_the_same_distance_whatever_its_depth(depth, side):
     ((x, y),) = cleared((7.0, side * (3.5 - depth)))
     assert (x, y) == pytest.approx((7.0, side * (3.5 + SETBACK)), abs=1e-6)
-
-
-def test_a_tree_at_the_edge_near_the_end_of_the_modelled_road_is_not_moved_beyond_that_end():
-    ((x, y),) = cleared((49.7, 3.5 - 1e-9))
-    assert (x, y) == pytest.approx((49.7, 3.5 + SETBACK), abs=1e-6)
-
-
-def test_a_tree_outside_stays_and_one_in_the_middle_is_left_out():
-    np.testing.assert_array_equal(cleared((7.0, 3.6), (7.0, 0.2), (7.0, 3.5 - NEAR_EDGE - 0.1)), [[7.0, 3.6]])

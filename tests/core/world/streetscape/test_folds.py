@@ -1,7 +1,5 @@
 """Folds of lane edges at bends that are tighter than the road is wide."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 import shapely
@@ -34,12 +32,6 @@ def test_a_fold_shrinks_to_the_point_where_the_edge_crosses_itself():
         assert len(edge) == len(before)
     crossing = (4 - 5.7, -5.7)
     assert np.hypot(*(found.right[:, :2] - crossing).T).min() == pytest.approx(0.0, abs=0.05)
-
-
-def test_lanes_that_share_an_edge_share_it_afterwards():
-    inner, outer = bent_lane(), dataclasses.replace(bent_lane(5.7, 8.0), lane_id=-3)
-    found = without_folds([inner, outer])
-    assert np.array_equal(found[0].right, found[1].left)
 
 
 def test_an_edge_without_folds_stays_as_it_is():

@@ -2,20 +2,17 @@
 
 import math
 import os
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-import shapely
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.site.scene_geometry import OTHER_LEVELS
 from seip_addon.core.world.opendrive.read import read_map
-from seip_addon.core.world.streetscape.description import SiteDescription, read_site_description
-from seip_addon.core.world.streetscape.levels import Crossing
+from seip_addon.core.world.streetscape.description import SiteDescription
 from seip_addon.core.world.streetscape.model import site_model
 from seip_addon.core.world.streetscape.terrain import FlatLand
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
@@ -92,33 +89,6 @@ def test_the_road_above_is_in_the_way_and_the_one_below_is_ground(tmp_path):
     np.testing.assert_allclose(street.solid.vertices[:, 2], -DECK, atol=1e-6)
 
 
-def test_walls_that_rays_end_on_close_the_gap_beside_a_road_below(tmp_path):
-    model = built(tmp_path, (0, 40))
-    (walls,) = [part for part in model.parts if part.name == "Retaining walls"]
-    assert walls.roles == (Role.GROUND,)
-    assert walls.solid.vertices[:, 2].min() == pytest.approx(-DECK)
-    assert walls.solid.vertices[:, 2].max() == pytest.approx(0.0)
-    (street,) = [part for part in model.parts if part.name == OTHER_LEVELS]
-    faces = [street.solid.vertices[list(face), :2] for face in street.solid.faces]
-    edge = shapely.union_all([shapely.Polygon(face) for face in faces], grid_size=1e-3).boundary
-    feet = shapely.union_all(
-        [shapely.LineString(walls.solid.vertices[list(face), :2]) for face in walls.solid.faces], grid_size=1e-3
-    )
-    assert shapely.difference(edge, feet.buffer(0.01)).length < 0.1
-
-
-def test_poles_of_another_level_carry_nothing(tmp_path):
-    """The lamp and the signal stand on the bridge."""
-    assert not [part for part in built(tmp_path, (-40, 0)).parts if Role.POLES in part.roles]
-    poles = [part for part in built(tmp_path, (0, 40)).parts if Role.POLES in part.roles]
-    assert {part.name for part in poles} == {"lamp", "Assumed signal pole 1"}
-
-
-def test_no_post_stands_beside_the_bridge_over_the_street(tmp_path):
-    area = corners(built(tmp_path, (0, 0), ("5",)), Role.CANDIDATE_AREAS)
-    assert np.abs(area[:, :, 1]).min() > 3.5
-
-
 def test_a_crossing_in_the_middle_of_the_place_is_refused_by_name(tmp_path):
     with pytest.raises(SeipError, match=r"road 5 lies 6\.0 m above road 2 at \(0, 0\).*level 5 or level 2"):
         built(tmp_path, (0, 0))
@@ -141,22 +111,6 @@ def test_a_ramp_belongs_to_the_level_that_it_leaves(tmp_path):
     assert not on_bridge.any()
 
 
-def test_roads_that_meet_in_height_are_one_level(tmp_path):
-    text = document(street("1", -60, 0, 120), street("2", 0, -60, 120, np.pi / 2, z=0.3))
-    model = built(tmp_path, (0, 0), text=text)
-    assert not any("level" in note for note in model.notes)
-
-
-def test_the_level_is_an_option_and_a_key(tmp_path):
-    path = tmp_path / "site.toml"
-    for written, roads in (('"5"', ("5",)), ('["5", "4"]', ("5", "4"))):
-        path.write_text(f'map = "map.xodr"\nnear = [0, 0]\nlevel = {written}\n', encoding="utf-8")
-        assert read_site_description(path).level == roads
-    path.write_text("level = 5", encoding="utf-8")
-    with pytest.raises(SeipError, match="level must be a text in quotes, or a list"):
-        read_site_description(path)
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(not MAPS.is_dir(), reason="the maps of other projects are not here; set SEIP_MAPS to their folder")
 @pytest.mark.parametrize(("near", "roads", "z"), [((-190, -1), (), 0), ((-236, 40), (), 10), ((-236, -1), ("3",), 0)])
@@ -165,52 +119,6 @@ def test_the_bridge_of_a_real_town_makes_no_curtain(near, roads, z):
     surface = [part for part in model.parts if part.name in {"Driving lanes", "Shoulders", "Verge", "Verge strip"}]
     for part in surface:
         np.testing.assert_allclose(part.solid.vertices[:, 2] + model.origin[2], z, atol=0.3)
-
-
-@pytest.mark.parametrize(
-    ("streets", "called"),
-    [
-        (("High Road", "Low Road"), "High Road lies 6.0 m above Low Road"),
-        (("High Road", ""), "High Road lies 6.0 m above a street without a name"),
-        (("", "Low Road"), "a street without a name lies 6.0 m above Low Road"),
-        (("Ring", "ring"), "Ring (road 5) lies 6.0 m above ring (road 2)"),
-        (("", ""), "road 5 lies 6.0 m above road 2"),
-    ],
-)
-def test_messages_name_streets_as_far_as_they_have_names(streets, called):
-    crossing = Crossing("5", "2", 6.0, (0.2, -0.3), streets)
-    assert str(crossing) == f"{called} at (0, 0)"
-    own = {name for name in (*streets, "5", "2") if name}
-    assert set(crossing.levels) <= own
-    assert len({level.casefold() for level in crossing.levels}) == 2
-
-
-def test_the_carriageways_of_one_street_are_one_note(tmp_path):
-    low = [street(str(n), x, 0, 60) for n, x in ((1, -90), (2, -30), (3, 30))]
-    high = [street(number, x, -90, 180, np.pi / 2, z=DECK) for number, x in (("4", -8), ("5", 8))]
-    road_map = read_text(tmp_path, document(*low, *high))
-    names = {"4": "High Road", "5": "High Road", "2": ""}
-    roads = tuple(replace(one, name=names.get(one.id, "")) for one in road_map.roads)
-    model = finish(site_model(replace(road_map, roads=roads), SiteDescription(near=(-40, 0), radius=50.0)))
-    notes = [note for note in model.notes if "another level" in note]
-    (note,) = notes
-    assert note.startswith(
-        "High Road lies 6.0 m above a street without a name at (-8, 0): the upper one is on another level"
-    )
-    assert "not studied" in note
-
-
-def test_of_two_roads_as_many_joints_away_the_nearer_one_is_studied(tmp_path):
-    """Road 1 leads to the lower road over 30 m, road 7 to the bridge over 130 m."""
-    middle = street("0", -90, 0, 60)
-    low = [street("1", -30, 0, 30), street("2", 0, 0, 60)]
-    ramp = road(
-        geometry(length=130.0, x=-90.0, y=0.0, hdg=-np.pi / 2), LANES, number="7",
-        elevation=f'<elevation s="0" a="0" b="{DECK / 130}" c="0" d="0"/>',
-    )  # fmt: skip
-    deck = street("8", -90, -130, 240, np.arctan2(170, 120), z=DECK)
-    model = built(tmp_path, (-60, 0), text=document(middle, *low, ramp, deck), radius=80.0)
-    assert any("road 8 lies 6.0 m above road" in note and "the upper one" in note for note in model.notes)
 
 
 def test_where_a_street_to_the_other_level_branches_off_the_surface_is_studied(tmp_path):

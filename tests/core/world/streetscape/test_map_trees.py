@@ -34,14 +34,3 @@ def test_the_crown_is_the_maps_unless_that_can_only_be_the_trunk(tmp_path, size,
     tree, model = tree_of(tmp_path, size)
     assert 2 * np.abs(tree.solid.vertices[:, :2]).max() == pytest.approx(crown)
     assert any("the width of a trunk" in note for note in model.notes) == (crown == 0.6 * 21)
-
-
-@pytest.mark.parametrize("kind", ["-1", "none", "obstacle"])
-@pytest.mark.parametrize(
-    "size", ['height="8" length="5" width="5"', 'height="8" radius="0.15"', 'length="5" width="5"', ""]
-)
-def test_a_tree_without_a_type_is_a_tree(tmp_path, kind, size):
-    tree, _ = tree_of(tmp_path, size, kind, "Tree_Maple_02")
-    assert {"bark", "leaves"} == set(tree.solid.materials)
-    widest = tree.solid.vertices[np.abs(tree.solid.vertices[:, :2]).max(axis=1).argmax()]
-    assert widest[2] > 2.0  # the crown hangs above the ground

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from seip_addon.core.progress import finish
-from seip_addon.core.world.opendrive.lanes import lane_surfaces
 from seip_addon.core.world.streetscape.description import SiteDescription
 from seip_addon.core.world.streetscape.model import site_model
-from seip_addon.core.world.streetscape.road_checks import height_gaps, steep_places
 from tests.builders.opendrive_text import document, geometry, lane, read_text, road, section
 
 
@@ -46,18 +44,3 @@ def test_a_step_between_roads_that_lead_into_each_other_is_named(tmp_path, step,
     assert bool(found) == warned
     if warned:
         assert f"differ in height by {abs(step):.2f} m on road 1 at (0, 2)" in found[0]
-
-
-def test_roads_above_each_other_make_no_step(tmp_path):
-    road_map = read_text(tmp_path, two_roads(0.0, 6.0).replace("<link>", "<!--").replace("</link>", "-->"))
-    assert not list(height_gaps(road_map, [lane for road in road_map.roads for lane in lane_surfaces(road)]))
-
-
-def test_a_short_steep_piece_is_found_between_level_ones(tmp_path):
-    pieces = "".join(
-        f'<elevation s="{s}" a="{a}" b="{b}" c="0" d="0"/>' for s, a, b in ((0, 0, 0), (30, 0, 0.5), (34, 2, 0))
-    )
-    text = document(road(geometry(length=60.0, x=-30.0), section(lane(-1)), elevation=pieces))
-    (found,) = steep_places(lane_surfaces(read_text(tmp_path, text).roads[0]))
-    assert found[0] == pytest.approx(0.5, abs=0.01)
-    assert 0 <= found[2][0] <= 4

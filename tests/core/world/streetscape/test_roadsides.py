@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 import shapely
 
@@ -30,21 +29,6 @@ def area(model, name, roles=(Role.CANDIDATE_AREAS,)):
     return shapely.transform(shapely.union_all(faces), lambda xy: xy + model.origin[:2])
 
 
-def scrap(number, length, x=50.0, y=5.0):
-    """A road of its own that is a bit of pavement, one metre wide."""
-    return road(geometry(length=length, x=x, y=y), section(lane(-1, 1.0, "sidewalk")), number=number)
-
-
-def test_a_scrap_of_pavement_leaves_the_verges_of_the_other_sides(tmp_path):
-    """Three square metres north of the road: the south keeps its verge, and the north but for some metres there."""
-    street = road(sections=section(lane(1), lane(-1)))
-    verge = area(built(tmp_path, street, scrap("2", 3.0)), "Verge strip")
-    south, north = (verge.intersection(shapely.box(10, low, 90, high)) for low, high in ((-9, 0), (0, 9)))
-    assert south.area == pytest.approx(80 * 1.5, rel=0.02)
-    assert 65 * 1.5 < north.area < 77 * 1.5
-    assert not verge.intersects(shapely.box(50.2, 3.5, 52.8, 9))
-
-
 def test_a_pavement_on_one_side_leaves_the_verge_on_the_other(tmp_path):
     model = built(tmp_path, road(sections=section(lane(1), lane(-1), lane(2, 2.0, "sidewalk"))))
     verge = area(model, "Verge strip")
@@ -52,12 +36,6 @@ def test_a_pavement_on_one_side_leaves_the_verge_on_the_other(tmp_path):
     assert verge.intersection(shapely.box(10, 0, 90, 9)).area < 1e-6
     assert area(model, "Pavements").area > 100
     assert any("m of roadside have no pavement" in note for note in model.notes)
-
-
-def test_a_pavement_beyond_a_grass_strip_is_beside_the_road(tmp_path):
-    sides = [lane(n * sign, w, kind) for sign in (1, -1) for n, w, kind in ((1, 3.5, "driving"), (2, 3, "border"))]
-    walks = [lane(3 * sign, 2.0, "sidewalk") for sign in (1, -1)]
-    assert area(built(tmp_path, road(sections=section(*sides, *walks))), "Verge strip").is_empty
 
 
 @pytest.mark.parametrize("x", [15.0, 85.0])
@@ -69,25 +47,6 @@ def test_no_verge_lies_across_the_end_of_the_road(tmp_path, x):
     low, _, high, _ = verge.bounds
     assert low > -0.2
     assert high < 100.2
-
-
-def ring(own=""):
-    """A junction of four connecting lanes round a square of 40 m, and a street that leads away from it."""
-    sides = [(0.0, 0.0, 0.0), (40.0, 0.0, np.pi / 2), (40.0, 40.0, np.pi), (0.0, 40.0, -np.pi / 2)]
-    strips = [
-        road(geometry(length=40.0, x=x, y=y, hdg=hdg), section(lane(1), lane(-1)), number=str(number), junction="7")
-        for number, (x, y, hdg) in enumerate(sides)
-    ]
-    away = road(geometry(length=60.0, x=43.5, y=20.0), section(lane(1), lane(-1)), number="9")
-    return (*strips, away)
-
-
-def test_no_verge_lies_in_a_hole_between_the_lanes_of_a_junction(tmp_path):
-    place = SiteDescription(near=(20.0, 20.0), radius=60.0)
-    model = built(tmp_path, *ring(), place=place, rest='<junction id="7" name="ring"/>')
-    verge = area(model, "Verge strip")
-    assert verge.area > 100
-    assert not verge.intersects(shapely.box(4, 4, 36, 36))
 
 
 def crossing(paved):
@@ -119,23 +78,6 @@ def test_what_is_added_round_corners_is_told_and_nothing_is_where_the_map_has_pa
     assert "9 m² are added to its" in note  # four squares of 1.5 m
     assert area(closed, "Pavements").area - area(own, "Pavements").area == pytest.approx(4 * (1.5**2 - 1), abs=0.05)
     assert not any("closed at the corners" in note for note in own.notes)
-
-
-def test_a_verge_between_a_street_and_a_footway_of_its_own_is_no_corner(tmp_path):
-    """The footway runs along the street 3 m beside it and round the corner: closing would fill all of the verge."""
-    street = section(lane(1), lane(-1))
-    footway = [
-        road(geometry(length=80.0, x=8.5, y=6.5), section(lane(1, 2.0, "sidewalk")), number="5"),
-        road(geometry(length=80.0, x=8.5, y=6.5, hdg=np.pi / 2), section(lane(-1, 2.0, "sidewalk")), number="6"),
-    ]
-    arms = [
-        road(geometry(length=85.0, x=3.5), street, number="1"),
-        road(geometry(length=85.0, y=3.5, hdg=np.pi / 2), street, number="2"),
-        road(geometry(length=7.0, x=-3.5), street, number="3", junction="7"),
-    ]
-    place = SiteDescription(near=(0.0, 0.0), radius=40.0)
-    model = built(tmp_path, *arms, *footway, place=place, rest='<junction id="7" name="corner"/>')
-    assert not any("closed at the corners" in note for note in model.notes)
 
 
 @pytest.mark.parametrize(("gap", "has_verge"), [(4.0, False), (15.0, True)])

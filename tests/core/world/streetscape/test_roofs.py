@@ -60,20 +60,6 @@ def test_a_courtyard_stays_open():
     assert volume(solid) == pytest.approx((96 - 16) * 5)
 
 
-def test_a_roof_falls_where_it_is_said_to():
-    east = house(BOX, 0.0, 4.0, side="wall", roof=Roof("skillion", 2.0, heading=0.0))
-    top = east.vertices[east.vertices[:, 2] > 3.0]
-    assert top[top[:, 0] > 14.9, 2] == pytest.approx(4.0)
-    assert top[top[:, 0] < 3.1, 2] == pytest.approx(6.0)
-
-
-def test_the_ridge_lies_along_the_longer_side_or_across_it():
-    along = house(BOX, 0.0, 4.0, side="wall", roof=Roof("gabled", 2.0)).vertices
-    across = house(BOX, 0.0, 4.0, side="wall", roof=Roof("gabled", 2.0, across=True)).vertices
-    assert along[along[:, 2] > 5.9, 1] == pytest.approx(9.0)
-    assert across[across[:, 2] > 5.9, 0] == pytest.approx(9.0)
-
-
 coordinates = st.tuples(st.floats(-40, 40), st.floats(-40, 40))
 
 

@@ -78,13 +78,6 @@ def test_every_key_arrives(tmp_path):
     assert (site.forbidden_areas[0].name, site.mandatory_areas[0].name) == ("Church", "Area")
 
 
-def test_a_region_is_one_outline_or_several(tmp_path):
-    one = read(tmp_path, "region = [[0, 0], [2, 0], [2, 2], [0, 2]]").region
-    two = read(tmp_path, "region = [[[0, 0], [2, 0], [2, 2]], [[5, 5], [7, 5], [7, 7]]]").region
-    assert (one.area, len(one.geoms)) == (4.0, 1)
-    assert (two.area, len(two.geoms)) == (4.0, 2)
-
-
 def test_a_row_ends_on_its_last_whole_step_in_spite_of_rounding(tmp_path):
     row = read(tmp_path, "[[tree]]\nfrom = [0, 0]\nto = [0.9, 0]\nspacing = 0.3\n").trees[0]
     np.testing.assert_allclose(row.positions[:, 0], [0, 0.3, 0.6, 0.9], atol=1e-12)
@@ -129,29 +122,3 @@ def test_a_mistake_is_named_with_its_cure(tmp_path, text, complaint):
         read(tmp_path, text)
     assert "site.toml" in str(raised.value)
     assert "\n" not in str(raised.value).strip()
-
-
-def test_a_missing_or_binary_file_is_named(tmp_path):
-    with pytest.raises(SeipError, match=r"nowhere\.toml"):
-        read_site_description(tmp_path / "nowhere.toml")
-    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(SeipError, match="not UTF-8 text"):
-        read_site_description(tmp_path / "binary.toml")
-
-
-@pytest.mark.parametrize(
-    ("lines", "sentence"),
-    [
-        ("[[building]]\noutline = [[0, 0], [9, 0], [9, 9]]\nheigth = 3", "height is missing .is 'heigth' a slip?"),
-        ("[[building]]\noutline = [[0, 0], [9, 0], [9, 9]]\nheight = 2e6", "height must be 0.01 to 1,000 m"),
-        ("[[building]]\noutline = [[0, 0], [1e8, 0], [9, 9]]\nheight = 9", "an outline of at most 100000 m"),
-        ("[[tree]]\nfrom = [0, 0]\nto = [1e6, 0]\nspacing = 0.001", "this row has 1e.09 places"),
-        ("near = [1e300, 0]", "near must be a point"),
-        (f"near = {'[' * 3000}", "is not valid TOML"),
-    ],
-)
-def test_slips_of_the_keyboard_are_caught(tmp_path, lines, sentence):
-    path = tmp_path / "site.toml"
-    path.write_text(f"{lines}\n", encoding="utf-8")
-    with pytest.raises(SeipError, match=sentence):
-        read_site_description(path)

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.site.roles import Role
 from seip_addon.core.world.opendrive.read import read_map
-from seip_addon.core.world.streetscape.description import Area, Building, Poles, SiteDescription, Trees, WeightedRegion
+from seip_addon.core.world.streetscape.description import Area, Building, Poles, SiteDescription, Trees
 from seip_addon.core.world.streetscape.model import site_model
 from tests.builders.street_map import street_map
 
@@ -59,39 +58,10 @@ def test_the_region_is_the_driving_surface_within_the_radius(tmp_path):
     assert plan(part(built, "Region of interest")).symmetric_difference(expected).area < 0.05
 
 
-def test_a_described_region_replaces_the_radius(tmp_path):
-    polygon = shapely.MultiPolygon([shapely.box(-25, -50, -15, 0)])
-    built = model(tmp_path, SiteDescription(near=(0.0, 0.0), region=polygon))
-    assert built.region.area == pytest.approx(10 * 3.5, abs=0.05)
-
-
-def test_the_central_box_is_weighted_unless_the_description_says_otherwise(tmp_path):
-    box = part(model(tmp_path), "Junction 7")
-    assert box.weight == 2.0
-    assert plan(box).symmetric_difference(shapely.box(-10, -3.5, 10, 3.5)).area < 0.05
-    own = WeightedRegion("Stop", 5.0, polygon=shapely.box(-20, -3, -12, 3))
-    built = model(tmp_path, replace(HERE, weighted_regions=(own,)))
-    assert [(each.name, each.weight) for each in with_role(built, Role.WEIGHTED_REGIONS)] == [("Stop", 5.0)]
-
-
 def test_flush_pavements_are_raised_and_raised_ones_are_kept(tmp_path):
     for kerb, height in ((0.0, 0.12), (0.2, 0.2)):
         heights = part(model(tmp_path, kerb=kerb), "Pavements").solid.vertices[:, 2]
         np.testing.assert_allclose(heights, height, atol=1e-9)
-
-
-def test_kerbs_hang_below_the_pavement_and_face_outwards(tmp_path):
-    kerbs = part(model(tmp_path), "Kerbs").solid
-    assert kerbs.vertices[:, 2].max() == pytest.approx(0.12)
-    assert kerbs.vertices[:, 2].min() < 0
-    for face in kerbs.faces:
-        a, b, c = kerbs.vertices[list(face)]
-        normal = np.cross(b - a, c - a)
-        assert normal[2] == pytest.approx(0)
-        middle = (a + b + c) / 3
-        if abs(middle[0]) < 60 and abs(normal[1]) > abs(normal[0]):
-            at_carriageway = abs(abs(middle[1]) - 3.5) < 0.1
-            assert np.sign(normal[1]) == np.sign(-middle[1] if at_carriageway else middle[1])
 
 
 def test_pavements_near_the_region_are_candidate_areas_and_others_are_not(tmp_path):
@@ -104,16 +74,6 @@ def test_pavements_near_the_region_are_candidate_areas_and_others_are_not(tmp_pa
     assert -60 < low < -40
     assert 40 < high < 60
     assert part(built, "Pavements beyond").roles == (Role.GROUND,)
-
-
-def test_without_pavements_a_strip_of_verge_is_the_candidate_area(tmp_path):
-    built = model(tmp_path, lane_types=("driving",))
-    (strip,) = with_role(built, Role.CANDIDATE_AREAS)
-    assert built.notes
-    distance = np.abs(strip.solid.vertices[:, 1])
-    inside = np.abs(strip.solid.vertices[:, 0]) < 20
-    assert distance[inside].min() == pytest.approx(3.5 + 0.8, abs=0.02)
-    assert distance[inside].max() == pytest.approx(3.5 + 2.3, abs=0.02)
 
 
 def test_every_kind_of_lane_has_its_surface(tmp_path):
@@ -179,52 +139,11 @@ def test_a_signal_beside_the_carriageway_is_its_pole_and_faces_its_traffic(tmp_p
     assert lamp_direction(pole) @ [travel, 0, 0] == pytest.approx(-1)
 
 
-@pytest.mark.parametrize("t", [1.2, -1.2])
-def test_a_signal_over_the_carriageway_hangs_on_an_arm_from_beside(tmp_path, t):
-    built = model(tmp_path, signals=SIGNAL.format(s=95, t=t, to="+", dynamic="yes"))
-    (pole,) = with_role(built, Role.POLES)
-    assert pole.foot[1] == pytest.approx(math.copysign(3.5 + 0.6, t), abs=0.02)
-    assert np.abs(placed(pole)[:, 1]).min() <= abs(t) + 0.1
-    assert lamp_direction(pole) @ [1, 0, 0] == pytest.approx(-1)
-
-
 def lamp_direction(pole):
     face = next(f for f, name in zip(pole.solid.faces, pole.solid.materials, strict=True) if name == "red lamp")
     a, b, c = placed(pole)[list(face[:3])]
     normal = np.cross(b - a, c - a)
     return normal / np.linalg.norm(normal)
-
-
-def test_where_traffic_keeps_left_lines_and_lamps_change_sides(tmp_path):
-    poles = replace(HERE, signal_poles=(Poles(np.array([[-12.0, -6.0]]), 6.0, 4.0, math.pi / 2),))
-    right, left = model(tmp_path, poles), model(tmp_path, poles, rule="LHT")
-    assert stop_line_sides(right) == {(-1, -1), (1, 1)}
-    assert stop_line_sides(left) == {(-1, 1), (1, -1)}
-    lamps = [with_role(built, Role.POLES)[0] for built in (right, left)]
-    assert [math.copysign(1, lamp_direction(pole)[0]) for pole in lamps] == [-1, 1]
-
-
-def stop_line_sides(built):
-    """Return the signs of x and y of each stop line: where bars, 0.4 m long, are 3.5 m wide."""
-    solid = part(built, "Lane markings").solid
-    quads = solid.vertices[np.array(solid.faces)]
-    bars = quads[np.ptp(quads[:, :, 1], axis=1) > 3]
-    return {tuple(side) for side in np.sign(bars.mean(axis=1)[:, :2]).astype(int).tolist()}
-
-
-def test_progress_comes_to_its_end(tmp_path):
-    path = tmp_path / "street.xodr"
-    path.write_text(street_map(), encoding="utf-8")
-    seen = []
-    finish(site_model(read_map(path), HERE), seen.append)
-    assert (seen[-1].done, seen[-1].what) == (seen[-1].total, "streets")
-    assert all(step.done <= step.total for step in seen)
-
-
-def test_signals_of_one_pole_share_it_and_signs_have_none(tmp_path):
-    pair = SIGNAL.format(s=95, t=-5, to="+", dynamic="yes") + SIGNAL.format(s=95.5, t=-5, to="+", dynamic="yes")
-    sign = SIGNAL.format(s=60, t=-5, to="+", dynamic="no")
-    assert len(with_role(model(tmp_path, signals=pair + sign), Role.POLES)) == 1
 
 
 def test_objects_of_the_map_become_what_they_are(tmp_path):
@@ -280,37 +199,6 @@ def test_lines_are_painted_between_lanes_but_not_in_the_junction(tmp_path):
     assert (np.abs(markings.vertices[:, 1]) < 0.1).all()
 
 
-@pytest.mark.parametrize(
-    ("description", "complaint"),
-    [
-        (
-            replace(HERE, near=(0.0, 500.0)),
-            r"no driving lane within 30 m of \(0, 500\); the nearest junctions are 7 at",
-        ),
-        (SiteDescription(junction="8"), "no junction '8'"),
-        (SiteDescription(), "no place is named"),
-        (
-            SiteDescription(region=shapely.MultiPolygon([shapely.box(0, 50, 9, 60)])),
-            "no driving lane within the region",
-        ),
-        (
-            replace(HERE, weighted_regions=(WeightedRegion("Far", 2.0, polygon=shapely.box(90, 0, 95, 3)),)),
-            "'Far' lies outside the region of interest",
-        ),
-        (replace(HERE, weighted_regions=(WeightedRegion("?", 2.0, junction="77"),)), "no junction '77'"),
-    ],
-)
-def test_a_place_that_is_none_is_named(tmp_path, description, complaint):
-    with pytest.raises(SeipError, match=complaint):
-        model(tmp_path, description)
-
-
-def test_a_junction_is_found_by_id_and_by_name(tmp_path):
-    for name in ("7", "crossing"):
-        built = model(tmp_path, SiteDescription(junction=name, radius=30.0))
-        np.testing.assert_array_equal(built.origin, [0, 0, 0])
-
-
 @pytest.mark.skipif(not MAPS.is_dir(), reason="the maps of other projects are not here; set SEIP_MAPS to their folder")
 @pytest.mark.parametrize(
     ("name", "place"),
@@ -332,19 +220,3 @@ def test_real_maps_become_one_sound_layer(name, place):
     if name == "Town05":  # its lanes cross each other in every junction
         assert plan_sum(driving) == pytest.approx(plan(driving).area, rel=0.002)
         assert sum(len(each.solid.faces) for each in built.parts) < 20_000
-
-
-CROSSWALK = (
-    '<object id="9" type="crosswalk" name="" s="100" t="0" zOffset="0" hdg="{heading}" length="{length}" '
-    'width="{width}"/>'
-)
-
-
-@pytest.mark.parametrize(("length", "width", "heading"), [(3, 7, 0), (7, 3, 1.5707963)])
-def test_new_posts_keep_off_the_landings_of_a_crossing_of_the_map(tmp_path, length, width, heading):
-    furniture = CROSSWALK.format(length=length, width=width, heading=heading)
-    built = model(tmp_path, replace(HERE, radius=30.0), furniture=furniture)
-    (landings,) = (one for one in built.parts if one.keep_off == "landings")
-    assert landings.roles == (Role.FORBIDDEN_AREAS,)
-    wanted = shapely.union_all([shapely.box(-11.5, y, -8.5, y + 2) for y in (3.5, -5.5)])
-    assert shapely.affinity.translate(plan(landings), *built.origin[:2]).symmetric_difference(wanted).area < 0.1

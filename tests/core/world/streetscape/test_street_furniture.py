@@ -1,5 +1,3 @@
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -46,46 +44,7 @@ def test_a_tree_is_as_high_and_wide_as_asked_for(height, crown, variant):
     assert volume(tree) > 0
 
 
-def test_trees_of_one_variant_are_equal_and_variants_differ():
-    first, again, other = (furniture.tree(8, 5, variant).vertices for variant in (1, 1, 2))
-    np.testing.assert_array_equal(first, again)
-    assert not np.array_equal(first, other)
-
-
 @pytest.mark.parametrize("shape", [furniture.street_light(8, 1.5), furniture.signal_pole(6, 5), furniture.post(4, 0.1)])
 def test_posts_stand_on_their_foot(shape):
     assert shape.vertices[:, 2].min() == pytest.approx(0.0)
     assert volume(shape) > 0
-
-
-def test_the_arm_reaches_along_x():
-    assert furniture.signal_pole(6, 5).vertices[:, 0].max() == pytest.approx(5.0, abs=0.2)
-    assert furniture.signal_pole(6, 0).vertices[:, 0].max() < 0.3
-
-
-@pytest.mark.parametrize(("faces_left", "side"), [(True, 1), (False, -1)])
-def test_lamps_face_the_side_that_is_asked_for(faces_left, side):
-    pole = furniture.signal_pole(6, 5, faces_left=faces_left)
-    lamps = [face for face, name in zip(pole.faces, pole.materials, strict=True) if name.endswith("lamp")]
-    assert len(lamps) == 6
-    for lamp in lamps:
-        a, b, c = pole.vertices[list(lamp[:3])]
-        assert np.sign(np.cross(b - a, c - a)[1]) == side
-
-
-def test_windows_stand_just_before_each_side():
-    square = np.array([[0, 0], [12, 0], [12, 12], [0, 12]], dtype=float)
-    panes = furniture.windows(square, 1.0, 9.6)
-    bays, storeys = int(12 / furniture.WINDOW_SPACING), 3
-    assert len(panes.faces) == 4 * bays * storeys
-    assert panes.vertices[:, 2].min() > 1.0
-    assert panes.vertices[:, 2].max() < 1.0 + 9.6
-    distance = np.maximum(-panes.vertices[:, :2], panes.vertices[:, :2] - 12).max(axis=1)
-    np.testing.assert_allclose(distance, furniture.WINDOW_OFFSET, atol=1e-9)
-
-
-def test_joining_keeps_every_face():
-    parts = [furniture.post(3, 0.1), furniture.tree(6, 3, 0)]
-    joined = solids.join(*parts)
-    assert volume(joined) == pytest.approx(math.fsum(map(volume, parts)))
-    assert len(joined.materials) == len(joined.faces)

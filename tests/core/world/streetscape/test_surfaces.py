@@ -1,6 +1,5 @@
 """Each place of a modelled street has one surface: no pavement in a lane, no two faces in one place."""
 
-import dataclasses
 import os
 from pathlib import Path
 
@@ -14,9 +13,8 @@ from seip_addon.core.workflows.site_building import SiteRequest, build_site
 from seip_addon.core.world.opendrive.lanes import LaneSurface
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.core.world.streetscape.description import SiteDescription
-from seip_addon.core.world.streetscape.footways import without_doubles
 from seip_addon.core.world.streetscape.model import site_model
-from seip_addon.core.world.streetscape.road_surface import markings, roadside, without_gaps, without_loose_ends
+from seip_addon.core.world.streetscape.road_surface import roadside, without_gaps
 from tests.builders.osm_text import crossing
 from tests.builders.street_map import street_map
 from tests.oracles.face_areas import check_surfaces, plan
@@ -67,38 +65,6 @@ def test_a_lane_that_overlaps_another_road_gives_way(tmp_path):
     assert shapely.contains_xy(roads, *(np.array([[-40.0, 5.0]]) - model.origin[:2]).T).all()
 
 
-PAVEMENT = shapely.box(-100, 0, 100, 2.5)
-
-
-def doubles(*points, width=2.0):
-    shapely.prepare(PAVEMENT)
-    return without_doubles(np.array(points, dtype=float), width, PAVEMENT)
-
-
-def test_a_footway_along_a_pavement_is_the_same_pavement():
-    area, length = doubles((-50, 6), (50, 6))
-    assert length == pytest.approx(100)
-    assert area.is_empty
-
-
-@pytest.mark.parametrize(
-    "line",
-    [[(-50, 12), (50, 12)], [(0, 3), (0, 40)], [(-20, 3), (30, 60)]],
-    ids=["far from it", "across", "aslant"],
-)
-def test_other_footways_stay(line):
-    area, length = doubles(*line)
-    assert length == 0
-    assert shapely.LineString(line).buffer(1.0).difference(area).area < 0.1
-
-
-def test_a_path_that_met_the_footway_is_led_on_to_the_pavement():
-    area, length = doubles((-50, 6), (0, 6), (0, 40))
-    assert length == pytest.approx(50, abs=2.5)
-    assert area.intersects(PAVEMENT)
-    assert area.bounds[0] > -4
-
-
 @needs_sumo
 def test_a_mapped_footway_beside_the_street_makes_no_second_pavement(tmp_path):
     extract = crossing()
@@ -141,22 +107,3 @@ def rectangle(road, low_x, low_y, high_x, high_y):
         road_id=road, junction_id=None, section=0, lane_id=-1, lane_type="driving", keeps_left=False,
         s=s, left=left, right=right,
     )  # fmt: skip
-
-
-def test_small_pieces_of_roads_that_lead_nowhere_are_left_out():
-    extent = shapely.box(-50, -50, 50, 50)
-    region = shapely.box(-20, -3, 20, 3)
-    main, next_to_it = rectangle("1", -40, -3, 0, 3), rectangle("2", 0, -3, 60, 3)
-    sliver, street = rectangle("3", 45, 40, 90, 46), rectangle("4", -45, 30, 45, 36)
-    kept = without_loose_ends([main, next_to_it, sliver, street], region, extent)
-    assert [lane.road_id for lane in kept] == ["1", "2", "4"]
-
-
-def test_markings_end_where_the_road_ends():
-    lanes = [rectangle("1", -60, 0, 60, 3.5)]
-    lanes.append(dataclasses.replace(rectangle("1", -60, -3.5, 60, 0), lane_id=1))
-    extent = shapely.Point(0, 0).buffer(41.7)
-    painted = markings(lanes, extent)
-    corners = shapely.points(painted[:, :, :2].reshape(-1, 2))
-    assert shapely.distance(extent, corners).max() < 0.1
-    assert painted[:, :, 0].max() == pytest.approx(41.7, abs=0.2)

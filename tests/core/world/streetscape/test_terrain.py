@@ -4,7 +4,6 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.geometry.plan import plane_height
 from seip_addon.core.world.streetscape.terrain import MAX_ROADSIDE, Embankments, Terrain, cut, triangulate
 from tests.oracles.random_cases import cases
 
@@ -22,21 +21,6 @@ def plan_area(triangles):
 @given(st.floats(0, 4), st.floats(0, 4))
 def test_height_on_a_plane_is_the_planes(x, y):
     assert Terrain(SQUARE).height(np.array([[x, y]]))[0] == pytest.approx(1 + y / 2)
-
-
-def test_height_beside_is_that_of_the_nearest_point():
-    np.testing.assert_allclose(Terrain(SQUARE).height(np.array([[2.0, 100.0], [2.0, -7.0], [9.0, 2.0]])), [3, 1, 2])
-
-
-def test_overlapping_triangles_count_equally():
-    lower = SQUARE - [0, 0, 0.4]
-    inside = np.array([[1.0, 2.0]])
-    assert Terrain(np.concatenate([SQUARE, lower])).height(inside)[0] == pytest.approx(1.8)
-
-
-def test_upright_triangles_are_no_ground():
-    upright = np.array([[[1, 1, 50], [2, 2, 50], [1.5, 1.5, 90]]], dtype=float)
-    assert Terrain(np.concatenate([SQUARE, upright])).height(np.array([[1.5, 1.5]]))[0] == pytest.approx(1.75)
 
 
 def test_triangles_fill_an_area_once_and_face_up():
@@ -81,15 +65,6 @@ def test_cutting_leaves_the_rest_on_its_plane(x, size):
     np.testing.assert_allclose(rest[..., 2], 1 + rest[..., 1] / 2, atol=1e-9)
 
 
-def test_cutting_everything_leaves_nothing():
-    assert cut(SQUARE, shapely.box(-1, -1, 5, 5)).shape == (0, 3, 3)
-    assert cut(np.empty((0, 3, 3)), shapely.box(0, 0, 1, 1)).shape == (0, 3, 3)
-
-
-def test_plane_height_extends_the_triangle():
-    assert plane_height(SQUARE[:1], np.array([[-3.0, 10.0]]))[0] == pytest.approx(6.0)
-
-
 def strip(x, width, z, length=60.0):
     """Return a road along y at a height."""
     low = np.array([[x, -length, z], [x + width, -length, z], [x + width, length, z], [x, length, z]], dtype=float)
@@ -108,19 +83,6 @@ def test_an_embankment_leads_from_the_road_to_the_land():
     assert (np.diff(height) <= 1e-9).all()
     assert np.abs(np.diff(height)).max() < 0.1 * 1.2
     np.testing.assert_array_equal(height[along[:, 0] > 8 + MAX_ROADSIDE], 0.0)
-
-
-def test_between_roads_at_different_heights_the_ground_has_no_step():
-    ground = Embankments(np.concatenate([strip(0, 8, 5.0), strip(12, 8, 0.0)]), level_land)
-    along = np.column_stack([np.linspace(8.0, 12.0, 401), np.zeros(401)])
-    height = ground.height(along)
-    assert height[[0, -1]] == pytest.approx([5.0, 0.0], abs=1e-3)
-    assert np.abs(np.diff(height)).max() < 0.07
-
-
-def test_a_road_below_the_land_lies_in_a_cutting():
-    ground = Embankments(strip(0, 8, -4.0), level_land)
-    assert ground.height(np.array([[8.0, 0.0], [10.0, 0.0], [30.0, 0.0]])) == pytest.approx([-4, -3.6, 0], abs=0.3)
 
 
 def test_steep_ground_has_a_finer_grid_without_cracks():

@@ -2,7 +2,6 @@
 
 import os
 from collections import Counter
-from itertools import combinations
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -13,41 +12,16 @@ from seip_addon.core import sumo_programs
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.traffic.floating_car_data import Extent, read_floating_car_data, read_trajectories
-from seip_addon.core.sensing.traffic.trajectories import CATEGORIES
 from seip_addon.core.sensing.traffic.vehicle_types import read_vehicle_types
 from seip_addon.core.sumo_programs import find_sumo
-from seip_addon.core.workflows.site_building import SiteRequest, build_site, save_map
 from seip_addon.core.world.traffic_simulation import simulation as sumo
-from seip_addon.core.world.traffic_simulation.demand import MODELS, VEHICLE_SHARES, Demand, write_routes
-from seip_addon.core.world.traffic_simulation.street_network import DRIVING, PARKING, WALKING, read_network
-from tests.builders.street_network import BAYS, ROAD, edge, network, three_ways, way
+from seip_addon.core.world.traffic_simulation.demand import VEHICLE_SHARES, Demand, write_routes
+from seip_addon.core.world.traffic_simulation.street_network import DRIVING, WALKING, read_network
+from tests.builders.street_network import three_ways
 from tests.sumo_here import needs_sumo
 
 ROOT = Path(__file__).resolve().parents[4]
 MAPS = Path(os.environ.get("SEIP_MAPS", ROOT.parent / "shared" / "opendrive"))
-
-
-@pytest.mark.parametrize(
-    ("text", "complaint"),
-    [
-        (edge("a", "n", ROAD, length=-7), r"n\.net\.xml .* <lane> 'a_0': the length is -7, not 0"),
-        (edge("a", "n", ROAD, length="nan"), "length is nan"),
-        (edge("a", "n", ROAD).replace('shape="0,0 120,0"', 'shape="0,0 nan,0"'), "a coordinate is nan"),
-        (edge("a", "n", ROAD).replace('shape="0,0 120,0"', 'shape="0,0 1e300,0"'), r"a coordinate is 1e\+300"),
-        (edge("a", "n", ROAD).replace('shape="0,0 120,0"', 'shape="0,0"'), "not a line of two or more points"),
-        (edge("a", "n", ROAD).replace('index="0"', 'index="-1"'), "the index is -1"),
-        (edge("a", "n", ROAD).replace(' to="n"', ""), "<edge> 'a': the attribute 'to' is missing"),
-        (
-            edge("a", "n", ROAD) + way("a", "b", "s", lane=4),
-            "<connection> from 'a' to 'b': fromLane is 4, but the edge has 1 lane",
-        ),
-        ('<junction id="n" type="traffic_light" x="inf" y="0"/>', "<junction> 'n': a coordinate is inf"),
-        ("", "has no edges"),
-    ],
-)
-def test_a_network_with_impossible_figures_is_refused(tmp_path, text, complaint):
-    with pytest.raises(SeipError, match=complaint):
-        network(tmp_path, text)
 
 
 def routes(folder, streets, seed=1, duration=3600.0, **demand):
@@ -63,20 +37,6 @@ def test_a_network_by_hand(tmp_path):
     assert streets.turns == {"in": [("left", "l"), ("on", "s"), ("right", "r")]}
     assert [arm.id for arm in streets.arms] == ["in"]
     np.testing.assert_array_equal(streets.signalised["j"], [3.0, 4.0])
-
-
-def test_where_people_cross_is_no_way_for_vehicles(tmp_path):
-    """Where a street has no pavement people walk on its lane, which leads to where they cross."""
-    streets = network(
-        tmp_path,
-        edge("in", "j", 'allow=""'),
-        edge("on", "out", ROAD),
-        '<junction id="out" type="dead_end" x="0" y="0"/>',
-        way("in", ":j_w5", "s"),
-        way("in", "on", "s"),
-    )
-    assert streets.turns == {"in": [("on", "s")]}
-    routes(tmp_path, streets, pedestrians=0.0)
 
 
 def test_flow_turns_and_mix_are_as_asked_for(tmp_path):
@@ -100,48 +60,6 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path):
     assert routes(tmp_path, streets, seed=4)[1] != routes(tmp_path, streets, seed=5)[1]
 
 
-def bays(root):
-    """Return lane and middle of each parked car."""
-    models = {f"parked_{name}": model for group in MODELS.values() for name, model in group.items()}
-    return [
-        (
-            vehicle.find("stop").get("lane"),
-            float(vehicle.find("stop").get("endPos")) - models[vehicle.get("type")].length / 2,
-        )
-        for vehicle in root.iter("vehicle")
-        if vehicle.get("id").startswith("parked")
-    ]
-
-
-@pytest.mark.parametrize("kerb", ["rows", "lanes"])
-def test_each_seed_parks_other_cars_in_other_places(tmp_path, kerb):
-    streets = three_ways(tmp_path)
-    if kerb == "lanes":
-        streets = network(
-            tmp_path, edge("in", "j", ROAD), edge("out", "end", BAYS, ROAD, length=200), way("in", "out", "s")
-        )
-    drawn = [routes(tmp_path, streets, seed=seed, duration=600.0)[0] for seed in range(1, 5)]
-    for one, other in combinations(map(bays, drawn), 2):
-        assert one
-        assert min(abs(a - b) for lane, a in one for there, b in other if lane == there or kerb == "lanes") > 1.0
-    names = [{entry.get("id") for entry in root if entry.tag in {"vehicle", "person"}} for root in drawn]
-    assert not any(one & other for one, other in combinations(names, 2))  # and so no paint is, which goes by the name
-    departures = [tuple(entry.get("depart") for entry in root if entry.tag in {"vehicle", "person"}) for root in drawn]
-    types = [tuple(vehicle.get("type") for vehicle in root.iter("vehicle")) for root in drawn]
-    assert len(set(departures)) == len(set(types)) == 4
-
-
-def test_every_model_is_read_back_as_its_category_and_size(tmp_path):
-    routes(tmp_path, three_ways(tmp_path))
-    types = finish(read_vehicle_types([tmp_path / "r.rou.xml"]))
-    assert tuple(MODELS) == CATEGORIES
-    for category, models in MODELS.items():
-        for name, model in models.items():
-            read = types[name]
-            assert (read.category, read.length, read.width, read.height) == (category, *model[2:5])
-    assert types["parked_compact"].category == "car"
-
-
 def test_rows_of_parked_cars_leave_a_lane_and_deliveries_keep_clear(tmp_path):
     root, _ = routes(tmp_path, three_ways(tmp_path), flow=3000.0)
     stops = {vehicle.get("id"): vehicle.find("stop") for vehicle in root.iter("vehicle")}
@@ -152,32 +70,6 @@ def test_rows_of_parked_cars_leave_a_lane_and_deliveries_keep_clear(tmp_path):
     assert others
     assert not parked & set(others)
     assert not any(lane.startswith("in") for lane in others)  # it has one lane: nobody could pass
-
-
-@pytest.mark.parametrize("shares", [{"tram": 1.0}, {"car": 0.0}, {"car": 1.0, "bus": -0.1}, {}])
-def test_no_mix_of_vehicles_is_one_sentence(shares):
-    with pytest.raises(SeipError, match="shares of vehicles must be for car, van"):
-        Demand(shares=shares)
-
-
-def test_parking_lanes_are_used_where_there_are_any(tmp_path):
-    streets = network(
-        tmp_path,
-        edge("in", "j", ROAD),
-        edge("out", "end", BAYS, ROAD, ROAD, length=200),
-        way("in", "out", "s"),
-    )
-    assert len(streets.edges["out"].lanes_for(PARKING)) == 1
-    root, _ = routes(tmp_path, streets)
-    lanes = [vehicle.find("stop").get("lane") for vehicle in root.iter("vehicle") if "parked" in vehicle.get("id")]
-    assert set(lanes) == {"out_0"}
-    assert 10 <= len(lanes) <= 25
-
-
-def test_a_map_without_ways_in_is_refused(tmp_path):
-    ring = network(tmp_path, edge("a", "x", ROAD), edge("b", "y", ROAD), way("a", "b", "s"), way("b", "a", "s"))
-    with pytest.raises(SeipError, match="no road leads into the map"):
-        routes(tmp_path, ring)
 
 
 @pytest.mark.parametrize(
@@ -196,14 +88,6 @@ def test_a_map_without_ways_in_is_refused(tmp_path):
 def test_senseless_demand_is_refused(make, complaint):
     with pytest.raises(SeipError, match=complaint):
         make()
-
-
-def test_without_sumo_the_cure_is_named(monkeypatch):
-    monkeypatch.setenv("PATH", "")
-    monkeypatch.delenv("SUMO_HOME", raising=False)
-    monkeypatch.setattr(sumo_programs.importlib.util, "find_spec", lambda _name: None)
-    with pytest.raises(SeipError, match=r"SUMO is not installed, which .* `pip install --group traffic`"):
-        find_sumo()
 
 
 JUNCTION = ROOT / "scenes" / "junction.xodr"
@@ -300,24 +184,3 @@ def test_town05_is_cut_to_the_scene(tmp_path):
     trajectories, warnings = read_trajectories(data, types, np.zeros(3), "Town05")
     assert len(trajectories) > 20
     assert not warnings
-
-
-@pytest.mark.slow
-@needs_sumo
-def test_cut_behind_traffic_lights_of_a_one_way_carriageway(tmp_path):
-    """The site ends a metre behind a node with traffic lights, all of whose ways on are cut off."""
-    extract = MAPS.parent / "osm" / "northgate_dual_carriageway.osm"
-    if not extract.is_file():
-        pytest.skip(f"no {extract}")
-    built = finish(build_site(extract, SiteRequest(near_latlon=(47.7086575, -122.3273312), approaches=40.0)))
-    save_map(built, tmp_path / "site.xodr")
-    files = simulated(tmp_path / "run", tmp_path / "site.xodr", duration=10.0, bounds=(13.4, 153.5, 187.5, 257.4))
-    assert len(read_network(files.net).arms) >= 3
-
-
-@needs_sumo
-def test_what_sumo_refuses_is_said_in_one_sentence(tmp_path):
-    programs = find_sumo()
-    with pytest.raises(SeipError, match=r"sumo failed: .*nowhere.*; check the map") as caught:
-        finish(sumo_programs.run(programs, programs.sumo, ["--net-file", tmp_path / "nowhere.net.xml"], "x"))
-    assert "\n" not in str(caught.value)
