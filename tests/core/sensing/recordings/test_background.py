@@ -65,7 +65,7 @@ def brute_force(ranges):
     agreeing = sum(abs(value - usual) <= margin(usual, spread) for value in returns)
     stopped = sum(value < usual - margin(usual, spread) for value in returns)
     agreement = agreeing / len(returns)
-    returned = agreeing / max(sweeps - stopped, 1)
+    returned = (len(returns) - stopped) / max(sweeps - stopped, 1)
     if agreeing < max(min(3, sweeps), 0.15 * sweeps):
         return np.nan, 0.0, returned, agreement
     return usual, spread, returned, agreement
