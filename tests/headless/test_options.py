@@ -19,7 +19,7 @@ from seip_addon.core.limits import Limits
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.settings import settings_of
-from seip_addon.core.site.candidates import DEFAULT_TYPE, CandidateSettings
+from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.workflows.survey_settings import SurveySettings
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -37,11 +37,6 @@ def test_options_left_alone_give_the_defaults(kind):
     parser = argparse.ArgumentParser()
     add_settings(parser, kind, *settings_of(kind))
     assert read_settings(kind, parser.parse_args([])) == kind()
-
-
-def test_commands_start_from_a_product():
-    assert read_settings(CandidateSettings, surveyed()).sensors == (DEFAULT_TYPE,)
-    assert read_settings(CandidateSettings, surveyed("--sensor", "vlp16")).sensors == ("vlp16",)
 
 
 @pytest.mark.parametrize(
@@ -141,24 +136,12 @@ def test_every_option_takes_finite_numbers_and_possible_paths(typed, complaint):
         parsed(*typed)
 
 
-def test_options_within_their_limits_are_read():
-    options = parsed("scene.blend", "--length", "-2.5", "--many", "3", "--share", "1")
-    assert (options.file, options.length, options.many, options.share) == (Path("scene.blend"), -2.5, 3, 1.0)
-
-
 def test_place_has_at_most_28_options_each_with_an_example_in_its_document():
     parser = place._parser()  # noqa: SLF001  # the command's own
     options = {action.option_strings[-1] for action in parser._actions if action.option_strings} - {"--help"}  # noqa: SLF001
     assert len(options) <= 28
     text = (ROOT / "docs" / "placement.md").read_text(encoding="utf-8")
     assert [name for name in options - {"--output"} if not re.search(rf"`[^`]*{name}\b", text)] == []
-
-
-@pytest.mark.parametrize("text", ["x", "1.5", "\N{ARABIC-INDIC DIGIT ONE}"])
-def test_a_text_that_is_no_number_is_left_to_the_parser(text, capsys):
-    with pytest.raises(SystemExit):
-        parsed("--many", text)
-    assert "invalid int value" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

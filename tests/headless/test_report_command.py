@@ -11,9 +11,8 @@ from headless.objective_options import read_objective
 import bpy
 import pytest
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.output.report.repeat import repeating_command
-from seip_addon.core.output.results.placement_file import comparable, load_placement
+from seip_addon.core.output.results.placement_file import load_placement
 from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import open_blend, save_blend
@@ -76,15 +75,6 @@ def test_the_record_and_the_maps_agree(folder):
     assert not any("not written" in note for note in record.notes)
 
 
-def test_the_command_of_a_record_asks_for_the_same_again(folder, tmp_path, monkeypatch):
-    record = load_placement(folder / "placement.json")
-    words = shlex.split(repeating_command(record))
-    assert words[:3] == ["seip", "place", "placed.blend"]
-    monkeypatch.chdir(folder)
-    place.main([*words[2:-1], str(tmp_path)])
-    assert comparable(load_placement(tmp_path / "placement.json")) == comparable(record)
-
-
 @pytest.mark.parametrize(
     "typed",
     [
@@ -110,22 +100,3 @@ def test_every_option_survives_the_record(folder, typed):
     assert surveys.read_survey_settings(again) == settings
     assert read_objective(again) == goal
     assert again.no_render == asked.no_render
-
-
-@pytest.mark.slow
-def test_a_new_placement_takes_the_report_on_the_old_one_away(folder, small_scene, tmp_path):
-    place.main([str(small_scene), "-o", str(tmp_path), *QUICK, "--count", "1"])
-    report.main([str(tmp_path)])
-    place.main([str(small_scene), "-o", str(tmp_path), *QUICK, "--count", "2"])
-    assert not (tmp_path / "report.html").exists()
-    assert not (tmp_path / "placement.kml").exists()
-    notes = load_placement(tmp_path / "placement.json").notes
-    assert "placement.geojson and placement.kml cannot be written: the scene's map names no projection" in notes
-
-
-def test_a_folder_that_is_none_is_not_made(tmp_path):
-    with pytest.raises(SeipError, match="there is no folder"):
-        report.main([str(tmp_path / "nowhere")])
-    assert not (tmp_path / "nowhere").exists()
-    with pytest.raises(SeipError, match=r"holds no placement\.json"):
-        report.main([str(tmp_path)])

@@ -3,7 +3,6 @@
 import json
 import math
 import os
-import resource
 import subprocess
 import sys
 import time
@@ -124,14 +123,6 @@ def test_a_started_run_is_finished(folder, run):
 
 
 @pytest.mark.slow
-def test_options_reach_the_frames(folder):
-    simulate.main(arguments(folder, "rolling", "--rolling-shutter", "--start", "0.5", "--rate", "2", "--seed", "9"))
-    (first, *_) = (frame for _, frame in load_frames(folder / "rolling"))
-    assert first.time == 0.5
-    assert first.delay.any()
-
-
-@pytest.mark.slow
 def test_traffic_that_is_animated_in_the_scene_is_simulated(folder):
     bpy.ops.wm.open_mainfile(filepath=str(folder / "placed.blend"))
     animate(bpy.context.scene, make_traffic().moved_to(ORIGIN))
@@ -177,37 +168,11 @@ def test_a_folder_of_another_run_is_left_alone(folder, run):
     assert contents(run) == before
 
 
-def test_a_run_is_not_written_into_the_folder_of_a_placement(folder):
-    (folder / "placed").mkdir()
-    (folder / "placed" / "placement.json").write_text("{}", encoding="utf-8")
-    with pytest.raises(SeipError, match="contains a placement"):
-        simulate.main(arguments(folder, "placed"))
-    assert [path.name for path in (folder / "placed").iterdir()] == ["placement.json"]
-
-
-def test_traffic_of_another_site_with_the_same_coordinates_is_refused(folder):
-    traffic = make_traffic()
-    traffic.position[:6, 1] += 15.5  # 12 m beside the middle of the road, where another site has its street
-    traffic.save(folder / "other.npz")
-    with pytest.raises(SeipError, match=r"traffic of another site: \d+% of the vehicle positions of .*other\.npz"):
-        simulate.main(arguments(folder, "wrong", "--traffic", str(folder / "other.npz")))
-    traffic = make_traffic(ORIGIN + np.array([0.0, 0.0, 25.0]))
-    traffic.save(folder / "above.npz")
-    with pytest.raises(SeipError, match="traffic of another site: 100%"):
-        simulate.main(arguments(folder, "wrong", "--traffic", str(folder / "above.npz")))
-
-
 def test_traffic_that_never_comes_to_the_scene_is_refused(folder):
     traffic = make_traffic(ORIGIN + np.array([0.0, 300.0, 0.0]))
     traffic.save(folder / "beside.npz")
     with pytest.raises(SeipError, match="traffic of another site: 100%"):
         simulate.main(arguments(folder, "wrong", "--traffic", str(folder / "beside.npz")))
-
-
-def test_traffic_of_another_place_has_its_sentence(folder):
-    make_traffic(np.array([9e5, 0.0, 0.0])).save(folder / "elsewhere.npz")
-    with pytest.raises(SeipError, match="far from this scene"):
-        simulate.main(arguments(folder, "wrong", "--traffic", str(folder / "elsewhere.npz")))
 
 
 def test_a_scene_without_sensors_or_traffic_has_its_sentence(folder):
@@ -221,27 +186,6 @@ def test_a_scene_without_sensors_or_traffic_has_its_sentence(folder):
         )
     with pytest.raises(SeipError, match="no traffic"):
         simulate.main([str(folder / "placed.blend"), "-o", str(folder / "wrong")])
-
-
-@pytest.mark.slow
-def test_a_disk_without_room_has_its_sentence(folder):
-    """A limit on the size of files stands for a full disk."""
-    command = [sys.executable, "-m", "headless.simulate", *arguments(folder, "full")]
-    done = subprocess.run(  # noqa: S603  # as above
-        command,
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
-    )
-    assert done.returncode == 1
-    assert "error: cannot write" in done.stderr
-    assert "make room there" in done.stderr
-    assert "Exception ignored" not in done.stderr
-    assert "Traceback" not in done.stderr
-    assert list((folder / "full").glob("frames/*")) == []
 
 
 def test_two_runs_into_one_folder_have_a_sentence(folder):

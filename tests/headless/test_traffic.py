@@ -69,17 +69,6 @@ def test_another_map_leaves_no_file(tmp_path):
     assert not output.exists()
 
 
-def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(SeipError, match=r"no such file: none\.xml; check its path"):
-        traffic.main([str(JUNCTION), "--fcd", "none.xml", "-o", str(tmp_path / "t.npz")])
-
-
-@pytest.mark.parametrize(("option", "value"), [("--duration", "0"), ("--warm-up", "-1"), ("--duration", "nan")])
-def test_senseless_times_are_refused(tmp_path, option, value):
-    with pytest.raises(SeipError, match=r"--duration must be (above 0 s|a finite number)"):
-        traffic.main([str(JUNCTION), "--simulate", "x.xodr", option, value, "-o", str(tmp_path / "t.npz")])
-
-
 @pytest.mark.parametrize("given", [
     ["--simulate", "x.xodr", "--routes", "x.xml"], ["--simulate", "x.xodr", "--start", "1"],
     ["--fcd", "x.xml", "--flow", "9"], ["--fcd", "x.xml", "--seed", "1"],

@@ -42,13 +42,6 @@ def test_every_study_has_a_name_and_a_description():
     assert all(f"`{name}`" in readme for name in STUDIES)
 
 
-def test_another_study_has_its_sentence():
-    shown = seip("study", "covrage")
-    assert shown.returncode == 1
-    assert "covrage" in shown.stderr
-    assert "seip study --help" in shown.stderr
-
-
 def test_help_fits_a_screen():
     for arguments, names in (([], VERBS), (["--help"], VERBS), (["study"], STUDIES), (["study", "--help"], STUDIES)):
         shown = seip(*arguments)

@@ -60,11 +60,3 @@ def test_elements_nested_without_end_are_refused_at_once(tmp_path):
     with pytest.raises(SeipError, match=r"place\.osm\.gz has more than 1,000 nested elements"):
         finish(read_tags(path, lambda tag, _: tags.append(tag)))
     assert len(tags) == 1000
-
-
-def test_elements_next_to_each_other_are_not_nested(tmp_path):
-    path = tmp_path / "net.xml"
-    path.write_text(f"<net>{'<lane><param/></lane>' * 3000}</net>", encoding="utf-8")
-    tags: list[str] = []
-    finish(read_tags(path, lambda tag, _: tags.append(tag)))
-    assert len(tags) == 6001

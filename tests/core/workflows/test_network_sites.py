@@ -101,13 +101,6 @@ def test_faulty_tables_are_refused_in_one_sentence(tmp_path, text, fault):
     assert len(str(refused.value)) < 600
 
 
-@pytest.mark.parametrize("encoding", ["utf-16", "latin-1"])
-def test_other_encodings_are_refused_with_the_cure(tmp_path, encoding):
-    path = write(tmp_path, "source,latitude,longitude,name\nmap.osm,54,7,Straße\n", encoding)
-    with pytest.raises(SeipError, match="is not in UTF-8: save it as CSV in UTF-8"):
-        table_places(path, 40.0)
-
-
 @pytest.fixture
 def two_junctions(tmp_path):
     extract = Extract()

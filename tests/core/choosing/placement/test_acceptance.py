@@ -1,7 +1,5 @@
 """Searches that a user ends early return the best placement so far with a bound that holds."""
 
-from dataclasses import replace
-
 from headless.studies.benchmark.street_visibility import street_problem
 
 import pytest
@@ -14,20 +12,10 @@ from seip_addon.core.progress import finish
 
 @pytest.fixture(scope="module")
 def problem():
-    return street_problem(40, 500, count=8)
+    return street_problem(30, 300, count=6)
 
 
-def test_nothing_is_accepted_before_the_search_begins(problem):
-    acceptance = Acceptance()
-    assert not acceptance.searching
-    steps = solve(problem, SolverLimits(acceptance=acceptance))
-    next(steps)
-    assert acceptance.searching
-    assert not acceptance.accepted
-    steps.close()
-
-
-@pytest.mark.parametrize("after", [1, 10, 60])
+@pytest.mark.parametrize("after", [1, 10])
 def test_an_accepted_search_ends_with_what_it_has(problem, after):
     acceptance = Acceptance()
     steps, placement, number = solve(problem, SolverLimits(effort=1e6, acceptance=acceptance)), None, 0
@@ -42,16 +30,7 @@ def test_an_accepted_search_ends_with_what_it_has(problem, after):
     assert number < after + 200
     assert placement.status == "feasible"
     assert any(note.startswith("the search ended before this placement was proven optimal") for note in placement.notes)
-    longer = finish(solve(problem, SolverLimits(effort=2.0)))
+    longer = finish(solve(problem, SolverLimits(effort=0.3)))
     assert placement.objective <= longer.bound
     assert longer.objective <= placement.bound
     assert placement.objective == problem.covered(placement.chosen)
-
-
-def test_acceptance_does_not_change_what_limits_are_equal(problem):
-    limits = SolverLimits(effort=0.5)
-    with_acceptance = replace(limits, acceptance=Acceptance())
-    assert with_acceptance == limits
-    one, other = finish(solve(problem, limits)), finish(solve(problem, with_acceptance))
-    assert (one.chosen == other.chosen).all()
-    assert one.bound == other.bound

@@ -1,7 +1,6 @@
 """Branch and bound against exhaustive search on the reduced problem."""
 
 import math
-from dataclasses import replace
 from itertools import combinations
 
 from headless.studies.benchmark.street_visibility import street_problem
@@ -78,20 +77,6 @@ def test_all_best_placements_are_listed_or_proven_absent(problem, share):
     assert few.overflowed == (len(search.found) > 1)
 
 
-def test_a_search_stops_at_its_limit():
-    instance = make_instance(street_problem(60, 400, seed=3, count=5))[0]
-    assert not finish(BestPlacements(instance, 0.0, 1, instance.total).run(forever(), 0.0))
-
-
-def test_an_uneven_street_is_solved_as_well_as_an_even_one():
-    problem = street_problem(16, 300, seed=5, count=3)
-    weights = np.random.default_rng(1).uniform(0.5, 2.0, 300)
-    instance = make_instance(replace(problem, weights=weights))[0]
-    best = max(instance.value(choice) for choice in feasible(instance))
-    (chosen,) = searched(instance, 0.0).found
-    assert instance.value(chosen) == best
-
-
 @cases(100)
 @given(small_problems(), st.integers(1, 6))
 def test_the_bound_of_a_search_that_was_stopped_holds_and_the_search_can_go_on(problem, branches):
@@ -109,30 +94,9 @@ def test_the_bound_of_a_search_that_was_stopped_holds_and_the_search_can_go_on(p
     assert instance.value(search.found[0]) == best
 
 
-def test_the_bound_falls_while_the_search_goes_on():
-    visible = np.random.default_rng(2).random((40, 300)) < 0.15
-    problem = replace(street_problem(40, 300, heights=1, count=6), visible=visible)
-    instance = make_instance(problem)[0]
-    search = BestPlacements(instance, 0.0, 1, instance.total)
-    bounds = []
-    while not finish(search.run(forever(), math.inf, 20)):
-        bounds.append(search.bound)
-    assert bounds == sorted(bounds, reverse=True)
-    assert len(set(bounds)) > 5
-
-
 def test_a_full_queue_changes_nothing(monkeypatch):
     instance = make_instance(street_problem(30, 200, seed=4, count=4))[0]
     plain = searched(instance, 0.0)
     monkeypatch.setattr(branch_and_bound, "MAX_WAITING_FOLLOWERS", 100)
     deep = searched(instance, 0.0)
     assert {tuple(choice) for choice in deep.found} == {tuple(choice) for choice in plain.found}
-
-
-def test_a_placement_found_elsewhere_is_taken_once():
-    instance = make_instance(street_problem(25, 200, seed=6, count=3))[0]
-    plain = searched(instance, 0.0)
-    search = BestPlacements(instance, 0.0, 10_000, instance.total)
-    search.offer(plain.found[0][::-1])
-    assert finish(search.run(forever(), math.inf))
-    assert sorted(map(tuple, search.found)) == sorted(map(tuple, plain.found))

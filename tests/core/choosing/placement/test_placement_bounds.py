@@ -3,8 +3,6 @@
 import math
 from itertools import combinations
 
-from headless.studies.benchmark.street_visibility import street_problem
-
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -12,7 +10,6 @@ from hypothesis import strategies as st
 
 from seip_addon.core.choosing.placement import bounds
 from seip_addon.core.choosing.placement.bounds import lagrangian_bound
-from seip_addon.core.choosing.placement.greedy import greedy
 from seip_addon.core.choosing.placement.local_search import composition_search
 from seip_addon.core.choosing.placement.reduced_problem import make_instance
 from seip_addon.core.choosing.placement.search_limits import Clock
@@ -20,8 +17,6 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from tests.oracles.placement_oracle import small_problems
 from tests.oracles.random_cases import cases
-
-NONE = np.zeros(0, np.int64)  # no candidate chosen
 
 
 def forever():
@@ -54,18 +49,6 @@ def test_every_placement_that_reaches_the_goal_is_left(problem, share):
         keep, bound = finish(lagrangian_bound(instance, share * instance.total, forever()))
     assert all(np.isin(choice, keep).all() for choice in reaching)
     assert all(instance.value(choice) <= bound.value + instance.slack for choice in reaching)
-
-
-def test_a_descent_ends_where_the_relaxation_covers_everything():
-    instance = reduced(street_problem(99, 991))
-    goal = instance.value(greedy(instance, NONE))
-    clock, patient = forever(), forever()
-    _, bound = finish(lagrangian_bound(instance, goal, clock))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bounds, "MIN_BOUND_LEFT", -1.0)
-        _, least = finish(lagrangian_bound(instance, goal, patient))
-    assert clock.work < 0.5 * patient.work
-    assert min(bound.value, instance.total) <= least.value * (1 + 2 * bounds.MIN_BOUND_LEFT)
 
 
 @cases(100)
