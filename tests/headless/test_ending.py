@@ -41,8 +41,9 @@ def run(*command):
     )
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-@pytest.mark.parametrize("suffix", [".blend", ".glb"])
+@pytest.mark.parametrize(
+    ("number", "status", "suffix"), [(signal.SIGINT, 130, ".blend"), (signal.SIGTERM, 143, ".glb")]
+)
 def test_signals_while_blender_writes_end_the_command(small_scene, tmp_path, number, status, suffix):
     out = tmp_path / "out"
     done = run("-c", SIGNALLED, suffix, int(number), small_scene, *PLACE, "-o", out)

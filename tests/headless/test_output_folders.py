@@ -12,10 +12,8 @@ from headless import runtime
 NONE = "missing.blend"
 COMMANDS = {
     "place": (),
-    "study coverage": (),
     "simulate": ("--dataset", "data/set"),
     "study stability": ("--work", "work"),
-    "study benchmark": ("--work", "work"),
 }
 
 

@@ -192,20 +192,12 @@ def test_the_reverse_problem_by_command(tmp_path, run):
     ("options", "sentence"),
     [
         (["--count", "0"], "--count must be at least 1, not 0"),
-        (["--count", "999"], "999 sensors are requested"),
         (["--tilts", "0", "90"], "a tilt must be more than -90° and less than 90°, not 90°"),
-        (["--tilts", "5", "5"], "the tilt of 5° is given twice"),
         (["--budget", "5"], "below the cheapest sensor"),
         (["--delta", "2"], "--delta is no longer an option"),
-        (["--grid", "0"], "grid spacing must be"),
-        (["--sensor", "typ1"], "type1"),
         (["--coverage", "1"], "cannot be reached"),
-        (["--solver", "cplex"], "highs"),
         (["--forbid", "sidewalk 3", "--require", "sidewalk 3"], "both forbidden and mandatory"),
-        (["--require", "sidewalk 4000"], "there is no position"),
         (["--catalogue", "missing.toml"], "missing.toml"),
-        (["--catalogue", "/dev/null"], "/dev/null is not a regular file"),
-        (["--spacing", "-1"], "spacing must be"),
     ],
 )
 def test_each_mistake_has_its_sentence_and_leaves_no_result(options, sentence, tmp_path, run):

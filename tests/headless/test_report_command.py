@@ -79,12 +79,8 @@ def test_the_record_and_the_maps_agree(folder):
     "typed",
     [
         ["--budget", "60000", "--heights", "4:5:0.5", "--tilts", "-5", "0", "10", "--allow", "assumed-poles"],
-        ["--coverage", "0.9", "--weighted", "4", "--require", "sidewalk 3", "signal pole 2", "--effort", "90"],
         ["--weather", "rain=10", "visibility=200", "wet", "--weighted"],
-        ["--grid", "2", "--solver", "cbc", "--pose-errors"],
         ["--pose-errors", "0.2", "3.5", "--seed", "2", "--risk", "worst", "--failures", "mean", "--count", "3"],
-        ["--failures", "worst", "--budget", "90000"],
-        ["--effort", "9e14"],
         [],
     ],
 )

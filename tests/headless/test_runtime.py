@@ -22,7 +22,6 @@ ROOT = Path(__file__).resolve().parents[2]
     ("argv", "own"),
     [
         (["blender", "-b", "site.blend", "-P", "place.py", "--", "--count", "4"], ["--count", "4"]),
-        (["blender", "-b", "-P", "place.py"], []),
         (["blender", "-P", "x.py", "--", "a", "--", "b"], ["a", "--", "b"]),
     ],
 )

@@ -28,7 +28,7 @@ def complete_system(monkeypatch):
 
 
 @pytest.mark.usefixtures("complete_system")
-@pytest.mark.parametrize("version", [(3, 8, 1), (3, 10, 0), (3, 12, 1), (3, 14, 0), (4, 0, 0)])
+@pytest.mark.parametrize("version", [(3, 10, 0), (3, 14, 0)])
 def test_other_pythons_are_refused_in_one_sentence(monkeypatch, version):
     monkeypatch.setattr(sys, "version_info", version)
     complaint = set_up.what_is_missing()

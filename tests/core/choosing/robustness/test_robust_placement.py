@@ -16,7 +16,6 @@ from seip_addon.core.choosing.robustness.robust_placement import solve_robust
 from seip_addon.core.choosing.robustness.scenario_visibility import ScenarioVisibility
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from tests.few import few
 from tests.oracles.placement_oracle import all_placements, covered, small_problems
 from tests.oracles.random_cases import cases
 
@@ -106,8 +105,8 @@ def reached_at_most(problem, views, risk):
     return max(risk.of(risk.outcomes(seen[:, c], problem.weights, problem.count)) for c in apart)
 
 
-@pytest.mark.parametrize("risk", few(RISKS, 4))
-@pytest.mark.parametrize("count", [4, 5])
+@pytest.mark.parametrize("risk", [Risk(tail=0.3), Risk(failure="worst"), Risk(failure="mean")])
+@pytest.mark.parametrize("count", [4])
 def test_no_placement_is_better_where_branches_are_many(risk, count):
     problem, views = crowd(3, count)
     answer = finish(solve_robust(problem, pack(views), risk))
@@ -116,7 +115,7 @@ def test_no_placement_is_better_where_branches_are_many(risk, count):
     assert answer.gap == 0
 
 
-@pytest.mark.parametrize("risk", few(RISKS, 3))
+@pytest.mark.parametrize("risk", [Risk(tail=0.5), Risk(failure="worst")])
 def test_without_time_the_bound_still_holds(risk, monkeypatch):
     monkeypatch.setattr("seip_addon.core.choosing.robustness.robust_placement.MIN_SECONDS", 1e-6)
     for seed in range(4):

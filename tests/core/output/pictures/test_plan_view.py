@@ -21,7 +21,6 @@ from seip_addon.core.output.pictures.palette import SEEN_COLOURS
 from seip_addon.core.output.pictures.plan_view import INSET_SIDE, MAP_WIDTH, draw_plan, save_plan_view
 from seip_addon.core.site.scene_geometry import ASSUMED, Mesh, Pole
 from tests.builders.small_junction import make_example
-from tests.few import few
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +69,7 @@ def test_no_global_state_of_matplotlib_is_touched(example, tmp_path):
 LAST_NOTE = "This last note has to be read to its end."
 
 
-@pytest.mark.parametrize("count", few([24, 3, 45], 1))
+@pytest.mark.parametrize("count", [24])
 def test_all_sensors_are_listed_and_labelled_and_nothing_is_cut_off(example, count):
     site = replace(example.site, region=shapely.box(-300, -20, 300, 20))
     deployment = deploy(site, example.models, example.visible[:count], np.arange(count))
@@ -110,7 +109,7 @@ def test_close_sensors_have_an_inset_which_hides_no_sensor_and_no_label(example)
     assert len(draw_plan(example.geometry, site, example.deployment).axes) == 2
 
 
-@pytest.mark.parametrize("size", [(600, 40), (100, 100), (40, 600)])
+@pytest.mark.parametrize("size", [(600, 40), (40, 600)])
 def test_a_metre_is_as_long_across_as_upwards_and_the_whole_region_is_shown(example, size):
     region = shapely.box(0, 0, *size)
     site = type(example.site)(**{**vars(example.site), "region": region})
