@@ -35,6 +35,11 @@ def modules(folder: str) -> list[Path]:
 
 
 @cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def imported(path: Path) -> tuple[str, ...]:
     """Full names of what a file imports, wherever in it."""
     return tuple(_imported(path))
@@ -42,7 +47,7 @@ def imported(path: Path) -> tuple[str, ...]:
 
 def _imported(path: Path) -> Iterator[str]:
     package = path.relative_to(ROOT).parts[:-1]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree(path)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -152,9 +157,9 @@ def test_groups_of_the_core_import_only_lower_ones():
 def test_the_add_on_never_names_itself():
     """Installed, it is called `bl_ext.user_default.seip.seip_addon`: only relative imports find it."""
     for path in modules("seip_addon"):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        absolute = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level == 0]
-        absolute += [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
+        nodes = list(ast.walk(tree(path)))
+        absolute = [node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.level == 0]
+        absolute += [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
         assert "seip_addon" not in {top(name) for name in absolute if name}, path
 
 

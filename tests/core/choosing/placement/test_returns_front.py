@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seip_addon.core.choosing.placement.objective import Objective, Solution
@@ -24,6 +24,7 @@ def solved(problem, returns):
     return Solution(goal, finish(solve_returns(problem, returns)), None, None)
 
 
+@settings(max_examples=5, deadline=None)
 @given(st.integers(0, 10**9))
 def test_each_number_of_sensors_has_the_returns_of_the_best_of_all(seed):
     problem, returns = problem_of(seed)

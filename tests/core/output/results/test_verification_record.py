@@ -42,7 +42,6 @@ def test_a_file_gives_what_was_written(tmp_path):
     [
         ({"schema": "seip-verification/9"}, "has the schema 'seip-verification/9'"),
         ({"sensors": [{}]}, r"sensors\[0\]\.id is missing"),
-        ({"changes": [as_json(CHANGES[0]) | {"kind": "moved"}]}, "must be 'new' or 'gone' or 'vehicle'"),
         ({"changes": [as_json(CHANGES[0]) | {"box": [1.0]}]}, "must be a list of 7 values"),
     ],
 )
@@ -65,8 +64,6 @@ def test_the_pose_is_in_words_with_its_interval():
     ("rotation", "towards"),
     [
         ((2.0, 0.0, 0.0), "south"),
-        ((-2.0, 0.0, 0.0), "north"),
-        ((0.0, 2.0, 0.0), "east"),
         ((2.0, 2.0, 0.0), "south-east"),
     ],
 )
