@@ -92,10 +92,6 @@ def test_weights_are_the_scene_s_or_one_for_all():
         ([], Scenarios()),
         (["--pose-errors"], Scenarios("pose-errors")),
         (
-            ["--pose-errors", "0.5"],
-            Scenarios("pose-errors", PoseErrors(0.5, 0.5, math.radians(2), math.radians(2))),
-        ),
-        (
             ["--pose-errors", "0.1", "5", "--seed", "3"],
             Scenarios("pose-errors", PoseErrors(0.1, 0.1, math.radians(5), math.radians(5)), seed=3),
         ),

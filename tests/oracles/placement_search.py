@@ -106,23 +106,17 @@ def _exclude(problem: PlacementProblem, one: int, other: int) -> bool:
 # ---- problems --------------------------------------------------------------------------------------------------------
 
 WEIGHTS: dict[str, Callable[[np.random.Generator, int], NDArray[np.float64]]] = {
-    "ones": lambda _, n: np.ones(n),
     "some zero": lambda random, n: random.choice([0.0, 1.0, 2.0], n),
     "halves": lambda random, n: random.choice([0.5, 1.0, 4.0], n),
-    "thousands": lambda random, n: np.floor(random.uniform(1, 5000, n)),
     "around single precision": lambda random, n: np.floor(random.uniform(1, 2**25 / n, n)),
     "one beside nearly single precision": lambda random, n: np.where(
         np.arange(n) < 2, 1.0, (2**24 - 4) // max(n - 2, 1) - random.integers(0, 2, n)
     ),
     "just below single precision": lambda random, n: (2**24 - 4 * n) // n + random.integers(0, 4, n).astype(float),
-    "millions": lambda random, n: np.floor(random.uniform(1, 2**24, n)),
     "near ties": lambda random, n: 2.0**24 + random.integers(0, 3, n),
-    "near ties of halves": lambda random, n: (2.0**22 + random.integers(0, 3, n)) / 2,
     "up to the largest whole ones": lambda random, n: np.floor(random.uniform(1, 2**53 / n, n)),
     "one outweighs all": lambda random, n: np.where(np.arange(n) == 0, 2.0**52, random.integers(1, 9, n)),
-    "beyond exact sums": lambda random, n: np.floor(random.uniform(1, 2**51, n)),
     "tenths": lambda random, n: random.integers(1, 30, n) / 10,
-    "any": lambda random, n: np.rint(random.uniform(0.1, 2.0, n) * 2**30) / 2**30,
     "any, decades apart": lambda random, n: np.rint(10.0 ** random.uniform(-4, 4, n) * 2**30) / 2**30,
 }
 

@@ -104,21 +104,6 @@ LAYERS = ("storage", "geometry", "site", "sensing", "world", "choosing", "output
 """Groups of packages of the core: each imports only those before it."""
 
 
-def package_of(parts):
-    """Name of the package that a module of the core is in: the second level of a group of packages, else the first."""
-    groups = {"world", "sensing", "choosing", "output"}
-    return ".".join(parts[: 2 if parts[0] in groups else 1]).removesuffix(".py")
-
-
-def test_packages_of_the_core_import_each_other_in_no_circle():
-    uses: dict[str, set[str]] = {}
-    for path in modules("seip_addon/core"):
-        package = package_of(path.relative_to(ROOT / "seip_addon" / "core").parts)
-        names = [name.split(".")[2:] for name in imported(path) if name.startswith("seip_addon.core.")]
-        uses.setdefault(package, set()).update({package_of(parts) for parts in names} - {package})
-    assert not circles(uses)
-
-
 def module_name(path):
     """Full name of a module or package."""
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")

@@ -1,16 +1,10 @@
 """Sites of a network: tables with faults, folders, keys, and the division of the road between neighbours."""
 
-import csv
-import re
-import tempfile
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
@@ -48,34 +42,6 @@ def test_table_with_names_weights_and_any_usual_delimiter(tmp_path):
         assert (first.name, first.weight, second.weight) == ("Straße ä/ö", 2.5, 1.0)
         assert (first.folder, second.folder) == ("strasse-a-o", "strasse-a-o-2")
         assert first.source == tmp_path / "map.osm"
-
-
-@given(
-    st.lists(
-        st.one_of(
-            st.text(max_size=80),
-            st.from_regex(r"[aA](-[12])*", fullmatch=True),
-            st.sampled_from(("忠孝東路", "信義路")),
-        ),
-        min_size=1,
-        max_size=20,
-    )
-)
-@example(["A", "A", "A-2"])
-@example(["A-2", "A", "a", "A!", "信義路", "信義路"])
-@example(["x" * 61, "x" * 62])
-@settings(max_examples=8, deadline=None)
-def test_each_site_has_a_folder_of_its_own(names):
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "sites.csv"
-        (path.parent / "map.osm").touch()
-        with path.open("w", encoding="utf-8", newline="") as file:
-            rows = csv.writer(file)
-            rows.writerow(("source", "latitude", "longitude", "name"))
-            rows.writerows(("map.osm", 50 + number / 100, 7, name) for number, name in enumerate(names))
-        folders = [place.folder for place in table_places(path, 40.0)]
-    assert len({folder.casefold() for folder in folders}) == len(names)
-    assert all(re.fullmatch(r"[a-z0-9][a-z0-9-]{0,70}", folder) for folder in folders)
 
 
 @pytest.mark.parametrize(

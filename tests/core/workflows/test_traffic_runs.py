@@ -4,12 +4,7 @@ import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.workflows.traffic_runs import found_runs, read_runs, split_runs
-
-
-def test_the_last_third_is_for_evaluation():
-    assert split_runs([1, 2, 3, 4, 5, 6]) == ([1, 2, 3, 4], [5, 6])
-    assert split_runs([1, 2]) == ([1], [2])
+from seip_addon.core.workflows.traffic_runs import found_runs, read_runs
 
 
 def test_a_folder_without_runs_is_named(tmp_path):

@@ -1,4 +1,4 @@
-"""Branch and bound against exhaustive search on the reduced problem."""
+"""Branch and bound, and the bound that it cuts by, against exhaustive search on the reduced problem."""
 
 import math
 from itertools import combinations
@@ -10,7 +10,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from seip_addon.core.choosing.placement import branch_and_bound
+from seip_addon.core.choosing.placement import bounds, branch_and_bound
+from seip_addon.core.choosing.placement.bounds import lagrangian_bound
 from seip_addon.core.choosing.placement.branch_and_bound import BestPlacements
 from seip_addon.core.choosing.placement.reduced_problem import make_instance
 from seip_addon.core.choosing.placement.search_limits import Clock
@@ -100,3 +101,18 @@ def test_a_full_queue_changes_nothing(monkeypatch):
     monkeypatch.setattr(branch_and_bound, "MAX_WAITING_FOLLOWERS", 100)
     deep = searched(instance, 0.0)
     assert {tuple(choice) for choice in deep.found} == {tuple(choice) for choice in plain.found}
+
+
+@cases(150)
+@given(small_problems(), st.floats(0.0, 1.0))
+def test_every_placement_that_reaches_the_goal_is_left(problem, share):
+    instance = reduced(problem)
+    assume(instance is not None)
+    reaching = [choice for choice in feasible(instance) if instance.value(choice) >= share * instance.total]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bounds, "REDUCTION_INTERVAL", 2)
+        patch.setattr(bounds, "MAX_KEPT_SHARE", 1.0)
+        patch.setattr(bounds, "MAX_LISTED_CHOICES", 1)
+        keep, bound = finish(lagrangian_bound(instance, share * instance.total, forever()))
+    assert all(np.isin(choice, keep).all() for choice in reaching)
+    assert all(instance.value(choice) <= bound.value + instance.slack for choice in reaching)

@@ -5,18 +5,13 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from seip_addon.core.choosing.placement.greedy import greedy_with_swaps
-from seip_addon.core.choosing.placement.local_search import SwapGains, composition_search
+from seip_addon.core.choosing.placement.local_search import composition_search
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.reduced_problem import make_instance
 from seip_addon.core.choosing.placement.search_limits import Clock
-from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from tests.oracles.placement_oracle import small_problems
-from tests.oracles.random_cases import cases
 
 NONE = np.zeros(0, np.int64)  # no candidate chosen
 
@@ -27,25 +22,6 @@ def searched(problem: PlacementProblem) -> float:
     first = finish(greedy_with_swaps(instance, NONE))
     chosen = finish(composition_search(instance, NONE, first, Clock(math.inf, math.inf)))
     return problem.covered(instance.original[chosen])
-
-
-@cases(100)
-@given(small_problems(limits=False), st.randoms(use_true_random=False))
-def test_gains_of_swaps_are_differences_of_values(problem: PlacementProblem, random: object) -> None:
-    try:
-        instance, _ = make_instance(problem)
-    except SeipError:
-        return
-    swaps = SwapGains(instance, NONE)
-    for _ in range(5):
-        slot, came = random.randrange(len(swaps.slots)), random.randrange(len(instance))  # type: ignore[attr-defined]
-        if came in swaps.slots:
-            continue
-        others = np.delete(swaps.slots, slot)
-        after = instance.value(np.append(others[others >= 0], came))
-        assert swaps.gains[slot, came] == after - swaps.value
-        swaps.swap(slot, came)
-        assert swaps.value == after
 
 
 def budget_of_few(seed: int) -> PlacementProblem:

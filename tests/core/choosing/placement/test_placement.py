@@ -16,7 +16,7 @@ import numpy as np
 import pulp.apis.coin_api
 import pytest
 
-from seip_addon.core.choosing.placement import cheapest, integer_program
+from seip_addon.core.choosing.placement import integer_program
 from seip_addon.core.choosing.placement.cheapest import cheapest_for_coverage
 from seip_addon.core.choosing.placement.integer_program import Outcome
 from seip_addon.core.choosing.placement.problem import PlacementProblem
@@ -29,9 +29,6 @@ from seip_addon.core.progress import Progress, finish
 if TYPE_CHECKING:
     from collections.abc import Generator
     from pathlib import Path
-
-    from seip_addon.core.arrays import Integer
-    from seip_addon.core.choosing.placement.reduced_problem import Instance
 
 
 def row_problem(visible: list[list[int]], **changes: object) -> PlacementProblem:
@@ -49,12 +46,6 @@ def row_problem(visible: list[list[int]], **changes: object) -> PlacementProblem
 
 
 halves = [[1, 1, 0, 0], [0, 0, 1, 1], [0, 1, 1, 0], [0, 0, 0, 1]]
-
-
-def test_a_bound_that_only_a_better_placement_meets_proves_nothing() -> None:
-    visible = [[1, 1, 1, 1, 1, 0, 0], [1, 1, 1, 0, 0, 0, 1], [1, 1, 1, 1, 0, 1, 0], [1] * 7]
-    problem = row_problem(visible, positions=np.array([0, 1, 2, 2]), mandatory=np.array([[0, 1, 1, 0]], bool), count=2)
-    assert finish(solve(problem)).chosen.tolist() == [1, 3]
 
 
 @pytest.mark.parametrize("limit", [1e-6, 0.01])
@@ -86,21 +77,6 @@ def test_a_program_out_of_time_is_not_called_infeasible(monkeypatch: pytest.Monk
     monkeypatch.setattr(integer_program.CoverProgram, "maximise", unfinished)
     with pytest.raises(SeipError, match="did not find out within 20 s whether the mandatory places"):
         finish(solve(row_problem(halves, mandatory=first_two)))
-
-
-def test_the_note_on_an_unproven_price_fits_the_gap(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The gap is a share of the price that was found: half of it may be saved where it is 50%."""
-    monkeypatch.setattr(cheapest, "_cheapest", unproven)
-    placement = finish(cheapest.cheapest_for_coverage(row_problem(halves, prices=np.array([2.0, 4.0, 3.0, 5.0])), 0.9))
-    assert placement.bound == placement.objective / 2
-    assert placement.gap == 0.5
-    assert any("the gap is the share of its price that another one may save" in note for note in placement.notes)
-
-
-def unproven(instance: Instance, chosen: Integer, *_: object) -> Generator[Progress, None, tuple[Integer, float]]:
-    """Stand for a search that runs out of time with a bound of half the price."""
-    yield from ()
-    return chosen, math.fsum(instance.price[chosen]) / 2
 
 
 @pytest.mark.slow

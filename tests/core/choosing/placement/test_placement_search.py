@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seip_addon.core.choosing.placement import cheapest
 from seip_addon.core.choosing.placement.cheapest import cheapest_for_coverage
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.solver import solve
@@ -70,17 +69,3 @@ def test_where_all_prices_are_equal_the_fewest_sensors_are_the_cheapest(price: f
     problem = replace(crowded(0), weights=np.ones(5), prices=np.full(17, price), min_distance=0.0)
     placement = finish(cheapest_for_coverage(problem, 1.0))
     assert (len(placement.chosen), placement.status, placement.objective) == (2, "optimal", 2 * price)
-
-
-def test_an_unfinished_choice_among_equally_cheap_placements_states_its_bound(monkeypatch) -> None:
-    """The bound lies 0.31 of five targets above what is covered."""
-    problem = replace(crowded(0), weights=np.ones(5), prices=np.full(17, 7.0), min_distance=0.0)
-    done = cheapest.solve_within
-
-    def unfinished(*arguments):
-        found = yield from done(*arguments)
-        return replace(found, status="feasible", bound=found.covered + 0.31)
-
-    monkeypatch.setattr(cheapest, "solve_within", unfinished)
-    (note,) = finish(cheapest_for_coverage(problem, 1.0)).notes
-    assert note == "among equally cheap placements another one may cover up to 6.2 percentage points more"

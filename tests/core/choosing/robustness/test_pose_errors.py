@@ -15,7 +15,7 @@ from seip_addon.core.choosing.placement.scenarios import ERROR_KINDS, PoseErrors
 from seip_addon.core.choosing.robustness.pose_errors import PoseDraws, draw_errors, out_of_objects
 from seip_addon.core.choosing.robustness.pose_study import PoseStudySettings, pose_study, pose_warnings
 from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import mean_of, quantile_of
+from seip_addon.core.estimates import quantile_of
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.sensor import level_orientation
@@ -95,12 +95,6 @@ def test_a_quantile_is_in_its_interval_as_often_as_is_said(share):
         assert found.low <= found.value <= found.high
         hits += found.low <= stats.norm.ppf(share) <= found.high
     assert hits / 600 > 0.93
-
-
-@given(st.lists(st.floats(-5, 5), min_size=2, max_size=40))
-def test_a_mean_is_within_its_interval(values):
-    found = mean_of(np.array(values))
-    assert found.low <= found.value <= found.high
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
-from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.choosing.robustness.robust_placement import solve_robust
 from seip_addon.core.choosing.robustness.scenario_visibility import ScenarioVisibility
 from seip_addon.core.errors import SeipError
@@ -125,17 +124,6 @@ def test_without_time_the_bound_still_holds(risk, monkeypatch):
         assert answer.objective <= best + 1e-9
         assert answer.bound >= best - 1e-9
         assert answer.status == "optimal" or any("search ended" in note for note in answer.notes)
-
-
-@given(small_problems(), st.sampled_from(RISKS[:4]))
-@cases(40, 12)
-def test_without_errors_it_is_the_nominal_answer(problem, risk):
-    assume(all_placements(problem))
-    nominal = finish(solve(problem))
-    robust = finish(solve_robust(problem, pack(np.stack([problem.visible] * 3)), risk))
-    assert robust.chosen.tolist() == nominal.chosen.tolist()
-    assert robust.objective == nominal.objective
-    assert robust.bound == nominal.bound
 
 
 def test_too_few_sensors_are_refused():

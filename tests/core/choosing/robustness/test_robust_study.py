@@ -10,7 +10,6 @@ from seip_addon.core.choosing.placement.objective import Objective, placement_pr
 from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
-from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.choosing.robustness.robust_study import robust_study
 from seip_addon.core.choosing.robustness.visibility_under_errors import draws_for, visibility_under_errors
 from seip_addon.core.progress import finish
@@ -32,25 +31,6 @@ def laid_out():
     grid = finish(compute_visibility(site, MODELS, around.sight, ANY))
     goal = placement_problem(site, grid.visible, MODELS, Objective(count=2))
     return around, replace(goal, forbidden=site.candidates.sensor == "type2")
-
-
-@pytest.fixture(scope="module")
-def study(laid_out):
-    return finish(robust_study(*laid_out, SCENARIOS, [Risk(), Risk(tail=0.0)], LIMITS))
-
-
-@pytest.mark.slow
-def test_all_are_evaluated_by_draws_that_none_was_chosen_on(laid_out, study):
-    around, problem = laid_out
-    (nominal,) = study.nominal
-    assert nominal.placement.chosen.tolist() == finish(solve(problem)).chosen.tolist()
-    for contender in (nominal, *study.robust):
-        chosen = contender.placement.chosen
-        drawn = draws_for(around, chosen, SCENARIOS.pose_errors, SCENARIOS.evaluated, SCENARIOS.seed + 1)
-        views = finish(visibility_under_errors(around, chosen, drawn))
-        expected = [views.seen(draw).any(axis=0).mean() for draw in range(SCENARIOS.evaluated)]
-        assert contender.unseen == pytest.approx(expected, abs=1e-12)
-        assert not problem.forbidden[chosen].any()
 
 
 LOSSES = [Risk(failure="worst"), Risk(tail=0.5, failure="worst"), Risk(tail=0.0, failure="mean")]

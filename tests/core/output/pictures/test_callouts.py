@@ -43,15 +43,3 @@ def test_boxes_are_stacked_upwards_without_overlap_and_no_farther_than_needed(se
         assert not any(overlap(low[i], high[i], low[j], high[j] + (0.0, 1.99)) for j in range(count) if j != i)
         if rise[i] > 0.0:  # it stands on another
             assert any(abs(low[i, 1] - high[j, 1] - 2.0) < 1e-9 for j in range(count))
-
-
-def test_no_label_is_in_a_box_that_is_taken():
-    anchors = np.array([(50.0, 50.0), (60.0, 55.0)])
-    sizes = np.full((2, 2), 12.0)
-    taken = np.array([(0.0, 0.0, 45.0, 100.0), (45.0, 62.0, 100.0, 100.0)])
-    bounds = (0.0, 0.0, 100.0, 100.0)
-    free, kept = (place_callouts(anchors, sizes, bounds, CLEARANCE, NOWHERE, boxes) for boxes in (None, taken))
-    low, high = kept - 6.0, kept + 6.0
-    for box in taken:
-        assert np.all((high[:, 0] <= box[0]) | (low[:, 0] >= box[2]) | (high[:, 1] <= box[1]) | (low[:, 1] >= box[3]))
-    assert not np.array_equal(free, kept)

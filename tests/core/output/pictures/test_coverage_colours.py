@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from seip_addon.core.output.pictures.coverage_colours import colouring
-from seip_addon.core.output.pictures.palette import WEIGHT_COLOURS
 
 SEEN_BY = np.array([0, 1, 2, 3, 7, 0])
 WEIGHT = np.array([1.0, 1.0, 2.0, 4.0, 2.0, 1.0])
@@ -21,11 +20,3 @@ def test_each_aspect_has_its_classes(aspect, words, of):
     assert (found.words, found.of.tolist()) == (words, of)
     assert len(set(found.colours)) == len(words)
     assert found.shares == pytest.approx(np.bincount(of) / len(of))
-
-
-def test_many_weights_share_classes_in_their_order():
-    weight = np.linspace(1, 9, 23)
-    found = colouring("weights", np.zeros(23, dtype=int), weight)
-    assert len(found.words) == len(WEIGHT_COLOURS)
-    assert (np.diff(found.of) >= 0).all()
-    assert found.words[0].startswith("weight 1 to ")

@@ -1,9 +1,6 @@
 """Colours of coverage, sensors and areas: no hue means two things, and one module states them all."""
 
-import math
-import re
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +14,6 @@ from seip_addon.core.output.pictures.palette import (
 )
 from seip_addon.core.output.pictures.plan_map import LAND, PAVEMENT, ROAD
 
-ADD_ON = Path(__file__).resolve().parents[4] / "seip_addon"
 GROUNDS = (LAND, PAVEMENT, ROAD)
 XYZ = np.array(
     [(0.4124564, 0.3575761, 0.1804375), (0.2126729, 0.7151522, 0.0721750), (0.0193339, 0.1191920, 0.9503041)]
@@ -36,34 +32,6 @@ SIGHTS = {
     ),
 }
 """Linear sRGB as people without one kind of cone see it: Machado, Oliveira and Fernandes (2009), severity 1."""
-NEUTRAL = 0.04
-"""Chroma of OKLab below which a colour is a grey."""
-
-
-def oklch(colour):
-    """Return lightness, chroma and hue (degrees) of a web colour, after Ottosson (2020)."""
-    linear = np.array([v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in rgb(colour)])
-    cones = np.cbrt(
-        np.array(
-            [
-                (0.4122214708, 0.5363325363, 0.0514459929),
-                (0.2119034982, 0.6806995451, 0.1073969566),
-                (0.0883024619, 0.2817188376, 0.6299787005),
-            ]
-        )
-        @ linear
-    )
-    light, a, b = (
-        np.array(
-            [
-                (0.2104542553, 0.7936177850, -0.0040720468),
-                (1.9779984951, -2.4285922050, 0.4505937099),
-                (0.0259040371, 0.7827717662, -0.8086757660),
-            ]
-        )
-        @ cones
-    )
-    return light, math.hypot(a, b), math.degrees(math.atan2(b, a)) % 360.0
 
 
 def linear(colour):
@@ -95,13 +63,3 @@ def test_classes_of_coverage_and_sensors_stay_apart_for_every_eye_and_in_grey_pr
     marks = (INK, PAPER)  # of sensors on plan and view: dark with a light border
     assert min(apart(mark, road, sight) for mark in marks[:1] for road in (*RETURNS_COLOURS, *GROUNDS)) > 25.0
     assert min(apart(mark, road, sight) for mark in marks[1:] for road in SEEN_COLOURS) > 20.0
-
-
-def test_no_other_module_states_a_colour():
-    stated = {
-        (path.name, colour)
-        for path in ADD_ON.rglob("*.py")
-        for colour in re.findall(r"#[0-9a-fA-F]{6}", path.read_text(encoding="utf-8"))
-        if path.name != "palette.py" and oklch(colour)[1] >= NEUTRAL
-    }
-    assert stated == set()

@@ -1,24 +1,15 @@
 import math
 from dataclasses import replace
 
-import matplotlib as mpl
 import numpy as np
 import pytest
 import shapely
 from matplotlib.colors import to_rgb
-from matplotlib.image import imread
 from matplotlib.patches import Wedge
 
 from seip_addon.core.choosing.placement.deployment import deploy
-from seip_addon.core.choosing.placement.returns_summary import ReturnsSummary
-from seip_addon.core.output.pictures.drawing import (
-    heading_of,
-    summary,
-    summary_parts,
-    text_width,
-)
 from seip_addon.core.output.pictures.palette import SEEN_COLOURS
-from seip_addon.core.output.pictures.plan_view import INSET_SIDE, MAP_WIDTH, draw_plan, save_plan_view
+from seip_addon.core.output.pictures.plan_view import INSET_SIDE, MAP_WIDTH, draw_plan
 from seip_addon.core.site.scene_geometry import ASSUMED, Mesh, Pole
 from tests.builders.small_junction import make_example
 
@@ -49,21 +40,6 @@ def test_every_target_is_painted_by_how_many_sensors_see_it(example, below_a_bri
     right = np.abs(painted - wanted).max(axis=1) < 0.02
     assert right.mean() > 0.93
     assert len(set(np.minimum(example.deployment.seen_by, 2))) == 3
-
-
-@pytest.mark.slow
-def test_the_same_placement_gives_the_same_bytes_whatever_the_users_style(example, tmp_path):
-    save_plan_view(tmp_path / "a.png", example.geometry, example.site, example.deployment)
-    save_plan_view(tmp_path / "b.png", example.geometry, example.site, example.deployment)
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    assert b"Software" not in (tmp_path / "a.png").read_bytes()[:200]
-    assert imread(tmp_path / "a.png").shape[1] > 1500
-
-
-def test_no_global_state_of_matplotlib_is_touched(example, tmp_path):
-    before = dict(mpl.rcParams)
-    save_plan_view(tmp_path / "a.png", example.geometry, example.site, example.deployment)
-    assert dict(mpl.rcParams) == before
 
 
 LAST_NOTE = "This last note has to be read to its end."
@@ -144,16 +120,6 @@ def test_sensors_that_do_not_look_all_round_show_which_way_they_look(example):
     assert sum("yaw 90°" in text.get_text() for text in figure.axes[-1].texts) == 1
 
 
-def test_the_summary_and_the_plan_name_installed_prices(example):
-    assert "installed" not in summary(example.deployment)
-    paid = tuple(replace(sensor, installation=9_000.0) for sensor in example.deployment.sensors)
-    deployment = replace(example.deployment, sensors=paid, price=sum(sensor.price for sensor in paid))
-    assert f"${deployment.price:,.0f} installed" in summary(deployment)
-    assert summary(example.deployment).endswith(" for sensors")
-    words = [text.get_text() for text in draw_plan(example.geometry, example.site, deployment).texts]
-    assert any("installed" in text for text in words)
-
-
 def test_assumed_poles_have_a_mark_of_their_own(example):
     """Those that carry nothing are drawn as well: they are in the way, and are not to be taken for the map's."""
     pole = Pole("guess", np.array((-12.0, 9.0, 0.1)), source=ASSUMED)
@@ -165,23 +131,3 @@ def test_assumed_poles_have_a_mark_of_their_own(example):
     assert not any("assumed" in text.get_text() for text in plain.axes[-1].texts)
     marked = pixel_at(draw_plan(geometry, example.site, example.deployment), (-12.0, 9.0))
     assert np.abs(marked - pixel_at(plain, (-12.0, 9.0))).max() > 0.05
-
-
-def test_the_map_carries_the_credits_of_its_sources(example):
-    sources = ("© OpenStreetMap contributors (ODbL)", "Surveyors $& Sons")
-    credited, plain = (
-        [text.get_text() for text in draw_plan(example.geometry, site, example.deployment).axes[0].texts]
-        for site in (replace(example.site, attribution=sources), example.site)
-    )
-    assert "\n".join(sources) in credited
-    assert not any("OpenStreetMap" in text for text in plain)
-
-
-def test_the_summary_of_a_placement_by_returns_begins_with_them_and_fits_the_page(example):
-    returns = ReturnsSummary(98765.0, dict.fromkeys(("car", "cyclist", "pedestrian"), 98765.0), ())
-    deployment = replace(example.deployment, returns=returns)
-    assert summary(deployment).startswith("98,765 returns from a car, ")
-    heading = heading_of(example.site, deployment, 5.4)
-    for part in summary_parts(deployment):
-        assert part in " ".join(heading.result)
-    assert all(text_width(line, 12.0) <= 5.4 for line in heading.result)

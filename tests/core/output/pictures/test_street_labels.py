@@ -11,7 +11,6 @@ from seip_addon.core.world.openstreetmap.street_plan import NamePlaces
 
 FRAME = (0.0, 0.0, 1000.0, 800.0)
 HEIGHT = 12.0
-NO_DOTS = np.empty((0, 3))
 
 
 @pytest.fixture
@@ -69,16 +68,3 @@ def test_labels_are_in_the_frame_and_neither_overlap_nor_cover_dots(places, widt
         for x, y, radius in dots.tolist():
             square = np.array([(x, y)]) + np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * radius / 1.5
             assert not overlap(box, square)
-
-
-def test_main_streets_are_named_first(widths):
-    places = NamePlaces(
-        ("Main", "Side"),
-        np.array([1, 0]),
-        np.array([(0.0, 0.0), (5.0, 0.0)]),
-        np.zeros(2),
-        np.array([900.0, 300.0]),
-        np.array([0, 2]),
-    )
-    view = MapView((0.0, 0.0), 1.0, FRAME, 0.1)
-    assert [one.name for one in street_labels(places, widths, HEIGHT, view, NO_DOTS)] == ["Main"]

@@ -1,7 +1,6 @@
 """Reports: what they say, that nothing in a name becomes markup, and that the same folder gives the same bytes."""
 
 import ast
-import io
 import re
 from dataclasses import replace
 from html import unescape
@@ -10,14 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from seip_addon.core.choosing.placement.objective import MOVED, FrontPoint, Objective
-from seip_addon.core.choosing.placement.returns_summary import ReturnsPoint, ReturnsSummary
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.pictures.close_up_sheet import TILE
-from seip_addon.core.output.report import sections
-from seip_addon.core.output.report.blocks import Card, Facts, Paragraph, Picture, Pictures, Table
+from seip_addon.core.output.report.blocks import Card, Facts, Paragraph, Picture, Table
 from seip_addon.core.output.report.evidence import load_evidence
 from seip_addon.core.output.report.html import as_html
 from seip_addon.core.output.report.sections import make_report
@@ -226,23 +221,6 @@ def test_no_field_is_empty_and_no_json_is_shown(folder, page):
     assert not re.search(r"[{}]|null|None|nan", page.text)
 
 
-def test_close_ups_are_those_of_the_sheet(folder):
-    evidence = load_evidence(folder)
-    assert len(evidence.close_ups) == len(evidence.record.sensors)
-    sheet = np.asarray(Image.open(folder / "sensors.png").convert("RGB"))
-    for number, (plan,) in enumerate(evidence.close_ups):
-        tile = np.asarray(Image.open(io.BytesIO(plan)).convert("RGB"))
-        assert tile.shape == (TILE[1], TILE[0], 3)
-        assert np.array_equal(tile, sheet[number * TILE[1] : (number + 1) * TILE[1]])
-    assert [block.pngs for block in blocks(folder, Pictures)] == list(evidence.close_ups)
-
-
-def test_without_pictures_there_is_still_a_report(tmp_path):
-    make_folder(tmp_path)
-    assert len(blocks(tmp_path, Picture)) == 1  # the blind spots
-    assert blocks(tmp_path, Pictures) == []
-
-
 def test_the_table_of_numbers_is_that_of_the_record(folder):
     record = load_evidence(folder).record
     (table,) = (table for table in blocks(folder, Table) if table.head[0] == "Sensors")
@@ -252,37 +230,6 @@ def test_the_table_of_numbers_is_that_of_the_record(folder):
     text = text_of(folder, front=proven)
     assert "none sees more" in text
     assert "at most 1.4 percentage points more" in text
-
-
-def test_the_table_of_numbers_of_a_placement_for_returns_is_of_returns(folder, monkeypatch):
-    front = (
-        ReturnsPoint(1, 8.24, 18_000.0, 0.0),
-        ReturnsPoint(3, 25.0, 54_000.0, 0.0312),
-        ReturnsPoint(4, 31.0, 72_000.0, None),
-    )
-    returns = ReturnsSummary(25.0, {"car": 80.0, "cyclist": 30.0, "pedestrian": 20.0}, (), front)
-    evidence = load_evidence(folder)
-    charts = []
-    drawn = sections.front_chart
-    monkeypatch.setattr(sections, "front_chart", lambda *given: charts.append(given) or drawn(*given))
-    report = make_report(replace(evidence, record=replace(evidence.record, returns=returns)))
-    (table,) = (table for table in blocks_of(report, Table) if table.head[0] == "Sensors")
-    assert table.head == ("Sensors", "Sensors, $", "Points", "Other choices")
-    assert table.rows == (
-        ("1", "18,000", "8.2", "none has more"),
-        ("3", "54,000", "25", "at most 3.2% more"),
-        ("4", "72,000", "31", "may have more"),
-    )
-    ((rows, placed, _, _, high),) = charts
-    assert [more for _, _, more in rows] == [0.0, pytest.approx(26.0 * 0.0312), 0.0]
-    assert placed == (3, 25.0)
-    assert high == 31.0
-    text = text_of(folder, returns=returns)
-    assert "these numbers of points on a road user" in text
-    assert "none sees more" not in text
-    assert "none sees more" in text_of(
-        folder, returns=replace(returns, front=()), front=(FrontPoint(1, 0.5, 1.0, 0.0),)
-    )
 
 
 def test_the_report_reads_what_the_placement_stored_and_imports_no_solver():
@@ -322,16 +269,10 @@ def broken(folder, name, content):
 def test_each_wrong_folder_has_its_sentence(folder, tmp_path):
     with pytest.raises(SeipError, match=r"there is no folder .*nowhere: name the one that `seip place`"):
         load_evidence(tmp_path / "nowhere")
-    with pytest.raises(SeipError, match=r"holds no placement\.json: name a folder"):
-        load_evidence(tmp_path)
     with pytest.raises(SeipError, match=r"placement\.json is damaged"):
         load_evidence(broken(tmp_path / "a", "placement.json", b"{"))
     with pytest.raises(SeipError, match=r"site\.npz is damaged or not a table .*; place the sensors again"):
         load_evidence(broken(tmp_path / "b", "site.npz", b"PK\x03\x04"))
-    with pytest.raises(SeipError, match=r"plan\.png is damaged or no picture"):
-        load_evidence(broken(tmp_path / "c", "plan.png", b"\x89PNG"))
-    with pytest.raises(SeipError, match=r"sensors\.png is damaged or no picture"):
-        load_evidence(broken(tmp_path / "d", "sensors.png", b"\x89PNG"))
     with pytest.raises(SeipError, match=r"sensors\.png is of another placement: place the sensors again"):
         load_evidence(broken(tmp_path / "e", "sensors.png", (folder / "plan.png").read_bytes()))
 

@@ -212,14 +212,6 @@ def test_latitude_and_longitude_are_those_of_the_map_and_its_header(example, run
     assert violations(content_of(record), SCHEMA) == []
 
 
-def test_without_a_known_projection_there_is_no_latitude(example, run):
-    for place in (GeoReference(), GeoReference("+proj=merc"), GeoReference("EPSG:32632", (0.0, 0.0, 0.0, 0.5))):
-        record = make_record(replace(example, site=replace(example.site, geo_reference=place)), run)
-        assert {(entry.latitude_deg, entry.easting_m) for entry in record.sensors} == {(None, None)}
-        assert (record.site.geo_reference is None) == (not place.projection)
-        assert violations(content_of(record), SCHEMA) == []
-
-
 def test_the_same_run_gives_the_same_bytes_but_for_times_and_versions(example, run, tmp_path):
     later = replace(run["provenance"], created=datetime(2027, 1, 1, tzinfo=UTC), durations={"visibility": 99.0})
     first, second = make_record(example, run), make_record(example, {**run, "provenance": later})
