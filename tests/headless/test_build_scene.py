@@ -51,13 +51,6 @@ def test_a_file_that_another_run_builds_is_left_to_it(road, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["site.blend", "street.xodr"]
 
 
-def test_a_mistake_leaves_no_file(road, tmp_path):
-    output = tmp_path / "site.blend"
-    with pytest.raises(SeipError, match=r"there is no driving lane within 80 m of \(0, 0\)"):
-        build_scene.main([str(road), "--near", "0", "0", "-o", str(output)])
-    assert not output.exists()
-
-
 def test_a_site_file_alone_is_enough(site, tmp_path):
     build_scene.main([str(site), "-o", str(tmp_path / "site.blend")])
     scene = opened(tmp_path / "site.blend")

@@ -55,9 +55,3 @@ def test_a_folder_that_was_there_stays_and_keeps_its_files(tmp_path, monkeypatch
     for name in ("empty", "full", "full/new"):
         assert fails(monkeypatch, "place", tmp_path / NONE, "-o", tmp_path / name) == "1"
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["empty", "full", "mine.txt"]
-
-
-def test_report_makes_no_folder(tmp_path, monkeypatch, capsys):
-    assert fails(monkeypatch, "report", tmp_path / "missing") == "1"
-    assert "missing" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []

@@ -50,11 +50,6 @@ def test_a_pipe_is_refused_before_a_reader_waits_for_it(tmp_path, capsys) -> Non
     assert runtime.refuse_pipes(plain) == plain
 
 
-def test_a_defect_keeps_its_traceback() -> None:
-    with pytest.raises(ZeroDivisionError):
-        runtime.run(lambda _argv: 1 / 0)
-
-
 def test_control_c_ends_with_130_and_one_line() -> None:
     script = (
         "import time\nfrom headless import runtime\n"

@@ -119,14 +119,28 @@ def circles(uses: dict[str, set[str]]) -> set[str]:
         uses = {name: names for name, names in uses.items() if name not in ends}
 
 
-def test_no_modules_import_each_other_in_a_circle_not_even_within_functions():
+def uses() -> dict[str, set[str]]:
+    """Modules of the program that each of them imports."""
     there = {module_name(path): path for folder in ("seip_addon", "headless") for path in modules(folder)}
-    uses = {}
-    for name, path in there.items():
-        of_modules = {one if one in there else one.rpartition(".")[0] for one in imported(path)}
-        uses[name] = of_modules & there.keys() - {name}
-    assert not circles(uses)
-    assert circles(uses | {"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == {"a", "b", "c"}
+    return {
+        name: {one if one in there else one.rpartition(".")[0] for one in imported(path)} & there.keys() - {name}
+        for name, path in there.items()
+    }
+
+
+def test_no_modules_import_each_other_in_a_circle_not_even_within_functions():
+    assert not circles(uses())
+    assert circles(uses() | {"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == {"a", "b", "c"}
+
+
+def test_the_report_imports_no_solver():
+    found, left, reached = uses(), ["headless.report"], set()
+    while left:
+        name = left.pop()
+        reached.add(name)
+        left += found[name] - reached
+    assert "seip_addon.core.output.report.write" in reached
+    assert not [name for name in reached if name.endswith((".solver", ".bounds", ".visibility.grid"))]
 
 
 def test_groups_of_the_core_import_only_lower_ones():

@@ -15,7 +15,6 @@ from seip_addon.core.storage.files import (
     lock_folder,
     locked_file,
     save_json,
-    unfinished_name,
     whole_file,
 )
 
@@ -24,10 +23,6 @@ HOLD = "import sys, time; from pathlib import Path; from seip_addon.core.storage
 LOCK = HOLD + "lock_folder(Path(sys.argv[1])); print('held', flush=True); time.sleep(60)"
 LOCK_FILE = (
     HOLD + "l = locked_file(Path(sys.argv[1]) / 'a.blend'); l.__enter__(); print('held', flush=True); time.sleep(60)"
-)
-UNFINISHED = HOLD + (
-    "names = [unfinished_name(Path(sys.argv[1]), name) for name in ('placed.blend', 'work')]; names[0].touch(); "
-    "names[1].mkdir(); (names[1] / 'x').touch(); print(names[0], flush=True); time.sleep(60)"
 )
 WRITE = HOLD + "part = whole_file(Path(sys.argv[1]) / 'a.json'); print(part.__enter__(), flush=True); time.sleep(60)"
 
@@ -88,16 +83,6 @@ def test_a_file_that_another_run_writes_is_refused_until_that_ends_however_it_en
     process.wait()
     with locked_file(tmp_path / "a.blend"):
         pass
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_unfinished_files_and_folders_of_a_killed_run_go_with_the_next_one(tmp_path, other):
-    process, dead = other(UNFINISHED, tmp_path)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    assert Path(dead).name.endswith("placed.blend")
-    assert len(list(tmp_path.iterdir())) == 2
-    assert unfinished_name(tmp_path, "x.png").suffix == ".png"
     assert list(tmp_path.iterdir()) == []
 
 

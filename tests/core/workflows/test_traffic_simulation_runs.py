@@ -84,7 +84,7 @@ def test_stopped_work_leaves_no_folder(tmp_path, stand_in):
     assert not (tmp_path / "runs").exists()
 
 
-@pytest.mark.parametrize("content", ["", "{}", '{"runs": 3}', "[", '{"runs": NaN}'])
+@pytest.mark.parametrize("content", ["[", '{"runs": 3}'])
 def test_a_damaged_list_of_runs_is_named(tmp_path, stand_in, content):
     (tmp_path / "runs").mkdir()
     (tmp_path / "runs" / SIMULATION).write_text(content, encoding="utf-8")

@@ -85,7 +85,7 @@ def test_close_sensors_have_an_inset_which_hides_no_sensor_and_no_label(example)
     assert len(draw_plan(example.geometry, site, example.deployment).axes) == 2
 
 
-@pytest.mark.parametrize("size", [(600, 40), (40, 600)])
+@pytest.mark.parametrize("size", [(600, 40)])
 def test_a_metre_is_as_long_across_as_upwards_and_the_whole_region_is_shown(example, size):
     region = shapely.box(0, 0, *size)
     site = type(example.site)(**{**vars(example.site), "region": region})

@@ -1,11 +1,9 @@
 """Reports: what they say, that nothing in a name becomes markup, and that the same folder gives the same bytes."""
 
-import ast
 import re
 from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,8 +24,6 @@ from tests.builders.report_folder import CROSSING, NAME, make_folder
 
 EFFORT = 0.2
 VOID = {"meta", "img", "link", "br"}
-ROOT = Path(__file__).resolve().parents[4]
-MOST_LINES = 12_000
 """Lines of the project that a report may import."""
 
 
@@ -230,34 +226,6 @@ def test_the_table_of_numbers_is_that_of_the_record(folder):
     text = text_of(folder, front=proven)
     assert "none sees more" in text
     assert "at most 1.4 percentage points more" in text
-
-
-def test_the_report_reads_what_the_placement_stored_and_imports_no_solver():
-    """Lazy imports count as well: all modules that are named anywhere in those that are reached."""
-    reached = _reached("headless.report")
-    assert not any("visibility.grid" in name or name.endswith((".solver", ".bounds")) for name in reached)
-    assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in reached.values()) <= MOST_LINES
-
-
-def _reached(start):
-    found, left = {}, [start]
-    while left:
-        name = left.pop()
-        path = ROOT.joinpath(*name.split("."))
-        file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-        if name in found or not file.is_file():
-            continue
-        found[name] = file
-        left += [".".join(name.split(".")[:depth]) for depth in range(1, name.count(".") + 1)]
-        package = name if path.is_dir() else name.rpartition(".")[0]
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Import):
-                left += [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom):
-                parts = package.split(".")[: package.count(".") + 2 - node.level] if node.level else []
-                base = ".".join([*parts, *([node.module] if node.module else [])])
-                left += [base, *(f"{base}.{alias.name}" for alias in node.names)]
-    return found
 
 
 def broken(folder, name, content):

@@ -168,14 +168,6 @@ def test_the_schema_is_made_from_the_types_of_the_record():
     assert FILE.read_text(encoding="utf-8") == text(), "run python -m tests.oracles.placement_schema"
 
 
-def test_a_sensor_is_turned_as_it_hangs(example, run):
-    for recorded, sensor in zip(make_record(example, run).sensors, example.deployment.sensors, strict=True):
-        assert np.allclose(recorded.orientation, sensor.orientation, rtol=0, atol=1e-7)
-    turned = made_by_hand(example, run).sensors[0]
-    assert turned.roll_deg == 3.0
-    assert not np.allclose(turned.orientation, replace(turned, roll_deg=None).orientation, rtol=0, atol=1e-3)
-
-
 @pytest.mark.parametrize("value", [None, "text"])
 def test_a_part_of_another_type_is_refused(whole, value):
     for place in every_place(whole):
