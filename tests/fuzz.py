@@ -6,8 +6,8 @@ Numbers of a result are finite and within `core.limits`: an accepted file with a
     python -m tests.fuzz map sweep.npz --count 5000 --seed 7
 
 Inputs are read in a process of their own, so that one that hangs, crashes or fills the memory is counted and named
-like the rest. Crashes within Blender's own reader are counted, and no fault
-of this project. Status 1 where there was any.
+like the rest. Crashes within Blender's own reader are counted, and no fault of this project. Status 1 where there was
+any.
 """
 
 from __future__ import annotations

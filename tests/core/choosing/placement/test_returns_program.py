@@ -45,7 +45,8 @@ def test_tangents_exceed_the_logarithm_by_the_stated_error_and_no_more(error, mo
         assert excess.max() > 0.95 * error  # no more lines than it takes
 
 
-def check_best_of_all(seed):
+@pytest.mark.parametrize("seed", range(4))
+def test_the_program_finds_the_best_of_all(seed):
     instance = small_instance(seed, mandatory=None)
     program = ReturnsProgram(instance)
     best = best_of(instance, program)
@@ -54,11 +55,6 @@ def check_best_of_all(seed):
     assert proof.value == pytest.approx(instance.value(proof.chosen))
     assert best - 2 * TIE_TOLERANCE <= proof.value <= best + 1e-12
     assert best - 2 * TIE_TOLERANCE <= proof.bound <= best + (2 * TIE_TOLERANCE if proof.optimal else 1e-5 * (1 + best))
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_the_program_finds_the_best_of_all(seed):
-    check_best_of_all(seed)
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -14,7 +14,6 @@ from seip_addon.core.sensing.visibility.visibility_model import visibility_model
 from tests.builders.small_junction import make_example
 
 CATALOGUE = load_catalogue()
-KEYS = ("os1_64_gen1", "os1_128", "vlp16")
 
 
 @pytest.fixture(scope="module")
@@ -59,14 +58,3 @@ def test_the_band_is_the_coverage_at_its_ends(example):
     assert band.low < plain.coverage < band.high
     assert (band.sheets, band.types) == (("os1_64_gen1",), ())
     assert f"{band.low:.1%} to {band.high:.1%}: detection by os1_64_gen1" in band.messages()[0]
-
-
-def test_each_type_is_compared_where_the_sensors_are(example):
-    plain = deployed(example, "os1_128")
-    band = finish(with_gain_band(around(example, *KEYS), plain)).gain_band
-    assert band.sheets == ()
-    assert (band.low, band.high) == (plain.coverage, plain.coverage)
-    for one in band.types:
-        sensors = deployed(example, one.sensor).sensors
-        for share, gain in zip((one.low, one.high), CATALOGUE[one.sensor].gains, strict=True):
-            assert share == pytest.approx(covered(example, sensors, gain).mean())

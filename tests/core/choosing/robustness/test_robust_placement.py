@@ -104,16 +104,6 @@ def reached_at_most(problem, views, risk):
     return max(risk.of(risk.outcomes(seen[:, c], problem.weights, problem.count)) for c in apart)
 
 
-@pytest.mark.parametrize("risk", [Risk(tail=0.3), Risk(failure="worst"), Risk(failure="mean")])
-@pytest.mark.parametrize("count", [4])
-def test_no_placement_is_better_where_branches_are_many(risk, count):
-    problem, views = crowd(3, count)
-    answer = finish(solve_robust(problem, pack(views), risk))
-    assert answer.objective == pytest.approx(reached_at_most(problem, views, risk))
-    assert answer.status == "optimal"
-    assert answer.gap == 0
-
-
 @pytest.mark.parametrize("risk", [Risk(tail=0.5), Risk(failure="worst")])
 def test_without_time_the_bound_still_holds(risk, monkeypatch):
     monkeypatch.setattr("seip_addon.core.choosing.robustness.robust_placement.MIN_SECONDS", 1e-6)

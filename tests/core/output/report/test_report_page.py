@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from functools import cache
 from html import unescape
 from html.parser import HTMLParser
 
@@ -71,8 +72,13 @@ def blocks_of(report, kind):
     return [block for block in (*tops, *within) if isinstance(block, kind)]
 
 
+@cache
+def report_of(folder):
+    return make_report(load_evidence(folder))
+
+
 def blocks(folder, kind):
-    return blocks_of(make_report(load_evidence(folder)), kind)
+    return blocks_of(report_of(folder), kind)
 
 
 def text_of(folder, **changes):
@@ -171,7 +177,7 @@ def test_every_sensor_has_a_card_with_its_place_and_its_costs(folder):
 
 
 def test_the_first_page_says_where_what_how_many_what_price_and_how_good(folder):
-    report = make_report(load_evidence(folder))
+    report = report_of(folder)
     (facts,) = (block for block in report.first if isinstance(block, Facts))
     assert [name for name, _ in facts.rows] == ["Where", "What", "How many", "Price", "Quality"]
     assert all(value.strip() for _, value in facts.rows)

@@ -1,17 +1,14 @@
 """Two placements, target by target, and the text that a file keeps of them."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.comparison import (
     BOTH,
     KEPT_ONLY,
     NEITHER,
     PRESENT_ONLY,
-    compare,
     compared_shares,
     packed_counts,
 )
@@ -25,8 +22,3 @@ def test_shares_are_those_of_sets_of_targets(pairs):
     for number, targets in ((BOTH, kept & present), (KEPT_ONLY, kept - present), (PRESENT_ONLY, present - kept)):
         assert shares[number] == len(targets) / len(pairs)
     assert shares[NEITHER] == (len(pairs) - len(kept | present)) / len(pairs)
-
-
-def test_other_targets_are_refused():
-    with pytest.raises(SeipError, match="on 2 and on 3 targets"):
-        compare(np.zeros(2, int), np.zeros(3, int))

@@ -1,9 +1,6 @@
-import copy
 import json
 import math
-import re
-from collections.abc import Iterator
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -17,14 +14,12 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record, save_placement
 from seip_addon.core.output.results.placement_record import PlacementRecord, Provenance, placement_record
-from seip_addon.core.output.results.recorded_settings import RecordedSettings
 from seip_addon.core.output.results.versions import versions
 from tests.builders.small_junction import Example, make_example
 from tests.oracles.json_schema import violations
 from tests.oracles.placement_schema import FILE, text
 
 GOAL = Objective(count=3, central_weight=2.5, forbidden=("pole 1",))
-LEFT_OUT = ("roll_deg", "installation_usd")  # of sensors that have none
 SCHEMA = json.loads(FILE.read_text(encoding="utf-8"))
 
 
@@ -90,55 +85,8 @@ def record(example, run, request) -> PlacementRecord:
     return make_record(example, run, **({} if request.param == "placed" else {"bound": math.inf, "gap": math.inf}))
 
 
-@pytest.fixture
-def whole(example, run) -> dict:
-    """Return a record with all that one can hold, as JSON."""
-    by_hand = made_by_hand(located(example), run)
-    (one, *_), greedy = by_hand.sensors, make_record(example, run).greedy
-    coverage = replace(by_hand.coverage, whole=one.coverage_added, seen_twice=0.0)
-    return content_of(
-        replace(
-            by_hand,
-            sensors=(one,),
-            price_usd=one.price_usd,
-            coverage=coverage,
-            greedy=greedy,
-            returns=RETURNS,
-            crossings=RETURNS.crossings,
-        )
-    )
-
-
 def content_of(record: PlacementRecord) -> dict:
     return json.loads(record.text())
-
-
-def every_place(value: object, place: tuple = ()) -> Iterator[tuple]:
-    """Yield the keys that lead to each value within a value of JSON."""
-    for key, part in value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ():
-        yield (*place, key)
-        yield from every_place(part, (*place, key))
-
-
-def parent(content: dict, place: tuple) -> dict | list:
-    for key in place[:-1]:
-        content = content[key]
-    return content
-
-
-def refusal(content: dict) -> str:
-    """Return the sentence with which a record is refused; nothing for one that is read, and can be written again."""
-    try:
-        record = parsed_record(json.dumps(content))
-    except SeipError as error:
-        return str(error)
-    assert content_of(record)["schema"] == content["schema"]
-    return ""
-
-
-def is_open(place: tuple) -> bool:
-    """Return whether a value is none that this program reads again, so that it may be anything."""
-    return place[0] == "settings" and place[1:2] not in {(), *((each.name,) for each in fields(RecordedSettings))}
 
 
 def test_the_record_is_what_the_schema_says_and_json_can_hold_it(example, run, tmp_path):
@@ -166,19 +114,6 @@ def test_a_record_is_written_as_it_was_read(record, tmp_path):
 
 def test_the_schema_is_made_from_the_types_of_the_record():
     assert FILE.read_text(encoding="utf-8") == text(), "run python -m tests.oracles.placement_schema"
-
-
-@pytest.mark.parametrize("value", [None, "text"])
-def test_a_part_of_another_type_is_refused(whole, value):
-    for place in every_place(whole):
-        changed = copy.deepcopy(whole)
-        parent(changed, place)[place[-1]] = value
-        sentence = refusal(changed)
-        if sentence:
-            assert re.fullmatch(r"the placement that this scene keeps .*; place the sensors again.*", sentence)
-        elif violations(changed, SCHEMA):
-            absent = value is None and place[-1] in {"returns", *LEFT_OUT}
-            assert is_open(place) or absent or (place[-1], value) == ("status", "text"), place
 
 
 def test_map_coordinates_are_local_ones_plus_the_origin_to_the_micrometre(example, run):

@@ -60,18 +60,6 @@ def test_the_pose_is_in_words_with_its_interval():
     assert "m from its planned position, each within" in pose_text(upright)
 
 
-@pytest.mark.parametrize(
-    ("rotation", "towards"),
-    [
-        ((2.0, 0.0, 0.0), "south"),
-        ((2.0, 2.0, 0.0), "south-east"),
-    ],
-)
-def test_the_top_of_a_sensor_tilts_where_its_axis_goes(rotation, towards):
-    """The axis of a sensor, up, moves along the cross product of the rotation vector and itself."""
-    assert f"to the {towards}," in pose_text(make_pose("S1", "type1", (0.0, 0.0, 5.0), rotation=rotation))
-
-
 def test_effects_add_up_to_the_difference():
     effects = [effect for _, _, effect in coverage_rows(STEPS)]
     assert effects[0] is None
