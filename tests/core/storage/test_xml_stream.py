@@ -12,10 +12,9 @@ from seip_addon.core.storage import xml_stream
 from seip_addon.core.storage.xml_stream import opened, read_tags
 
 
-@pytest.mark.parametrize("begin", ['<osm><node k="', "<osm><!--"])
-def test_a_huge_attribute_or_comment_is_refused_at_once(tmp_path, begin):
+def test_a_huge_attribute_is_refused_at_once(tmp_path):
     path = tmp_path / "place.osm.gz"
-    path.write_bytes(gzip.compress((begin + "a" * (96 << 20)).encode(), compresslevel=1))
+    path.write_bytes(gzip.compress(('<osm><node k="' + "a" * (96 << 20)).encode(), compresslevel=1))
     start = time.process_time()
     with pytest.raises(SeipError, match=r"place\.osm\.gz holds a tag or text of more than 8 MiB"):
         finish(read_tags(path, lambda *_: None))

@@ -83,7 +83,7 @@ def test_a_program_out_of_time_is_not_called_infeasible(monkeypatch: pytest.Monk
 def test_a_long_program_can_be_stopped_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("seip_addon.core.choosing.placement.solver.is_worthwhile", lambda *_: False)
     before = set(threading.enumerate())
-    steps = solve(street_problem(40, 500, blocks=2, count=8), SolverLimits(time_limit=60.0))
+    steps = solve(hard_problem(), SolverLimits("highs", time_limit=60.0))
     while "integer program" not in next(steps).what:
         pass
     next(steps)

@@ -9,8 +9,7 @@ import pytest
 import shapely
 from shapely.geometry import shape
 
-from seip_addon.core.choosing.placement.objective import Objective, Solution, placement_constraints
-from seip_addon.core.choosing.placement.problem import Placement
+from seip_addon.core.choosing.placement.objective import Objective, placement_constraints
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.output.results.geojson import save_geojson
@@ -18,6 +17,7 @@ from seip_addon.core.output.results.kml import NAMESPACE, save_kml
 from seip_addon.core.output.results.located import located
 from seip_addon.core.output.results.site_file import load_site_file, save_site_file
 from seip_addon.core.site.scene_geometry import NamedArea
+from tests.builders.report_folder import make_solution
 from tests.builders.small_junction import Example, make_example
 
 OFFSET = (-4_500_000.0, 5_300_000.0, 400.0)
@@ -115,22 +115,6 @@ def test_the_same_placement_gives_the_same_bytes(placed, tmp_path):
         save(tmp_path / name, placed)
         save(tmp_path / f"again {name}", placed)
         assert (tmp_path / name).read_bytes() == (tmp_path / f"again {name}").read_bytes()
-
-
-def make_solution(example, goal) -> Solution:
-    chosen = np.array([sensor.pose for sensor in example.deployment.sensors])
-    placement = Placement(
-        chosen=chosen,
-        objective=1.0,
-        bound=1.0,
-        gap=0.0,
-        status="optimal",
-        solver="none",
-        seconds=0.0,
-        covered=1.0,
-        price=0.0,
-    )
-    return Solution(goal, placement, None, example.deployment)
 
 
 def test_the_site_file_holds_the_problem_as_it_was_solved(example, tmp_path):
