@@ -97,7 +97,7 @@ def test_simulated_twice_it_is_the_same_file(tmp_path, capsys):
 def test_the_paper_s_traffic_runs_on_the_road_of_town05(tmp_path, capsys):
     blend, data, output = tmp_path / "town05.blend", tmp_path / "run.fcd.xml.gz", tmp_path / "traffic.npz"
     subprocess.run(  # noqa: S603  # our own interpreter and command
-        [sys.executable, "-m", "headless.build_scene", str(TOWN), "--near", "-49", "-1", "--radius", "80",
+        [sys.executable, "-m", "headless.build_scene", str(TOWN), "--near", "-49", "-1", "--radius", "40",
          "-o", str(blend)],
         cwd=ROOT, check=True, timeout=120, capture_output=True,
     )  # fmt: skip
