@@ -119,6 +119,7 @@ def circles(uses: dict[str, set[str]]) -> set[str]:
         uses = {name: names for name, names in uses.items() if name not in ends}
 
 
+@cache
 def uses() -> dict[str, set[str]]:
     """Modules of the program that each of them imports."""
     there = {module_name(path): path for folder in ("seip_addon", "headless") for path in modules(folder)}
