@@ -11,12 +11,7 @@ from pathlib import Path
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.storage.files import (
-    lock_folder,
-    locked_file,
-    save_json,
-    whole_file,
-)
+from seip_addon.core.storage.files import lock_folder, locked_file, save_json, whole_file
 
 ROOT = Path(__file__).resolve().parents[3]
 HOLD = "import sys, time; from pathlib import Path; from seip_addon.core.storage.files import *; "

@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 
-from seip_addon.core.choosing.placement.objective import (
-    Objective,
-    check_objective,
-    placement_problem,
-    target_weights,
-)
+from seip_addon.core.choosing.placement.objective import Objective, check_objective, placement_problem, target_weights
 from seip_addon.core.choosing.placement.optimisation import optimise
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish

@@ -10,9 +10,7 @@ from hypothesis import strategies as st
 
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.returns_solver import solve_returns
-from seip_addon.core.choosing.placement.search_limits import (
-    SolverLimits,
-)
+from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 

@@ -17,9 +17,7 @@ from seip_addon.core.choosing.robustness.traffic_instants import (
     obstacles_of,
     spread_instants,
 )
-from seip_addon.core.choosing.robustness.visibility_in_traffic import (
-    visibility_in_traffic,
-)
+from seip_addon.core.choosing.robustness.visibility_in_traffic import visibility_in_traffic
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.rosette import Rosette
