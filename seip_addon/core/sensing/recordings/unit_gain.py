@@ -30,11 +30,11 @@ _LEAST_IN_BIN = 30
 def fitted_gain(one: RayComparison) -> Gain | None:
     """Return the gain at which the law predicts the share of returns; None if the recording does not determine it.
 
-    Only rays whose surface is as predicted are used. The weight of each is the derivative of its chance to return, since
-    rays that return at any gain would turn the few returns that are not matched with them into a loss of power. The
-    interval is that of the jackknife over sectors of azimuth, because neighbouring rays return or not together: real
-    surfaces deviate from their materials over 16 m and more. Its degrees of freedom are those of the effective number of
-    sectors, since few of them have most of the doubtful rays.
+    Only rays whose surface is as predicted are used. The weight of each is the derivative of its chance to return,
+    since rays that return at any gain would turn the few returns that are not matched with them into a loss of power.
+    The interval is that of the jackknife over sectors of azimuth, because neighbouring rays return or not together:
+    real surfaces deviate from their materials over 16 m and more. Its degrees of freedom are those of the effective
+    number of sectors, since few of them have most of the doubtful rays.
     """
     model = one.sensor.model
     rays = _comparable(one)
