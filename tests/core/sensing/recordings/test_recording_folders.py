@@ -200,3 +200,9 @@ def test_damaged_packets(packets):
     refused("not a readable recording of an Ouster sensor", packets.path)
     packets.path.with_suffix(".json").unlink()
     refused("put os1.json into the same folder", packets.path)
+
+
+def test_metadata_that_are_not_json(tmp_path):
+    (tmp_path / "os1.pcap").write_bytes(b"packets")
+    (tmp_path / "os1.json").write_text("{", encoding="utf-8")
+    refused("os1.json is not a sensor's metadata", tmp_path / "os1.pcap")
