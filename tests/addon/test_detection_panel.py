@@ -96,12 +96,6 @@ def test_without_torch_one_sentence_says_what_to_install_and_where(placed, monke
     assert re.search(sentence, said[0])
 
 
-def test_a_python_that_was_named_is_run_where_its_checkout_is(monkeypatch):
-    monkeypatch.setattr(preferences, "own", lambda: SimpleNamespace(python="/checkout/.venv/bin/python"))
-    found = preferences.detecting_python()
-    assert found == DetectingPython(Path("/checkout/.venv/bin/python"), Path("/checkout"))
-
-
 def test_the_figures_stand_in_the_panel_and_the_files_in_the_folder(placed, stand_in, tmp_path, monkeypatch):
     assert bpy.ops.seip.detect() == {"FINISHED"}
     assert files(tmp_path / "out") == {"detection.json", "errors.png", str(Path("kitti", "000000.txt"))}
@@ -138,21 +132,6 @@ def test_sensors_that_were_changed_make_the_figures_old(placed, stand_in, monkey
     sensor.rotation_euler.z += 0.1
     bpy.context.view_layer.update()
     assert detection_panel.CHANGED in drawn(monkeypatch)[0]
-
-
-def test_a_result_takes_the_place_of_an_earlier_one_alone(placed, stand_in, tmp_path):
-    old = tmp_path / "out" / "kitti" / "000001.txt"
-    old.parent.mkdir(parents=True)
-    for path in (old, tmp_path / "out" / "detection.json", tmp_path / "out" / "notes.txt"):
-        path.write_text("earlier")
-    stand_in(end="sys.exit('error: no')")
-    with pytest.raises(RuntimeError, match="no"):
-        bpy.ops.seip.detect()
-    assert files(tmp_path / "out") == {"detection.json", "notes.txt", str(Path("kitti", "000001.txt"))}
-    stand_in()
-    bpy.ops.seip.detect()
-    assert files(tmp_path / "out") == {"detection.json", "notes.txt", "errors.png", str(Path("kitti", "000000.txt"))}
-    assert json.loads((tmp_path / "out" / "detection.json").read_text()) == RECORD
 
 
 def no_sensors(scene, folder):
@@ -209,22 +188,6 @@ def test_a_command_that_fails_has_its_sentence_and_leaves_nothing(placed, stand_
     assert "Traceback" not in str(said.value)
     assert not (tmp_path / "out").exists()
     assert not placed.seip.detection.record
-
-
-@pytest.mark.parametrize(
-    ("program", "words"),
-    [
-        ("nowhere/bin/python", "python cannot be started .*name the Python with PyTorch"),
-        (sys.executable, r"does not have this project: run `make detection`.*pip install"),
-    ],
-)
-def test_a_python_that_is_of_no_use_has_its_sentence(placed, tmp_path, monkeypatch, program, words):
-    monkeypatch.delenv("PYTHONPATH", raising=False)
-    python = DetectingPython(tmp_path / program, tmp_path)
-    monkeypatch.setattr(preferences, "detecting_python", lambda: python)
-    with pytest.raises(RuntimeError, match=words):
-        bpy.ops.seip.detect()
-    assert not (tmp_path / "out").exists()
 
 
 def test_work_that_is_stopped_ends_the_command_and_leaves_nothing(placed, stand_in, tmp_path):

@@ -32,26 +32,3 @@ def test_no_panel_expands_a_property_without_its_names():
     assert {name: lines for name, lines in faults.items() if lines} == {}
 
 
-@pytest.mark.parametrize(
-    ("call", "wrong"),
-    [
-        ("row.prop(goal, 'limit', text='', expand=True)", True),
-        ("row.prop(goal, 'limit', text='', expand=not is_narrow(context))", True),
-        ("row.prop(goal, 'limit', text='', expand=False)", False),
-        ("row.prop(goal, 'limit', text='')", False),
-        ("row.prop(goal, 'limit', expand=True)", False),
-    ],
-)
-def test_the_search_finds_rows_without_names(call, wrong):
-    assert bool(nameless_rows(call)) is wrong
-
-
-@pytest.mark.parametrize(("width", "expanded"), [(400, True), (120, False)])
-def test_the_goals_are_segments_with_names_or_a_list_where_there_is_no_room(junction, monkeypatch, width, expanded):
-    layout = DrawnLayout()
-    preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
-    context = SimpleNamespace(scene=junction, region=SimpleNamespace(width=width), preferences=preferences)
-    monkeypatch.setattr(placement, "settings_column", lambda layout: layout)  # of the window, which there is none of
-    placement.draw(layout, context)
-    drawn = [options for name, options in layout.properties if name == "limit"]
-    assert [(options.get("expand", False), "text" in options) for options in drawn] == [(expanded, not expanded)]

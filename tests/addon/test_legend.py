@@ -22,25 +22,11 @@ def blocks(add_on):
     return [Block("Coverage of the road by sensors", tuple(Entry(one, (BLACK,)) for one in words))]
 
 
-def test_a_legend_with_room_has_the_scale_of_the_interface(blocks):
-    (left, bottom, right, top), scale = placed_legend(blocks, (0.0, 0.0, 2000.0, 1000.0), 1.5)
-    assert scale == 1.5
-    assert (right, bottom) == (2000.0 - MARGIN * 1.5, MARGIN * 1.5)
-    assert left < right
-    assert bottom < top
-
-
 def test_a_legend_without_room_shrinks_until_it_fits(blocks):
     (left, bottom, right, top), scale = placed_legend(blocks, FRAME, 2.0)
     assert LEAST_SCALE < scale < 2.0
     assert FRAME[0] <= left < right < FRAME[2]
     assert FRAME[1] < bottom < top < FRAME[3]
-
-
-def test_a_legend_in_a_low_viewport_fits_as_well(blocks):
-    (_, _, _, top), scale = placed_legend(blocks, (0.0, 0.0, 2000.0, 120.0), 2.0)
-    assert scale < 2.0
-    assert top < 120.0
 
 
 def boxes_apart(one, other):
@@ -62,20 +48,6 @@ def test_a_legend_keeps_off_the_gizmos_of_navigation(blocks, size):
         assert box == free
 
 
-def test_gizmos_that_are_switched_off_take_no_room(add_on):
-    space = SimpleNamespace(show_gizmo=True, show_gizmo_navigate=True)
-    (ball, buttons) = navigation_boxes(space, FRAME, 2.0)
-    assert ball[2:] == buttons[2:] == FRAME[2:]
-    assert ball[0] < buttons[0]
-    assert buttons[1] < ball[1]
-    assert navigation_boxes(SimpleNamespace(show_gizmo=True, show_gizmo_navigate=False), FRAME, 2.0) == []
-    assert navigation_boxes(SimpleNamespace(show_gizmo=False, show_gizmo_navigate=True), FRAME, 2.0) == []
-
-
-def test_a_legend_stays_readable(blocks):
-    assert placed_legend(blocks, (0.0, 0.0, 60.0, 60.0), 2.0)[1] == pytest.approx(LEAST_SCALE)
-
-
 def test_labels_are_in_the_frame_off_the_legend_and_off_each_other(add_on):
     generator = np.random.default_rng(4)
     anchors = generator.uniform((120.0, 0.0), (460.0, 400.0), (12, 2))
@@ -91,20 +63,3 @@ def test_labels_are_in_the_frame_off_the_legend_and_off_each_other(add_on):
             assert beside or one[3] <= other[1] or other[3] <= one[1]
 
 
-def test_a_label_of_what_is_outside_the_frame_stays_with_it(add_on):
-    boxes = label_boxes(np.array([(600.0, 100.0)]), np.array([80.0]), FRAME, [], 1.0)
-    assert boxes[0, [0, 2]].tolist() == [560.0, 640.0]
-
-
-def test_no_labels_give_no_boxes(add_on):
-    assert label_boxes(np.empty((0, 2)), np.empty(0), FRAME, [], 1.0).shape == (0, 4)
-
-
-@pytest.mark.parametrize(
-    ("width", "expected"), [(600, "111 returns · $32k · proven"), (283, "111 returns · $32k"), (60, "111 returns")]
-)
-def test_a_status_without_room_loses_its_last_parts(add_on, width, expected, monkeypatch):
-    scale = bpy.context.preferences.system.ui_scale or 1.0
-    context = SimpleNamespace(region=SimpleNamespace(width=width * scale), preferences=bpy.context.preferences)
-    monkeypatch.setattr(sections, "bpy", SimpleNamespace(context=context))
-    assert sections.fitting("111 returns · $32k · proven", sections.text_width("Placement")) == expected

@@ -79,20 +79,6 @@ def test_files_of_an_export_can_be_opened_while_they_are_of_the_placement(juncti
         bpy.ops.seip.show_plan()
 
 
-def test_files_of_another_objective_are_not_opened_as_those_of_the_placement(junction, tmp_path):
-    """A batch run with other shares of the road users may choose the same sensors, of another value."""
-    bpy.ops.seip.solve_placement()
-    junction.seip.result.folder = str(tmp_path)
-    bpy.ops.seip.export_result()
-    assert results.exported_files(junction)
-    path = tmp_path / "placement.json"
-    content = json.loads(path.read_text(encoding="utf-8"))
-    assert content["settings"]["goal"]["shares"] == [1.0, 1.0, 1.0]
-    content["settings"]["goal"]["shares"] = [1.0, 2.0, 2.0]
-    path.write_text(json.dumps(content), encoding="utf-8")
-    assert not results.exported_files(junction)
-
-
 @pytest.mark.slow
 def test_pose_errors_are_only_evaluated_where_that_is_the_risk_measure(junction, tmp_path, small_scene):
     junction.seip.goal.scenarios, junction.seip.goal.risk = "pose-errors", "none"
@@ -164,55 +150,6 @@ def test_another_goal_makes_placing_the_next_step(junction, monkeypatch, change)
     assert scene_status.next_step(junction) == scene_status.other_goal(junction) == ""
 
 
-def test_a_placement_of_any_goal_is_of_that_goal(junction):
-    goal = junction.seip.goal
-    goal.limit, goal.budget, goal.min_distance = "BUDGET", 12_345.67, 3.3
-    goal.weighting, goal.central_weight = "VALUE", 2.7
-    bpy.ops.seip.solve_placement()
-    assert scene_status.other_goal(junction) == ""
-    goal.limit, goal.coverage = "COVERAGE", 12.3
-    bpy.ops.seip.solve_placement()
-    assert scene_status.other_goal(junction) == ""
-
-
-def test_numbers_of_sensors_placed_by_returns_show_returns(junction):
-    front = (ReturnsPoint(1, 4.0, 1000.0, 0.0), ReturnsPoint(2, 16.0, 2000.0, 0.0))
-    bpy.ops.seip.solve_placement()
-    record = parsed_record(junction.seip.result.record)
-    by_returns = replace(record, front=(), returns=ReturnsSummary(16.0, {"car": 16.0}, (), front))
-    assert placement_panel.numbers(by_returns) == [(1, 0.25, "4 · $1,000"), (2, 1.0, "16 · $2,000")]
-    text = "Returns per revolution and price of the best placement found for each number. "
-    assert placement_panel.front_text(by_returns) == f"{text}No other has more."
-    for gap, limit in ((0.031, "Others have at most 3.1% more."), (None, "Not every number is proven.")):
-        open_ended = replace(by_returns.returns, front=(front[0], replace(front[1], gap=gap)))
-        assert placement_panel.front_text(replace(by_returns, returns=open_ended)) == f"{text}{limit}"
-    stored = json.loads(junction.seip.result.record) | {"front": [], "returns": as_json(by_returns.returns)}
-    junction.seip.result.record = json.dumps(stored)
-    junction.seip.sections.numbers = True
-    layout, numbers = choices(junction)
-    assert [number[0] for number in numbers] == [1, 2]
-    assert [bar[1] for bar in layout.bars] == ["4 · $1,000", "16 · $2,000"]
-
-
-def test_numbers_of_sensors_are_not_offered_where_the_record_has_none(junction):
-    bpy.ops.seip.solve_placement()
-    junction.seip.sections.numbers = True
-    record = json.loads(junction.seip.result.record)
-    junction.seip.result.record = json.dumps({**record, "front": []})
-    layout, numbers = choices(junction)
-    assert numbers == layout.bars == []
-
-
-def test_the_text_on_numbers_of_sensors_states_how_much_better_they_could_be(junction):
-    bpy.ops.seip.solve_placement()
-    record = parsed_record(junction.seip.result.record)
-    front = tuple(replace(point, missed=0.0) for point in record.front)
-    text = "Coverage and price of the best placement found for each number. "
-    assert placement_panel.front_text(replace(record, front=front)) == f"{text}No other sees more."
-    open_ended = replace(record, front=(*front[:-1], replace(front[-1], missed=0.0123)))
-    assert placement_panel.front_text(open_ended) == f"{text}Others see at most 1.2% of the road more."
-
-
 def test_a_placement_with_the_grid_at_hand_casts_no_ray(junction, monkeypatch):
     bpy.ops.seip.compute_visibility()
     for caster in (BvhRayCaster, EmbreeRayCaster):
@@ -239,18 +176,6 @@ def test_work_that_is_stopped_at_its_end_leaves_no_trace(junction):
         assert vars(before) == seen
 
 
-def test_a_stopped_placement_does_not_reach_the_export(junction, tmp_path):
-    bpy.ops.seip.solve_placement()
-    junction.seip.goal.count = 3
-    finish(work_of("SEIP_OT_solve_placement", junction))  # and stopped
-    junction.seip.result.folder = str(tmp_path)
-    bpy.ops.seip.export_result()
-    record = load_placement(tmp_path / "placement.json")
-    rows = list(csv.DictReader((tmp_path / "candidates.csv").read_text(encoding="utf-8").splitlines()))
-    assert {int(row["pose"]) for row in rows if row["chosen"]} == {sensor.pose for sensor in record.sensors}
-    assert len(json.loads((tmp_path / "carla_spawn.json").read_text(encoding="utf-8"))) == 2
-
-
 def test_a_mistake_is_one_sentence(junction):
     junction.seip.survey.heights = "high"
     with pytest.raises(RuntimeError, match="'high' is neither a height in metres"):
@@ -272,17 +197,6 @@ def test_a_saved_placement_goes_on_without_computing(junction, tmp_path, monkeyp
     scene.seip.result.folder = "//out/"
     assert bpy.ops.seip.export_result() == {"FINISHED"}
     assert comparable(load_placement(tmp_path / "out" / "placement.json")) == comparable(parsed_record(before))
-
-
-def test_an_emptied_cache_is_said(junction, tmp_path):
-    bpy.ops.seip.solve_placement()
-    session_data.forget()
-    for file in (tmp_path / "cache").glob("*.npz"):
-        file.unlink()
-    with pytest.raises(RuntimeError, match="no longer holds the visibility of this placement: place again"):
-        bpy.ops.seip.follow_sensors()
-    bpy.ops.seip.compute_visibility()
-    assert bpy.ops.seip.follow_sensors() == {"FINISHED"}
 
 
 def test_undo_brings_the_earlier_placement_back_and_redo_the_new(junction):
@@ -353,28 +267,6 @@ def test_a_file_of_a_newer_version_is_refused(junction, tmp_path):
     assert bpy.context.scene.seip.version == scene_status.FILE_VERSION + 1
 
 
-def test_the_version_is_in_the_file(junction, tmp_path, monkeypatch):
-    path = tmp_path / "own.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    assert bpy.context.scene.seip.is_property_set("version")
-
-
-def test_a_scene_without_region_has_its_sentence(junction):
-    region = bpy.data.collections["SEIP Region"]
-    for obj in list(region.objects):
-        region.objects.unlink(obj)
-    with pytest.raises(RuntimeError, match="There is no region"):
-        bpy.ops.seip.solve_placement()
-
-
-def test_a_region_without_targets_has_its_sentence(junction):
-    for obj in bpy.data.collections["SEIP Region"].objects:
-        obj.location.x += 5000.0
-    with pytest.raises(RuntimeError, match=r"Error: .*target"):
-        bpy.ops.seip.solve_placement()
-
-
 def test_an_unsaved_file_says_where_it_would_write(junction, monkeypatch):
     bpy.ops.seip.solve_placement()
     junction.seip.result.folder = "//seip-result/"
@@ -383,14 +275,6 @@ def test_an_unsaved_file_says_where_it_would_write(junction, monkeypatch):
     from seip_addon.operators.results import no_folder  # noqa: PLC0415  # registered with the add-on
 
     assert no_folder(scene) == "Save the file, or choose another folder: seip-result/ is beside the file."
-
-
-def test_a_folder_that_cannot_be_written_has_its_sentence(junction, tmp_path):
-    bpy.ops.seip.solve_placement()
-    (tmp_path / "file").write_text("")
-    junction.seip.result.folder = str(tmp_path / "file" / "out")
-    with pytest.raises(RuntimeError, match="choose a folder that you may write to"):
-        bpy.ops.seip.export_result()
 
 
 @pytest.mark.parametrize(
@@ -420,7 +304,3 @@ def test_panel_and_batch_place_alike_over_pose_errors(junction, tmp_path, risk, 
     assert any("in nineteen of twenty" in note for note in panel.notes)
 
 
-def test_a_coverage_to_reach_is_not_optimised_over_scenarios(junction):
-    junction.seip.goal.limit, junction.seip.goal.scenarios = "COVERAGE", "pose-errors"
-    with pytest.raises(RuntimeError, match="needs a number of sensors or a budget"):
-        bpy.ops.seip.solve_placement()

@@ -29,11 +29,6 @@ def shown(scene: bpy.types.Scene) -> np.ndarray:
     return counts
 
 
-def test_a_click_selects_the_sensor(placed):
-    placed.seip.result.active_sensor = 1
-    assert [obj["seip_label"] for obj in bpy.context.selected_objects] == ["S2"]
-
-
 def test_two_placements_are_compared_target_by_target(placed):
     bpy.ops.seip.keep_placement(name="two")
     before = unpacked_counts(placed.seip.result.seen) > 0
@@ -70,18 +65,6 @@ def test_two_placements_are_compared_target_by_target(placed):
     assert "seip.show_comparison" in dict(layout.operators)
     bpy.ops.seip.show_comparison(back=True)
     assert (shown(placed) > 0).sum() == after.sum()
-
-
-def test_other_targets_are_not_compared(placed):
-    bpy.ops.seip.keep_placement(name="coarse")
-    placed.seip.survey.grid = 5.0
-    bpy.ops.seip.solve_placement()
-    with pytest.raises(RuntimeError, match="made on different targets"):
-        bpy.ops.seip.show_comparison()
-    layout = drawn_comparison(placed)
-    assert "different targets" in layout.text
-    assert "Share of the Road" not in layout.text
-    assert "seip.show_comparison" not in dict(layout.operators)
 
 
 def drawn_comparison(scene: bpy.types.Scene) -> DrawnLayout:
@@ -131,43 +114,12 @@ def test_moved_sensors_are_followed(placed):
     assert (shown(placed) <= 1).all()
 
 
-def test_a_level_turn_of_a_whole_step_sees_the_same(placed):
-    bpy.ops.seip.follow_sensors()
-    before = shown(placed)
-    first = placed_sensors(placed)["S1"]
-    first.rotation_euler.z += np.pi
-    live_coverage.update()
-    assert session.following.moved == ("S1",)
-    assert (shown(placed) == before).mean() > 0.97
-
-
-def test_following_leaves_nothing_behind(placed):
-    handlers = bpy.app.handlers.depsgraph_update_post
-    count = len(handlers)
-    bpy.ops.seip.follow_sensors()
-    assert len(handlers) == count + 1
-    bpy.ops.seip.follow_sensors()
-    assert session.following is None
-    assert len(handlers) == count
-    bpy.ops.seip.follow_sensors()
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    assert session.following is None
-
-
 def test_following_stops_where_the_scene_has_changed(placed):
     bpy.ops.seip.follow_sensors()
     bpy.data.objects["building 1"].location.x += 1.0
     bpy.context.view_layer.update()
     live_coverage.update()
     assert "the scene has changed" in session.following.problem
-
-
-def test_a_scene_that_is_deleted_during_the_work_has_its_sentence(placed):
-    number = placed.session_uid
-    bpy.ops.scene.new(type="NEW")
-    bpy.data.scenes.remove(placed)
-    with pytest.raises(SeipError, match="is gone: nothing was written"):
-        scene_of(number)
 
 
 def test_tilted_sensors_are_where_the_placement_put_them_until_a_hand_turns_them(placed):
@@ -189,46 +141,3 @@ def test_tilted_sensors_are_where_the_placement_put_them_until_a_hand_turns_them
         bpy.ops.seip.show_sight_lines(sensor="S1")
 
 
-CORNER = """
-[corner]
-name = "Corner"
-manufacturer = "Test"
-source = "Test"
-channels = 32
-field_of_view_deg = [-30.0, 0.0]
-horizontal_field_of_view_deg = 120.0
-range_m = [0.5, 100.0]
-points_per_second = 200_000
-rotation_rate_hz = 10.0
-price_usd = [2_000, 2_000]
-"""
-
-
-def test_sensors_that_look_one_way_are_where_the_placement_put_them_until_a_hand_turns_them(junction, tmp_path):
-    (tmp_path / "mine.toml").write_text(CORNER, encoding="utf-8")
-    entry = bpy.context.preferences.addons.new()
-    entry.module = preferences.ADDON_ID
-    try:
-        bpy.ops.seip.add_catalogue(filepath=str(tmp_path / "mine.toml"))
-        for one in junction.seip.survey.types:
-            one.use = one.name == "corner"
-        bpy.ops.seip.solve_placement()
-        known = session.state_of(junction)
-        sensors, poses = known.solution.deployment.sensors, known.layout.site.candidates
-        assert len(set(poses.yaw[poses.position_of == 0])) in range(1, 9)
-        assert [sensor.yaw for sensor in sensors] == [poses.yaw[sensor.pose] for sensor in sensors]
-        bpy.ops.seip.show_sight_lines(sensor="S1")
-        bpy.ops.seip.follow_sensors()
-        assert session.following.moved == ()
-
-        coverage = session.following.coverage
-        placed_sensors(junction)["S1"].rotation_euler.z += 0.9 * np.pi
-        live_coverage.update()
-        assert session.following.moved == ("S1",)
-        assert session.following.coverage < coverage
-        bpy.ops.seip.evaluate_sensors()
-        record = parsed_record(junction.seip.result.record)
-        moved = next(sensor for sensor in record.sensors if sensor.pose is None)
-        assert (moved.yaw_deg - np.degrees(sensors[0].yaw)) % 360 == pytest.approx(162.0, abs=1e-3)
-    finally:
-        bpy.context.preferences.addons.remove(entry)

@@ -109,17 +109,6 @@ def test_a_map_of_another_place_is_refused_and_nothing_is_written(site, tmp_path
     assert not site.seip.detection.runs
 
 
-def test_the_map_of_the_example_is_known(add_on):
-    bpy.ops.seip.load_example()
-    assert bpy.context.scene.seip.simulation.street_map() == SCENES / "junction.xodr"
-
-
-def test_the_map_of_a_site_built_from_a_description_is_known(add_on):
-    bpy.ops.seip.choose_map(filepath=str(SCENES / "junction.toml"))
-    bpy.ops.seip.build_site()
-    assert bpy.context.scene.seip.simulation.street_map() == SCENES / "junction.xodr"
-
-
 def test_the_map_beside_the_file_is_known_by_its_relative_name(add_on, tmp_path):
     shutil.copy(SCENES / "corridor.xodr", tmp_path)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "mine.blend"))
@@ -128,32 +117,6 @@ def test_the_map_beside_the_file_is_known_by_its_relative_name(add_on, tmp_path)
     simulation = bpy.context.scene.seip.simulation
     assert simulation.map == "//corridor.xodr"
     assert simulation.street_map() == tmp_path / "corridor.xodr"
-
-
-def test_a_scene_without_a_map_asks_for_one(junction, monkeypatch):
-    monkeypatch.setattr(preferences, "sumo", SimpleNamespace)
-    assert NO_MAP in drawn().text
-    with pytest.raises(RuntimeError, match=r"There is no map to simulate traffic on: name the OpenDRIVE map"):
-        bpy.ops.seip.simulate_traffic()
-    junction.seip.simulation.map = "/nowhere/map.xodr"
-    assert NO_MAP not in drawn().text
-    assert bpy.ops.seip.simulate_traffic.poll()
-
-
-def test_where_sumo_is_missing_the_section_installs_it(site, monkeypatch):
-    monkeypatch.setattr(preferences, "sumo", lambda: None)
-    layout = drawn()
-    assert layout.text.count(preferences.NO_SUMO) == 1
-    assert "seip.install_sumo" in dict(layout.operators)
-    with pytest.raises(RuntimeError, match=preferences.NO_SUMO):
-        bpy.ops.seip.simulate_traffic()
-
-
-def test_a_file_that_was_never_saved_has_no_folder_beside_it(add_on, monkeypatch):
-    monkeypatch.setattr(preferences, "sumo", SimpleNamespace)
-    bpy.ops.seip.load_example()
-    with pytest.raises(RuntimeError, match="the file has not been saved: save it first"):
-        bpy.ops.seip.simulate_traffic()
 
 
 @needs_sumo
@@ -166,16 +129,3 @@ def test_stopped_simulation_leaves_nothing(site, tmp_path):
     assert "SEIP Traffic" not in bpy.data.collections
 
 
-@pytest.mark.slow
-@needs_sumo
-def test_a_placement_in_traffic_uses_the_simulated_runs(site):
-    site.seip.simulation.count, site.seip.simulation.duration = 3, 20.0
-    bpy.ops.seip.simulate_traffic()
-    survey, goal = site.seip.survey, site.seip.goal
-    bpy.ops.seip.list_sensor_types()
-    survey.heights, survey.grid, survey.spacing = "5", 8.0, 25.0
-    for one in survey.types:
-        one.use = one.name == "vlp16"
-    goal.scenarios, goal.count = "traffic", 2
-    with patch.dict(DEFAULT_COUNTS, traffic=(2, 4)):
-        assert bpy.ops.seip.solve_placement() == {"FINISHED"}

@@ -56,22 +56,6 @@ def test_the_panel_builds_what_the_batch_command_builds(scene, tmp_path, shape, 
     assert by_panel[1].origin.tolist() == by_batch[1].origin.tolist()
 
 
-def test_without_a_junction_it_is_the_middle_of_the_map(scene):
-    choose(scene)
-    bpy.ops.seip.build_site()
-    assert "Region of interest" in scene.objects
-
-
-def test_a_description_says_where_and_how_large(scene):
-    site = choose(scene, SCENES / "junction.toml")
-    assert site.is_described()
-    bpy.ops.seip.build_site()
-    shipped = SCENES / "junction.blend"
-    area = read_scene(scene).geometry.region.area
-    bpy.ops.wm.open_mainfile(filepath=str(shipped))
-    assert area == pytest.approx(read_scene(bpy.context.scene).geometry.region.area)
-
-
 def test_a_site_of_the_same_place_is_changed_and_own_objects_stay(scene):
     site = choose(scene)
     site.junction = site.junctions[0].name
@@ -91,16 +75,6 @@ def test_a_site_of_the_same_place_is_changed_and_own_objects_stay(scene):
     bpy.ops.seip.build_site()
     assert read_scene(scene).geometry.region.area == pytest.approx(small)
     assert len(scene.objects) == count + 1
-
-
-def test_a_changed_site_makes_its_placement_stale(junction):
-    site = choose(junction)
-    junction[contract.BUILT] = site.place()
-    bpy.ops.seip.solve_placement()
-    assert not scene_status.stale_placement(junction)
-    bpy.ops.seip.build_site()
-    bpy.context.view_layer.update()
-    assert scene_status.stale_placement(junction)
 
 
 def test_a_scene_that_has_a_site_of_another_place_keeps_it(scene):
@@ -130,18 +104,6 @@ def test_a_bad_map_is_one_sentence(scene, tmp_path, text, complaint):
     assert not scene.seip.site.source
 
 
-def test_without_a_map_there_is_nothing_to_build(scene):
-    with pytest.raises(RuntimeError, match="Choose a map first"):
-        bpy.ops.seip.build_site()
-
-
-def test_an_unknown_junction_is_named(scene):
-    choose(scene).junction = "777"
-    with pytest.raises(RuntimeError, match="no junction '777'"):
-        bpy.ops.seip.build_site()
-    assert not any(contract.base_name(collection) in contract.INPUTS for collection in bpy.data.collections)
-
-
 def test_roles_by_operator(scene):
     bpy.ops.mesh.primitive_plane_add()
     assert bpy.ops.seip.assign_role(role="ROADS") == {"FINISHED"}
@@ -152,19 +114,6 @@ def test_roles_by_operator(scene):
     bpy.ops.object.select_all(action="DESELECT")
     with pytest.raises(RuntimeError, match="Select objects first"):
         bpy.ops.seip.assign_role(role="ROADS")
-
-
-def test_a_drawn_area_is_active_and_can_be_undone(scene):
-    scene.cursor.location = (5.0, 6.0, 1.0)
-    bpy.ops.ed.undo_push()
-    bpy.ops.seip.add_area(role="WEIGHTED_REGIONS", size=(10.0, 20.0))
-    obj = bpy.context.object
-    assert obj.name == "Weighted regions"
-    assert obj.select_get()
-    assert tuple(obj.location[:2]) == (5.0, 6.0)
-    bpy.ops.ed.undo_push()
-    bpy.ops.ed.undo()
-    assert "Weighted regions" not in bpy.data.objects
 
 
 def test_weights_and_rules_are_the_contract_s_own(scene):
@@ -209,10 +158,3 @@ def test_the_check_lists_and_shows(scene):
         bpy.ops.seip.show_problem(number=number)
 
 
-def test_the_check_lists_bad_settings(scene):
-    choose(scene)
-    bpy.ops.seip.build_site()
-    scene.seip.survey.heights = "high"
-    bpy.ops.seip.check_site()
-    assert scene.seip.site.problems[0].is_error
-    assert "'high' is neither a height" in scene.seip.site.problems[0].text

@@ -100,32 +100,6 @@ def test_a_mistake_leaves_the_scene_as_it_was(scene, street, files):
     assert not scene.collection.all_objects
 
 
-def test_a_site_in_a_new_scene_takes_the_files_over(scene, street, files):
-    chosen = choose(scene, street)
-    chosen.osm = str(files / "around.osm")
-    assert bpy.ops.seip.build_site() == {"FINISHED"}
-    scene[contract.BUILT] = "another place"
-    assert bpy.ops.seip.build_site() == {"FINISHED"}
-    new = next(each for each in bpy.data.scenes if each != scene)
-    assert new.seip.site.osm == chosen.osm
-
-
-def test_the_section_shows_a_setting_where_its_file_is_named(scene, street):
-    chosen = choose(scene, street)
-
-    def shown():
-        layout = DrawnLayout()
-        site.draw_place(layout, chosen)
-        return {name for name, _ in layout.properties}
-
-    assert "terrain" not in shown()
-    scene.seip.sections.sources = True
-    assert {"osm", "terrain"} <= shown()
-    assert "terrain_epsg" not in shown()
-    chosen.terrain = "/file"
-    assert "terrain_epsg" in shown()
-
-
 def test_installed_costs_are_in_the_survey(junction, tmp_path):
     survey = junction.seip.survey
     assert survey.settings().installed_cost is None
@@ -145,14 +119,3 @@ def test_installed_costs_are_in_the_survey(junction, tmp_path):
         bpy.ops.seip.solve_placement()
 
 
-def test_a_placement_is_priced_with_them(junction):
-    bpy.ops.seip.solve_placement()
-    without = junction.seip.result.record
-    junction.seip.survey.installed = True
-    bpy.ops.seip.solve_placement()
-    with_cost = junction.seip.result.record
-
-    def price(text):
-        return sum(sensor.price_usd for sensor in parsed_record(text).sensors)
-
-    assert price(with_cost) > price(without) + 1000.0

@@ -17,7 +17,6 @@ from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing
 from tests.builders.sumo_wheel import write_programs, write_wheel
 
-SCENES = Path(__file__).resolve().parents[2] / "scenes"
 BUTTON = f"Install SUMO ({sumo_size().download} MB)"
 
 
@@ -83,12 +82,6 @@ def test_panel_dialog_and_button_say_that_sumo_is_missing_before_the_last_click(
         front_door._build(chosen)  # noqa: SLF001  # a dialog cannot be confirmed without a window
 
 
-def test_a_map_needs_no_sumo(scene, machine):
-    bpy.ops.seip.choose_map(filepath=str(SCENES / "junction.xodr"))
-    assert preferences.NO_SUMO not in drawn(site.draw, bpy.context).text
-    assert bpy.ops.seip.build_site.poll()
-
-
 def test_after_the_installation_nothing_is_missing(chosen, tmp_path):
     assert bpy.ops.seip.install_sumo() == {"FINISHED"}
     where = tmp_path / "own" / SUMO_VERSION / "sumo"
@@ -112,13 +105,6 @@ def test_offline_one_sentence_says_how_to_allow_it_or_name_a_folder(chosen, onli
         bpy.ops.seip.install_sumo()
 
 
-def test_without_pip_the_folder_is_what_remains(chosen, monkeypatch):
-    monkeypatch.setattr(preferences, "pip", list)
-    assert preferences.NO_PIP in drawn(sumo.draw_status).text
-    with pytest.raises(RuntimeError, match="has no pip"):
-        bpy.ops.seip.install_sumo()
-
-
 def test_the_folder_in_the_preferences_comes_first(machine, tmp_path, monkeypatch):
     write_programs(tmp_path / "mine", version="1.22.0")
     monkeypatch.setattr(preferences, "own", lambda: SimpleNamespace(sumo=str(tmp_path / "mine")))
@@ -133,34 +119,3 @@ def test_a_sumo_that_does_not_start_can_be_replaced(scene, machine, tmp_path):
     assert ("seip.install_sumo", BUTTON) in status.operators
 
 
-def test_the_preferences_draw_folder_status_and_button(scene, machine):
-    entry = bpy.context.preferences.addons.new()
-    entry.module = preferences.ADDON_ID
-    try:
-        layout = DrawnLayout()
-        stand_in = SimpleNamespace(layout=layout, catalogues=())
-        preferences_panel.SEIP_AP_preferences.draw(stand_in, bpy.context)
-        assert "sumo" in {name for name, _ in layout.properties}
-        assert preferences.NO_SUMO in layout.text
-        assert ("seip.install_sumo", BUTTON) in layout.operators
-    finally:
-        bpy.context.preferences.addons.remove(entry)
-
-
-def test_no_choice_of_a_place_changes_the_size_of_the_dialog(chosen):
-    def rows():
-        layout = dialog()
-        return [name for name, _ in layout.properties], len(layout.labels)
-
-    chosen_site = chosen.seip.site
-    without = rows()
-    chosen_site.position = "52.5, 13.4"
-    assert rows() == without
-    chosen_site.junction = chosen_site.junctions[0].name
-    assert rows() == without
-    for path in ("junction.xodr", "junction.toml"):
-        bpy.ops.seip.choose_map(filepath=str(SCENES / path))
-        chosen_site.junction = ""
-        without = rows()
-        chosen_site.junction = chosen_site.junctions[0].name
-        assert rows() == without

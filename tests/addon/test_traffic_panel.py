@@ -95,15 +95,6 @@ def test_the_cloud_is_drawn_in_the_colours_asked_for(placed):
     assert overlays.find(placed, CLOUD) is None
 
 
-def test_other_traffic_ends_the_scan_of_the_earlier(placed, small_scene):
-    bpy.ops.seip.load_traffic()
-    bpy.ops.seip.scan_frame()
-    placed.seip.traffic.file = str(small_scene.parent / "small_traffic" / "run-2.npz")
-    bpy.ops.seip.load_traffic()
-    assert session.scan_of(placed) is None
-    assert overlays.find(placed, CLOUD) is None
-
-
 def test_animated_objects_are_scanned_as_the_file_is(placed):
     bpy.ops.seip.load_traffic()
     placed.frame_set(480)
@@ -137,37 +128,3 @@ def test_each_mistake_has_its_sentence(placed, tmp_path, wrong, words):
     assert not (tmp_path / "run").exists()
 
 
-def test_a_folder_beside_a_file_that_was_never_saved_has_its_sentence(add_on, small_scene):
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    scene = make_scene(make_example().geometry)
-    write_result(scene, make_example().site, make_example().deployment)
-    scene.seip.traffic.file = str(small_scene.parent / "small_traffic" / "run-1.npz")
-    with pytest.raises(RuntimeError, match="the file has not been saved: save it first"):
-        bpy.ops.seip.write_dataset()
-
-
-def test_a_second_scan_of_the_same_scene_needs_no_preparation(placed):
-    bpy.ops.seip.scan_frame()
-    first = session.scan_of(placed).simulation
-    placed.frame_set(300)
-    bpy.ops.seip.scan_frame()
-    assert session.scan_of(placed).simulation is first
-    empty = next(obj for obj in bpy.data.collections["SEIP Sensors"].objects if obj.type == "EMPTY")
-    empty.location.z += 1.0
-    bpy.ops.seip.scan_frame()
-    assert session.scan_of(placed).simulation is not first
-
-
-def test_floating_car_data_are_put_on_the_road(placed, tmp_path):
-    car = '<vehicle id="a" x="{}" y="{}" angle="90" type="car" speed="5"/>'
-    lines = [
-        f'<timestep time="{time}">{car.format(ORIGIN[0] + 5 * time - 20, ORIGIN[1] - 2.0)}</timestep>'
-        for time in range(6)
-    ]
-    fcd = tmp_path / "run.fcd.xml"
-    fcd.write_text(f"<fcd-export>{''.join(lines)}</fcd-export>", encoding="utf-8")
-    placed.seip.traffic.file = str(fcd)
-    assert bpy.ops.seip.load_traffic() == {"FINISHED"}
-    assert placed.seip.traffic.loaded.startswith("1 road user, 0 to 5 s\n1 car")
-    bpy.ops.seip.scan_frame()
-    assert session.scan_of(placed).run.trajectories.source == "run.fcd.xml"

@@ -169,16 +169,6 @@ def test_stopped_work_leaves_nothing(placed, tmp_path, reports):
     assert placed.session_uid not in session.verifications
 
 
-def test_work_in_a_thread_is_stopped_within_seconds(placed, tmp_path):
-    work = Background(SEIP_OT_verify.prepare(_Stub(), placed))
-    time.sleep(0.3)
-    work.stop()
-    assert work.join(20.0)
-    with pytest.raises(CancelledError):
-        work.result()
-    assert not (tmp_path / "out").exists()
-
-
 class _Stub:
     """Stands in for an operator that Blender would make."""
 
@@ -230,25 +220,6 @@ def test_each_mistake_has_its_sentence(placed, tmp_path, wrong, words):
         bpy.ops.seip.verify()
     assert not (tmp_path / "out").exists()
     assert placed.session_uid not in session.verifications
-
-
-def test_an_empty_field_needs_no_sentence_and_there_are_no_buttons(placed):
-    placed.seip.verification.recording = ""
-    layout = drawn()
-    assert not layout.labels
-    assert [name for name, _ in layout.operators] == ["seip.verify"]
-
-
-def test_a_picture_that_is_gone_is_named(verified, tmp_path):
-    (tmp_path / "out" / "verification" / "changes.png").unlink()
-    with pytest.raises(RuntimeError, match=r"changes\.png is no longer there"):
-        bpy.ops.seip.show_changes()
-
-
-def test_another_file_knows_nothing_of_it(verified, small_scene):
-    bpy.ops.wm.open_mainfile(filepath=str(small_scene))
-    assert not session.verifications
-    assert not bpy.ops.seip.correct_scene.poll()
 
 
 def test_a_saved_file_keeps_what_was_found(verified, tmp_path):

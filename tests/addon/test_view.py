@@ -31,14 +31,6 @@ def handler_count():
     return len(overlays._handles)  # noqa: SLF001  # nobody else asks
 
 
-def test_nothing_can_be_shown_before_a_placement(junction):
-    with pytest.raises(RuntimeError, match="There is no coverage to show: place sensors first"):
-        bpy.ops.seip.colour_coverage()
-    with pytest.raises(RuntimeError, match="There is no placement yet: place sensors first"):
-        bpy.ops.seip.show_sight_lines()
-    assert handler_count() == 0
-
-
 @pytest.mark.parametrize("aspect", ["seen", "times", "weights"])
 def test_coverage_is_coloured_with_a_legend(placed, aspect):
     assert bpy.ops.seip.colour_coverage(aspect=aspect) == {"FINISHED"}
@@ -48,20 +40,6 @@ def test_coverage_is_coloured_with_a_legend(placed, aspect):
     assert sum(shares) == pytest.approx(100.0, abs=0.3)
     assert words[len(shares) :] == ["weighted region", "no sensor allowed"]
     assert handler_count() == 2
-
-
-def test_one_of_the_buttons_of_colours_is_always_pressed(placed):
-    def pressed():
-        layout = MagicMock()
-        context = SimpleNamespace(scene=placed, space_data=SimpleNamespace(shading=SimpleNamespace(type="MATERIAL")))
-        view_section._draw_coverage(layout, context)  # noqa: SLF001  # the part with the buttons
-        calls = layout.column().row().operator.call_args_list
-        return [call.kwargs["text"] for call in calls if call.kwargs.get("depress") and call.kwargs["text"]]
-
-    assert pressed() == ["Sensors"]
-    for aspect, words in (("seen", "Seen"), ("weights", "Weights"), ("times", "Sensors")):
-        bpy.ops.seip.colour_coverage(aspect=aspect)
-        assert pressed() == [words]
 
 
 def test_sight_lines_are_the_row_of_the_grid(placed):
@@ -84,14 +62,6 @@ def test_sight_lines_are_the_row_of_the_grid(placed):
         f"{len(missed.positions) // 6:,} in view, but between beams or too faint",
     ]
     assert overlay.about == sensor.label
-
-
-def test_a_sensor_that_was_moved_has_no_sight_lines(placed):
-    obj = next(obj for obj in bpy.data.collections["SEIP Sensors"].objects if obj.get("seip_label") == "S1")
-    obj.location.x += 0.5
-    bpy.context.view_layer.update()
-    with pytest.raises(RuntimeError, match="S1 is not at a candidate pose"):
-        bpy.ops.seip.show_sight_lines(sensor="S1")
 
 
 def test_undo_takes_colours_and_legend_back(placed):
@@ -136,30 +106,6 @@ def test_a_picture_has_the_view_and_the_plan(placed, tmp_path, monkeypatch):
         assert sheet.width > sheet.height
 
 
-def test_a_picture_of_a_viewport_needs_one(placed, tmp_path):
-    placed.seip.view.picture = str(tmp_path / "report.png")
-    with pytest.raises(RuntimeError, match="there is no viewport here to take a picture of"):
-        bpy.ops.seip.save_picture()
-
-
-def test_another_scene_shows_nothing_of_this_one(placed):
-    bpy.ops.seip.colour_coverage(aspect="times")
-    other = bpy.data.scenes.new("other")
-    assert overlays.overlays_of(other) == []
-    assert len(overlays.overlays_of(placed)) == 1
-
-
-def test_a_view_that_hides_the_colours_is_set_in_one_click(placed):
-    screen = bpy.context.window_manager.windows[0].screen
-    area = next(area for area in screen.areas if area.type == "VIEW_3D")
-    space = area.spaces.active
-    space.shading.type, space.shading.color_type = "SOLID", "OBJECT"
-    assert not shows_coverage(space)
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=area):
-        bpy.ops.seip.show_coverage_colours()
-    assert shows_coverage(space)
-
-
 def test_a_placement_shows_its_coverage_with_legend_and_labels_and_so_does_the_file_when_it_is_opened(placed, tmp_path):
     blocks, labels = overlays.legend_blocks(placed), overlays.labels_of(placed)
     assert [block.title for block in blocks] == ["Road surface"]
@@ -174,24 +120,6 @@ def test_a_placement_shows_its_coverage_with_legend_and_labels_and_so_does_the_f
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
     assert handler_count() == 0
-
-
-def test_the_legend_names_the_areas_that_are_shown(placed):
-    regions = bpy.data.collections["SEIP Weighted Regions"].objects
-    for obj in regions:
-        obj.hide_set(True)
-    assert [entry.words for entry in legend_of_coverage(placed).entries][3:] == ["no sensor allowed"]
-    for obj in bpy.data.collections["SEIP Forbidden Areas"].objects:
-        obj.hide_set(True)
-    assert len(legend_of_coverage(placed).entries) == 3
-
-
-def test_the_aspect_that_was_chosen_is_shown_after_placing_again(placed):
-    bpy.ops.seip.colour_coverage(aspect="weights")
-    placed.seip.goal.count = 1
-    bpy.ops.seip.solve_placement()
-    assert coverage_of(placed)[ASPECT] == "weights"
-    assert legend_of_coverage(placed).title == "Weight"
 
 
 def test_labels_are_of_sensors_that_are_shown_where_they_are(placed):
