@@ -2,12 +2,6 @@
 
 import ast
 from pathlib import Path
-from types import SimpleNamespace
-
-import pytest
-
-from seip_addon.panels import placement
-from tests.builders.drawn_layout import DrawnLayout
 
 ADD_ON = Path(__file__).resolve().parents[2] / "seip_addon"
 
@@ -30,5 +24,3 @@ def nameless_rows(source):
 def test_no_panel_expands_a_property_without_its_names():
     faults = {path.name: nameless_rows(path.read_text(encoding="utf-8")) for path in ADD_ON.rglob("*.py")}
     assert {name: lines for name, lines in faults.items() if lines} == {}
-
-

@@ -12,8 +12,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from seip_addon import loose_pieces, scene_status
-from seip_addon.core.sensing.traffic.trajectories import Trajectories
-from seip_addon.panels import detection, export, front_door, placement, results, site, view
+from seip_addon.panels import detection, export, front_door, placement, results, view
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import placed_sensors
@@ -23,7 +22,6 @@ from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import make_example
-from tests.few import few
 from tests.sumo_here import needs_sumo
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
@@ -193,5 +191,3 @@ def test_all_sections_open_without_and_with_a_placement(junction, monkeypatch):
     drawn = {name for name, _ in panel.layout.operators}
     assert {"seip.check_site", "seip.choose_sensors", "seip.solve_placement"} <= drawn
     assert {"seip.write_report", "seip.save_picture", "seip.show_comparison"} <= drawn
-
-

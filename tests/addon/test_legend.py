@@ -1,16 +1,11 @@
 """Legend, labels and the status of a section in the room that they have."""
 
-from types import SimpleNamespace
-
-import bpy
 import numpy as np
 import pytest
 
 from seip_addon.overlay import Block, Entry
-from seip_addon.panels import sections
-from seip_addon.viewport.free_frame import navigation_boxes
 from seip_addon.viewport.labels import label_boxes
-from seip_addon.viewport.legend import LEAST_SCALE, MARGIN, placed_legend
+from seip_addon.viewport.legend import LEAST_SCALE, placed_legend
 
 FRAME = (120.0, 0.0, 460.0, 520.0)
 BLACK = (0.0, 0.0, 0.0, 1.0)
@@ -61,5 +56,3 @@ def test_labels_are_in_the_frame_off_the_legend_and_off_each_other(add_on):
         for other in every[:number]:
             beside = one[2] <= other[0] or other[2] <= one[0]
             assert beside or one[3] <= other[1] or other[3] <= one[1]
-
-

@@ -13,11 +13,7 @@ import pytest
 from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
 from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
 from seip_addon.operators.placement import SEIP_OT_solve_placement
-from seip_addon.panels import placement as placement_panel
 from seip_addon.session import session
-from tests.builders.drawn_layout import DrawnLayout
-from tests.builders.scene_by_hand import make_scene
-from tests.builders.small_junction import make_example
 from tests.builders.small_scene import make_run
 
 OPTIONS = [
@@ -120,5 +116,3 @@ def test_runs_that_are_of_no_use_are_refused_before_any_ray_is_cast(coarse, tmp_
         bpy.ops.seip.solve_placement()
     assert not coarse.seip.result.record
     assert not (tmp_path / "cache").exists()
-
-

@@ -1,6 +1,5 @@
 """From a click to placed sensors: operators do what the batch command does, and what they find outlives the file."""
 
-import csv
 import json
 import math
 from collections.abc import Generator
@@ -13,14 +12,10 @@ import bpy
 import pytest
 
 from seip_addon import scene_status
-from seip_addon import session as session_data
-from seip_addon.core.choosing.placement.returns_summary import ReturnsPoint, ReturnsSummary
 from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.visibility.grid import VisibilityGrid
 from seip_addon.core.sensing.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
-from seip_addon.core.storage.json_dataclass import as_json
-from seip_addon.operators import results
 from seip_addon.panels import export as export_panel
 from seip_addon.panels import placement as placement_panel
 from seip_addon.scene.contract import WRITTEN
@@ -302,5 +297,3 @@ def test_panel_and_batch_place_alike_over_pose_errors(junction, tmp_path, risk, 
     batch = load_placement(tmp_path / "placement.json")
     assert comparable(panel) == comparable(replace(batch, settings={**batch.settings, "render": False}))
     assert any("in nineteen of twenty" in note for note in panel.notes)
-
-

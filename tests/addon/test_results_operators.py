@@ -4,13 +4,12 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon import live_coverage, preferences
-from seip_addon.core.errors import SeipError
+from seip_addon import live_coverage
 from seip_addon.core.output.results.comparison import unpacked_counts
 from seip_addon.core.output.results.placement_file import parsed_record
 from seip_addon.panels import results as results_panel
 from seip_addon.scene.sensors import placed_sensors
-from seip_addon.session import scene_of, session
+from seip_addon.session import session
 from seip_addon.viewport.coverage import legend_of_coverage
 from tests.builders.drawn_layout import DrawnLayout
 
@@ -139,5 +138,3 @@ def test_tilted_sensors_are_where_the_placement_put_them_until_a_hand_turns_them
     assert session.following.coverage != coverage
     with pytest.raises(RuntimeError, match="S1 is not at a candidate pose"):
         bpy.ops.seip.show_sight_lines(sensor="S1")
-
-

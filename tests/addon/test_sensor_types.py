@@ -1,23 +1,12 @@
 """The list of sensor types, catalogues of one's own, presets, the beams in the viewport, and the cache."""
 
-import argparse
-
-from headless.options import read_settings
-from headless.survey import add_options
-
 import bpy
-import numpy as np
 import pytest
 
 from seip_addon import preferences
-from seip_addon.core.errors import SeipError
-from seip_addon.core.geometry.orientation import orientation
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.visibility.ray_casting import MAX_THREADS
-from seip_addon.core.sensing.visibility.ring_resolution import unresolved_from
 from seip_addon.core.site.candidates import DEFAULT_TYPE, CandidateSettings
 from seip_addon.panels import sensor_table, sensors
-from seip_addon.session import session
 from seip_addon.viewport import beam_preview
 from tests.builders.drawn_layout import DrawnLayout
 

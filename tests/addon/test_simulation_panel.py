@@ -4,16 +4,13 @@ import re
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
-from unittest.mock import patch
 
 from headless import build_scene, traffic
 
 import bpy
 import pytest
 
-from seip_addon import preferences
-from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
-from seip_addon.operators.simulation import NO_MAP, SEIP_OT_simulate_traffic
+from seip_addon.operators.simulation import SEIP_OT_simulate_traffic
 from seip_addon.panels import simulation as simulation_panel
 from seip_addon.session import session
 from tests.builders.drawn_layout import DrawnLayout
@@ -127,5 +124,3 @@ def test_stopped_simulation_leaves_nothing(site, tmp_path):
     work.close()
     assert not (tmp_path / "seip-traffic").exists()
     assert "SEIP Traffic" not in bpy.data.collections
-
-

@@ -8,7 +8,6 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon import scene_status
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 
@@ -156,5 +155,3 @@ def test_the_check_lists_and_shows(scene):
     pole.hide_set(True)
     with pytest.raises(RuntimeError, match="is hidden"):
         bpy.ops.seip.show_problem(number=number)
-
-

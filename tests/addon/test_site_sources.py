@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.results.placement_file import parsed_record
 from seip_addon.core.site.installed_cost import load_installed_cost
 from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.opendrive.read import read_map
-from seip_addon.panels import placement, site
+from seip_addon.panels import placement
 from seip_addon.scene import contract
 from tests.builders.dem_files import origin_at, write_dem
 from tests.builders.drawn_layout import DrawnLayout
@@ -117,5 +116,3 @@ def test_installed_costs_are_in_the_survey(junction, tmp_path):
         survey.settings()
     with pytest.raises(RuntimeError, match="cannot read the installed costs"):
         bpy.ops.seip.solve_placement()
-
-

@@ -9,8 +9,7 @@ import pytest
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.site_places import site_places
 from seip_addon.session import session
-from seip_addon.viewport.free_frame import uncovered
-from seip_addon.viewport.street_map import DOT_SPACING, STEP, StreetMap, wrapped
+from seip_addon.viewport.street_map import DOT_SPACING, STEP, StreetMap
 from tests.builders.osm_text import Extract, crossing
 
 FRAME = (60.0, 0.0, 860.0, 600.0)

@@ -1,7 +1,6 @@
 """Where SUMO is missing, panel, dialog and preferences say so and install it."""
 
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
@@ -12,7 +11,6 @@ from seip_addon.core import sumo_programs
 from seip_addon.core.errors import SeipError
 from seip_addon.core.sumo_installation import SUMO_VERSION, sumo_size
 from seip_addon.panels import front_door, site, sumo
-from seip_addon.panels import preferences as preferences_panel
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing
 from tests.builders.sumo_wheel import write_programs, write_wheel
@@ -117,5 +115,3 @@ def test_a_sumo_that_does_not_start_can_be_replaced(scene, machine, tmp_path):
     status = drawn(sumo.draw_status)
     assert "libGL.so.1 is missing" in status.text
     assert ("seip.install_sumo", BUTTON) in status.operators
-
-

@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 
 from seip_addon.core.sensing.scans.frame import Frame
-from seip_addon.scene.write import write_result
 from seip_addon.session import session
 from seip_addon.viewport import overlays
 from seip_addon.viewport.point_cloud import NAME as CLOUD
-from tests.builders.scene_by_hand import make_scene
-from tests.builders.small_junction import ORIGIN, make_example
 
 
 @pytest.fixture
@@ -126,5 +123,3 @@ def test_each_mistake_has_its_sentence(placed, tmp_path, wrong, words):
     with pytest.raises(RuntimeError, match=words):
         bpy.ops.seip.write_dataset()
     assert not (tmp_path / "run").exists()
-
-

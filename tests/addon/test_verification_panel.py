@@ -3,15 +3,12 @@
 import json
 import re
 import shutil
-import time
-from concurrent.futures import CancelledError
 from dataclasses import replace
 
 import bpy
 import numpy as np
 import pytest
 
-from seip_addon.background import Background
 from seip_addon.core.output.results.verification_record import load_verification
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.site.scene_geometry import Mesh

@@ -1,8 +1,5 @@
 """What the viewport shows: colours of the coverage, sight lines, and overlays that are always removed."""
 
-from types import SimpleNamespace
-from unittest.mock import MagicMock
-
 import bpy
 import numpy as np
 import pytest
@@ -12,12 +9,10 @@ import seip_addon
 from seip_addon.core.output.pictures.plan_view import DPI, MAP_WIDTH, MARGIN
 from seip_addon.core.output.pictures.sheet import GAP
 from seip_addon.operators import view
-from seip_addon.panels import view as view_section
 from seip_addon.scene.sensors import placed_sensors
-from seip_addon.scene.write import ASPECT, coverage_of
 from seip_addon.session import session
 from seip_addon.viewport import overlays, picture
-from seip_addon.viewport.coverage import legend_of_coverage, shows_coverage
+from seip_addon.viewport.coverage import legend_of_coverage
 from seip_addon.viewport.sight_lines import NAME as SIGHT
 
 

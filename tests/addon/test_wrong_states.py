@@ -8,7 +8,7 @@ from unittest.mock import MagicMock
 import bpy
 import pytest
 
-from seip_addon import live_coverage, preferences, registration, scene_status, scene_survey
+from seip_addon import preferences, registration, scene_survey
 from seip_addon.background import Background
 from seip_addon.core.acceptance import Acceptance
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
@@ -18,9 +18,6 @@ from seip_addon.core.progress import Progress, finish
 from seip_addon.operators import base, results
 from seip_addon.panels import missing_package
 from seip_addon.panels import placement as placement_panel
-from seip_addon.panels import results as results_panel
-from seip_addon.scene import contract
-from seip_addon.scene.sensors import placed_sensors
 from seip_addon.session import RunningWork, session
 from tests.builders.drawn_layout import DrawnLayout
 

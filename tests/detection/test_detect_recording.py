@@ -3,7 +3,6 @@
 import csv
 import json
 import math
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -187,14 +186,6 @@ def test_an_interrupted_run_goes_on_and_gives_the_same_bytes(folder, results, tm
     assert ours == theirs
 
 
-def test_other_inputs_are_detected_anew(folder, results, tmp_path, monkeypatch):
-    detected, run = [], detect_recording.detect
-    monkeypatch.setattr(detect_recording, "detect", lambda *given: detected.append(given) or run(*given))
-    shutil.copytree(results, tmp_path / "out")
-    detect.main(arguments(folder, tmp_path / "out", "--radius", "40"))
-    assert len(detected) == SWEEPS
-
-
 def changed(folder, tmp_path, change):
     """Return a recording with some change."""
     other = tmp_path / "other"
@@ -249,14 +240,6 @@ def test_wrong_recordings_are_refused_before_anything_is_written(folder, tmp_pat
     assert not [path for path in (tmp_path / "out").glob("**/*") if path.is_file() and not path.name.startswith(".")]
 
 
-def test_labels_of_other_frames_are_refused(folder, tmp_path):
-    (tmp_path / "labels").mkdir()
-    for number in range(3):
-        (tmp_path / "labels" / f"{number}.txt").write_text("")
-    with pytest.raises(SeipError, match=r"has 3 files of labels, but the recording has 8 frames: give one for each"):
-        detect.main(arguments(folder, tmp_path / "out", "--labels", str(tmp_path / "labels")))
-
-
 @pytest.mark.parametrize("text", ["", "0 0 1 1 1 2 0 Pedestrian\n", "500 0 1 4 2 2 0 Car\n"])
 def test_labels_without_a_vehicle_in_the_region_are_refused_before_anything_is_written(folder, tmp_path, text):
     (tmp_path / "labels").mkdir()
@@ -265,11 +248,6 @@ def test_labels_without_a_vehicle_in_the_region_are_refused_before_anything_is_w
     with pytest.raises(SeipError, match=r"has a car or van or truck or bus in the region"):
         detect.main(arguments(folder, tmp_path / "out", "--labels", str(tmp_path / "labels")))
     assert not [path for path in (tmp_path / "out").glob("**/*") if path.is_file() and not path.name.startswith(".")]
-
-
-def test_a_scene_needs_traffic(tmp_path):
-    with pytest.raises(SeipError, match=r"name the runs of traffic .* or a recording in place of the scene"):
-        detect.main([str(tmp_path / "scene.blend"), "-o", str(tmp_path / "out")])
 
 
 def test_a_mistake_ends_with_one_sentence_and_status_1(folder, tmp_path):

@@ -80,21 +80,6 @@ def test_tensors_larger_than_the_file_are_refused(stored):
         Detector.load(stored)
 
 
-def test_a_file_of_another_version_is_refused(stored):
-    state = torch.load(stored, weights_only=True) | {"version": 2}
-    torch.save(state, stored)
-    with pytest.raises(SeipError, match="not a detector of this version of the program: train it again"):
-        Detector.load(stored)
-
-
-def test_other_weights_than_were_written_are_noticed(stored):
-    state = torch.load(stored, weights_only=True)
-    next(iter(state["weights"].values())).flatten()[0] += 1.0
-    torch.save(state, stored)
-    with pytest.raises(SeipError, match="digest does not match"):
-        Detector.load(stored)
-
-
 def test_a_flipped_bit_is_a_sentence_or_nothing_lost(stored):
     whole, before = stored.read_bytes(), Detector.load(stored)
     random = np.random.default_rng(3)

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 from headless.detection.detection_area import DetectionArea
 from headless.detection.detector import Detector, TrainingRecord
-from headless.detection.frames import Recording, training_record_of
 from headless.detection.pillars import filling, grid_over
 from headless.detection.settings import NetworkSettings
 from headless.detection.suitability import MAX_OVERFULL_SHARE, suitability_warnings
@@ -64,20 +63,6 @@ def test_over_full_pillars_are_counted():
     assert sentence.startswith("75% of the pillars with points have more than the 2 that are kept, and 56% of all")
 
 
-def test_what_is_not_known_is_not_held_against_it():
-    assert suitability_warnings(detector(TrainingRecord()), ["type9"], AREA, cloud_frame(NOTHING)) == ()
-
-
 def test_the_file_keeps_what_it_was_trained_on(tmp_path):
     detector().save(tmp_path / "detector.pt")
     assert Detector.load(tmp_path / "detector.pt").training_record == KNOWN
-
-
-def test_experience_is_that_of_all_recordings():
-    recordings = [
-        Recording("a", "run 1", [], ("type2", "type1"), "Junction"),
-        Recording("b", "run 1", [], ("type2",), "Junction"),
-        Recording("c", "run 2", [], (), ""),
-    ]
-    assert training_record_of(recordings) == KNOWN
-    assert training_record_of(recordings[2:]) == TrainingRecord()

@@ -77,21 +77,6 @@ def test_a_detector_its_curve_and_its_figures_are_written(folder, capsys):
     assert "vehicles of one run within 1 m of one of another at the same instant: " in said
 
 
-def test_clouds_of_other_sensor_types_are_warned_of(folder, capsys):
-    train.main(arguments(folder, "at-home"))
-    trained = Detector.load(folder / "at-home" / "detector.pt").training_record
-    assert "warning" not in capsys.readouterr().out
-    shutil.copytree(folder / "third", folder / "foreign")
-    manifest = folder / "foreign" / "manifest.json"
-    record = json.loads(manifest.read_text(encoding="utf-8"))
-    for sensor in record["sensors"]:
-        sensor["sensor"] = "another"
-    manifest.write_text(json.dumps(record), encoding="utf-8")
-    train.main(arguments(folder, "away", test="foreign"))
-    said = capsys.readouterr().out
-    assert f"foreign: the detector was trained on clouds of {' and '.join(trained.sensors)}, not of another:" in said
-
-
 def test_a_finished_training_is_not_done_again(folder):
     train.main(arguments(folder, "again"))
     before = (folder / "again" / "detector.pt").stat().st_mtime_ns
@@ -99,12 +84,6 @@ def test_a_finished_training_is_not_done_again(folder):
     assert (folder / "again" / "detector.pt").stat().st_mtime_ns == before
     with pytest.raises(SeipError, match="other settings"):
         train.main(arguments(folder, "again", more=("--seed", "7")))
-
-
-def test_the_same_traffic_in_two_splits_is_refused(folder):
-    with pytest.raises(SeipError, match=r"first \(train\) and .*first \(test\) show the same run of traffic"):
-        train.main(arguments(folder, "leak", test="first"))
-    assert not (folder / "leak").exists()
 
 
 def test_the_same_traffic_under_another_name_is_refused(folder):

@@ -99,27 +99,6 @@ def test_a_second_correction_changes_nothing(scene):
     assert len([obj for obj in bpy.data.objects if obj.name.startswith("Found")]) == 1
 
 
-def test_a_name_that_is_taken_gets_a_number_and_the_box_still_replaces_its_own(scene):
-    other = bpy.data.objects.new("Found 1", None)
-    scene.collection.objects.link(other)
-    found = verified(scene, new=[("Found 1", BOX)])
-    correct_scene(scene, found)
-    correct_scene(scene, found)
-    assert set(solids(scene)) == {"Wall", "Found 1.001"}
-    assert other.name == "Found 1"
-
-
-def test_an_object_of_several_collections_is_removed_from_all_of_the_scene(scene):
-    kiosk = cube("Kiosk", (0, 20, 0.5))
-    mine = bpy.data.collections.new("Mine")
-    scene.collection.children.link(mine)
-    mine.objects.link(kiosk)
-    contract.find_or_make(scene, contract.POLES).objects.link(kiosk)
-    assert not correct_scene(scene, verified(scene, gone={"Kiosk"}))
-    assert "Kiosk" not in bpy.data.objects
-    assert set(solids(scene)) == {"Wall"}
-
-
 def test_another_scene_keeps_its_object(scene):
     kiosk = cube("Kiosk", (0, 20, 0.5))
     other = bpy.data.scenes.new("Other")
@@ -127,13 +106,6 @@ def test_another_scene_keeps_its_object(scene):
     correct_scene(scene, verified(scene, gone={"Kiosk"}))
     assert "Kiosk" not in scene.objects
     assert "Kiosk" in other.objects
-
-
-def test_a_gone_pole_is_removed(scene):
-    cube("Post", (0, 20, 2.0), 0.3, contract.POLES)
-    assert len(read_scene(scene).geometry.poles) == 1
-    correct_scene(scene, verified(scene, gone={"Post"}))
-    assert not read_scene(scene).geometry.poles
 
 
 def test_children_stay_where_they_are_and_pieces_go(scene):
@@ -198,21 +170,6 @@ def test_a_part_of_an_instance_stays_with_a_sentence(scene):
     assert solids(scene) == before
 
 
-def test_a_part_of_a_curve_stays_with_a_sentence(scene):
-    curve = bpy.data.curves.new("Fence", "CURVE")
-    curve.dimensions, curve.bevel_depth = "3D", 0.2
-    for x in (0.0, 5.0):
-        spline = curve.splines.new("POLY")
-        spline.points.add(1)
-        spline.points[0].co, spline.points[1].co = (x, 20, 0, 1), (x, 22, 0, 1)
-    fence = bpy.data.objects.new("Fence", curve)
-    contract.find_or_make(scene, contract.OCCLUDERS).objects.link(fence)
-    before = solids(scene)
-    (sentence,) = correct_scene(scene, verified(scene, gone={"Fence"}, keep=lambda middle: middle[:, 0] > 2))
-    assert "convert it to a mesh" in sentence
-    assert solids(scene) == before
-
-
 @pytest.fixture
 def with_library(scene, tmp_path):
     """The scene with a collection of occluders from another file, which holds two cubes in one object."""
@@ -237,27 +194,6 @@ def test_an_object_of_a_linked_collection_stays_with_a_sentence(scene, with_libr
         assert "'House' has changed, but is linked from" in sentence
         assert "city.blend" in sentence
         assert solids(scene) == before
-
-
-def test_a_linked_object_is_unlinked_from_a_collection_of_the_file(scene, with_library):
-    house = with_library.objects[0]
-    contract.find_or_make(scene, contract.OCCLUDERS).objects.link(house)
-    (sentence,) = correct_scene(scene, verified(scene, gone={"House"}, keep=lambda middle: middle[:, 1] < 22))
-    assert "is linked from" in sentence
-    assert not correct_scene(scene, verified(scene, gone={"House"}))
-    assert set(solids(scene)) == {"Wall"}
-
-
-def test_a_street_in_the_same_instance_stays_with_a_sentence(scene):
-    instance = _instance(scene, cube("Inner", (0, 0, 0), collection=""))
-    roads = bpy.data.collections.new("SEIP Roads.001")
-    roads.objects.link(cube("Lane", (9, 0, 0), collection=""))
-    instance.instance_collection.children.link(roads)
-    before = solids(scene)
-    name = next(name for name in before if name.startswith("Instance"))
-    (sentence,) = correct_scene(scene, verified(scene, gone={name}))
-    assert "Make Instances Real" in sentence
-    assert solids(scene) == before
 
 
 @pytest.mark.parametrize("mode", ["XYZ", "ZYX", "QUATERNION"])

@@ -41,18 +41,6 @@ def empties(scene):
     return [obj for obj in contract.find(scene, contract.SENSORS).objects if obj.type == "EMPTY"]
 
 
-def test_sensors_are_read_as_they_were_written(scene, example):
-    sensors = read_sensors(scene, CATALOGUE)
-    assert [sensor.label for sensor in sensors] == [sensor.label for sensor in example.deployment.sensors]
-    for read, written in zip(sensors, example.deployment.sensors, strict=True):
-        assert read.model is CATALOGUE[written.model.key]
-        np.testing.assert_allclose(read.xyz, written.xyz, atol=1e-5)
-        forward = (math.cos(written.yaw), math.sin(written.yaw), 0.0)
-        np.testing.assert_allclose(
-            read.orientation, np.column_stack([forward, (-forward[1], forward[0], 0), (0, 0, 1)]), atol=1e-6
-        )
-
-
 @pytest.fixture
 def tilted(example):
     """A deployment that looks about itself, nose down by different angles."""
@@ -139,20 +127,6 @@ def test_a_copy_and_one_without_a_label_get_the_first_that_is_free(scene):
     extra["seip_label"] = "S10"
     contract.find(scene, contract.SENSORS).objects.link(extra)
     assert [sensor.label for sensor in read_sensors(scene, CATALOGUE)] == ["S1", "S2", "S3", "S4", "S5", "S10"]
-
-
-def test_a_hidden_sensor_is_none(scene):
-    empties(scene)[0].hide_set(True)
-    assert len(read_sensors(scene, CATALOGUE)) == 2
-    for obj in empties(scene):
-        obj.hide_set(True)
-    with pytest.raises(SeipError, match="3 hidden ones"):
-        read_sensors(scene, CATALOGUE)
-
-
-def test_a_scene_without_sensors_has_its_sentence(example):
-    with pytest.raises(SeipError, match=r"no sensors in the collection 'SEIP Sensors': place some"):
-        read_sensors(make_scene(example.geometry), CATALOGUE)
 
 
 @pytest.mark.parametrize("key", [None, 5, "type9"])

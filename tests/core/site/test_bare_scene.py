@@ -43,19 +43,3 @@ def test_a_bare_map_says_so_once_when_it_is_built(tmp_path):
     tree = Trees(np.array([[-20.0, 9.0]]), 8.0, 5.0)
     assert finish(site_model(read_map(path), here)).warnings == (NO_OBSTACLES_MESSAGE,)
     assert finish(site_model(read_map(path), replace(here, trees=(tree,)))).warnings == ()
-
-
-@pytest.mark.parametrize(("x", "bare"), [(5, False), (60, True)])
-def test_a_house_that_stands_beyond_sensors_and_targets_hides_nothing(x, bare):
-    """It is within range of every sensor, and no line of sight leads past it."""
-    house = Mesh("house", block((x, 8, 0), (x + 8, 9, 9)))
-    assert lay_out(street(occluders=(house,)), SETTINGS).warnings.count(NO_OBSTACLES_MESSAGE) == bare
-
-
-@pytest.mark.parametrize(("x", "bare"), [(-20.0, 0), (90.0, 1)])
-def test_a_tree_beyond_the_place_hides_nothing_when_a_map_is_built(tmp_path, x, bare):
-    path = tmp_path / "street.xodr"
-    path.write_text(street_map(), encoding="utf-8")
-    trees = (Trees(np.array([[x, 9.0]]), 8.0, 5.0),)
-    place = SiteDescription(near=(0.0, 0.0), radius=30.0, trees=trees)
-    assert finish(site_model(read_map(path), place)).warnings.count(NO_OBSTACLES_MESSAGE) == bare

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.site.locations import direction, locations
+from seip_addon.core.site.locations import locations
 from seip_addon.core.site.scene_geometry import Mesh, NamedArea, SceneGeometry
 
 
@@ -49,18 +49,3 @@ def scene(places=PLACES):
 )
 def test_street_side_and_distances_are_those_of_a_plan_drawn_by_hand(foot, words):
     assert locations(scene(), np.array([foot])) == [words]
-
-
-def test_without_named_streets_there_are_sides_and_distances():
-    assert locations(scene(()), np.array([(30.0, 5.2)])) == ["north kerb of the road, 1.2 m behind the kerb"]
-
-
-def test_there_are_as_many_locations_as_feet():
-    feet = np.random.default_rng(0).uniform(-40, 90, (20, 2))
-    assert locations(scene(), feet) == [locations(scene(), foot[None])[0] for foot in feet]
-    assert locations(scene(), np.empty((0, 2))) == []
-
-
-@pytest.mark.parametrize(("vector", "name"), [((1, 0), "east"), ((0, 1), "north"), ((-1, -1), "south-west")])
-def test_directions(vector, name):
-    assert direction(np.array(vector, dtype=float)) == name

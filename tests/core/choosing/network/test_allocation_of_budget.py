@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.choosing.network import frontier as frontiers
 from seip_addon.core.choosing.network import network_search
 from seip_addon.core.choosing.network.allocation import allocate, allocation_of, relaxed_allocation
 from seip_addon.core.choosing.network.frontier import Frontier, Options, SolvedBudget, possible_amounts
@@ -117,23 +116,6 @@ def test_a_search_that_ends_early_has_a_bound_that_holds(seed):
 
 
 @pytest.mark.usefixtures("rounds")
-def test_no_site_is_solved_twice_for_the_same_money_and_effort():
-    rng = np.random.default_rng(5)
-    sites = [EnumeratedSite(rng) for _ in range(4)]
-    asked = []
-    plain = solver(sites, 0.05)
-
-    def solve(requests):
-        asked.extend(requests)
-        return (yield from plain(requests))
-
-    known = [site.frontier(60_000.0) for site in sites]
-    finish(search_allocations(known, np.ones(4), [Goal(40_000.0, 0.0), Goal(30_000.0, 0.0)], solve))
-    assert len(asked) == len(set(asked))
-    assert max(one.budget for one in asked) <= 40_000.0
-
-
-@pytest.mark.usefixtures("rounds")
 def test_searches_of_a_goal_are_no_longer_than_its_limit_and_its_bound_holds():
     rng = np.random.default_rng(7)
     sites = [EnumeratedSite(rng) for _ in range(3)]
@@ -207,20 +189,6 @@ def test_allocation_equals_enumeration_and_no_relaxed_one_is_worse(tables, budge
     lower = allocation_of(options, np.ones(len(options)), [parts[0] for parts in relaxed.taken])
     assert lower.price <= budget * (1 + 1e-6)
     assert lower.value <= max(within) * (1 + 1e-9)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_amounts_contain_the_price_of_every_placement(seed, monkeypatch):
-    rng = np.random.default_rng(seed)
-    monkeypatch.setattr(frontiers, "MOST_AMOUNTS", int(rng.integers(2, 30)))
-    site = EnumeratedSite(rng)
-    amounts, ends = possible_amounts(site.prices, site.positions, MOST, 60_000.0)
-    assert amounts[0] == ends[0] == 0.0
-    assert len(amounts) <= frontiers.MOST_AMOUNTS
-    assert (amounts[1:] > ends[:-1]).all()
-    for price, _, _ in site.placements():
-        if price <= 60_000.0:
-            assert any(low - 1e-6 <= price <= high + 1e-6 for low, high in zip(amounts, ends, strict=True))
 
 
 @pytest.mark.parametrize("seed", range(4))
