@@ -75,15 +75,10 @@ def test_all_main_operators_are_in_a_menu_that_the_search_goes_by(scene):
 
 
 @needs_sumo
-@pytest.mark.parametrize("by", ["junction", "position"])
-def test_a_site_of_an_extract_is_built_with_its_map(scene, extract, by):
+def test_a_site_of_an_extract_is_built_with_its_map(scene, extract):
     bpy.ops.seip.choose_map(filepath=str(extract))
     site = scene.seip.site
-    site.radius = 40.0
-    if by == "junction":
-        site.junction = site.junctions[0].name
-    else:
-        site.position = "52.5, 13.4"
+    site.radius, site.position = 40.0, "52.5, 13.4"
     assert bpy.ops.seip.build_site() == {"FINISHED"}
     assert read_scene(scene).geometry.region.area > 400
     assert len(contract.find(scene, contract.OCCLUDERS).objects) >= 4
@@ -92,7 +87,7 @@ def test_a_site_of_an_extract_is_built_with_its_map(scene, extract, by):
     assert "<OpenDRIVE" in text.as_string()
 
 
-def test_the_start_up_cube_is_no_part_of_a_site_and_the_view_shows_it_all(fresh):
+def test_the_example_is_the_shipped_junction_without_the_start_up_cube_and_the_view_shows_it_all(fresh):
     assert bpy.ops.seip.load_example() == {"FINISHED"}
     assert bpy.context.scene == fresh
     assert not {"Cube", "Light", "Camera"} & set(fresh.objects.keys())
@@ -105,11 +100,7 @@ def test_the_start_up_cube_is_no_part_of_a_site_and_the_view_shows_it_all(fresh)
         assert np.hypot(*(np.array(space.region_3d.view_location[:2]) - middle)) < 60
         assert 50 < space.region_3d.view_distance < 1000
     assert scene_status.next_step(fresh) == "seip.check_site"
-
-
-def test_the_example_is_the_shipped_junction(scene):
-    bpy.ops.seip.load_example()
-    built = read_scene(scene).geometry
+    built = read_scene(fresh).geometry
     bpy.ops.wm.open_mainfile(filepath=str(SCENES / "junction.blend"))
     shipped = read_scene(bpy.context.scene).geometry
     assert built.region.area == pytest.approx(shipped.region.area)
@@ -165,14 +156,14 @@ def test_the_post_of_a_deleted_sensor_goes_with_it(scene, copied):
     assert {obj.name for obj in scene.objects} == before
 
 
-@pytest.mark.parametrize("part", [results, export, view, detection])
-def test_a_section_has_one_sentence_where_there_is_nothing_yet(scene, part, monkeypatch):
-    said = []
-    monkeypatch.setattr(part, "draw_sentence", lambda _, text, **__: said.append(text))
-    layout = DrawnLayout()
-    part.draw(layout, bpy.context)
-    assert len(said) == 1
-    assert not layout.operators
+def test_a_section_has_one_sentence_where_there_is_nothing_yet(scene, monkeypatch):
+    for part in (results, export, view, detection):
+        said = []
+        monkeypatch.setattr(part, "draw_sentence", lambda _, text, said=said, **__: said.append(text))
+        layout = DrawnLayout()
+        part.draw(layout, bpy.context)
+        assert len(said) == 1
+        assert not layout.operators
 
 
 def test_all_sections_open_without_and_with_a_placement(junction, monkeypatch):

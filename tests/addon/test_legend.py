@@ -17,18 +17,11 @@ def blocks(add_on):
     return [Block("Coverage of the road by sensors", tuple(Entry(one, (BLACK,)) for one in words))]
 
 
-def test_a_legend_without_room_shrinks_until_it_fits(blocks):
-    (left, bottom, right, top), scale = placed_legend(blocks, FRAME, 2.0)
-    assert LEAST_SCALE < scale < 2.0
-    assert FRAME[0] <= left < right < FRAME[2]
-    assert FRAME[1] < bottom < top < FRAME[3]
-
-
 def boxes_apart(one, other):
     return one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
 
 
-@pytest.mark.parametrize("size", [(2000.0, 1400.0), (2000.0, 520.0), (900.0, 520.0), (2000.0, 300.0), (460.0, 300.0)])
+@pytest.mark.parametrize("size", [(2000.0, 1400.0), (2000.0, 520.0), (460.0, 300.0)])
 def test_a_legend_keeps_off_the_gizmos_of_navigation(blocks, size):
     frame = (0.0, 0.0, *size)
     gizmos = [(size[0] - 208.0, size[1] - 208.0, *size), (size[0] - 92.0, size[1] - 468.0, *size)]

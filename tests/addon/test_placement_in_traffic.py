@@ -100,8 +100,6 @@ def damaged(folder):
     ("wrong", "words"),
     [
         (shutil.rmtree, r"there is no run of traffic \(\.npz\) in .*runs: choose another folder, or make two or more"),
-        (lambda folder: None, "there is no run of traffic"),
-        (lambda folder: make_run(1, 30.0).save(folder / "run.npz"), "two runs of traffic or more are needed, not 1"),
         (other_place, "traffic of another place"),
         (copies, r"run-1\.npz and .*run-2\.npz are nearly the same traffic"),
         (damaged, r"run-2\.npz is damaged.*file of trajectories.*import or simulate them again"),

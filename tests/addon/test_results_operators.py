@@ -73,15 +73,6 @@ def drawn_comparison(scene: bpy.types.Scene) -> DrawnLayout:
     return layout
 
 
-def test_kept_placements_have_names_and_can_be_forgotten(placed):
-    bpy.ops.seip.keep_placement()
-    bpy.ops.seip.keep_placement()
-    bpy.ops.seip.keep_placement(name="Placement 1")
-    assert [one.name for one in placed.seip.kept] == ["Placement 1", "Placement 2"]
-    bpy.ops.seip.drop_placement()
-    assert [one.name for one in placed.seip.kept] == ["Placement 2"]
-
-
 def test_moved_sensors_are_followed(placed):
     before = shown(placed)
     coverage = parsed_record(placed.seip.result.record).coverage.whole
@@ -119,22 +110,3 @@ def test_following_stops_where_the_scene_has_changed(placed):
     bpy.context.view_layer.update()
     live_coverage.update()
     assert "the scene has changed" in session.following.problem
-
-
-def test_tilted_sensors_are_where_the_placement_put_them_until_a_hand_turns_them(placed):
-    placed.seip.survey.tilts = "12"
-    bpy.ops.seip.solve_placement()
-    known = session.state_of(placed)
-    assert {sensor.tilt for sensor in known.solution.deployment.sensors} == {np.radians(12)}
-    bpy.ops.seip.show_sight_lines(sensor="S1")
-
-    bpy.ops.seip.follow_sensors()
-    assert session.following.moved == ()
-    coverage = session.following.coverage
-    first = placed_sensors(placed)["S1"]
-    first.rotation_euler.y = 0.0
-    live_coverage.update()
-    assert session.following.moved == ("S1",)
-    assert session.following.coverage != coverage
-    with pytest.raises(RuntimeError, match="S1 is not at a candidate pose"):
-        bpy.ops.seip.show_sight_lines(sensor="S1")

@@ -10,7 +10,6 @@ import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.site.installed_cost import load_installed_cost
-from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.core.world.opendrive.read import read_map
 from seip_addon.panels import placement
 from seip_addon.scene import contract
@@ -79,15 +78,6 @@ def test_the_panel_builds_what_the_batch_command_builds_of_the_same_files(scene,
     )
     bpy.ops.wm.open_mainfile(filepath=str(files / "site.blend"))
     assert shapes(bpy.context.scene) == by_panel
-
-
-def test_the_fields_are_those_of_the_request(scene, street):
-    chosen = choose(scene, street)
-    chosen.terrain, chosen.terrain_epsg = "/survey.laz", 25832
-    request = chosen.request()
-    assert request.terrain == TerrainRequest(street.joinpath("/survey.laz"), 25832)
-    chosen.terrain = ""
-    assert (chosen.request().terrain, chosen.request().osm) == (None, None)
 
 
 def test_a_mistake_leaves_the_scene_as_it_was(scene, street, files):

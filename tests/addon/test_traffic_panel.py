@@ -105,21 +105,19 @@ def test_animated_objects_are_scanned_as_the_file_is(placed):
     assert np.allclose(np.sort(animated.labels.centre[:, 0]), np.sort(from_file.labels.centre[:, 0]), atol=0.01)
 
 
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        (lambda scene: setattr(scene.seip.traffic, "file", "/nowhere/run.npz"), "there is no .*run.npz"),
-        (lambda scene: setattr(scene.seip.traffic, "file", ""), "There is nothing to scan: name a traffic file"),
-        (
-            lambda scene: bpy.data.batch_remove(bpy.data.collections["SEIP Sensors"].objects),
-            "There is no sensor to scan with",
-        ),
-        (lambda scene: setattr(scene.seip.traffic, "folder", ""), "name a folder"),
-    ],
-)
-def test_each_mistake_has_its_sentence(placed, tmp_path, wrong, words):
-    placed.seip.traffic.folder = str(tmp_path / "run")
-    wrong(placed)
-    with pytest.raises(RuntimeError, match=words):
+def test_each_mistake_has_its_sentence(placed, tmp_path):
+    traffic = placed.seip.traffic
+    run, folder = traffic.file, str(tmp_path / "run")
+    for file, output, words in (
+        ("/nowhere/run.npz", folder, "there is no .*run.npz"),
+        ("", folder, "There is nothing to scan"),
+        (run, "", "name a folder"),
+    ):
+        traffic.file, traffic.folder = file, output
+        with pytest.raises(RuntimeError, match=words):
+            bpy.ops.seip.write_dataset()
+    traffic.folder = folder
+    bpy.data.batch_remove(bpy.data.collections["SEIP Sensors"].objects)
+    with pytest.raises(RuntimeError, match="There is no sensor to scan with"):
         bpy.ops.seip.write_dataset()
     assert not (tmp_path / "run").exists()

@@ -26,15 +26,15 @@ def handler_count():
     return len(overlays._handles)  # noqa: SLF001  # nobody else asks
 
 
-@pytest.mark.parametrize("aspect", ["seen", "times", "weights"])
-def test_coverage_is_coloured_with_a_legend(placed, aspect):
-    assert bpy.ops.seip.colour_coverage(aspect=aspect) == {"FINISHED"}
-    block = legend_of_coverage(placed)
-    words = [entry.words for entry in block.entries]
-    shares = [float(one.split()[-1].rstrip("%")) for one in words if one.endswith("%")]
-    assert sum(shares) == pytest.approx(100.0, abs=0.3)
-    assert words[len(shares) :] == ["weighted region", "no sensor allowed"]
-    assert handler_count() == 2
+def test_coverage_is_coloured_with_a_legend(placed):
+    for aspect in ("seen", "times", "weights"):
+        assert bpy.ops.seip.colour_coverage(aspect=aspect) == {"FINISHED"}
+        block = legend_of_coverage(placed)
+        words = [entry.words for entry in block.entries]
+        shares = [float(one.split()[-1].rstrip("%")) for one in words if one.endswith("%")]
+        assert sum(shares) == pytest.approx(100.0, abs=0.3)
+        assert words[len(shares) :] == ["weighted region", "no sensor allowed"]
+        assert handler_count() == 2
 
 
 def test_sight_lines_are_the_row_of_the_grid(placed):

@@ -5,7 +5,6 @@ import math
 from headless.detection import centre_head
 from headless.detection.centre_head import CentreHead, TrainingTargets
 from headless.detection.pillars import PillarGrid
-from headless.detection.rotated_boxes import in_plan, paired_iou
 from headless.detection.settings import CLASSES
 
 import numpy as np
@@ -15,7 +14,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 GRID = PillarGrid(west=-8.0, south=-6.4, bottom=-1.0, top=4.0, columns=40, rows=32, pillar=0.4)
-CAR = 0
 SIZES = ((4.5, 1.8, 1.6), (8.0, 2.5, 3.3), (1.9, 0.7, 1.7), (0.6, 0.6, 1.75))  # of each class, metres
 
 
@@ -68,8 +66,7 @@ def test_a_centre_head_that_knows_the_boxes_says_them(seed):
     assert found.score[0] > 0.99
 
 
-@pytest.mark.parametrize("places", [6, pytest.param(40, marks=pytest.mark.slow)])
-def test_gradients_of_the_losses_are_their_slopes(places):
+def test_gradients_of_the_losses_are_their_slopes():
     torch.manual_seed(2)
     head = CentreHead(3, 4).double().eval()
     wanted = TrainingTargets(
@@ -83,30 +80,11 @@ def test_gradients_of_the_losses_are_their_slopes(places):
     torch.stack(parts(output)).sum().backward()
     step = 1e-6
     random = np.random.default_rng(4)
-    steepest = output.grad.abs().flatten().topk(places).indices.tolist()
-    for index in [*steepest, *random.integers(0, output.numel(), places).tolist()]:
+    steepest = output.grad.abs().flatten().topk(6).indices.tolist()
+    for index in [*steepest, *random.integers(0, output.numel(), 6).tolist()]:
         moved = output.detach().clone()
         moved.view(-1)[index] += step
         higher = float(torch.stack(parts(moved)).sum())
         moved.view(-1)[index] -= 2 * step
         lower = float(torch.stack(parts(moved)).sum())
         assert output.grad.view(-1)[index] == pytest.approx((higher - lower) / (2 * step), abs=1e-5, rel=1e-4)
-
-
-def test_the_predicted_overlap_is_taught_the_true_one():
-    wanted = targets((CAR, 0.1, 0.3, 0.8, 4.5, 1.8, 1.6, 0.4))
-    shifted = wanted.boxes.clone()
-    shifted[:, 0] += 0.5
-    true = float(paired_iou(in_plan(shifted), in_plan(wanted.boxes)))
-    middle = torch.zeros(1, 3)
-    told = torch.zeros(1, centre_head.BOX_CHANNELS)
-    told[0, :3] = shifted[0, :3]
-    told[0, 3:6] = torch.log(shifted[0, 3:6] / torch.tensor(centre_head.TYPICAL_SIZE))
-    told[0, 6], told[0, 7] = math.sin(0.8), math.cos(0.8)
-    told[0, 8], told[0, 9] = math.cos(0.4), math.sin(0.4)
-    losses = []
-    for guess in (0.3, true, 0.95):
-        told[0, 10] = math.log(guess / (1 - guess))
-        losses.append(float(centre_head.box_losses(told, wanted.boxes, middle, torch.ones(1))["overlap"]))
-    assert losses[1] < losses[0]
-    assert losses[1] < losses[2]

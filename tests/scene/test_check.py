@@ -82,12 +82,11 @@ def test_all_faults_are_listed_where_reading_stops_at_the_first(scene):
         read_scene(scene)
 
 
-@pytest.mark.parametrize("name", ["seip_origin", "seip_header_offset", "seip_places"])
-def test_a_broken_property_of_the_scene(scene, name):
-    scene[name] = "here"
+def test_a_broken_property_of_the_scene(scene):
+    scene["seip_origin"] = "here"
     severity, _, text = only(scene)
     assert severity == "ERROR"
-    assert name in text
+    assert "seip_origin" in text
 
 
 def test_hidden_objects_do_not_count(scene):

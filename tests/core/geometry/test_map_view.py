@@ -22,7 +22,7 @@ def test_all_points_are_in_the_frame_of_the_fitted_view_and_nearly_fill_it(point
     assert (pixels.min(axis=0) + pixels.max(axis=0)) / 2 == pytest.approx(((left + right) / 2, (bottom + top) / 2))
 
 
-@pytest.mark.parametrize("factor", [0.7, 1.25, 1e9, 1e-9])
+@pytest.mark.parametrize("factor", [1.25, 1e9, 1e-9])
 def test_the_place_under_the_mouse_stays_there_as_the_view_is_zoomed(points, factor):
     view, mouse = MapView.fitted(points, FRAME), (321.0, 456.0)
     zoomed = view.zoomed(factor, mouse)

@@ -84,10 +84,3 @@ def test_a_post_is_blocked_by_what_comes_too_near_in_plan_at_its_height(seed, cl
     meets = (low < (foot[:, 2] + height)[:, None] + clearance) & (high > foot[:, 2:] + 0.3)
     halves = (Mesh("a", triangles[:30]), Mesh("b", triangles[30:]))
     assert post_blocked(foot, height, clearance, halves).tolist() == (near & meets).any(axis=1).tolist()
-
-
-def test_winding_number_tells_inside_whatever_the_normals():
-    points = np.array([(0.0, 0.0, 0.0), (1.5, 0.5, 0.5), (0.3, 0.1, 0.2)])
-    ball = TETRAHEDRON[FACES]
-    np.testing.assert_allclose(np.abs(winding_number(points, ball)), [1, 0, 1], atol=1e-12)
-    np.testing.assert_allclose(np.abs(winding_number(points, ball[:, ::-1])), [1, 0, 1], atol=1e-12)

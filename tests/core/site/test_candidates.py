@@ -17,15 +17,6 @@ from seip_addon.core.site.site import make_site
 from tests.builders.plain_street import PLAIN, block, street
 
 
-def test_poses_are_positions_by_heights_by_types():
-    candidates = generate_candidates(street(), replace(PLAIN, sensors=("type1", "type3")))
-    positions = len(candidates.position)
-    assert len(candidates) == positions * 2 * 2
-    assert np.bincount(candidates.position_of).tolist() == [4] * positions
-    assert candidates.sensor[:4].tolist() == ["type1", "type3"] * 2
-    assert candidates.height[:4].tolist() == [3.5, 3.5, 8.0, 8.0]
-
-
 def test_candidates_and_targets_that_do_not_fit_in_memory_are_refused_before_any_is_tested():
     heights = tuple(np.linspace(3.0, 23.0, 2001).tolist())
     with pytest.raises(SeipError, match=r"positions × 2,001 heights .* too many") as refused:
@@ -61,13 +52,6 @@ def test_a_pole_carries_its_sensor_on_a_bracket_towards_the_region():
     assert candidates.position_name.tolist() == ["signal"]
     assert candidates.on_pole.all()
     np.testing.assert_allclose(candidates.xyz, [(0, 8.6, 3.6), (0, 8.6, 8.1)])
-
-
-def test_a_pole_serves_its_surroundings():
-    pole = Pole("signal", np.array((0.0, 9.0, 0.1)))
-    candidates = generate_candidates(street(poles=(pole,)), PLAIN)
-    posts = candidates.position[~candidates.on_pole]
-    assert np.hypot(posts[:, 0], posts[:, 1] - 9.0).min() >= 2.0 - 1e-6
 
 
 def test_no_sensor_hangs_above_its_pole():
@@ -144,28 +128,15 @@ def test_names_and_order_of_poles_change_no_place(order):
         ({"candidate_areas": shapely.Polygon()}, {}, "no candidate"),
         ({"occluders": (Mesh("hall", block((-90, -90, -1), (90, 90, 30))),)}, {}, r"no candidate is left \(\d+ inside"),
         ({}, {"heights": (-1.0,)}, "mounting height must be a positive"),
-        ({}, {"heights": ()}, "no mounting height"),
-        ({}, {"sensors": ()}, "no sensor type"),
-        ({}, {"spacing": 0.0}, "candidate spacing must be"),
-        ({}, {"clearance": -1.0}, "clearance must be"),
         (
             {"poles": (Pole("stub", np.array((0.0, 9.0, 0.1)), 2.0, mandatory=True),)},
             {},
             "'stub' must carry.*lower heights",
         ),
-        ({"mandatory_areas": (NamedArea("moon", shapely.box(900, 900, 901, 901)),)}, {}, "'moon' must carry a sensor"),
         (
             {"poles": (Pole("p", np.array((0.0, 9.0, 0.1)), forbidden=True, mandatory=True),)},
             {},
             "'p' is both forbidden and mandatory",
-        ),
-        (
-            {
-                "poles": (Pole("p", np.array((0.0, 9.0, 0.1)), mandatory=True),),
-                "forbidden_areas": (NamedArea("park", shapely.box(-5, 5, 5, 15)),),
-            },
-            {},
-            "mandatory pole 'p' stands in a forbidden area",
         ),
     ],
 )

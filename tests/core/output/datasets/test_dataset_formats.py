@@ -72,7 +72,7 @@ def test_kitti_labels_turn_back_into_the_boxes(seed):
         assert words[4:8] == ["0", "0", "100", "100"]
 
 
-@pytest.mark.parametrize(("visibility", "occluded"), [(1.0, "0"), (0.8, "0"), (0.79, "1"), (0.4, "1"), (0.39, "2")])
+@pytest.mark.parametrize(("visibility", "occluded"), [(0.8, "0"), (0.79, "1"), (0.39, "2")])
 def test_kitti_occlusion_follows_visibility(visibility, occluded):
     frame = make_frame(1, users=1)
     labels = replace(frame.labels, visibility=np.array([visibility]))
