@@ -12,7 +12,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from seip_addon import loose_pieces, scene_status
-from seip_addon.panels import detection, export, front_door, placement, results, view
+from seip_addon.panels import detection, export, front_door, results, view
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import placed_sensors
@@ -117,18 +117,6 @@ def test_the_next_step_leads_to_placed_sensors(junction):
     junction.seip.survey.types["type1"].use = True
     bpy.ops.seip.solve_placement()
     assert scene_status.next_step(junction) == ""
-
-
-def test_the_button_states_number_and_time(junction):
-    assert placement.button_text(junction) == "Place 2 Sensors"
-    bpy.ops.seip.compute_visibility()
-    assert scene_status.search_seconds(junction) == junction.seip.survey.effort
-    assert placement.button_text(junction).startswith("Place 2 Sensors, up to ")
-    junction.seip.goal.limit = "BUDGET"
-    junction.seip.goal.budget = 40_000.0
-    assert placement.button_text(junction).startswith("Place for $40,000, up to ")
-    junction.seip.survey.heights = "5 8"
-    assert placement.button_text(junction) == "Place for $40,000"
 
 
 @pytest.mark.parametrize("copied", [False, True])

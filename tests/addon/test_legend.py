@@ -1,13 +1,10 @@
 """Legend, labels and the status of a section in the room that they have."""
 
-import numpy as np
 import pytest
 
 from seip_addon.overlay import Block, Entry
-from seip_addon.viewport.labels import label_boxes
 from seip_addon.viewport.legend import LEAST_SCALE, placed_legend
 
-FRAME = (120.0, 0.0, 460.0, 520.0)
 BLACK = (0.0, 0.0, 0.0, 1.0)
 
 
@@ -34,18 +31,3 @@ def test_a_legend_keeps_off_the_gizmos_of_navigation(blocks, size):
         assert scale == without == 2.0
     if size[1] == 1400.0:
         assert box == free
-
-
-def test_labels_are_in_the_frame_off_the_legend_and_off_each_other(add_on):
-    generator = np.random.default_rng(4)
-    anchors = generator.uniform((120.0, 0.0), (460.0, 400.0), (12, 2))
-    widths = generator.uniform(80.0, 140.0, 12)
-    legend = (250.0, 20.0, 440.0, 200.0)
-    boxes = label_boxes(anchors, widths, FRAME, [legend], 1.0)
-    assert np.all((boxes[:, 0] >= FRAME[0]) & (boxes[:, 2] <= FRAME[2]))
-    assert np.all(boxes[:, 1] > anchors[:, 1])
-    every = [*boxes.tolist(), list(legend)]
-    for number, one in enumerate(every):
-        for other in every[:number]:
-            beside = one[2] <= other[0] or other[2] <= one[0]
-            assert beside or one[3] <= other[1] or other[3] <= one[1]

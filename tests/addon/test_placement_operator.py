@@ -172,18 +172,6 @@ def test_undo_brings_the_earlier_placement_back_and_redo_the_new(junction):
     assert labels(bpy.context.scene) == ["S1", "S2", "S3"]
 
 
-def test_each_scene_keeps_its_own(junction):
-    bpy.ops.seip.solve_placement()
-    bpy.ops.scene.new(type="FULL_COPY")
-    other = bpy.context.scene
-    other.seip.goal.count = 1
-    assert other != junction
-    bpy.ops.seip.solve_placement()
-    assert len(json.loads(other.seip.result.record)["sensors"]) == 1
-    assert len(json.loads(junction.seip.result.record)["sensors"]) == 2
-    assert labels(junction) == ["S1", "S2"]
-
-
 def test_rules_come_from_what_is_selected_and_hold(junction):
     bpy.ops.seip.solve_placement()
     first = placed_sensors(junction)["S1"]

@@ -6,8 +6,7 @@ import pytest
 from seip_addon import preferences
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.site.candidates import DEFAULT_TYPE, CandidateSettings
-from seip_addon.panels import sensor_table, sensors
-from seip_addon.viewport import beam_preview
+from seip_addon.panels import sensors
 from tests.builders.drawn_layout import DrawnLayout
 
 OWN = """
@@ -108,28 +107,6 @@ def _made(path):
     return str(path)
 
 
-def test_beams_are_shown_until_hidden_or_another_file_is_opened(survey):
-    assert bpy.ops.seip.preview_beams() == {"FINISHED"}
-    assert beam_preview.is_shown()
-    bpy.ops.seip.preview_beams()
-    assert not beam_preview.is_shown()
-    bpy.ops.seip.preview_beams()
-    bpy.ops.wm.read_homefile(use_empty=True)
-    assert not beam_preview.is_shown()
-    bpy.ops.seip.preview_beams()  # and the fixture sees that it goes with the add-on
-
-
-@pytest.mark.parametrize(("wanted", "number"), [("ouster os1-128", 2), ("HESAI", 7), ("nothing of that name", 0)])
-def test_the_table_is_filtered_by_what_is_typed(survey, wanted, number):
-    survey.filter = wanted
-    layout = DrawnLayout()
-    sensor_table.draw_table(layout, survey)
-    titles = [options["text"] for name, options in layout.properties if name == "use"]
-    assert len(titles) == number
-    assert all(wanted.casefold() in title.casefold() for title in titles)
-    assert ("No product has this in its name." in layout.text) == (number == 0)
-
-
 def test_a_sensor_is_dropped_and_shown(survey):
     survey.types["vlp16"].use = True
     assert bpy.ops.seip.drop_sensor_type(key=DEFAULT_TYPE) == {"FINISHED"}
@@ -157,13 +134,3 @@ def test_the_cache_is_emptied_of_grids_alone(survey):
     (folder / "mine.txt").write_text("mine", encoding="utf-8")
     assert bpy.ops.seip.empty_cache() == {"FINISHED"}
     assert [entry.name for entry in folder.iterdir()] == ["mine.txt"]
-
-
-def test_heights_and_tilts_are_checked_as_they_are_typed(survey):
-    assert (survey.wrong_heights(), survey.wrong_tilts()) == ("", "")
-    survey.heights, survey.tilts = "8 high", "95"
-    assert "'high' is neither a height" in survey.wrong_heights()
-    assert "less than 90°" in survey.wrong_tilts()
-    survey.heights, survey.tilts = "", "0:10:5"
-    assert "no mounting height is given" in survey.wrong_heights()
-    assert survey.wrong_tilts() == ""

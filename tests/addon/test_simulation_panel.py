@@ -106,16 +106,6 @@ def test_a_map_of_another_place_is_refused_and_nothing_is_written(site, tmp_path
     assert not site.seip.detection.runs
 
 
-def test_the_map_beside_the_file_is_known_by_its_relative_name(add_on, tmp_path):
-    shutil.copy(SCENES / "corridor.xodr", tmp_path)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "mine.blend"))
-    bpy.ops.seip.choose_map(filepath="//corridor.xodr")
-    bpy.ops.seip.build_site()
-    simulation = bpy.context.scene.seip.simulation
-    assert simulation.map == "//corridor.xodr"
-    assert simulation.street_map() == tmp_path / "corridor.xodr"
-
-
 @needs_sumo
 def test_stopped_simulation_leaves_nothing(site, tmp_path):
     work = SEIP_OT_simulate_traffic.prepare(SimpleNamespace(), site)

@@ -80,15 +80,6 @@ def test_the_panel_builds_what_the_batch_command_builds_of_the_same_files(scene,
     assert shapes(bpy.context.scene) == by_panel
 
 
-def test_a_mistake_leaves_the_scene_as_it_was(scene, street, files):
-    chosen = choose(scene, street)
-    chosen.terrain = str(files / "none.tif")
-    with pytest.raises(RuntimeError, match="no such file"):
-        bpy.ops.seip.build_site()
-    assert len(bpy.data.scenes) == 1
-    assert not scene.collection.all_objects
-
-
 def test_installed_costs_are_in_the_survey(junction, tmp_path):
     survey = junction.seip.survey
     assert survey.settings().installed_cost is None

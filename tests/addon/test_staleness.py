@@ -106,13 +106,6 @@ def test_what_does_not_matter_is_not_read_again(known):
     assert not read_again(known)
 
 
-def test_other_settings_lay_out_anew_from_the_same_reading(known):
-    bpy.context.scene.seip.survey.grid = 5.0
-    assert scene_status.stale_survey(bpy.context.scene) == "The settings have changed since it was computed."
-    assert not read_again(known)
-    assert session.state_of(bpy.context.scene).layout.site.targets.spacing == 5.0
-
-
 def reopened(tmp_path: Path) -> bpy.types.Scene:
     path = tmp_path / "saved.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))

@@ -9,7 +9,7 @@ import pytest
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.site_places import site_places
 from seip_addon.session import session
-from seip_addon.viewport.street_map import STEP, StreetMap
+from seip_addon.viewport.street_map import StreetMap
 from tests.builders.osm_text import Extract, crossing
 
 FRAME = (60.0, 0.0, 860.0, 600.0)
@@ -65,18 +65,6 @@ def test_a_drag_pans_and_picks_nothing(street_map, button):
     assert street_map.handle(event(button, "RELEASE"), (start[0] + 50, start[1] - 50)) == ""
     assert not street_map.is_dragged()
     assert street_map.view.to_pixels(street_map.plan.junctions) == pytest.approx(before + np.array((50, -50)))
-
-
-def test_the_wheel_zooms_about_the_mouse_and_home_shows_all_again(street_map):
-    fitted, mouse = street_map.view, (300.0, 200.0)
-    street_map.handle(event("WHEELUPMOUSE"), mouse)
-    assert street_map.view.scale == pytest.approx(STEP * fitted.scale)
-    assert street_map.view.to_metres(mouse) == pytest.approx(fitted.to_metres(mouse))
-    street_map.handle(event("WHEELDOWNMOUSE"), mouse)
-    assert street_map.view.scale == pytest.approx(fitted.scale)
-    street_map.handle(event("WHEELUPMOUSE"), mouse)
-    street_map.handle(event("HOME"), mouse)
-    assert street_map.view == fitted
 
 
 def test_another_file_forgets_the_choice_and_the_same_one_keeps_it(add_on, tmp_path):

@@ -103,13 +103,6 @@ def test_offline_one_sentence_says_how_to_allow_it_or_name_a_folder(chosen, onli
         bpy.ops.seip.install_sumo()
 
 
-def test_the_folder_in_the_preferences_comes_first(machine, tmp_path, monkeypatch):
-    write_programs(tmp_path / "mine", version="1.22.0")
-    monkeypatch.setattr(preferences, "own", lambda: SimpleNamespace(sumo=str(tmp_path / "mine")))
-    assert preferences.sumo_folders() == (tmp_path / "mine", tmp_path / "own" / SUMO_VERSION)
-    assert preferences.sumo_status() == (f"SUMO 1.22.0 in {tmp_path / 'mine' / 'bin'}", True)
-
-
 def test_a_sumo_that_does_not_start_can_be_replaced(scene, machine, tmp_path):
     write_programs(tmp_path / "own" / SUMO_VERSION, script="echo 'libGL.so.1 is missing' >&2; exit 127")
     status = drawn(sumo.draw_status)

@@ -8,8 +8,6 @@ import pytest
 
 from seip_addon.core.sensing.scans.frame import Frame
 from seip_addon.session import session
-from seip_addon.viewport import overlays
-from seip_addon.viewport.point_cloud import NAME as CLOUD
 
 
 @pytest.fixture
@@ -74,22 +72,6 @@ def test_a_scan_at_a_time_of_the_run_is_the_runs_frame(placed, tmp_path):
     recorded, shown = Frame.load(tmp_path / "run" / "frames" / "000001.npz"), session.scan_of(placed).frame
     assert shown.points.tobytes() == recorded.points.tobytes()
     assert shown.labels.points.tolist() == recorded.labels.points.tolist()
-
-
-def test_the_cloud_is_drawn_in_the_colours_asked_for(placed):
-    bpy.ops.seip.scan_frame()
-    frame = session.scan_of(placed).frame
-    seen = []
-    for by in ("sensor", "intensity", "instance"):
-        placed.seip.view.cloud_colour = by
-        (layer,) = overlays.find(placed, CLOUD).layers
-        assert layer.colours.shape == (len(frame), 4)
-        assert layer.colours.dtype == np.float32
-        seen.append(layer.colours)
-    assert not np.array_equal(seen[0], seen[1])
-    assert len(np.unique(seen[0], axis=0)) == 2
-    bpy.ops.seip.hide_scan()
-    assert overlays.find(placed, CLOUD) is None
 
 
 def test_animated_objects_are_scanned_as_the_file_is(placed):

@@ -8,13 +8,13 @@ from unittest.mock import MagicMock
 import bpy
 import pytest
 
-from seip_addon import preferences, registration, scene_survey
+from seip_addon import preferences, registration
 from seip_addon.background import Background
 from seip_addon.core.acceptance import Acceptance
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.output.results.answer import sentence
 from seip_addon.core.output.results.placement_file import parsed_record
-from seip_addon.core.progress import Progress, finish
+from seip_addon.core.progress import Progress
 from seip_addon.operators import base, results
 from seip_addon.panels import missing_package
 from seip_addon.panels import placement as placement_panel
@@ -129,17 +129,6 @@ def test_a_broken_package_is_named_in_the_sidebar(monkeypatch):
     assert missing_package.MISSING == "shapely.lib"
     registration.unregister()
     assert not hasattr(bpy.types, "SEIP_PT_incomplete")
-
-
-def test_work_asks_blender_for_nothing_once_it_is_under_way(junction, monkeypatch):
-    def asked():
-        pytest.fail("the preferences were asked from the work")
-
-    seeing = scene_survey.with_visibility(finish(scene_survey.survey(junction)))
-    for name in ("cache_folder", "cores", "own"):
-        monkeypatch.setattr(preferences, name, asked)
-    _, survey = finish(seeing)
-    assert survey.grid.visible.any()
 
 
 def test_the_best_so_far_can_be_used_while_a_search_runs_and_only_then(placed, monkeypatch):

@@ -5,8 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tests.builders.labelled_frames import box, detected, frame, traffic, truth
 
@@ -140,34 +138,6 @@ def test_agrees_with_the_lyft_kit(iou):
 
 
 # Properties -------------------------------------------------------------------------------------------------------
-
-
-seeds = st.integers(0, 2**31)
-
-
-def small(seed):
-    return traffic(seed, frames=4, cars=6)
-
-
-@settings(deadline=None)
-@given(seeds, seeds)
-def test_the_order_does_not_matter(seed, shuffle):
-    frames, rng = small(seed), np.random.default_rng(shuffle)
-    frames = [replace(told, detected=replace(told.detected, score=np.round(told.detected.score, 1))) for told in frames]
-    mixed = [
-        replace(
-            frames[number],
-            truth=shuffled(frames[number].truth, rng),
-            detected=shuffled(frames[number].detected, rng),
-        )
-        for number in rng.permutation(len(frames))
-    ]
-    assert average_precision(mixed) == pytest.approx(average_precision(frames), abs=1e-12)
-
-
-def shuffled(table, rng):
-    order = rng.permutation(len(table))
-    return replace(table, **{name: value[order] for name, value in vars(table).items()})
 
 
 # Its interval -----------------------------------------------------------------------------------------------------

@@ -1,7 +1,5 @@
 """What goes into the charts, from what was measured."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import shapely
@@ -12,26 +10,12 @@ pytest.importorskip("torch", reason="the detector's torch is optional")
 
 from headless.detection.chart_data import error_view
 from headless.detection.matching import Rule
-from headless.studies.detection.claims import SeedResult
-from headless.studies.detection.results import cells
 
 RULE = Rule()
 TOLD = frame(
     truth([box(0), box(20), box(40)], distance=[5, 15, 25], inside=[True, True, False]),
     detected([box(0), box(20), box(90), box(-90)], [0.9, 0.3, 0.6, 0.7], inside=[True, True, True, False]),
 )
-
-
-def test_cells_gather_seeds():
-    one = SeedResult("type1", 2, 0, 0.6, 12_000, 0.5, 1.0, 0.5)
-    trials = [one, replace(one, seed=1, average_precision=0.7), replace(one, sensor="type2", average_precision=0.8)]
-    first, second = cells(trials)
-    assert (first.name, first.price, first.coverage, first.values) == ("2 × type1", 12_000, 0.5, (0.6, 0.7))
-    low, high = first.interval
-    assert (low, high) == pytest.approx((0.65 - 12.7062 * 0.05, 1.0), abs=1e-5)  # no average precision is above 1
-    assert second.values == (0.8,)
-    assert second.interval is None
-    assert cells([]) == ()
 
 
 def test_error_view_shows_what_reaches_the_score():

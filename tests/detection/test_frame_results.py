@@ -47,16 +47,6 @@ def result(points, boxes):
     return frame_result(frame, found, region=REGION, sensors=SENSORS, run="a")
 
 
-def test_road_users_are_those_of_the_frame():
-    told = result([], [])
-    assert (told.run, told.time) == ("a", 1.5)
-    assert told.truth.boxes.tolist() == [[3, 4, 6, 5, 2, 2.2, 0.5], [30, 8, 0, 12, 2.5, 3, -2]]
-    assert told.truth.points.tolist() == [7, 0]
-    assert told.truth.distance.tolist() == [5, 10]
-    assert told.truth.inside.tolist() == [True, False]
-    assert len(told.detected) == 0
-
-
 def test_detections_get_their_class_place_and_distance():
     told = result([[0, 0, 0]], [[3, 4, 6, 4, 2, 2, 0], [30, 8, 0, 4, 2, 2, 0]])
     assert told.detected.category.tolist() == ["car", "truck"]

@@ -3,7 +3,7 @@
 import math
 
 from headless.detection.network import PillarEncoder
-from headless.detection.pillars import PillarGrid, fill_pillars, grid_over, stacked
+from headless.detection.pillars import PillarGrid, fill_pillars, grid_over
 
 import numpy as np
 import pytest
@@ -105,32 +105,6 @@ def test_the_encoder_takes_the_maximum_of_each_pillar():
         scaled = (linear - normal.running_mean) / torch.sqrt(normal.running_var + normal.eps)
         expected = (scaled * normal.weight + normal.bias).clamp(min=0).max(dim=0).values
         torch.testing.assert_close(got[number], expected, atol=1e-5, rtol=1e-5)
-
-
-def test_a_cloud_looks_the_same_beside_a_fuller_one():
-    """There is no padding that could show: neither in the features nor in what training normalises over."""
-    few, many = fill_pillars(cloud(60, 8), GRID, 8), fill_pillars(cloud(2000, 9), GRID, 8)
-    both = stacked([few, many], GRID)
-    module = encoder()
-    together = encoded(module, both, 2 * len(GRID))
-    torch.testing.assert_close(together[: len(GRID)], encoded(module, few, len(GRID)), atol=0, rtol=0)
-    module.train()
-    encoded(module, both, 2 * len(GRID))
-    linear = torch.from_numpy(both.features) @ module.linear.weight.T
-    module.normalisation.reset_running_stats()
-    module.normalisation.momentum = 1.0
-    encoded(module, both, 2 * len(GRID))
-    torch.testing.assert_close(module.normalisation.running_mean, linear.mean(dim=0), atol=1e-5, rtol=1e-4)
-
-
-def test_grids_cover_the_region_and_fit_the_network():
-    grid = grid_over((-95.0, -95.0, 95.0, 94.887), (-1.0, 6.0), 0.4)
-    assert (grid.columns, grid.rows) == (480, 480)
-    assert max(grid.west, grid.south) <= -95
-    assert min(grid.east, grid.north) >= 95
-    exact = grid_over((0.0, 0.0, 12.8, 6.4), (0.0, 3.0), 0.4)
-    assert (exact.columns, exact.rows) == (32, 16)
-    assert grid.centre == pytest.approx((0.0, -0.0565))
 
 
 def test_what_no_grid_can_be_laid_over_is_refused():

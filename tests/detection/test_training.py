@@ -98,14 +98,6 @@ def test_another_training_is_not_continued(tmp_path, learning, aside):
         trained(learning[:1], aside, store=path)
 
 
-def test_training_leaves_torch_as_it_was(learning, aside):
-    before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled(), torch.random.get_rng_state()
-    for _ in train(learning, aside, SMALL, replace(BRIEF, steps=1)):
-        assert not torch.are_deterministic_algorithms_enabled()
-    assert (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()) == before[:2]
-    assert (torch.random.get_rng_state() == before[2]).all()
-
-
 def test_runs_of_traffic_are_in_one_split_alone(learning, aside):
     splits = {"training": learning, "validation": aside, "test": [recording("leak", "run 1", 7)]}
     recordings = {what: [each.recording for each in some] for what, some in splits.items()}

@@ -86,13 +86,6 @@ def test_objects_are_where_the_trajectories_are_at_every_frame(scene, fps, base)
     check_frames(scene, trajectories, objects, [*forth, *np.random.default_rng(0).permutation(forth).tolist()])
 
 
-def test_another_origin_is_moved_to_the_scenes(scene):
-    trajectories = traffic()
-    here = [np.array(obj.matrix_world) for obj in animate(scene, trajectories)]
-    moved = animate(scene, trajectories.moved_to(ORIGIN + np.array((100.0, -50.0, 3.0))))
-    assert np.allclose(here, [np.array(obj.matrix_world) for obj in moved], atol=1e-4)
-
-
 def test_objects_have_bodies_names_and_properties(scene):
     trajectories = traffic(users=7)
     objects = animate(scene, trajectories)
@@ -144,22 +137,6 @@ def animated_cube(scene, name="mine", size=(4.0, 2.0, 1.5), origin_up=0.75, **pr
         obj[key] = value
     contract.find_or_make(scene, contract.TRAFFIC).objects.link(obj)
     return obj
-
-
-def test_the_users_objects_are_left_alone(scene):
-    mine = animated_cube(scene, seip_category="van")
-    borrowed = animate(scene, traffic(users=1))[0].data
-    keeper = bpy.data.objects.new("keeps the mesh", borrowed)
-    scene.collection.objects.link(keeper)
-    scene.frame_set(7)
-    before = np.array(mine.matrix_world)
-    animate(scene, traffic(users=2))
-    clear_traffic(scene)
-    scene.frame_set(7)
-    assert keeper.data == borrowed
-    assert mine.name in contract.find(scene, contract.TRAFFIC).objects
-    assert mine.animation_data.action is not None
-    assert np.array_equal(np.array(mine.matrix_world), before)
 
 
 def test_what_is_read_is_what_was_written(scene):

@@ -4,7 +4,6 @@ import bpy
 import numpy as np
 import pytest
 import shapely
-from mathutils import Vector
 
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.geometry.solids import block
@@ -102,19 +101,6 @@ def test_the_scene_knows_where_it_is(model):
     assert [place.name for place in read_scene(scene).geometry.places] == ["Mill Lane"]
     assert bpy.data.objects["Middle"][contract.WEIGHT] == 3.0
     assert (scene.unit_settings.system, scene.unit_settings.scale_length) == ("METRIC", 1.0)
-
-
-def test_the_camera_sees_the_whole_region(model):
-    scene = built(model)
-    bpy.context.view_layer.update()
-    camera = scene.camera
-    to_camera = camera.matrix_world.inverted()
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    projection = camera.calc_matrix_camera(depsgraph, x=1600, y=900)
-    for x, y in shapely.get_coordinates(model.region):
-        seen = projection @ to_camera @ Vector((x, y, 0, 1))
-        assert abs(seen.x / seen.w) < 1
-        assert abs(seen.y / seen.w) < 1
 
 
 def test_windows_are_loose_once_their_building_is_gone_and_not_when_they_are_taken_off(model):

@@ -82,20 +82,6 @@ def test_all_faults_are_listed_where_reading_stops_at_the_first(scene):
         read_scene(scene)
 
 
-def test_a_broken_property_of_the_scene(scene):
-    scene["seip_origin"] = "here"
-    severity, _, text = only(scene)
-    assert severity == "ERROR"
-    assert "seip_origin" in text
-
-
-def test_hidden_objects_do_not_count(scene):
-    sheet(scene, "wall", contract.OCCLUDERS, 1, 1, (0, 20, 0)).hide_set(True)
-    severity, _, text = only(scene)
-    assert severity == "WARNING"
-    assert text.startswith("1 hidden object in 'SEIP Occluders'")
-
-
 def test_a_large_object_without_a_role(scene):
     house = cube(scene, "house", None, (0, 30, 5), 10)
     cube(scene, "far away", None, (0, 900, 5), 10)

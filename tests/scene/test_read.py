@@ -5,13 +5,9 @@ import hashlib
 import bpy
 import numpy as np
 import pytest
-import shapely
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.geometry.geo_reference import GeoReference
-from seip_addon.core.site.scene_geometry import NamedArea
 from seip_addon.scene import contract
-from seip_addon.scene.named_places import places_text
 from seip_addon.scene.read import read_scene
 
 
@@ -47,22 +43,6 @@ def occluders(scene):
     return {mesh.name: mesh.triangles for mesh in read_scene(scene).geometry.occluders}
 
 
-def test_the_scene_remembers_where_on_the_earth_it_is(scene):
-    assert read_scene(scene).geometry.geo_reference == GeoReference()
-    scene["seip_geo_reference"] = "EPSG:32632"
-    scene["seip_header_offset"] = [1.0, 2.0, 3.0, 0.5]
-    assert read_scene(scene).geometry.geo_reference == GeoReference("EPSG:32632", (1.0, 2.0, 3.0, 0.5))
-
-
-def test_named_places_come_back_as_they_were(scene):
-    assert read_scene(scene).geometry.places == ()
-    hole = shapely.box(0, 0, 9, 9).difference(shapely.box(3, 3, 6, 6))
-    scene["seip_places"] = places_text([NamedArea("Längs “Weg”", hole), NamedArea("b", shapely.box(0, 0, 1, 1))])
-    first, second = read_scene(scene).geometry.places
-    assert (first.name, second.name) == ("Längs “Weg”", "b")
-    assert first.polygon.equals(hole)
-
-
 def test_region_road_and_origin_arrive_in_metres(scene):
     scene["seip_origin"] = [5.4e6, 0.125, 3.0]
     geometry = read_scene(scene).geometry
@@ -79,14 +59,6 @@ def test_modifiers_count(scene):
     triangles = occluders(scene)["wall"]
     assert len(triangles) == 6
     assert triangles[..., 0].max() == pytest.approx(5)
-
-
-def test_parents_count(scene):
-    parent = put(scene, bpy.data.objects.new("parent", None), (), (100, 0, 0))
-    scene.collection.objects.link(parent)
-    wall = sheet(scene, "wall", (contract.OCCLUDERS,), 1, 1, (0, 20, 0))
-    wall.parent = parent
-    assert occluders(scene)["wall"][..., 0].mean() == pytest.approx(100, abs=1)
 
 
 def test_collection_instances_count_by_the_instancers_collection(scene):
@@ -143,14 +115,6 @@ def test_linked_collections_count(scene, tmp_path):
         target.collections = [contract.OCCLUDERS]
     scene.collection.children.link(target.collections[0])
     assert sorted(occluders(scene)) == ["linked wall", "own wall"]
-
-
-def test_an_object_in_two_collections_is_cast_against_once(scene):
-    sheet(scene, "pavement", (contract.GROUND, contract.CANDIDATE_AREAS, contract.OCCLUDERS), 60, 2, (0, 9, 0))
-    geometry = read_scene(scene).geometry
-    assert [mesh.name for mesh in geometry.ground] == ["pavement"]
-    assert geometry.occluders == ()
-    assert geometry.candidate_areas.area == pytest.approx(480)
 
 
 def test_poles_stand_at_their_origins_and_their_faces_occlude(scene):
@@ -219,13 +183,6 @@ def test_hidden_objects_do_not_count_and_are_reported(scene):
     assert reading.warnings == ("1 hidden object in 'SEIP Occluders' did not count: show them if they should",)
 
 
-def test_weights_come_from_the_property(scene):
-    sheet(scene, "centre", (contract.WEIGHTED_REGIONS,), 4, 4)["seip_weight"] = 3.5
-    sheet(scene, "plain", (contract.WEIGHTED_REGIONS,), 2, 2)
-    weights = {area.name: area.weight for area in read_scene(scene).geometry.weighted_regions}
-    assert weights == {"centre": 3.5, "plain": 2.0}
-
-
 def test_reading_changes_nothing(scene):
     sheet(scene, "wall", (contract.OCCLUDERS,), 1, 1, (0, 20, 0)).modifiers.new("row", "ARRAY")
 
@@ -281,21 +238,3 @@ def test_a_missing_library_is_named(scene, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
     with pytest.raises(SeipError, match=r"is linked from .*library\.blend, which is not there"):
         read_scene(bpy.context.scene)
-
-
-def test_an_object_may_name_the_rule_that_keeps_new_posts_off_it(scene):
-    for name, where in (
-        ("track", contract.GROUND),
-        ("landing", contract.FORBIDDEN_AREAS),
-        ("house", contract.OCCLUDERS),
-    ):
-        sheet(scene, name, (where,), 2, 3)["seip_keep_off"] = "cycle-tracks" if name == "track" else "landings"
-    sheet(scene, "church", (contract.FORBIDDEN_AREAS,), 1, 1)
-    pole = put(scene, bpy.data.objects.new("mains", None), (contract.POLES,))
-    pole["seip_keep_off"] = "power-poles"
-    geometry = read_scene(scene).geometry
-    found = {(area.name, area.rule): area.polygon.area for area in geometry.keep_off_areas}
-    assert found == {("track", "cycle-tracks"): pytest.approx(24), ("landing", "landings"): pytest.approx(24)}
-    assert [area.name for area in geometry.forbidden_areas] == ["church"]
-    assert [pole.keep_off for pole in geometry.poles] == ["power-poles"]
-    assert [mesh.name for mesh in geometry.ground] == ["track"]

@@ -25,7 +25,6 @@ POLE = Pole("mast", np.array((0.0, 9.0, 0.1)), 6.0)
     [
         ((), True),
         ((Mesh("mast", block((-0.1, 8.9, 0.1), (5.0, 9.1, 6.0))),), True),
-        ((Mesh("kerb stone", block((5, 8, 0), (9, 9, 0.6))),), True),
         ((Mesh("bollard", block((5, 8, 0), (5.2, 8.2, 1.4))),), True),
         ((Mesh("wall", block((5, 8, 0), (9, 9, 1.6))),), False),
     ],

@@ -72,14 +72,6 @@ def test_what_lies_inside_an_object_is_dropped_and_counted():
     assert candidates.dropped["inside an object"] >= 2
 
 
-def test_posts_keep_clear_of_walls_but_low_kerbs_are_none():
-    wall = Mesh("wall", block((-40, 9.5, 0), (40, 9.6, 2)))
-    kerb = Mesh("kerb", block((-40, 7.0, 0), (40, 8.0, 0.25)))
-    candidates = generate_candidates(street(occluders=(wall, kerb)), replace(PLAIN, clearance=1.0, setback=0.2))
-    assert candidates.position[:, 1].max() <= 8.5 + 1e-6
-    assert candidates.position[:, 1].min() < 8.0
-
-
 @pytest.mark.parametrize(("above", "free"), [(0.2, False), (0.4, True)])
 def test_a_sensor_keeps_its_clearance_from_what_is_above_it(above, free):
     low = 0.1 + 3.5 + above

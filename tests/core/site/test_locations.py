@@ -31,9 +31,6 @@ def scene(places=PLACES):
     [
         ((30.0, 5.2), "north kerb of Rope Lane, 1.2 m behind the kerb, 14 m east of the crossing of Rope Lane"),
         ((14.0, -4.5), "south kerb of Rope Lane, 0.5 m behind the kerb, beside the crossing of Rope Lane"),
-        ((90.0, 4.0), "kerb of Rope Lane, on the kerb"),
-        ((5.0, 80.0), "east kerb of Mill Street, 1.0 m behind the kerb"),
-        ((-6.0, 60.0), "west kerb of Mill Street, 2.0 m behind the kerb, 59 m north of the crossing of Rope Lane"),
         (
             (-5.0, -5.0),
             (

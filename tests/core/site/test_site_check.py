@@ -73,13 +73,6 @@ def test_a_region_beside_the_road_is_an_error_and_one_of_two_a_warning():
     assert one(found(*SOUND.surfaces, beside), "no road within") == ("WARNING", "beside")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("factor", "complains"), [(0.05, True), (300.0, True)])
-def test_a_region_of_no_earthly_size(factor, complains):
-    surfaces = [dataclasses.replace(each, triangles=each.triangles * factor) for each in SOUND.surfaces]
-    assert any("m across" in text for _, _, text in found(*surfaces)) == complains
-
-
 def test_map_coordinates_are_too_far_for_single_precision():
     surfaces = [moved(each, x=5.4e6) for each in SOUND.surfaces]
     severity, _ = one(found(*surfaces), "5,400 km from the origin")

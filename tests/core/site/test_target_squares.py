@@ -9,11 +9,6 @@ def targets(xyz, spacing):
     return Targets(np.array(xyz, dtype=float), np.ones(count), np.zeros(count, bool), spacing)
 
 
-def test_a_square_is_as_wide_as_targets_are_apart_and_turns_counter_clockwise():
-    square = target_squares(targets([(10.0, -4.0, 1.5)], 2.0))
-    assert square.tolist() == [[[9.0, -5.0, 1.5], [11.0, -5.0, 1.5], [11.0, -3.0, 1.5], [9.0, -3.0, 1.5]]]
-
-
 def test_corners_that_squares_share_have_the_mean_height():
     left, right = target_squares(targets([(0.5, 0.5, 1.0), (1.5, 0.5, 3.0)], 1.0))
     assert left[:, 2].tolist() == [1.0, 2.0, 2.0, 1.0]

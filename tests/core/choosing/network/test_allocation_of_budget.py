@@ -137,34 +137,6 @@ def test_searches_of_a_goal_are_no_longer_than_its_limit_and_its_bound_holds():
     assert [one.bound for one in both] == pytest.approx([best, best])
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("rounds")
-def test_search_needs_far_fewer_rounds_than_there_are_amounts():
-    amounts = np.arange(257) * 1000.0
-    known = [Frontier(amounts, amounts, 600.0) for _ in range(3)]
-    rounds = []
-
-    def solve(requests):
-        yield Progress(0, 0, "known values")
-        rounds.append(requests)
-        roots = [math.sqrt(one.budget) for one in requests]
-        return [
-            SolvedBudget(one.budget, (), one.budget, root, root, one.effort)
-            for one, root in zip(requests, roots, strict=True)
-        ]
-
-    (found,) = finish(search_allocations(known, np.ones(3), [Goal(240_000.0, 0.0)], solve))
-    assert found.price == 240_000.0
-    assert found.value == pytest.approx(3 * math.sqrt(80_000.0))
-    assert len(rounds) <= 80
-
-
-def test_money_that_adds_nothing_is_not_spent():
-    options = Options(np.array([0.0, 10.0, 30.0]), np.array([0.0, 2.0, 2.0]), np.arange(3))
-    found = allocate([options], np.ones(1), 100.0)
-    assert found.taken == (1,)
-
-
 @given(
     st.lists(st.lists(st.tuples(st.integers(0, 40), st.integers(0, 1000)), max_size=4), min_size=1, max_size=4),
     st.integers(0, 120),

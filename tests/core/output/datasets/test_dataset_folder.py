@@ -1,6 +1,5 @@
 """What holds for every format: whole files, the manifest, runs and splits, and what is refused."""
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -127,10 +126,3 @@ def test_names_that_cannot_be_files_are_refused(name, tmp_path):
     with pytest.raises(SeipError, match="cannot give its name to a file"):
         make_run(sensors=(replace(make_sensors()[0], label=name),))
     refused("cannot give its name to a file", "kitti", [(name, make_frame())], make_run(), tmp_path)
-
-
-def test_nothing_but_whole_files_is_left_when_a_frame_fails(tmp_path):
-    frames = itertools.chain(make_frames(count=1), (1 / 0 for _ in range(1)))
-    with pytest.raises(ZeroDivisionError):
-        write("openpcdet", frames, make_run(), tmp_path)
-    assert sorted(contents(tmp_path)) == ["labels/000000.txt", "manifest.json", "points/000000.npy"]

@@ -1,7 +1,6 @@
 """The conversions of each format, against other ways to the same numbers."""
 
 import math
-import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from seip_addon.core.output.datasets import kitti, mmdetection3d, openpcdet, pcd
+from seip_addon.core.output.datasets import kitti, openpcdet, pcd
 from seip_addon.core.output.datasets.label_files import read_labels
 from seip_addon.core.output.datasets.sample import make_sample
 from tests.builders.scan_frames import make_frame, make_frames, make_run, rotation, write
@@ -78,20 +77,6 @@ def test_kitti_occlusion_follows_visibility(visibility, occluded):
     labels = replace(frame.labels, visibility=np.array([visibility]))
     sample = _sample(replace(frame, labels=labels), kitti.FORMAT)
     assert kitti.sample_files(sample)["training/label_2/000000.txt"]().split()[2].decode() == occluded
-
-
-def test_kitti_test_split_stands_apart(tmp_path):
-    write("kitti", make_frames(), make_run(split="test"), tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["ImageSets", "manifest.json", "testing"]
-
-
-def test_mmdetection3d_numbers_its_classes_in_order(tmp_path):
-    write("mmdetection3d", make_frames(), make_run(), tmp_path)
-    info = pickle.loads((tmp_path / "custom_infos_train.pkl").read_bytes())  # noqa: S301  # written above
-    assert info["metainfo"]["categories"] == {
-        name: number for number, name in enumerate(mmdetection3d.FORMAT.classes.values())
-    }
-    assert info["metainfo"]["info_version"] == "1.1"
 
 
 def test_the_viewpoint_of_a_sensors_cloud_is_its_pose():

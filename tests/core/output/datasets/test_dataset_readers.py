@@ -154,27 +154,6 @@ def test_kitti_by_open3d_ml(frames, tmp_path):
             )
 
 
-def test_kitti_by_openpcdets_steps(frames, tmp_path):
-    """KittiDataset.get_infos: calibration by line number, float32, rect_to_lidar, z raised by half the height."""
-    write("kitti", frames, make_run(), tmp_path)
-    for number, (_, frame) in enumerate(frames):
-        stem = f"{number:06d}"
-        lines = (tmp_path / "training/calib" / f"{stem}.txt").read_text().splitlines()
-        rectify = np.array(lines[4].split(" ")[1:], dtype=np.float32).reshape(3, 3)
-        to_camera = np.array(lines[5].split(" ")[1:], dtype=np.float32).reshape(3, 4)
-        both = np.eye(4)
-        both[:3] = rectify @ to_camera
-        words = [line.split(" ") for line in (tmp_path / "training/label_2" / f"{stem}.txt").read_text().splitlines()]
-        users = kept(frame)
-        for row, user in zip(words, users, strict=True):
-            height, width, length, *location, turn = map(float, row[8:15])
-            xyz = np.array([*location, 1.0]) @ np.linalg.inv(both.T)
-            box = [*xyz[:2], xyz[2] + height / 2, length, width, height]
-            assert box == pytest.approx([*frame.labels.centre[user], *frame.labels.size[user]], abs=1e-12)
-            points = frame.points[frame.instance == user]
-            require_around(box[:3], box[3:], rotation(-(turn + math.pi / 2)), points)
-
-
 def test_pcd_by_pypcd4(frames, tmp_path):
     pypcd4 = reader("pypcd4")
     write("pcd", frames, make_run(), tmp_path)
