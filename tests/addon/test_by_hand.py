@@ -152,14 +152,3 @@ def test_an_export_that_fails_or_is_stopped_leaves_the_earlier_one_whole(placed,
     monkeypatch.setattr("seip_addon.preferences.cache_folder", lambda: tmp_path / "cache")
     bpy.ops.seip.export_result()
     assert (out / "placement.json").read_bytes() != before["placement.json"]
-
-
-@pytest.mark.slow
-def test_the_view_is_rendered_elsewhere_and_ends_with_who_asked(placed, tmp_path):
-    placed.seip.result.render = True
-    work = bpy.types.SEIP_OT_export_result.prepare(type("Operator", (), {})(), placed)
-    rendering = [progress.done for progress in work if progress.what == "rendering"]
-    assert rendering == sorted(rendering)
-    assert rendering[-1] > rendering[0] == 0
-    assert (tmp_path / "out" / "view.png").stat().st_size > 50_000
-    assert load_placement(tmp_path / "out" / "placement.json").settings["render"] is True

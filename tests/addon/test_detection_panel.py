@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import subprocess
 import sys
 import time
 from concurrent.futures import CancelledError
@@ -16,7 +15,6 @@ import pytest
 
 from seip_addon import preferences
 from seip_addon.background import Background
-from seip_addon.core.progress import Progress
 from seip_addon.core.workflows.detection import DetectingPython
 from seip_addon.operators.detection import SEIP_OT_detect
 from seip_addon.panels import detection as detection_panel
@@ -193,30 +191,3 @@ def test_work_that_is_stopped_ends_the_command_and_leaves_nothing(placed, stand_
     with pytest.raises(ProcessLookupError):
         os.kill(process, 0)
     assert not (tmp_path / "out").exists()
-
-
-def test_progress_is_read_as_commands_write_it_to_a_log():
-    """Of the bar that the command itself shows."""
-    code = """
-from headless import runtime
-from seip_addon.core.progress import Progress
-with runtime.progress_bar() as report:
-    report(Progress(0, 0, "prepare run-1"))
-    report(Progress(1, 3, "place 4 × type2", counted=False))
-    report(Progress(12, 1200, "detect in run-1"))
-"""
-    outcome = subprocess.run(  # noqa: S603  # our own interpreter and script
-        [sys.executable, "-c", code],
-        env=os.environ | {"SEIP_SECONDS_BETWEEN_LINES": "0", "PYTHONUTF8": "1"},
-        cwd=Path(__file__).parents[2],
-        capture_output=True,
-        encoding="utf-8",
-        check=True,
-        timeout=120,
-    )
-    from seip_addon.core.workflows.detection import _progress  # noqa: PLC0415
-
-    found = _progress(outcome.stderr)
-    assert found == Progress(12, 1200, "detect in run-1")
-    stages = _progress(outcome.stderr.rpartition("detect in run-1")[0])
-    assert stages == Progress(1, 3, "place 4 × type2", counted=False)

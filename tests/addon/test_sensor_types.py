@@ -5,7 +5,7 @@ import pytest
 
 from seip_addon import preferences
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.site.candidates import DEFAULT_TYPE, CandidateSettings
+from seip_addon.core.site.candidates import DEFAULT_TYPE
 from seip_addon.panels import sensors
 from tests.builders.drawn_layout import DrawnLayout
 
@@ -45,12 +45,6 @@ def catalogue(tmp_path):
 
 def used(survey):
     return tuple(one.name for one in survey.types if one.use)
-
-
-def test_the_list_is_the_catalogue_and_the_choice_the_default(survey):
-    assert [one.name for one in survey.types] == list(load_catalogue())
-    assert used(survey) == (DEFAULT_TYPE,)
-    assert survey.settings().candidates == CandidateSettings(sensors=(DEFAULT_TYPE,))
 
 
 def test_the_choice_is_kept_when_a_file_is_reopened(survey, tmp_path):

@@ -6,8 +6,6 @@ import bpy
 import pytest
 
 from seip_addon import scene_status
-from seip_addon.scene.sensors import placed_sensors
-from seip_addon.sensor_edits import sensor_edits
 from seip_addon.session import SceneState, session
 
 
@@ -140,23 +138,3 @@ def test_a_check_holds_until_scene_or_settings_change(known, tmp_path):
     assert scene_status.stale_check(scene) == "The scene has changed since the check."
     bpy.ops.seip.check_site()
     assert scene_status.stale_check(reopened(tmp_path)) == scene_status.OLD_CHECK
-
-
-def test_what_a_hand_did_to_the_sensors_is_said(known):
-    scene = bpy.context.scene
-    scene.seip.goal.count = 4
-    bpy.ops.seip.solve_placement()
-    bpy.data.collections["SEIP Sensors"].hide_viewport = True
-    assert not sensor_edits(scene)
-    bpy.data.collections["SEIP Sensors"].hide_viewport = False
-    sensors = placed_sensors(scene)
-    sensors["S1"].location.z -= 2.0
-    sensors["S2"].rotation_euler.x = 0.2
-    sensors["S4"]["seip_sensor"] = "vlp16"
-    copy = sensors["S1"].copy()
-    bpy.data.collections["SEIP Sensors"].objects.link(copy)
-    bpy.context.view_layer.update()
-    assert sensor_edits(scene).describe() == "By hand: S1, S2, S4 moved; S5 added."
-    bpy.data.objects.remove(copy)
-    bpy.data.objects.remove(sensors["S3"])
-    assert sensor_edits(scene).describe() == "By hand: S1, S2, S4 moved; S3 deleted."

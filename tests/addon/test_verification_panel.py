@@ -131,20 +131,6 @@ def test_the_scene_is_corrected_once_and_verified_again_without_changes(verified
     assert names(verified) == before - {GONE} | {"Found 1"}
 
 
-def test_the_correction_is_undone_in_one_step(verified):
-    bpy.context.preferences.edit.use_global_undo = True
-    bpy.ops.ed.undo_push(message="verified")
-    before = names(verified)
-    bpy.ops.seip.correct_scene("EXEC_DEFAULT", True)  # with undo
-    assert names(bpy.context.scene) != before
-    bpy.ops.ed.undo()
-    assert names(bpy.context.scene) == before
-    assert [tuple(obj.location) for obj in bpy.data.collections["SEIP Sensors"].objects] == [
-        (9.5, 9.5, 6.0),
-        (-9.5, -9.5, 6.0),
-    ]
-
-
 def test_a_moved_object_makes_the_verification_old(verified):
     assert operators.CHANGED not in drawn().text
     bpy.data.objects["building 0"].location.x += 1.0

@@ -1,6 +1,5 @@
 """What the add-on says where something is not as it should be: one sentence, and no traceback."""
 
-import builtins
 import json
 import re
 from unittest.mock import MagicMock
@@ -85,20 +84,6 @@ def test_a_cache_that_cannot_be_written_is_named_before_anything_is_cast(junctio
     monkeypatch.setattr(preferences, "cache_folder", lambda: file)
     with pytest.raises(RuntimeError, match=r"cannot write to .*file.* as Cache in the add-on's preferences"):
         bpy.ops.seip.compute_visibility()
-
-
-def test_a_package_that_is_gone_is_named(placed, tmp_path, monkeypatch):
-    come = builtins.__import__
-
-    def gone(name, *rest, **more):
-        if name.startswith("osmium"):
-            raise ModuleNotFoundError("No module named 'osmium'", name="osmium")
-        return come(name, *rest, **more)
-
-    monkeypatch.setattr(builtins, "__import__", gone)
-    (tmp_path / "town.osm.pbf").write_bytes(bytes(100))
-    with pytest.raises(RuntimeError, match=r"No module named 'osmium'.*install its zip again"):
-        bpy.ops.seip.choose_map(filepath=str(tmp_path / "town.osm.pbf"))
 
 
 def endless():

@@ -47,14 +47,6 @@ def result(points, boxes):
     return frame_result(frame, found, region=REGION, sensors=SENSORS, run="a")
 
 
-def test_detections_get_their_class_place_and_distance():
-    told = result([[0, 0, 0]], [[3, 4, 6, 4, 2, 2, 0], [30, 8, 0, 4, 2, 2, 0]])
-    assert told.detected.category.tolist() == ["car", "truck"]
-    assert told.detected.inside.tolist() == [True, False]
-    assert told.detected.distance.tolist() == [5, 10]
-    assert told.detected.score.tolist() == [0.1, 0.9]
-
-
 def test_returns_as_a_plain_search_counts_them():
     rng = np.random.default_rng(1)
     points = rng.uniform(-10, 10, (3000, 3)).astype(np.float32)

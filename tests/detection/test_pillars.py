@@ -3,15 +3,12 @@
 import math
 
 from headless.detection.network import PillarEncoder
-from headless.detection.pillars import PillarGrid, fill_pillars, grid_over
+from headless.detection.pillars import PillarGrid, fill_pillars
 
 import numpy as np
-import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-
-from seip_addon.core.errors import SeipError
 
 GRID = PillarGrid(west=-3.0, south=-2.0, bottom=-1.0, top=4.0, columns=12, rows=8, pillar=0.5)
 
@@ -105,10 +102,3 @@ def test_the_encoder_takes_the_maximum_of_each_pillar():
         scaled = (linear - normal.running_mean) / torch.sqrt(normal.running_var + normal.eps)
         expected = (scaled * normal.weight + normal.bias).clamp(min=0).max(dim=0).values
         torch.testing.assert_close(got[number], expected, atol=1e-5, rtol=1e-5)
-
-
-def test_what_no_grid_can_be_laid_over_is_refused():
-    with pytest.raises(SeipError, match="extent of the detector is empty"):
-        grid_over((5.0, 0.0, 5.0, 9.0), (0.0, 3.0), 0.4)
-    with pytest.raises(SeipError, match="too many"):
-        grid_over((0.0, 0.0, 9000.0, 9000.0), (0.0, 3.0), 0.4)

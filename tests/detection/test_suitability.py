@@ -1,7 +1,5 @@
 """A detector says what it has been trained on, and what speaks against using it beyond."""
 
-from dataclasses import replace
-
 from headless.detection.detection_area import DetectionArea
 from headless.detection.detector import Detector, TrainingRecord
 from headless.detection.pillars import filling, grid_over
@@ -40,15 +38,6 @@ def test_it_is_quiet_at_home():
 def test_other_sensor_types_are_named():
     (sentence,) = suitability_warnings(detector(), ["type3", "type1"], AREA, cloud_frame(NOTHING))
     assert "trained on clouds of type1 and type2, not of type3:" in sentence
-
-
-def test_another_site_than_the_only_one_is_named():
-    elsewhere, home = (replace(AREA, site=site) for site in ("Corridor", "Junction"))
-    (sentence,) = suitability_warnings(detector(), ["type1"], elsewhere, cloud_frame(NOTHING))
-    assert "trained only at Junction, not at Corridor:" in sentence
-    assert suitability_warnings(detector(), ["type1"], home, cloud_frame(NOTHING)) == ()
-    travelled = detector(TrainingRecord(("type1",), ("Junction", "Square")))
-    assert suitability_warnings(travelled, ["type1"], elsewhere, cloud_frame(NOTHING)) == ()
 
 
 def test_over_full_pillars_are_counted():

@@ -13,15 +13,6 @@ from seip_addon.scene.blend_file import new_file, open_blend, save_blend
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_a_saved_scene_opens_again_and_leaves_no_other_file(tmp_path):
-    new_file()["seip_origin"] = [1.0, 2.0, 3.0]
-    save_blend(tmp_path / "deeper" / "site.blend")
-    assert [path.name for path in (tmp_path / "deeper").iterdir()] == ["site.blend"]
-    new_file()
-    open_blend(tmp_path / "deeper" / "site.blend")
-    assert list(bpy.context.scene["seip_origin"]) == [1, 2, 3]
-
-
 def test_scripts_in_a_file_do_not_run(tmp_path):
     """A text that Blender would register as a module, where files are trusted."""
     new_file()

@@ -93,17 +93,6 @@ def test_geometry_nodes_instances_count(scene):
     assert everything[..., 1].max() == pytest.approx(50.5)
 
 
-def test_curves_and_text_with_faces_count(scene):
-    curve = bpy.data.curves.new("rail", "CURVE")
-    curve.dimensions = "3D"
-    spline = curve.splines.new("POLY")
-    spline.points.add(1)
-    spline.points[0].co, spline.points[1].co = (0, 20, 1, 1), (10, 20, 1, 1)
-    curve.bevel_depth = 0.1
-    put(scene, bpy.data.objects.new("rail", curve), (contract.OCCLUDERS,))
-    assert len(occluders(scene)["rail"]) > 8
-
-
 def test_linked_collections_count(scene, tmp_path):
     library = tmp_path / "library.blend"
     sheet(scene, "linked wall", (contract.OCCLUDERS,), 1, 1, (0, 30, 0))

@@ -140,21 +140,6 @@ def test_the_rendered_view_changes_nothing_in_the_file(example, scene, tmp_path,
     assert "Fra:" not in capfd.readouterr().out
 
 
-def test_each_sensor_has_a_close_up_that_shows_it(example, scene, tmp_path, monkeypatch):
-    monkeypatch.setattr("seip_addon.scene.render.SAMPLES", 1)
-    monkeypatch.setattr("seip_addon.scene.render.WIDTH", 64)
-    monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 36)
-    monkeypatch.setattr("seip_addon.scene.render.TILE", (64, 48))
-    write_result(scene, example.site, example.deployment)
-    kept, objects = settings_of(scene), len(bpy.data.objects)
-    taken = rendered_pictures(scene, example.site, example.deployment, tmp_path)
-    assert [picture.size for picture in taken.close_ups] == [(64, 48)] * 3
-    assert list(taken.places) == ["S1", "S2", "S3"]
-    assert all(0.05 < share < 0.95 for place in taken.places.values() for share in place)
-    assert len({picture.tobytes() for picture in taken.close_ups}) == 3
-    assert (settings_of(scene), len(bpy.data.objects)) == (kept, objects)
-
-
 def colours_of(obj):
     """Return the colour of each square by its material, and that of its first corner by the attribute."""
     mesh = obj.data

@@ -79,13 +79,6 @@ def test_map_coordinates_are_too_far_for_single_precision():
     assert severity == "WARNING"
 
 
-def test_a_pole_far_from_the_region_and_one_above_the_ground():
-    poles = [Pole("far", np.array((20.0, 100.0, 0.0))), Pole("high", np.array((5.0, 2.0, 4.2)))]
-    problems = found(*SOUND.surfaces, poles=poles)
-    assert one(problems, "95 m from the region") == ("WARNING", "far")
-    assert one(problems, "4.2 m above the ground") == ("WARNING", "high")
-
-
 def test_a_missing_face_is_a_hole_and_an_island_is_none():
     around = [(-50, -4, 50, -1), (-50, -1, -1, 1), (1, -1, 50, 1), (-50, 1, 50, 4)]
     holed = Surface("roads", "holed", np.concatenate([sheet(*box) for box in around]))

@@ -47,19 +47,6 @@ def test_yaws_are_spread_evenly_and_the_first_looks_to_the_region():
     assert not poses.tilt.any()
 
 
-@pytest.mark.parametrize("degrees", [90, 200])
-def test_yaws_without_a_target_before_the_sensor_are_left_out(degrees):
-    settings = replace(BOTH, sensors=("one-way",), yaws=12)
-    site = site_of(settings, looking(degrees))
-    every = site_of(settings, looking(359.9)).candidates
-    kept = {(*xyz, yaw) for xyz, yaw in zip(site.candidates.xyz.tolist(), site.candidates.yaw.tolist(), strict=True)}
-    assert 0 < len(kept) < len(every)
-    for xyz, yaw in zip(every.xyz.tolist(), every.yaw.tolist(), strict=True):
-        off = [math.remainder(math.atan2(y - xyz[1], x - xyz[0]) - yaw, math.tau) for x, y, _ in site.targets.xyz]
-        assert ((*xyz, yaw) in kept) == (min(map(abs, off)) <= math.radians(degrees) / 2)
-    assert site.candidates.dropped["looking past all targets"] == len(every) - len(kept)
-
-
 @pytest.mark.parametrize("yaws", [0, 361])
 def test_a_wrong_number_of_yaws_has_its_sentence(yaws):
     with pytest.raises(SeipError, match=f"1 to 360 yaws, not {yaws}"):

@@ -14,7 +14,6 @@ import shapely
 from seip_addon.core.output.network.network_page import network_page
 from seip_addon.core.output.network.network_record import network_json
 from seip_addon.core.output.network.network_report import make_network_report
-from seip_addon.core.output.network.network_view import network_view
 from seip_addon.core.output.network.ranked_sites import gain_text, ranked_sites
 from seip_addon.core.output.network.write import write_network
 from seip_addon.core.output.report.blocks import Facts
@@ -22,7 +21,6 @@ from tests.builders.invented_network import make_network, make_site, make_street
 
 HOSTILE = ("<script>alert(1)</script>", "=cmd|' /C calc'!A0", "مفترق \u202eevil", "🚦 Ecke & “x” $a_b$", '" onload="x')
 VOID = {"meta", "br"}
-SHAPES = (0.5, 1.0)
 
 
 class Page(HTMLParser):
@@ -154,21 +152,3 @@ def test_networks_without_sensors_are_written(tmp_path, status, sites):
     assert "No site has sensors." in (tmp_path / "network.html").read_text(encoding="utf-8")
     assert facts(record)["Sensors"] == "none"
     assert ("Proof" in facts(record)) == (status != "failed")
-
-
-def test_sites_on_both_sides_of_the_date_line_are_near_each_other(tmp_path):
-    draw = np.random.default_rng(1)
-    east, west = (make_site(number, draw) for number in range(2))
-    east = replace(east, latitude=-16.8, longitude=179.99, sensors=())
-    west = replace(west, latitude=-16.8, longitude=-179.99, sensors=())
-    record = network_of((west, east, replace(east, name="beyond", longitude=180.01)))
-    line = (np.array([(-16.8, 179.98), (-16.8, -179.98)]), 2)
-    view = network_view(record, [line], SHAPES)
-    degree = 111_320.0 * math.cos(math.radians(16.8))
-    assert view.places[:, 0] == pytest.approx(np.array((1, -1, 1)) * 0.01 * degree, rel=2e-3)
-    assert view.width < 0.03 * degree
-    write_network(tmp_path, record)
-    places = [
-        one["geometry"]["coordinates"][0] for one in json.loads((tmp_path / "network.geojson").read_text())["features"]
-    ]
-    assert sorted(places) == [-179.99, -179.99, 179.99]
