@@ -65,15 +65,6 @@ def test_import_is_in_the_file_menu_and_takes_dropped_files(scene):
         assert [one.poll_drop(area) for one in handlers] == [expected] * 2
 
 
-def test_all_main_operators_are_in_a_menu_that_the_search_goes_by(scene):
-    names = drawn(bpy.types.SEIP_MT_main.draw)
-    assert {"seip.load_example", "seip.build_site", "seip.check_site", "seip.solve_placement"} <= set(names)
-    for name in names:
-        module, _, operator = name.partition(".")
-        assert getattr(getattr(bpy.ops, module), operator).get_rna_type().name
-    assert front_door.draw_object in bpy.types.VIEW3D_MT_object._dyn_ui_initialize()  # noqa: SLF001  # Blender has no other list
-
-
 @needs_sumo
 def test_a_site_of_an_extract_is_built_with_its_map(scene, extract):
     bpy.ops.seip.choose_map(filepath=str(extract))

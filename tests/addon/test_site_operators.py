@@ -8,6 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
+from seip_addon.core.site.installed_cost import load_installed_cost
+from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 
@@ -93,6 +95,29 @@ def test_a_bad_map_is_one_sentence(scene, tmp_path, text, complaint):
     with pytest.raises(RuntimeError, match=complaint):
         bpy.ops.seip.choose_map(filepath=str(path))
     assert not scene.seip.site.source
+
+
+def test_further_files_are_those_of_the_request(scene):
+    site = choose(scene)
+    site.terrain, site.terrain_epsg, site.osm = "/survey.laz", 25832, "/around.osm"
+    request = site.request()
+    assert request.terrain == TerrainRequest(MAP.joinpath("/survey.laz"), 25832)
+    assert request.osm == MAP.joinpath("/around.osm")
+    site.terrain = site.osm = ""
+    assert (site.request().terrain, site.request().osm) == (None, None)
+
+
+def test_installed_costs_are_in_the_survey(junction, tmp_path):
+    survey = junction.seip.survey
+    assert survey.settings().installed_cost is None
+    survey.installed = True
+    assert survey.settings().installed_cost == load_installed_cost()
+    (tmp_path / "mine.toml").write_text("new_post_usd = 9000\n", encoding="utf-8")
+    survey.installed_cost = str(tmp_path / "mine.toml")
+    assert survey.settings().installed_cost == load_installed_cost(tmp_path / "mine.toml")
+    survey.installed_cost = str(tmp_path / "none.toml")
+    with pytest.raises(RuntimeError, match="cannot read the installed costs"):
+        bpy.ops.seip.solve_placement()
 
 
 def test_roles_by_operator(scene):

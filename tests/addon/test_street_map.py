@@ -3,7 +3,6 @@
 from types import SimpleNamespace
 
 import bpy
-import numpy as np
 import pytest
 
 from seip_addon.core.progress import finish
@@ -51,20 +50,6 @@ def test_a_click_picks_the_junction_under_the_mouse(street_map):
             assert street_map.handle(event(kind, value), (x + 2, y - 1)) == ""
         assert street_map.handle(event("LEFTMOUSE", "RELEASE"), (x + 3, y - 1)) == "PICK"
         assert street_map.hovered == junction
-
-
-@pytest.mark.parametrize("button", ["LEFTMOUSE", "MIDDLEMOUSE"])
-def test_a_drag_pans_and_picks_nothing(street_map, button):
-    start = pixel(street_map, int(street_map.shown()[0]))
-    before = street_map.view.to_pixels(street_map.plan.junctions)
-    street_map.handle(event("MOUSEMOVE", "NOTHING"), start)
-    street_map.handle(event(button), start)
-    assert street_map.is_dragged()
-    for part in (1, 20, 50):
-        street_map.handle(event("MOUSEMOVE", "NOTHING"), (start[0] + part, start[1] - part))
-    assert street_map.handle(event(button, "RELEASE"), (start[0] + 50, start[1] - 50)) == ""
-    assert not street_map.is_dragged()
-    assert street_map.view.to_pixels(street_map.plan.junctions) == pytest.approx(before + np.array((50, -50)))
 
 
 def test_another_file_forgets_the_choice_and_the_same_one_keeps_it(add_on, tmp_path):

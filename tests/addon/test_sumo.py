@@ -95,14 +95,6 @@ def test_after_the_installation_nothing_is_missing(chosen, tmp_path):
     assert chosen.seip.site.request().sumo == (tmp_path / "own" / SUMO_VERSION,)
 
 
-def test_offline_one_sentence_says_how_to_allow_it_or_name_a_folder(chosen, online):
-    online(False)
-    for layout in (drawn(site.draw, bpy.context), drawn(sumo.draw_status)):
-        assert preferences.OFFLINE in layout.text
-    with pytest.raises(RuntimeError, match="Allow Online Access in Preferences, System, or install Eclipse SUMO"):
-        bpy.ops.seip.install_sumo()
-
-
 def test_a_sumo_that_does_not_start_can_be_replaced(scene, machine, tmp_path):
     write_programs(tmp_path / "own" / SUMO_VERSION, script="echo 'libGL.so.1 is missing' >&2; exit 127")
     status = drawn(sumo.draw_status)

@@ -7,7 +7,7 @@ from tests.builders.labelled_frames import box, detected, frame, near_and_far, t
 pytest.importorskip("torch", reason="the detector's torch is optional")
 
 from headless.detection.average_precision import evaluate
-from headless.detection.breakdown import average_precision_by, recall_by, recall_by_category
+from headless.detection.breakdown import average_precision_by, recall_by_category
 from headless.detection.matching import Rule
 
 AT_07 = Rule()
@@ -27,10 +27,3 @@ def test_average_precision_by_distance():
     bins = average_precision_by(evaluate([near_and_far()], AT_07), "distance", (0, 40, 60, 100))
     assert [(one.low, one.high, one.wanted) for one in bins] == [(0, 40, 2), (40, 60, 2), (60, 100, 0)]
     assert values(bins) == [5 / 6, 1 / 4, None]
-
-
-def test_recall_by_visibility_at_a_score():
-    evaluation = evaluate([near_and_far()], AT_07)
-    assert values(recall_by(evaluation, "visibility", (0, 0.5, 0.95, 2), 0.1)) == [1 / 2, 1, 1]
-    assert values(recall_by(evaluation, "visibility", (0, 0.5, 0.95, 2), 0.6)) == [0, 1, 1]
-    assert values(recall_by(evaluation, "visibility", (2, 3), 0.1)) == [None]

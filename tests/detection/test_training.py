@@ -89,15 +89,6 @@ def test_a_training_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path, lea
     assert len(list(train(learning, aside, SMALL, BRIEF, store=broken))) == 1  # nothing left to do
 
 
-def test_another_training_is_not_continued(tmp_path, learning, aside):
-    path = tmp_path / "state.pt"
-    trained(learning, aside, store=path)
-    with pytest.raises(SeipError, match="other settings or recordings"):
-        trained(learning, aside, replace(BRIEF, seed=9), store=path)
-    with pytest.raises(SeipError, match="or recordings"):
-        trained(learning[:1], aside, store=path)
-
-
 def test_runs_of_traffic_are_in_one_split_alone(learning, aside):
     splits = {"training": learning, "validation": aside, "test": [recording("leak", "run 1", 7)]}
     recordings = {what: [each.recording for each in some] for what, some in splits.items()}

@@ -140,17 +140,6 @@ def box(scene, name, where, low, high, at=(0, 0, 0)):
     return put(scene, bpy.data.objects.new(name, mesh), where, at)
 
 
-def test_scattered_posts_are_a_pole_each_and_their_host_is_none(scene):
-    host = sheet(scene, "host", (contract.POLES,), 10, 5, (0, 20, 0))
-    post = box(scene, "post", (), (-0.1, -0.1, 0), (0.1, 0.1, 6))
-    scene.collection.objects.link(post)
-    post.parent = host
-    host.instance_type = "VERTS"
-    host.show_instancer_for_viewport = False
-    poles = read_scene(scene).geometry.poles
-    assert sorted(tuple(pole.base[:2].round(3)) for pole in poles) == [(-10, 15), (-10, 25), (10, 15), (10, 25)]
-
-
 def test_a_pole_is_as_high_as_its_shaft(scene):
     post = box(scene, "post", (contract.POLES,), (-0.1, -0.1, -0.2), (0.1, 0.1, 6), (3, 9, 0.5))
     arm = box(scene, "arm", (), (1, -0.1, 6), (4, 0.1, 7.5))

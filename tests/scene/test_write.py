@@ -118,6 +118,7 @@ def save_rendered_view(path, scene, site, deployment):
     with TemporaryDirectory() as folder:
         taken = rendered_pictures(scene, site, deployment, Path(folder))
         labelled_view.save_labelled_view(path, taken.view, site, deployment, shown_legend(scene), taken.sight)
+    return taken
 
 
 def test_the_rendered_view_changes_nothing_in_the_file(example, scene, tmp_path, capfd, monkeypatch):
@@ -131,7 +132,10 @@ def test_the_rendered_view_changes_nothing_in_the_file(example, scene, tmp_path,
     everything += [bpy.data.lights, bpy.data.images, bpy.data.collections]
     counts, users, kept = [len(data) for data in everything], fingerprint(scene.objects), settings_of(scene)
     for name in ("a.png", "b.png"):
-        save_rendered_view(tmp_path / name, scene, example.site, example.deployment)
+        taken = save_rendered_view(tmp_path / name, scene, example.site, example.deployment)
+    assert list(taken.places) == ["S1", "S2", "S3"]
+    assert all(0.05 < share < 0.95 for place in taken.places.values() for share in place)
+    assert len({picture.tobytes() for picture in taken.close_ups}) == 3
     assert [len(data) for data in everything] == counts
     assert fingerprint(scene.objects) == users
     assert settings_of(scene) == kept

@@ -9,7 +9,7 @@ from seip_addon.core.geometry.plan import outline
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.check import SceneContents, Surface, check_site
-from seip_addon.core.site.scene_geometry import ASSUMED, Mesh, Pole, SceneGeometry
+from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
 from seip_addon.core.site.site import make_site
 
 
@@ -56,27 +56,10 @@ def test_a_sound_site_has_no_problem():
     assert found(*SOUND.surfaces) == []
 
 
-def test_everything_is_counted():
-    counts = checked(*SOUND.surfaces, poles=[Pole("post", np.zeros(3), mandatory=True, source=ASSUMED)]).counts
-    assert counts["Roads"] == "1 object, 2 triangles"
-    assert counts["Area of the region"] == "600 m²"
-    assert counts["Road in the region"] == "480 m²"
-    assert counts["Candidate area"] == "300 m²"
-    assert counts["Poles"] == "1 pole, 1 mandatory, 1 assumed"
-    assert counts["Targets"] == f"{len(SITE.targets)}, 0 in weighted regions"
-    assert counts["Poses"] == f"{len(SITE.candidates)}"
-
-
 def test_a_region_beside_the_road_is_an_error_and_one_of_two_a_warning():
     beside = moved(REGION, y=200, name="beside")
     assert one(found(ROAD, beside, PAVEMENT), "no road within") == ("ERROR", "beside")
     assert one(found(*SOUND.surfaces, beside), "no road within") == ("WARNING", "beside")
-
-
-def test_map_coordinates_are_too_far_for_single_precision():
-    surfaces = [moved(each, x=5.4e6) for each in SOUND.surfaces]
-    severity, _ = one(found(*surfaces), "5,400 km from the origin")
-    assert severity == "WARNING"
 
 
 def test_a_missing_face_is_a_hole_and_an_island_is_none():

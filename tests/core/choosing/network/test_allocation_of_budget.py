@@ -115,28 +115,6 @@ def test_a_search_that_ends_early_has_a_bound_that_holds(seed):
     assert found.bound <= found.value * 1.2 * (1 + 1e-9)
 
 
-@pytest.mark.usefixtures("rounds")
-def test_searches_of_a_goal_are_no_longer_than_its_limit_and_its_bound_holds():
-    rng = np.random.default_rng(7)
-    sites = [EnumeratedSite(rng) for _ in range(3)]
-    plain, efforts = solver(sites, 0.05), []
-
-    def solve(requests):
-        efforts.extend(one.effort for one in requests)
-        return (yield from plain(requests))
-
-    known = [site.frontier(40_000.0) for site in sites]
-    limited, free = Goal(40_000.0, 0.0, effort=1.0), Goal(40_000.0, 0.0)
-    (found,) = finish(search_allocations(known, np.ones(3), [limited], solve))
-    assert max(efforts) == 1.0
-    best = best_of_all(sites, np.ones(3), 40_000.0)
-    assert found.value <= best * (1 + 1e-9)
-    assert best * (1 - 1e-9) <= found.bound
-    assert found.bound > found.value * 1.01
-    both = finish(search_allocations(known, np.ones(3), [free, limited], solve))
-    assert [one.bound for one in both] == pytest.approx([best, best])
-
-
 @given(
     st.lists(st.lists(st.tuples(st.integers(0, 40), st.integers(0, 1000)), max_size=4), min_size=1, max_size=4),
     st.integers(0, 120),

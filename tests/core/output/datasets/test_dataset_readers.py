@@ -65,14 +65,6 @@ def test_openpcdet(frames, tmp_path):
             )
 
 
-def test_openpcdet_reads_a_frame_without_labels(tmp_path):
-    """get_infos slices the boxes' columns, which fails where there is none; drop_info_with_name drops DontCare."""
-    write("openpcdet", make_frames(users=0), make_run(), tmp_path)
-    rows = [line.strip().split(" ") for line in (tmp_path / "labels" / "000000.txt").read_text().splitlines()]
-    boxes, names = np.array([row[:-1] for row in rows], dtype=np.float32)[:, :7], np.array([row[-1] for row in rows])
-    assert boxes[[number for number, name in enumerate(names) if name != "DontCare"]].shape == (0, 7)
-
-
 def read_mmdetection3d(folder, frames):
     """What Det3DDataset.parse_ann_info and LoadPointsFromFile make of the information file's samples."""
     information = pickle.loads((folder / "custom_infos_train.pkl").read_bytes())  # noqa: S301  # written by the test
