@@ -41,16 +41,16 @@ def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scen
         encoding="utf-8"
     )
     key = session.state_of(junction).survey.grid.key
+    assert offered() == [str(tmp_path / "panel" / "report.html"), str(tmp_path / "panel")]
+    junction.seip.goal.count = 1
+    bpy.ops.seip.solve_placement()
+    assert offered() == []  # the files are not of this placement
     place.main([str(small_scene), *OPTIONS, "-o", str(tmp_path / "batch")])
     panel, batch = (load_placement(tmp_path / name / "placement.json") for name in ("panel", "batch"))
     assert comparable(panel) == comparable(batch)
     assert VisibilityGrid.load(tmp_path / "batch" / "visibility.npz").key == key
     for name in ("candidates.csv", "carla_spawn.json", "site.npz", "visibility.npz"):
         assert (tmp_path / "panel" / name).read_bytes() == (tmp_path / "batch" / name).read_bytes()
-    assert offered() == [str(tmp_path / "panel" / "report.html"), str(tmp_path / "panel")]
-    junction.seip.goal.count = 1
-    bpy.ops.seip.solve_placement()
-    assert offered() == []  # the files are not of this placement
 
 
 def offered() -> list[str]:

@@ -68,7 +68,7 @@ def dialog():
     return panel.layout
 
 
-def test_panel_dialog_and_button_say_that_sumo_is_missing_before_the_last_click(chosen):
+def test_panel_dialog_and_button_say_that_sumo_is_missing_before_the_last_click(chosen, online):
     for layout in (drawn(site.draw, bpy.context), dialog()):
         assert layout.text.count(preferences.NO_SUMO) == 1
         assert ("seip.install_sumo", BUTTON) in layout.operators
@@ -78,6 +78,9 @@ def test_panel_dialog_and_button_say_that_sumo_is_missing_before_the_last_click(
         bpy.ops.seip.build_site()
     with pytest.raises(SeipError, match=preferences.NO_SUMO):
         front_door._build(chosen)  # noqa: SLF001  # a dialog cannot be confirmed without a window
+    online(False)
+    with pytest.raises(RuntimeError, match="Allow Online Access"):
+        bpy.ops.seip.install_sumo()
 
 
 def test_after_the_installation_nothing_is_missing(chosen, tmp_path):

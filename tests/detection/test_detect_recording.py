@@ -20,7 +20,7 @@ from seip_addon.core.geometry.geo_reference import GeoReference
 from tests.builders.scanned_street import ground_mesh, mounted, street_meshes, street_record, surface_of
 
 SENSOR = mounted("os1_32_rev7", (-16.0, -14.0, 4.5))
-SWEEPS = 8
+SWEEPS = 6
 CARS = [
     [(-18.0 + 5 * n, -2.0, 4.5, 1.8, 1.5, 0.0), (2.0, 16.0 - 5 * n, 4.5, 1.8, 1.5, -math.pi / 2)] for n in range(SWEEPS)
 ]
@@ -89,7 +89,7 @@ def test_detections_pictures_video_and_figures_are_written(results):
     assert (sensor["id"], sensor["sensor"]) == ("S1", "os1_32_rev7")
     assert sensor["local_m"] == pytest.approx(SENSOR.xyz.tolist())
     assert sensor["intensity_scale"] == pytest.approx(1 / 255, rel=0.1)
-    assert any("8 sweeps over 4 s are few" in sentence for sentence in record["warnings"])
+    assert any("6 sweeps over 2 s are few" in sentence for sentence in record["warnings"])
 
 
 def test_the_table_lists_each_detection_with_its_score_time_and_box(results):
