@@ -49,13 +49,7 @@ def test_panel_and_command_give_the_same_files(placed, small_scene, tmp_path):
     placed.seip.detection.runs = str(runs)
     assert bpy.ops.seip.detect() == {"FINISHED"}
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "placed.blend"), copy=True)
-    asked = [
-        str(tmp_path / "placed.blend"),
-        "--detector",
-        placed.seip.detection.detector,
-        "--traffic",
-        str(runs / "run-1.npz"),
-    ]
+    named = ["--detector", placed.seip.detection.detector, "--traffic", str(runs / "run-1.npz")]
     record = placed.seip.detection.record
     detect.main([str(tmp_path / "placed.blend"), *named, "-o", str(tmp_path / "command")])
     assert record == (tmp_path / "command" / "detection.json").read_text(encoding="utf-8")
