@@ -12,6 +12,7 @@ import bpy
 import pytest
 
 from seip_addon import scene_status
+from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
 from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.sensing.visibility.grid import VisibilityGrid
@@ -201,7 +202,8 @@ def test_a_file_of_a_newer_version_is_refused(junction, tmp_path):
 
 
 @pytest.mark.slow
-def test_panel_and_batch_place_alike_over_pose_errors(junction, tmp_path, small_scene):
+def test_panel_and_batch_place_alike_over_pose_errors(junction, tmp_path, small_scene, monkeypatch):
+    monkeypatch.setitem(DEFAULT_COUNTS, "pose-errors", (6, 60))
     goal = junction.seip.goal
     goal.scenarios, goal.risk, goal.failures = "pose-errors", "worst-quarter", "mean"
     goal.position_error, goal.tilt_error = 0.5, math.radians(3)

@@ -114,7 +114,8 @@ def test_windows_are_loose_once_their_building_is_gone_and_not_when_they_are_tak
     assert loose_pieces(scene.objects) == [panes]
 
 
-def test_what_keeps_new_posts_off_is_read_as_it_was_built(model):
+def test_weights_and_what_keeps_new_posts_off_are_read_as_they_were_built(model):
     geometry = read_scene(built(model)).geometry
     assert [(area.name, area.rule) for area in geometry.keep_off_areas] == [("Driveway", "driveways")]
     assert geometry.forbidden_areas == ()
+    assert [(area.name, area.weight) for area in geometry.weighted_regions] == [("Middle", 3.0)]

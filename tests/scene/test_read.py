@@ -61,6 +61,14 @@ def test_modifiers_count(scene):
     assert triangles[..., 0].max() == pytest.approx(5)
 
 
+def test_parents_count(scene):
+    parent = put(scene, bpy.data.objects.new("parent", None), (), (100, 0, 0))
+    scene.collection.objects.link(parent)
+    wall = sheet(scene, "wall", (contract.OCCLUDERS,), 1, 1, (0, 20, 0))
+    wall.parent = parent
+    assert occluders(scene)["wall"][..., 0].mean() == pytest.approx(100, abs=1)
+
+
 def test_collection_instances_count_by_the_instancers_collection(scene):
     asset = bpy.data.collections.new("tree asset")
     leaf = bpy.data.objects.new("leaf", sheet(scene, "leaf", (), 1, 1).data)
