@@ -202,11 +202,9 @@ def _head_values(detector: Detector, plane: _Plane, cells: Tensor) -> Tensor:
     """Return the output of the head at cells, (n, channels) Tensor."""
     branches = [list(branch) for branch in detector.head.branches]
     where = functional.pad(cells, (1, 1, 1, 1))
-    if len(branches[0]) == 1:
-        values = [plane.values[plane.index[where]]] * len(branches)
-    else:  # the hidden layers of all branches are one, as gathering their neighbourhoods takes as long as the products
-        weights, biases = zip(*(_layer(hidden) for hidden, _ in branches), strict=True)
-        together = _products(plane, where, (torch.cat(weights, dim=1), torch.cat(biases)))[:-1]
-        values = list(torch.relu(together).split([len(bias) for bias in biases], dim=1))
+    # The hidden layers of all branches are one, as gathering their neighbourhoods takes as long as the products.
+    weights, biases = zip(*(_layer(hidden) for hidden, _ in branches), strict=True)
+    together = _products(plane, where, (torch.cat(weights, dim=1), torch.cat(biases)))[:-1]
+    values = torch.relu(together).split([len(bias) for bias in biases], dim=1)
     last = [_layer(nn.Sequential(branch[-1])) for branch in branches]
     return torch.cat([torch.addmm(bias, one, weight) for one, (weight, bias) in zip(values, last, strict=True)], dim=1)

@@ -4,7 +4,6 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import shapely
 
 from seip_addon.core.sensing.lidar.beams import BeamPattern
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
@@ -19,7 +18,6 @@ from tests.builders.scan_frames import rotation
 from tests.builders.street_recording import memory_record
 
 ROAD, WALLS = 0.17, 0.3
-REGION = shapely.box(-40, -40, 40, 40)
 
 
 def box_mesh(name, x, y, length, width, height, yaw=0.0, bottom=0.0):

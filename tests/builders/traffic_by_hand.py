@@ -24,9 +24,6 @@ class Body:
     reflectivity: np.ndarray
 
 
-USERS = (RoadUser("a", "car", 4.5, 1.8, 1.5), RoadUser("b", "bus", 12.0, 2.5, 3.4))
-
-
 def box_body(user: RoadUser, reflectivity: float = 0.5) -> Body:
     """Return a box of a road user's size, which says where it ends."""
     half = (user.length / 2, user.width / 2)

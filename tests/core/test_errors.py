@@ -16,7 +16,3 @@ def test_control_characters_are_replaced():
     sentence = str(SeipError("road 'a\x1b[31m\x00\x85' has\nno\tlength"))
     assert sentence == "road 'a\N{REPLACEMENT CHARACTER}[31m\N{REPLACEMENT CHARACTER} ' has no length"
     assert not any(unicodedata.category(one) == "Cc" for one in sentence)
-
-
-def test_others_are_as_they_are_written():
-    assert str(SeipError("there is no file x; check its name")) == "there is no file x; check its name"

@@ -8,7 +8,7 @@ import scipy.stats
 from seip_addon.core.estimates import IntervalEstimate, student_quantile
 
 
-@pytest.mark.parametrize("freedom", [*range(1, 31), 59, 60, 1000])
+@pytest.mark.parametrize("freedom", [1, 30, 1000])
 def test_student_quantiles(freedom):
     assert student_quantile(freedom) == pytest.approx(scipy.stats.t.ppf(0.975, freedom), abs=1e-9)
 

@@ -50,7 +50,6 @@ def test_ground_of_a_terrain_file_is_in_the_scene(street, tmp_path, capsys):
 
 @pytest.mark.parametrize(("more", "complaint"), [
     (["--terrain", "none.tif"], "no such file"),
-    (["--terrain", "none.laz"], "no such file"),
     (["--terrain", "street.xodr"], "is not a TIFF file"),
 ])  # fmt: skip
 def test_a_mistake_leaves_nothing_behind(more, complaint, street, tmp_path, monkeypatch):

@@ -19,7 +19,6 @@ from matplotlib.collections import PolyCollection
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.pictures import chart_style as style
-from seip_addon.core.output.pictures.drawing import box_corners
 from tests.builders.charts import is_drawn, legend, line, record_figures, words
 
 
@@ -61,20 +60,6 @@ def test_parts_chart(tmp_path, figures):
     assert words(figures[0]) == ["10", "40", "0"]
     assert line(second, "1 × type1").get_ydata().tolist() == [2.0, 0.5]
     assert second.get_ylim()[1] > 2
-
-
-def test_training_chart_marks_the_best(tmp_path, figures):
-    loss = [4.0 / step for step in range(1, 201)]
-    save_training_chart(tmp_path / "training.png", loss, {50: 0.3, 100: 0.6, 150: 0.5}, "Seed 0")
-    assert is_drawn(tmp_path / "training.png")
-    panel, beside = figures[0].axes
-    assert line(panel, "loss").get_ydata().tolist() == loss
-    # Five at a time, fewer at the ends.
-    assert line(panel, "smoothed").get_ydata()[[0, 100]] == pytest.approx([np.mean(loss[:3]), np.mean(loss[98:103])])
-    assert line(beside, "validation AP").get_ydata().tolist() == [0.3, 0.6, 0.5]
-    assert line(beside, "best: 0.60 after 100 steps").get_xdata().tolist() == [100]
-    save_training_chart(tmp_path / "training.png", loss, {}, "Seed 0")
-    assert len(figures[1].axes) == 1
 
 
 def errors(**changed):
@@ -120,37 +105,6 @@ def test_error_view(tmp_path, figures):
     (missed,) = middles(panel, error_view.TRUTH_COLOUR, error_view.ERROR)
     assert missed == pytest.approx([20, 5], abs=0.2)
     assert len(middles(panel, error_view.DETECTED_COLOUR, error_view.ERROR)) == 2
-
-
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_the_legend_of_errors_is_whole(tmp_path, figures, count):
-    save_error_view(tmp_path / "errors.png", [errors()] * count, "Junction")
-    (legend,) = figures[0].legends
-    extent = legend.get_window_extent()
-    assert extent.x0 >= 0
-    assert extent.x1 <= figures[0].bbox.width
-
-
-def test_corners_of_a_turned_box():
-    """4 × 2 m about (10, 0), a right angle to the left: the front left corner is at (9, 2)."""
-    (turned,) = box_corners(np.array([[10, 0, 4, 2, np.pi / 2]]))
-    assert turned == pytest.approx(np.array([[9, 2], [9, -2], [11, -2], [11, 2]]))
-
-
-def test_error_view_of_an_empty_frame(tmp_path, figures):
-    none = np.zeros((0, 5))
-    nobody = np.zeros(0, dtype=bool)
-    view = errors(cloud=np.zeros((0, 2)), truth=none, wanted=nobody, missed=nobody, detected=none, false=nobody)
-    save_error_view(tmp_path / "errors.png", [view], "Junction")
-    assert figures[0].axes[0].get_title(loc="right") == "0 missed of 0, 0 false"
-
-
-def test_dense_clouds_are_thinned_evenly(tmp_path, figures):
-    cloud = np.column_stack([np.arange(500_000) / 10_000, np.zeros(500_000)])
-    save_error_view(tmp_path / "errors.png", [errors(cloud=cloud)], "Junction")
-    drawn = figures[0].axes[0].get_lines()[0].get_xdata()
-    assert error_view.MAX_POINTS / 2 < len(drawn) <= error_view.MAX_POINTS
-    assert np.diff(drawn) == pytest.approx(drawn[1] - drawn[0])
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-pytest.importorskip("bpy")
+bpy = pytest.importorskip("bpy")
 
 PLACE = ["--count", "1", "--heights", "5.4", "--spacing", "12", "--grid", "6", "--sensor", "type1", "--no-render"]
 
@@ -41,8 +41,9 @@ def run(*command):
     )
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-@pytest.mark.parametrize("suffix", [".blend", ".glb"])
+@pytest.mark.parametrize(
+    ("number", "status", "suffix"), [(signal.SIGINT, 130, ".blend"), (signal.SIGTERM, 143, ".glb")]
+)
 def test_signals_while_blender_writes_end_the_command(small_scene, tmp_path, number, status, suffix):
     out = tmp_path / "out"
     done = run("-c", SIGNALLED, suffix, int(number), small_scene, *PLACE, "-o", out)
@@ -53,16 +54,11 @@ def test_signals_while_blender_writes_end_the_command(small_scene, tmp_path, num
 
 def test_commands_end_where_a_scene_has_python_drivers(small_scene, tmp_path):
     scene = tmp_path / "driven.blend"
-    script = (
-        "import bpy, os\n"
-        f"bpy.ops.wm.open_mainfile(filepath={str(small_scene)!r})\n"
-        "empty = bpy.data.objects.new('driven', None)\n"
-        "bpy.context.scene.collection.objects.link(empty)\n"
-        "empty.driver_add('location', 0).driver.expression = 'max(frame, len(\"a\"))'\n"
-        f"bpy.ops.wm.save_as_mainfile(filepath={str(scene)!r})\n"
-        "os._exit(0)\n"
-    )
-    assert run("-c", script).returncode == 0
+    bpy.ops.wm.open_mainfile(filepath=str(small_scene))
+    empty = bpy.data.objects.new("driven", None)
+    bpy.context.scene.collection.objects.link(empty)
+    empty.driver_add("location", 0).driver.expression = "max(frame, len('a'))"
+    bpy.ops.wm.save_as_mainfile(filepath=str(scene))
     done = run("-m", "headless.place", scene, *PLACE, "-o", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     assert "written to" in done.stdout

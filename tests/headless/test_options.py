@@ -19,7 +19,7 @@ from seip_addon.core.limits import Limits
 from seip_addon.core.sensing.scans.simulation import ScanSettings
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.settings import settings_of
-from seip_addon.core.site.candidates import DEFAULT_TYPE, CandidateSettings
+from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.workflows.survey_settings import SurveySettings
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -39,11 +39,6 @@ def test_options_left_alone_give_the_defaults(kind):
     assert read_settings(kind, parser.parse_args([])) == kind()
 
 
-def test_commands_start_from_a_product():
-    assert read_settings(CandidateSettings, surveyed()).sensors == (DEFAULT_TYPE,)
-    assert read_settings(CandidateSettings, surveyed("--sensor", "vlp16")).sensors == ("vlp16",)
-
-
 @pytest.mark.parametrize(
     ("typed", "kind", "changed"),
     [
@@ -51,9 +46,7 @@ def test_commands_start_from_a_product():
         (["--heights", "4:5:0.5", "8"], CandidateSettings, {"heights": (4.0, 4.5, 5.0, 8.0)}),
         (["--tilts", "0", "90:1"], CandidateSettings, None),
         (["--tilts", "0", "45"], CandidateSettings, {"tilts": (0.0, math.pi / 4)}),
-        (["--spacing", "near"], CandidateSettings, None),
         (["--spacing", "\N{ARABIC-INDIC DIGIT ONE}"], CandidateSettings, None),
-        (["--heights", "\N{FULLWIDTH DIGIT FIVE}"], CandidateSettings, None),
         (["--allow", "islands", "assumed-poles"], CandidateSettings, {"allow": ("islands", "assumed-poles")}),
         (["--allow", "gardens"], CandidateSettings, None),
         (["--grid", "2"], SurveySettings, {"grid_spacing": 2.0}),
@@ -99,10 +92,6 @@ def test_weights_are_the_scene_s_or_one_for_all():
         ([], Scenarios()),
         (["--pose-errors"], Scenarios("pose-errors")),
         (
-            ["--pose-errors", "0.5"],
-            Scenarios("pose-errors", PoseErrors(0.5, 0.5, math.radians(2), math.radians(2))),
-        ),
-        (
             ["--pose-errors", "0.1", "5", "--seed", "3"],
             Scenarios("pose-errors", PoseErrors(0.1, 0.1, math.radians(5), math.radians(5)), seed=3),
         ),
@@ -128,22 +117,15 @@ def parsed(*typed):
     ("typed", "complaint"),
     [
         (["--length", "nan"], "--length must be a finite number, not nan"),
-        (["--length=-inf"], "--length must be a finite number, not -inf"),
         (["--many", "9" * 40], "--many must be a finite number, not 999"),
         (["--share", "-0.1"], r"--share must be 0 to 1, not -0\.1"),
         ([""], "file must not be empty: name a file or folder"),
         (["a" * 5000], "file is 'aaa.*longer than a path"),
-        (["folder/" + "a" * 300 + ".blend"], "file is 'folder/aaa.*longer than a path"),
     ],
 )
 def test_every_option_takes_finite_numbers_and_possible_paths(typed, complaint):
     with pytest.raises(SeipError, match=complaint):
         parsed(*typed)
-
-
-def test_options_within_their_limits_are_read():
-    options = parsed("scene.blend", "--length", "-2.5", "--many", "3", "--share", "1")
-    assert (options.file, options.length, options.many, options.share) == (Path("scene.blend"), -2.5, 3, 1.0)
 
 
 def test_place_has_at_most_28_options_each_with_an_example_in_its_document():
@@ -154,22 +136,12 @@ def test_place_has_at_most_28_options_each_with_an_example_in_its_document():
     assert [name for name in options - {"--output"} if not re.search(rf"`[^`]*{name}\b", text)] == []
 
 
-@pytest.mark.parametrize("text", ["x", "1.5", "\N{ARABIC-INDIC DIGIT ONE}"])
-def test_a_text_that_is_no_number_is_left_to_the_parser(text, capsys):
-    with pytest.raises(SystemExit):
-        parsed("--many", text)
-    assert "invalid int value" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     "typed",
     [
         ["--near", "-31.97", "115.86"],
         ["--near", "-31.97,115.86"],
-        ["--near", "-31.97, 115.86"],
-        ["--near", "-31.97,", "115.86"],
         ["--near", "-31.97; 115.86"],
-        ["--near=-31.97,115.86"],
         ["--near", "-31.97°, 115.86°"],
     ],
 )
@@ -183,9 +155,7 @@ def test_a_place_is_read_as_web_maps_copy_it(typed):
         assert (read.near, read.name, read.source) == ([-31.97, 115.86], "1,2", "map")
 
 
-@pytest.mark.parametrize(
-    "typed", [["--near", "52.5"], ["--near", "52.5,13.4,1"], ["--near", "52.5,east"], ["--near", ","]]
-)
+@pytest.mark.parametrize("typed", [["--near", "52.5"], ["--near", "52.5,east"]])
 def test_what_is_no_pair_of_numbers_is_refused(typed, capsys):
     parser = new_parser("build", "Build.")
     parser.add_argument("--near", type=float, nargs=2)

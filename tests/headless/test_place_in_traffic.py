@@ -56,18 +56,6 @@ def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, run):
     assert any(note.startswith("this placement sees ") and note in said for note in notes)
 
 
-@pytest.mark.slow
-def test_a_risk_measure_over_traffic_is_named_and_evaluation_only_is_a_note(tmp_path, run):
-    run(tmp_path / "worst", "--count", "2", "--risk", "worst")
-    run(tmp_path / "none", "--count", "2", "--risk", "none")
-    worst, none = (
-        json.loads((tmp_path / name / "placement.json").read_text(encoding="utf-8")) for name in ("worst", "none")
-    )
-    assert "in traffic, in the worst of 4 instants" in worst["notes"][0]
-    assert [note.startswith("in traffic (") for note in none["notes"]].count(True) == 1
-    assert none["objective"]["sought"] == "most returns"  # as without traffic
-
-
 def test_traffic_that_is_of_no_use_is_refused(tmp_path, run):
     here = trajectories(tmp_path / "here.npz")
     with pytest.raises(SeipError, match="two runs of traffic or more are needed, not 1"):

@@ -1,7 +1,9 @@
 """The report command: from a scene that knows where on the Earth it is to a page that can be sent."""
 
+import io
 import json
 import shlex
+from contextlib import redirect_stdout
 from dataclasses import replace
 
 from headless import place, report
@@ -11,9 +13,8 @@ from headless.objective_options import read_objective
 import bpy
 import pytest
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.output.report.repeat import repeating_command
-from seip_addon.core.output.results.placement_file import comparable, load_placement
+from seip_addon.core.output.results.placement_file import load_placement
 from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import open_blend, save_blend
@@ -35,12 +36,14 @@ def folder(small_scene, tmp_path_factory):
     scene[contract.PLACES] = json.dumps([["Mill Lane", "POLYGON ((-36 -7, -7 -7, -7 7, -36 7, -36 -7))"]])
     save_blend(made / "located.blend")
     place.main([str(made / "located.blend"), "-o", str(made / "out"), *QUICK, *RULES])
+    with redirect_stdout(io.StringIO()) as said:
+        report.main([str(made / "out")])
+    assert said.getvalue().split() == [str(made / "out" / "report.html"), str(made / "out" / "report.pdf")]
     return made / "out"
 
 
-def test_a_report_is_written_and_named(folder, capsys):
-    report.main([str(folder)])
-    assert capsys.readouterr().out.split() == [str(folder / "report.html"), str(folder / "report.pdf")]
+def test_a_report_is_written(folder):
+    assert (folder / "report.pdf").is_file()
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "Mill Lane" in page
     record = load_placement(folder / "placement.json")
@@ -52,7 +55,6 @@ def test_a_report_is_written_and_named(folder, capsys):
 
 
 def test_everything_that_is_shared_names_the_sources(folder):
-    report.main([str(folder)])
     assert load_placement(folder / "placement.json").site.attribution == (CREDIT, "Surveyors & Sons")
     assert (folder / "ATTRIBUTION.txt").read_text(encoding="utf-8") == f"{CREDIT}\nSurveyors & Sons\n"
     assert json.loads((folder / "placement.geojson").read_text(encoding="utf-8"))["attribution"][0] == CREDIT
@@ -76,25 +78,12 @@ def test_the_record_and_the_maps_agree(folder):
     assert not any("not written" in note for note in record.notes)
 
 
-def test_the_command_of_a_record_asks_for_the_same_again(folder, tmp_path, monkeypatch):
-    record = load_placement(folder / "placement.json")
-    words = shlex.split(repeating_command(record))
-    assert words[:3] == ["seip", "place", "placed.blend"]
-    monkeypatch.chdir(folder)
-    place.main([*words[2:-1], str(tmp_path)])
-    assert comparable(load_placement(tmp_path / "placement.json")) == comparable(record)
-
-
 @pytest.mark.parametrize(
     "typed",
     [
         ["--budget", "60000", "--heights", "4:5:0.5", "--tilts", "-5", "0", "10", "--allow", "assumed-poles"],
-        ["--coverage", "0.9", "--weighted", "4", "--require", "sidewalk 3", "signal pole 2", "--effort", "90"],
         ["--weather", "rain=10", "visibility=200", "wet", "--weighted"],
-        ["--grid", "2", "--solver", "cbc", "--pose-errors"],
         ["--pose-errors", "0.2", "3.5", "--seed", "2", "--risk", "worst", "--failures", "mean", "--count", "3"],
-        ["--failures", "worst", "--budget", "90000"],
-        ["--effort", "9e14"],
         [],
     ],
 )
@@ -110,22 +99,3 @@ def test_every_option_survives_the_record(folder, typed):
     assert surveys.read_survey_settings(again) == settings
     assert read_objective(again) == goal
     assert again.no_render == asked.no_render
-
-
-@pytest.mark.slow
-def test_a_new_placement_takes_the_report_on_the_old_one_away(folder, small_scene, tmp_path):
-    place.main([str(small_scene), "-o", str(tmp_path), *QUICK, "--count", "1"])
-    report.main([str(tmp_path)])
-    place.main([str(small_scene), "-o", str(tmp_path), *QUICK, "--count", "2"])
-    assert not (tmp_path / "report.html").exists()
-    assert not (tmp_path / "placement.kml").exists()
-    notes = load_placement(tmp_path / "placement.json").notes
-    assert "placement.geojson and placement.kml cannot be written: the scene's map names no projection" in notes
-
-
-def test_a_folder_that_is_none_is_not_made(tmp_path):
-    with pytest.raises(SeipError, match="there is no folder"):
-        report.main([str(tmp_path / "nowhere")])
-    assert not (tmp_path / "nowhere").exists()
-    with pytest.raises(SeipError, match=r"holds no placement\.json"):
-        report.main([str(tmp_path)])

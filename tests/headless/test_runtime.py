@@ -1,9 +1,7 @@
-import io
 import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -15,20 +13,15 @@ from typing import Never
 from headless import runtime
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress, finish
+from seip_addon.core.progress import Progress
 
 ROOT = Path(__file__).resolve().parents[2]
-
-
-def test_plain_python_passes_on_all_but_the_program_name() -> None:
-    assert runtime.arguments(["place.py", "site.blend", "--count", "4"]) == ["site.blend", "--count", "4"]
 
 
 @pytest.mark.parametrize(
     ("argv", "own"),
     [
         (["blender", "-b", "site.blend", "-P", "place.py", "--", "--count", "4"], ["--count", "4"]),
-        (["blender", "-b", "-P", "place.py"], []),
         (["blender", "-P", "x.py", "--", "a", "--", "b"], ["a", "--", "b"]),
     ],
 )
@@ -47,12 +40,6 @@ def test_a_mistake_is_one_line_and_status_1(capsys) -> None:
     assert capsys.readouterr().err == "error: there is no lane here; move the point\n"
 
 
-def test_success_is_status_0() -> None:
-    with pytest.raises(SystemExit) as end:
-        runtime.run(lambda _argv: None)
-    assert end.value.code == 0
-
-
 def test_a_pipe_is_refused_before_a_reader_waits_for_it(tmp_path, capsys) -> None:
     pipe = tmp_path / "map.osm"
     os.mkfifo(pipe)
@@ -61,11 +48,6 @@ def test_a_pipe_is_refused_before_a_reader_waits_for_it(tmp_path, capsys) -> Non
             runtime.refuse_pipes(words)
     plain = [str(tmp_path), "no such file", "x" * 5000, "\0", os.devnull, "--count=3"]
     assert runtime.refuse_pipes(plain) == plain
-
-
-def test_a_defect_keeps_its_traceback() -> None:
-    with pytest.raises(ZeroDivisionError):
-        runtime.run(lambda _argv: 1 / 0)
 
 
 def test_control_c_ends_with_130_and_one_line() -> None:
@@ -83,29 +65,6 @@ def test_control_c_ends_with_130_and_one_line() -> None:
     assert complaint == "stopped, no result written\n"
 
 
-class Terminal(io.StringIO):
-    def isatty(self):
-        return True
-
-
-def two_works():
-    for total in (3, 5):
-        for done in range(total + 1):
-            yield Progress(done, total, f"part of {total}")
-            time.sleep(0.05)
-
-
-def test_a_terminal_sees_one_bar_on_one_line(monkeypatch) -> None:
-    terminal = Terminal()
-    monkeypatch.setattr(sys, "stderr", terminal)
-    with runtime.progress_bar() as report:
-        finish(two_works(), report)
-    shown = terminal.getvalue()
-    assert "part of 3:" in shown
-    assert "part of 5:" in shown
-    assert "\n" not in shown
-
-
 def test_a_log_gets_a_line_every_ten_seconds_at_most(capsys, monkeypatch) -> None:
     clock = iter(range(0, 100, 4))
     monkeypatch.setattr(runtime.time, "monotonic", lambda: next(clock))
@@ -118,22 +77,6 @@ def test_a_log_gets_a_line_every_ten_seconds_at_most(capsys, monkeypatch) -> Non
     assert [line.partition(":")[0] for line in lines[:2]] == ["cast", "cast"]
     assert "2/8" in lines[0]
     assert lines[2:] == ["search [00:36]"]
-
-
-def test_a_log_gives_the_time_left_of_counted_work_alone(capsys, monkeypatch) -> None:
-    clock = iter(range(0, 1000, 20))
-    monkeypatch.setattr(runtime.time, "monotonic", lambda: next(clock))
-    with runtime.progress_bar() as report:
-        report(Progress(0, 0, "search"))
-        report(Progress(20, 40, "cast"))  # 20 of them are from an earlier run
-        report(Progress(30, 40, "cast"))
-        report(Progress(1, 2, "check", counted=False))
-        report(Progress(2, 2, "check", counted=False))
-    search, resumed, cast, *stages = capsys.readouterr().err.splitlines()
-    assert search == "search [00:20]"
-    assert "[00:00<?" in resumed
-    assert "30/40 [00:20<00:20," in cast
-    assert [line.partition("| ")[2] for line in stages] == ["1/2 [01:20]", "2/2 [01:40]"]
 
 
 def test_what_is_logged_goes_to_the_output_and_warnings_say_so(capsys) -> None:

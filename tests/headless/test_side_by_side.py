@@ -1,7 +1,6 @@
 """Work in steps: several pieces at the same time."""
 
 import threading
-from concurrent.futures import ThreadPoolExecutor
 
 from headless.side_by_side import side_by_side
 
@@ -32,29 +31,6 @@ def test_results_come_in_the_order_of_the_works():
     assert finish(side_by_side(works, 2)) == ["0", "1", "2"]
 
 
-def test_one_thread_runs_one_after_the_other():
-    seen = []
-    finish(side_by_side([counting(3, name, seen) for name in "abc"], 1))
-    assert seen == list("aaabbbccc")
-
-
-def test_progress_is_of_all_works():
-    go = threading.Event()
-
-    def waiting():
-        yield Progress(1, 4, "wait")
-        go.wait(10)
-        yield Progress(4, 4, "wait")
-
-    steps = side_by_side([waiting(), waiting()], 2)
-    told = []
-    while not told or told[-1].done < 2:
-        told.append(next(steps))
-    go.set()
-    finish(steps)
-    assert told[-1] == Progress(2, 8, "wait")
-
-
 def test_a_work_that_fails_stops_the_others():
     stopped = threading.Event()
 
@@ -73,19 +49,3 @@ def test_stopping_stops_all():
     next(steps)
     steps.close()
     assert all(one.wait(10) for one in stopped)
-
-
-def test_an_interruption_while_works_begin_stops_those_that_have_begun(monkeypatch):
-    stopped, begun = threading.Event(), []
-
-    def interrupted(pool, *work):
-        if begun:
-            raise KeyboardInterrupt
-        begun.append(submit(pool, *work))
-        return begun[0]
-
-    submit = ThreadPoolExecutor.submit
-    monkeypatch.setattr(ThreadPoolExecutor, "submit", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        finish(side_by_side([endless(stopped), endless(threading.Event())], 2))
-    assert stopped.wait(10)

@@ -69,17 +69,6 @@ def test_another_map_leaves_no_file(tmp_path):
     assert not output.exists()
 
 
-def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(SeipError, match=r"no such file: none\.xml; check its path"):
-        traffic.main([str(JUNCTION), "--fcd", "none.xml", "-o", str(tmp_path / "t.npz")])
-
-
-@pytest.mark.parametrize(("option", "value"), [("--duration", "0"), ("--warm-up", "-1"), ("--duration", "nan")])
-def test_senseless_times_are_refused(tmp_path, option, value):
-    with pytest.raises(SeipError, match=r"--duration must be (above 0 s|a finite number)"):
-        traffic.main([str(JUNCTION), "--simulate", "x.xodr", option, value, "-o", str(tmp_path / "t.npz")])
-
-
 @pytest.mark.parametrize("given", [
     ["--simulate", "x.xodr", "--routes", "x.xml"], ["--simulate", "x.xodr", "--start", "1"],
     ["--fcd", "x.xml", "--flow", "9"], ["--fcd", "x.xml", "--seed", "1"],
@@ -108,7 +97,7 @@ def test_simulated_twice_it_is_the_same_file(tmp_path, capsys):
 def test_the_paper_s_traffic_runs_on_the_road_of_town05(tmp_path, capsys):
     blend, data, output = tmp_path / "town05.blend", tmp_path / "run.fcd.xml.gz", tmp_path / "traffic.npz"
     subprocess.run(  # noqa: S603  # our own interpreter and command
-        [sys.executable, "-m", "headless.build_scene", str(TOWN), "--near", "-49", "-1", "--radius", "80",
+        [sys.executable, "-m", "headless.build_scene", str(TOWN), "--near", "-49", "-1", "--radius", "40",
          "-o", str(blend)],
         cwd=ROOT, check=True, timeout=120, capture_output=True,
     )  # fmt: skip

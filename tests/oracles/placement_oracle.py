@@ -69,15 +69,6 @@ def covered(problem: PlacementProblem, choice: tuple[int, ...]) -> float:
     )
 
 
-def merit(problem: PlacementProblem, choice: tuple[int, ...]) -> tuple[object, ...]:
-    """Return the key by which placements are compared, smallest first."""
-    times = [sum(column[i] for i in choice) for column in problem.visible.T]
-    doubly = sum(w for w, n in zip(problem.weights, times, strict=True) if n > 1)
-    rank = canonical(problem)
-    price = sum(problem.prices[i] for i in choice)
-    return (-round(covered(problem, choice), 9), len(choice), price, -round(doubly, 9), [rank.index(i) for i in choice])
-
-
 def _feasible(problem: PlacementProblem, choice: tuple[int, ...]) -> bool:
     return (
         not problem.forbidden[list(choice)].any()

@@ -40,8 +40,10 @@ def shared() -> list[str]:
     return sorted(name for name, number in importers.items() if number >= MANY)
 
 
-def with_examples() -> list[str]:
-    return sorted(name_of(path) for path in PRODUCT if ">>> " in path.read_text(encoding="utf-8"))
+def with_examples() -> list[object]:
+    """Names of the modules with examples; those of the interface place sensors, which takes a while."""
+    names = sorted(name_of(path) for path in PRODUCT if ">>> " in path.read_text(encoding="utf-8"))
+    return [pytest.param(name, marks=pytest.mark.slow) if name == "seip_addon.api" else name for name in names]
 
 
 @pytest.mark.parametrize("name", with_examples())

@@ -1,8 +1,5 @@
 """What goes into the extension, and what does not."""
 
-import runpy
-import subprocess
-import sys
 import tomllib
 import zipfile
 from pathlib import Path
@@ -77,45 +74,12 @@ def test_one_version_stands_in_manifest_and_project():
     assert build_extension.manifest()["version"] == project["version"]
 
 
-def test_the_listing_has_tags_that_blender_s_platform_knows_and_no_address_that_is_not_ours():
-    manifest = build_extension.manifest()
-    folder = Path(build_extension.importlib.util.find_spec("bpy").origin).parent
-    script = next(folder.glob("*/scripts/modules/_bpy_internal/extensions/tags.py"))
-    assert set(manifest["tags"]) <= runpy.run_path(str(script))["addons"]
-    assert "website" not in manifest
-    assert len(manifest["tagline"]) <= 64
-    assert all(len(words) <= 64 for words in manifest["permissions"].values())
-
-
-def test_blender_brings_its_own_numpy():
-    assert not {Requirement(pin).name.lower() for pin in requirements("extension")} & {"numpy", "bpy"}
-
-
-def test_the_extension_tool_refuses_with_its_own_words(tmp_path):
-    with pytest.raises(SystemExit, match="refused to validate"):
-        build_extension.blender_extension("validate", str(tmp_path))
-
-
-@pytest.mark.slow
-def test_the_root_package_is_lazy():
-    """A checkout of any name can be imported without loading the add-on a second time."""
-    script = (
-        "import importlib.util, sys\n"
-        f"spec = importlib.util.spec_from_file_location('a-b', {str(ROOT / '__init__.py')!r},"
-        f" submodule_search_locations=[{str(ROOT)!r}])\n"
-        "module = importlib.util.module_from_spec(spec); sys.modules['a-b'] = module; spec.loader.exec_module(module)\n"
-        "assert not [name for name in sys.modules if 'seip_addon' in name or name == 'bpy']\n"
-        "module.register(); module.unregister()\n"
-        "assert 'a-b.seip_addon' in sys.modules and 'seip_addon' not in sys.modules\n"
-    )
-    command = [sys.executable, "-c", script]
-    subprocess.run(command, check=True, timeout=120, stdin=subprocess.DEVNULL)  # noqa: S603  # our own script
-
-
 @pytest.mark.parametrize(
     ("name", "platform"),
     [
-        pytest.param(name, at, marks=pytest.mark.slow if at == "linux-x64" else pytest.mark.long)
+        pytest.param(
+            name, at, marks=pytest.mark.slow if (name, at) == ("blender4.5", "linux-x64") else pytest.mark.long
+        )
         for name, build in build_extension.BUILDS.items()
         for at in build.platforms
     ],

@@ -35,6 +35,11 @@ def modules(folder: str) -> list[Path]:
 
 
 @cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def imported(path: Path) -> tuple[str, ...]:
     """Full names of what a file imports, wherever in it."""
     return tuple(_imported(path))
@@ -42,7 +47,7 @@ def imported(path: Path) -> tuple[str, ...]:
 
 def _imported(path: Path) -> Iterator[str]:
     package = path.relative_to(ROOT).parts[:-1]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree(path)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -99,21 +104,6 @@ LAYERS = ("storage", "geometry", "site", "sensing", "world", "choosing", "output
 """Groups of packages of the core: each imports only those before it."""
 
 
-def package_of(parts):
-    """Name of the package that a module of the core is in: the second level of a group of packages, else the first."""
-    groups = {"world", "sensing", "choosing", "output"}
-    return ".".join(parts[: 2 if parts[0] in groups else 1]).removesuffix(".py")
-
-
-def test_packages_of_the_core_import_each_other_in_no_circle():
-    uses: dict[str, set[str]] = {}
-    for path in modules("seip_addon/core"):
-        package = package_of(path.relative_to(ROOT / "seip_addon" / "core").parts)
-        names = [name.split(".")[2:] for name in imported(path) if name.startswith("seip_addon.core.")]
-        uses.setdefault(package, set()).update({package_of(parts) for parts in names} - {package})
-    assert not circles(uses)
-
-
 def module_name(path):
     """Full name of a module or package."""
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
@@ -129,14 +119,29 @@ def circles(uses: dict[str, set[str]]) -> set[str]:
         uses = {name: names for name, names in uses.items() if name not in ends}
 
 
-def test_no_modules_import_each_other_in_a_circle_not_even_within_functions():
+@cache
+def uses() -> dict[str, set[str]]:
+    """Modules of the program that each of them imports."""
     there = {module_name(path): path for folder in ("seip_addon", "headless") for path in modules(folder)}
-    uses = {}
-    for name, path in there.items():
-        of_modules = {one if one in there else one.rpartition(".")[0] for one in imported(path)}
-        uses[name] = of_modules & there.keys() - {name}
-    assert not circles(uses)
-    assert circles(uses | {"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == {"a", "b", "c"}
+    return {
+        name: {one if one in there else one.rpartition(".")[0] for one in imported(path)} & there.keys() - {name}
+        for name, path in there.items()
+    }
+
+
+def test_no_modules_import_each_other_in_a_circle_not_even_within_functions():
+    assert not circles(uses())
+    assert circles(uses() | {"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == {"a", "b", "c"}
+
+
+def test_the_report_imports_no_solver():
+    found, left, reached = uses(), ["headless.report"], set()
+    while left:
+        name = left.pop()
+        reached.add(name)
+        left += found[name] - reached
+    assert "seip_addon.core.output.report.write" in reached
+    assert not [name for name in reached if name.endswith((".solver", ".bounds", ".visibility.grid"))]
 
 
 def test_groups_of_the_core_import_only_lower_ones():
@@ -152,9 +157,9 @@ def test_groups_of_the_core_import_only_lower_ones():
 def test_the_add_on_never_names_itself():
     """Installed, it is called `bl_ext.user_default.seip.seip_addon`: only relative imports find it."""
     for path in modules("seip_addon"):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        absolute = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level == 0]
-        absolute += [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
+        nodes = list(ast.walk(tree(path)))
+        absolute = [node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.level == 0]
+        absolute += [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
         assert "seip_addon" not in {top(name) for name in absolute if name}, path
 
 

@@ -42,15 +42,8 @@ def test_every_study_has_a_name_and_a_description():
     assert all(f"`{name}`" in readme for name in STUDIES)
 
 
-def test_another_study_has_its_sentence():
-    shown = seip("study", "covrage")
-    assert shown.returncode == 1
-    assert "covrage" in shown.stderr
-    assert "seip study --help" in shown.stderr
-
-
 def test_help_fits_a_screen():
-    for arguments, names in (([], VERBS), (["--help"], VERBS), (["study"], STUDIES), (["study", "--help"], STUDIES)):
+    for arguments, names in (([], VERBS), (["study", "--help"], STUDIES)):
         shown = seip(*arguments)
         assert shown.returncode == 0
         lines = shown.stdout[shown.stdout.index("usage:") :].splitlines()  # bpy 5.2 writes its own log before them
@@ -68,7 +61,6 @@ def test_another_verb_has_its_sentence():
 
 
 def test_a_verb_runs_its_command_and_keeps_its_exit_status(tmp_path):
-    assert "usage: place" in seip("place", "--help").stdout
     shown = seip("place", str(tmp_path / "nothing.blend"), "-o", str(tmp_path / "out"))
     assert shown.returncode == 1
     assert shown.stderr.startswith("error: ")

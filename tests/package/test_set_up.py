@@ -28,20 +28,13 @@ def complete_system(monkeypatch):
 
 
 @pytest.mark.usefixtures("complete_system")
-@pytest.mark.parametrize("version", [(3, 8, 1), (3, 10, 0), (3, 12, 1), (3, 14, 0), (4, 0, 0)])
+@pytest.mark.parametrize("version", [(3, 10, 0), (3, 14, 0)])
 def test_other_pythons_are_refused_in_one_sentence(monkeypatch, version):
     monkeypatch.setattr(sys, "version_info", version)
     complaint = set_up.what_is_missing()
     assert f"Python {version[0]}.{version[1]}," in complaint
     assert "make PYTHON=python3.13" in complaint
     assert "\n" not in complaint
-
-
-@pytest.mark.usefixtures("complete_system")
-@pytest.mark.parametrize("version", [(3, 11, 2), (3, 13, 5)])
-def test_supported_pythons_lack_nothing(monkeypatch, version):
-    monkeypatch.setattr(sys, "version_info", version)
-    assert set_up.what_is_missing() is None
 
 
 def test_all_that_is_missing_comes_in_one_line(monkeypatch):
@@ -51,12 +44,6 @@ def test_all_that_is_missing_comes_in_one_line(monkeypatch):
         "this system lacks the module ensurepip, libEGL.so.1, libXi.so.6; "
         "install with: apt-get install --no-install-recommends python3-venv libegl1 libxi6"
     )
-
-
-def test_a_library_that_is_not_there_is_noticed(monkeypatch):
-    monkeypatch.setattr(system_libraries, "DEBIAN_PACKAGES", {"libc.so.6": "libc6", "libnowhere.so.7": "libnowhere7"})
-    monkeypatch.setattr(sys, "platform", "linux")
-    assert system_libraries.missing_libraries() == {"libnowhere.so.7": "libnowhere7"}
 
 
 @pytest.mark.usefixtures("complete_system")
@@ -90,18 +77,6 @@ def test_the_environment_gets_the_command_seip(tmp_path):
     assert "build-scene" in shown.stdout
 
 
-def test_a_step_that_fails_ends_the_set_up():
-    with pytest.raises(SystemExit, match="set-up stopped"):
-        set_up.run(sys.executable, "-c", "raise SystemExit(3)")
-
-
-def test_set_up_speaks_old_python():
-    """Syntax that Python 3.8 cannot read would show it a traceback instead of the sentence."""
-    for name in ("set_up.py", "system_libraries.py", "__init__.py"):
-        compile((ROOT / "headless" / name).read_text(encoding="utf-8"), name, "exec", dont_inherit=True)
-        __import__("ast").parse((ROOT / "headless" / name).read_text(encoding="utf-8"), feature_version=(3, 8))
-
-
 def test_every_pin_is_exact_and_stands_once():
     names = [canonicalize_name(pin.name) for pin in PINS if pin.name not in {"bpy", "numpy"}]
     assert len(names) == len(set(names))
@@ -120,11 +95,6 @@ def test_what_the_pinned_packages_need_is_pinned_too():
     assert not unpinned
 
 
-def test_the_installed_versions_are_the_pinned_ones():
-    for name, pin in PINS_HERE.items():
-        assert metadata.version(name) in pin.specifier, name
-
-
 def test_every_package_that_is_installed_has_its_digest():
     for group in ("installer", "development", "traffic", "detection", "second-opinion"):
         pins = [pin for pin in set_up.requirements(group) if pin.split("==")[0] not in set_up.UNLOCKED]
@@ -132,11 +102,6 @@ def test_every_package_that_is_installed_has_its_digest():
         assert len(lines) == len(pins)
         for line in lines:
             assert re.search(r" --hash=sha256:[0-9a-f]{64}( |$)", line), line
-
-
-def test_a_package_without_a_digest_is_not_installed():
-    with pytest.raises(SystemExit, match=r"wheels\.lock holds no wheel of shapely 9\.9"):
-        set_up.locked(["shapely==9.9"])
 
 
 def test_pip_refuses_another_package_of_the_same_name_and_version(tmp_path, monkeypatch):

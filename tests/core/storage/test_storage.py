@@ -11,25 +11,13 @@ from pathlib import Path
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.storage.files import (
-    check_folder,
-    lock_folder,
-    locked_file,
-    remove_empty,
-    save_json,
-    unfinished_name,
-    whole_file,
-)
+from seip_addon.core.storage.files import lock_folder, locked_file, save_json, whole_file
 
 ROOT = Path(__file__).resolve().parents[3]
 HOLD = "import sys, time; from pathlib import Path; from seip_addon.core.storage.files import *; "
 LOCK = HOLD + "lock_folder(Path(sys.argv[1])); print('held', flush=True); time.sleep(60)"
 LOCK_FILE = (
     HOLD + "l = locked_file(Path(sys.argv[1]) / 'a.blend'); l.__enter__(); print('held', flush=True); time.sleep(60)"
-)
-UNFINISHED = HOLD + (
-    "names = [unfinished_name(Path(sys.argv[1]), name) for name in ('placed.blend', 'work')]; names[0].touch(); "
-    "names[1].mkdir(); (names[1] / 'x').touch(); print(names[0], flush=True); time.sleep(60)"
 )
 WRITE = HOLD + "part = whole_file(Path(sys.argv[1]) / 'a.json'); print(part.__enter__(), flush=True); time.sleep(60)"
 
@@ -93,36 +81,6 @@ def test_a_file_that_another_run_writes_is_refused_until_that_ends_however_it_en
     assert list(tmp_path.iterdir()) == []
 
 
-def test_unfinished_files_and_folders_of_a_killed_run_go_with_the_next_one(tmp_path, other):
-    process, dead = other(UNFINISHED, tmp_path)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    assert Path(dead).name.endswith("placed.blend")
-    assert len(list(tmp_path.iterdir())) == 2
-    assert unfinished_name(tmp_path, "x.png").suffix == ".png"
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_an_unfinished_name_in_a_folder_that_cannot_be_made_is_a_sentence(tmp_path):
-    (tmp_path / "file").touch()
-    with pytest.raises(SeipError, match=r"cannot write .*a\.png"):
-        unfinished_name(tmp_path / "file" / "folder", "a.png")
-    assert unfinished_name(tmp_path / "new" / "folder", "a.png").parent.is_dir()
-
-
-def test_what_an_earlier_process_of_the_same_number_left_goes_too(tmp_path):
-    left = tmp_path / f".seip-{os.getpid()}-0123abcd-placed.blend"
-    left.touch()
-    save_json(tmp_path / "a.json", {})
-    assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
-
-
-def test_unfinished_files_are_those_of_this_process(tmp_path):
-    with whole_file(tmp_path / "a.png") as temporary:
-        assert temporary.name.startswith(f".seip-{os.getpid()}-")
-        assert temporary.suffix == ".png"
-
-
 def test_a_folder_that_is_made_for_a_file_goes_with_it(tmp_path):
     path = tmp_path / "a" / "b" / "file.json"
     with pytest.raises(ZeroDivisionError), locked_file(path), whole_file(path):
@@ -134,18 +92,3 @@ def test_a_folder_that_is_made_for_a_file_goes_with_it(tmp_path):
     assert [one.name for one in tmp_path.rglob("*")] == ["a"]
     save_json(path, 1)
     assert path.exists()
-
-
-def test_only_folders_that_are_empty_are_removed(tmp_path):
-    made = check_folder(tmp_path / "a" / "b" / "c")
-    assert set(made) == {tmp_path / "a", tmp_path / "a" / "b", tmp_path / "a" / "b" / "c"}
-    assert check_folder(tmp_path / "a" / "b" / "c") == ()
-    (tmp_path / "a" / "mine.txt").touch()
-    remove_empty(made)
-    assert [one.name for one in tmp_path.rglob("*")] == ["a", "mine.txt"]
-
-
-def test_a_folder_that_cannot_be_made_leaves_none_of_its_parents(tmp_path):
-    with pytest.raises(SeipError, match="cannot write to"):
-        check_folder(tmp_path / "a" / ("x" * 300))
-    assert list(tmp_path.iterdir()) == []

@@ -6,13 +6,12 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from seip_addon.core.acceptance import Acceptance
-from seip_addon.core.choosing.placement.objective import MOVED, Objective
+from seip_addon.core.choosing.placement.objective import Objective
 from seip_addon.core.choosing.placement.scenarios import PoseErrors, Scenarios
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.moved_sensors import evaluate_moved_sensors
-from seip_addon.core.workflows.placing import ACCEPTED_MESSAGE, place
+from seip_addon.core.workflows.placing import place
 
 
 def best_of_all(survey, count, worth):
@@ -56,23 +55,6 @@ def test_pose_errors_are_evaluated_on_held_out_scenarios(small_survey):
 def test_traffic_scenarios_need_runs(small_survey):
     with pytest.raises(SeipError, match="traffic"):
         finish(place(small_survey, Objective(count=1, scenarios=Scenarios(kind="traffic"))))
-
-
-def test_an_accepted_search_says_so(small_survey):
-    acceptance = Acceptance()
-    acceptance.accept()
-    solution = finish(place(small_survey, Objective(count=3), acceptance=acceptance))
-    assert solution.placement.status != "optimal"
-    assert ACCEPTED_MESSAGE in solution.placement.notes
-    assert solution.placement.bound >= solution.placement.objective > 0
-
-
-def test_sensors_at_candidate_poses_see_what_the_grid_holds(small_survey):
-    solution = finish(place(small_survey, Objective(count=2)))
-    mounted = [one.mounted for one in solution.deployment.sensors]
-    moved = finish(evaluate_moved_sensors(small_survey, solution.objective, mounted, {}))
-    assert moved.deployment.coverage == solution.deployment.coverage
-    assert moved.placement.status == MOVED
 
 
 def test_a_sensor_moved_by_hand_sees_what_its_rays_see(small_survey):

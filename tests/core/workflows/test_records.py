@@ -12,12 +12,9 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.placement_file import load_placement, save_placement
 from seip_addon.core.output.results.placement_record import Provenance
 from seip_addon.core.progress import finish
-from seip_addon.core.sensing.weather import Weather
 from seip_addon.core.site.scene_geometry import NamedArea
-from seip_addon.core.workflows import records
 from seip_addon.core.workflows.placing import place, with_context
 from seip_addon.core.workflows.records import inputs_of, record_of, restored_solution
-from seip_addon.core.workflows.survey import lay_out, see
 
 MADE = Provenance(datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC), {"placement": 1.0}, {"seip": "0"})
 CROSSING = NamedArea("zebra", shapely.box(-9.0, -4.0, -6.0, 4.0), crossing=True)
@@ -71,11 +68,6 @@ def test_a_record_of_another_grid_is_refused(small_survey):
         finish(restored_solution(small_survey, other))
 
 
-def test_a_placement_by_coverage_does_not_depend_on_road_users(small_survey):
-    record = record_of(small_survey, finish(place(small_survey, Objective(count=1))), MADE)
-    assert record.is_of(inputs_of(replace(small_survey, geometry=replace(small_survey.geometry, places=(CROSSING,)))))
-
-
 CHANGES = {
     "a crossing that moves": lambda old: replace(old, places=(replace(CROSSING, polygon=shapely.box(6, -4, 9, 4)),)),
     "a crossing that is none": lambda old: replace(old, places=(replace(CROSSING, crossing=False),)),
@@ -100,26 +92,3 @@ def test_road_users_that_change_make_a_placement_by_returns_stale(by_returns, ch
     assert not record.is_of(inputs_of(other))
     with pytest.raises(SeipError, match="the placement is stale"):
         finish(restored_solution(other, record))
-
-
-def test_another_share_on_crossings_makes_a_placement_by_returns_stale(by_returns, monkeypatch):
-    survey, record = by_returns
-    monkeypatch.setattr(records, "CROSSING_SHARE", 0.4)
-    assert not record.is_of(inputs_of(survey))
-
-
-def test_another_range_of_the_sensors_makes_a_placement_by_returns_stale(by_returns):
-    survey, record = by_returns
-    models = {key: replace(model, max_range=model.max_range - 1.0) for key, model in survey.models.items()}
-    assert inputs_of(replace(survey, models=models))["returns"] != record.inputs["returns"]
-
-
-def test_weather_makes_a_placement_by_returns_stale(small_survey, tmp_path):
-    settings = replace(
-        small_survey.settings, candidates=replace(small_survey.settings.candidates, sensors=("os1_128",))
-    )
-    survey = finish(see(lay_out(small_survey.geometry, settings), tmp_path / "visibility.npz"))
-    record = record_of(survey, finish(place(survey, Objective(count=1))), MADE)
-    assert record.returns is not None
-    fog = lay_out(small_survey.geometry, replace(settings, weather=Weather(visibility=200.0)))
-    assert inputs_of(fog)["returns"] != record.inputs["returns"]

@@ -24,19 +24,7 @@ def test_each_kind_has_its_share_and_half_of_the_pedestrians_is_on_crossings():
     assert np.ptp(weights[4:7]) == 0
 
 
-def test_pedestrians_keep_their_share_where_there_is_no_crossing():
-    some = users([0, 1, 2, 2], [-1, -1, -1, -1])
-    weights = user_weights(some, Objective(count=1))
-    np.testing.assert_allclose(weights, np.array([1, 1, 0.5, 0.5]) * 4 / 3)
-
-
 def test_weights_of_regions_multiply_those_of_kinds():
     some = users([0, 0, 1, 2], [-1, -1, -1, -1], [1.0, 2.0, 1.0, 1.0])
     plain, weighted = (user_weights(some, Objective(count=1, central_weight=w)) for w in (None, "scene"))
     np.testing.assert_allclose(weighted / plain, [1, 2, 1, 1])
-
-
-def test_a_share_of_zero_leaves_a_kind_out():
-    some = users([0, 1, 2, 2], [-1, -1, -1, 0])
-    weights = user_weights(some, Objective(count=1, shares=(1.0, 0.0, 0.0)))
-    assert (weights > 0).tolist() == [True, False, False, False]

@@ -1,25 +1,14 @@
 """Survey of a site: layout, stored visibility grid, records of placements."""
 
 from dataclasses import replace
-from datetime import UTC, datetime
 
 import numpy as np
 import pytest
 
-from seip_addon.core.output.results.placement_record import Provenance
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.visibility.visibility_model import visibility_model
 from seip_addon.core.workflows.survey import grid_key, lay_out, see
-
-MADE = Provenance(datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC), {"placement": 1.0}, {"seip": "0"})
-
-
-def test_the_layout_keeps_the_scene_its_settings_and_the_warnings_of_its_reading(small_layout):
-    assert set(small_layout.models) == {"type1", "type2"}
-    assert small_layout.warnings[0] == "read with care"
-    assert small_layout.site.targets.spacing == 4.0
-    assert set(np.unique(small_layout.site.candidates.sensor)) == {"type1", "type2"}
 
 
 def test_the_grid_is_that_of_each_pose_alone(small_survey):

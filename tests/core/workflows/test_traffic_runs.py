@@ -4,24 +4,7 @@ import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.workflows.traffic_runs import found_runs, read_runs, runs_in, split_runs, traffic_folder
-
-
-def test_runs_are_in_the_order_of_their_numbers(tmp_path):
-    for name in ("run-10", "run-2", "run-1"):
-        (tmp_path / f"{name}.npz").touch()
-    (tmp_path / "notes.txt").touch()
-    assert [path.stem for path in runs_in(tmp_path)] == ["run-1", "run-2", "run-10"]
-
-
-def test_the_last_third_is_for_evaluation():
-    assert split_runs([1, 2, 3, 4, 5, 6]) == ([1, 2, 3, 4], [5, 6])
-    assert split_runs([1, 2]) == ([1], [2])
-
-
-def test_the_folder_is_named_after_the_scene(tmp_path):
-    assert traffic_folder(tmp_path / "place.blend").name == "place_traffic"
-    assert traffic_folder(tmp_path / "place.blend", "_dense").name == "place_traffic_dense"
+from seip_addon.core.workflows.traffic_runs import found_runs, read_runs
 
 
 def test_a_folder_without_runs_is_named(tmp_path):

@@ -154,12 +154,12 @@ class Search:
         bound = max(bounds, default=-math.inf)
         return bound if bound >= self.goal - self._rounding else -math.inf
 
-    def run(self, clock: Clock, seconds: float, most: float = math.inf) -> Generator[Progress, None, bool]:
-        """Continue the search, for at most ``most`` branches; return whether it ended within the limits."""
-        end, last = clock.elapsed + min(seconds, clock.left), self._met + most
+    def run(self, clock: Clock, seconds: float) -> Generator[Progress, None, bool]:
+        """Continue the search; return whether it ended within the limits."""
+        end = clock.elapsed + min(seconds, clock.left)
         self._clock = clock
         while self._is_open() and not self.satisfied:
-            if clock.elapsed > end or clock.left <= 0 or self._met >= last:
+            if clock.elapsed > end or clock.left <= 0:
                 return False
             yield Progress(0, 0, f"searching placements, {self._met:,} branches so far")
             self._met += 1

@@ -57,7 +57,8 @@ class Background:
     spread : (r,) float32, metres
         Standard deviation of that range (1.48 times the median absolute deviation), at most 0.5 m.
     returned : (r,) float32, 0 to 1
-        Share of the sweeps with a return at the usual range, of those in which no road user stopped the ray.
+        Share of the sweeps with a return from the usual range or beyond, without those in which a road user stopped the
+        ray.
     agreement : (r,) float32, 0 to 1
         Share of all returns of each ray that are at its usual range; NaN without returns.
     sweeps : int
@@ -175,8 +176,9 @@ def background_of(rays: RayGrid, ranges: NDArray[np.float32], seconds: float) ->
     spread = np.minimum(1.4826 * _median(np.sort(deviation, axis=0), returns), np.float32(_MAX_SPREAD))
     margin = range_margin(usual, spread)
     agreeing = (deviation <= margin).sum(axis=0)
-    # A sweep in which a road user stopped the ray says nothing about the surface behind it.
-    free = np.maximum(sweeps - (hit & (ranges < usual - margin)).sum(axis=0), 1)
+    # A sweep in which a road user stopped the ray says nothing about the surface behind it. Returns beyond the margin
+    # count: left out, one in some hundred is missing, as if the sensor received less power.
+    near = (hit & (ranges < usual - margin)).sum(axis=0)
     known = agreeing >= max(min(3, sweeps), _LEAST_AGREEMENT * sweeps)
     with np.errstate(invalid="ignore"):
         agreement = np.where(returns > 0, agreeing / np.maximum(returns, 1), np.nan)
@@ -184,7 +186,7 @@ def background_of(rays: RayGrid, ranges: NDArray[np.float32], seconds: float) ->
         rays=rays,
         usual=np.where(known, usual, np.nan).astype(np.float32),
         spread=np.where(known, spread, 0.0).astype(np.float32),
-        returned=(agreeing / free).astype(np.float32),
+        returned=((returns - near) / np.maximum(sweeps - near, 1)).astype(np.float32),
         agreement=agreement.astype(np.float32),
         sweeps=sweeps,
         seconds=seconds,

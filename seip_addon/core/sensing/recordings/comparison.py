@@ -53,7 +53,7 @@ class RayComparison:
     measured : (r,) float64, metres
         Usual range; NaN without a background.
     returned : (r,) float64, 0 to 1
-        Share of the sweeps with a return at the usual range.
+        Share of the sweeps with a return from the usual range or beyond.
     result : (r,) int64
         `AGREES`, `NEARER`, `FARTHER`, `NOTHING` or `UNKNOWN`.
     """

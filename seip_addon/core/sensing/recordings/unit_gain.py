@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -11,7 +11,6 @@ import numpy as np
 from ...arrays import Boolean, Float, Integer
 from ...estimates import student_quantile
 from ..lidar.carla_dropoff import CarlaDropoff
-from ..lidar.model import LidarModel
 from ..lidar.noisy_returns import return_chance
 from .azimuth_sectors import sector_of
 from .comparison import AGREES, NOTHING, RayComparison
@@ -29,39 +28,56 @@ _LEAST_IN_BIN = 30
 
 
 def fitted_gain(one: RayComparison) -> Gain | None:
-    """Return the gain at which the law predicts the mean share of returns; None if the recording does not determine it.
+    """Return the gain at which the law predicts the share of returns; None if the recording does not determine it.
 
-    Only rays whose surface is as predicted are used. The interval is that of the jackknife over sectors of azimuth,
-    because neighbouring rays return or not together: surfaces deviate from their materials over 16 m and more. Its
-    degrees of freedom are those of the effective number of sectors, since few of them have most of the doubtful rays.
+    Only rays whose surface is as predicted are used. The weight of each is the derivative of its chance to return,
+    since rays that return at any gain would turn the few returns that are not matched with them into a loss of power.
+    The interval is that of the jackknife over sectors of azimuth, because neighbouring rays return or not together:
+    real surfaces deviate from their materials over 16 m and more. Its degrees of freedom are those of the effective
+    number of sectors, since few of them have most of the doubtful rays.
     """
     model = one.sensor.model
     rays = _comparable(one)
     if isinstance(model.law, CarlaDropoff) or rays.sum() < _LEAST_RAYS:
         return None
     distance, reflected, returned = one.predicted[rays], one.reflected[rays], one.returned[rays]
+
+    def chance(log_gain: float) -> Float:
+        return return_chance(model.amplified(math.exp(log_gain)), distance, reflected)
+
+    def slope(log_gain: float) -> Float:
+        return (chance(log_gain + _STEP) - chance(log_gain - _STEP)) / (2 * _STEP)
+
+    found = _root(chance, returned, np.ones(len(returned)))
+    if found is None:
+        return None
+    weight = slope(found)
+    found = _root(chance, returned, weight)
+    if found is None:
+        return None
+    sector = sector_of(one.directions[rays], _SECTORS)
+    slopes = np.bincount(sector, weight * slope(found), _SECTORS)
+    total, others = float(slopes.sum()), np.maximum(slopes.sum() - slopes, 1e-9)
+    residual = weight * (returned - chance(found))
+    without = np.bincount(sector, residual, _SECTORS) / others  # by which the logarithm changes without a sector
+    effective = total**2 / float(slopes @ slopes)
+    half = student_quantile(max(1, round(effective) - 1)) * math.sqrt((1 - 1 / _SECTORS) * float(without @ without))
+    return Gain(math.exp(found), math.exp(found - half), math.exp(found + half))
+
+
+def _root(chance: Callable[[float], Float], returned: Float, weight: Float) -> float | None:
+    """Return the logarithm of the gain at which the weighted mean chance is that of the returns; None outside."""
     low, high = math.log(_LEAST), math.log(_MOST)
-    wanted = float(returned.mean())
-    if not _mean_chance(model, low, distance, reflected) < wanted < _mean_chance(model, high, distance, reflected):
+    wanted = float(weight @ returned)
+    if not float(weight @ chance(low)) < wanted < float(weight @ chance(high)):
         return None
     for _ in range(_STEPS):  # the mean chance grows with the gain
         middle = (low + high) / 2
-        if _mean_chance(model, middle, distance, reflected) < wanted:
+        if float(weight @ chance(middle)) < wanted:
             low = middle
         else:
             high = middle
-    found = (low + high) / 2
-    residual = returned - return_chance(model.amplified(math.exp(found)), distance, reflected)
-    above, below = (
-        return_chance(model.amplified(math.exp(found + step)), distance, reflected) for step in (_STEP, -_STEP)
-    )
-    sector = sector_of(one.directions[rays], _SECTORS)
-    slope = np.bincount(sector, (above - below) / (2 * _STEP), _SECTORS)
-    total, others = float(slope.sum()), np.maximum(slope.sum() - slope, 1e-9)
-    without = np.bincount(sector, residual, _SECTORS) / others  # by which the logarithm changes without a sector
-    effective = total**2 / float(slope @ slope)
-    half = student_quantile(max(1, round(effective) - 1)) * math.sqrt((1 - 1 / _SECTORS) * float(without @ without))
-    return Gain(math.exp(found), math.exp(found - half), math.exp(found + half))
+    return (low + high) / 2
 
 
 def return_shares(one: RayComparison, gain: float, surfaces: Sequence[tuple[str, Integer]]) -> list[ReturnShare]:
@@ -90,7 +106,3 @@ def _comparable(one: RayComparison) -> Boolean:
     """Return the rays whose surface is as predicted, or that do not return from it."""
     rays: Boolean = np.isin(one.result, (AGREES, NOTHING)) & (one.predicted >= one.sensor.model.min_range)
     return rays
-
-
-def _mean_chance(model: LidarModel, log_gain: float, distance: Float, reflected: Float) -> float:
-    return float(return_chance(model.amplified(math.exp(log_gain)), distance, reflected).mean())

@@ -1,7 +1,6 @@
-"""Branch and bound against exhaustive search on the reduced problem."""
+"""Branch and bound, and the bound that it cuts by, against exhaustive search on the reduced problem."""
 
 import math
-from dataclasses import replace
 from itertools import combinations
 
 from headless.studies.benchmark.street_visibility import street_problem
@@ -11,7 +10,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from seip_addon.core.choosing.placement import branch_and_bound
+from seip_addon.core.choosing.placement import bounds, branch_and_bound
+from seip_addon.core.choosing.placement.bounds import lagrangian_bound
 from seip_addon.core.choosing.placement.branch_and_bound import BestPlacements
 from seip_addon.core.choosing.placement.reduced_problem import make_instance
 from seip_addon.core.choosing.placement.search_limits import Clock
@@ -78,47 +78,21 @@ def test_all_best_placements_are_listed_or_proven_absent(problem, share):
     assert few.overflowed == (len(search.found) > 1)
 
 
-def test_a_search_stops_at_its_limit():
-    instance = make_instance(street_problem(60, 400, seed=3, count=5))[0]
-    assert not finish(BestPlacements(instance, 0.0, 1, instance.total).run(forever(), 0.0))
-
-
-def test_an_uneven_street_is_solved_as_well_as_an_even_one():
-    problem = street_problem(16, 300, seed=5, count=3)
-    weights = np.random.default_rng(1).uniform(0.5, 2.0, 300)
-    instance = make_instance(replace(problem, weights=weights))[0]
-    best = max(instance.value(choice) for choice in feasible(instance))
-    (chosen,) = searched(instance, 0.0).found
-    assert instance.value(chosen) == best
-
-
 @cases(100)
-@given(small_problems(), st.integers(1, 6))
-def test_the_bound_of_a_search_that_was_stopped_holds_and_the_search_can_go_on(problem, branches):
+@given(small_problems())
+def test_the_bound_of_a_search_that_was_stopped_holds_and_the_search_can_go_on(problem):
     instance = reduced(problem)
     assume(instance is not None)
     best = max(map(instance.value, (choice for choice in feasible(instance) if len(choice))), default=-1.0)
     assume(best > 0)
     search = BestPlacements(instance, 0.0, 10_000, instance.total)
-    bounds = []
-    while not finish(search.run(forever(), math.inf, branches)):
+    bounds, clock = [], Clock(math.inf, 1e9)
+    while not finish(search.run(clock, 0.0)):
         found = max(map(instance.value, search.found), default=0.0)
         assert max(found, search.bound) >= best
         bounds.append(search.bound)
     assert bounds == sorted(bounds, reverse=True)
     assert instance.value(search.found[0]) == best
-
-
-def test_the_bound_falls_while_the_search_goes_on():
-    visible = np.random.default_rng(2).random((40, 300)) < 0.15
-    problem = replace(street_problem(40, 300, heights=1, count=6), visible=visible)
-    instance = make_instance(problem)[0]
-    search = BestPlacements(instance, 0.0, 1, instance.total)
-    bounds = []
-    while not finish(search.run(forever(), math.inf, 20)):
-        bounds.append(search.bound)
-    assert bounds == sorted(bounds, reverse=True)
-    assert len(set(bounds)) > 5
 
 
 def test_a_full_queue_changes_nothing(monkeypatch):
@@ -129,10 +103,16 @@ def test_a_full_queue_changes_nothing(monkeypatch):
     assert {tuple(choice) for choice in deep.found} == {tuple(choice) for choice in plain.found}
 
 
-def test_a_placement_found_elsewhere_is_taken_once():
-    instance = make_instance(street_problem(25, 200, seed=6, count=3))[0]
-    plain = searched(instance, 0.0)
-    search = BestPlacements(instance, 0.0, 10_000, instance.total)
-    search.offer(plain.found[0][::-1])
-    assert finish(search.run(forever(), math.inf))
-    assert sorted(map(tuple, search.found)) == sorted(map(tuple, plain.found))
+@cases(150)
+@given(small_problems(), st.floats(0.0, 1.0))
+def test_every_placement_that_reaches_the_goal_is_left(problem, share):
+    instance = reduced(problem)
+    assume(instance is not None)
+    reaching = [choice for choice in feasible(instance) if instance.value(choice) >= share * instance.total]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bounds, "REDUCTION_INTERVAL", 2)
+        patch.setattr(bounds, "MAX_KEPT_SHARE", 1.0)
+        patch.setattr(bounds, "MAX_LISTED_CHOICES", 1)
+        keep, bound = finish(lagrangian_bound(instance, share * instance.total, forever()))
+    assert all(np.isin(choice, keep).all() for choice in reaching)
+    assert all(instance.value(choice) <= bound.value + instance.slack for choice in reaching)

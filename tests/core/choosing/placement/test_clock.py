@@ -8,26 +8,9 @@ from headless.studies.benchmark.street_visibility import street_problem
 import pytest
 
 from seip_addon.core.choosing.placement import search_limits
-from seip_addon.core.choosing.placement.search_limits import DEFAULT_EFFORT, OPERATIONS_PER_UNIT, Clock, SolverLimits
+from seip_addon.core.choosing.placement.search_limits import OPERATIONS_PER_UNIT, Clock
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.progress import finish
-
-
-def test_work_counts_alike_on_every_machine() -> None:
-    clock = Clock(math.inf, 3.0)
-    clock.spend(2 * OPERATIONS_PER_UNIT)
-    assert (clock.elapsed, clock.left) == (pytest.approx(2.0, rel=1e-3), pytest.approx(1.0, rel=1e-3))
-
-
-def test_without_a_limit_of_work_time_is_the_measure() -> None:
-    clock = Clock(100.0)
-    clock.spend(50 * OPERATIONS_PER_UNIT)
-    assert clock.elapsed < 1.0
-    assert clock.left > 99.0
-
-
-def test_time_ends_a_limit_of_work_too() -> None:
-    assert Clock(1e-9, 5.0).left < 0
 
 
 def test_what_a_part_spends_is_spent_of_the_whole() -> None:
@@ -47,9 +30,3 @@ def test_without_any_limit_given_a_search_is_limited_by_work_and_never_by_time(m
     loaded = finish(solve(problem))
     first, second = ((one.status, one.bound, one.chosen.tolist(), one.notes) for one in (alone, loaded))
     assert first == second
-
-
-def test_a_time_limit_replaces_the_default_limit_of_work() -> None:
-    assert SolverLimits().clock().left == DEFAULT_EFFORT
-    assert not SolverLimits(time_limit=5.0).clock().counts_work
-    assert SolverLimits(time_limit=1e6, effort=5.0).clock().left == 5.0

@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 
-from seip_addon.core.choosing.placement.objective import (
-    Objective,
-    check_objective,
-    placement_problem,
-    target_weights,
-)
+from seip_addon.core.choosing.placement.objective import Objective, check_objective, placement_problem, target_weights
 from seip_addon.core.choosing.placement.optimisation import optimise
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
@@ -24,12 +19,6 @@ def problem(example, **goal):
     return placement_problem(example.site, example.visible, example.models, Objective(**goal))
 
 
-def test_without_a_goal_four_sensors_are_sought(example):
-    assert problem(example).count == 4
-    assert problem(example, budget=50_000.0).count is None
-    assert problem(example, coverage=0.5).count is None
-
-
 def test_weights_count_in_the_weighted_problem_alone(example):
     central = example.site.targets.central
     assert set(target_weights(example.site, Objective())) == {1.0}
@@ -37,12 +26,6 @@ def test_weights_count_in_the_weighted_problem_alone(example):
     weights = target_weights(example.site, Objective(central_weight=7.5))
     assert set(weights[central]) == {7.5}
     assert set(weights[~central]) == {1.0}
-
-
-def test_prices_come_from_the_catalogue(example):
-    stated = problem(example)
-    for price, key in zip(stated.prices, example.site.candidates.sensor, strict=True):
-        assert price == example.models[key].price
 
 
 def test_demands_by_name_are_met(example):
@@ -54,37 +37,14 @@ def test_demands_by_name_are_met(example):
     assert chosen <= set(names[:5])
 
 
-def test_the_reverse_problem_reaches_its_coverage_at_the_least_price(example):
-    goal = Objective(coverage=0.6)
-    plan = finish(optimise(example.site, example.visible, example.models, goal))
-    assert plan.deployment.coverage >= 0.6
-    assert plan.greedy is None
-    cheaper = Objective(budget=plan.placement.price - 1)
-    other = finish(optimise(example.site, example.visible, example.models, cheaper))
-    assert other.deployment.coverage < 0.6
-
-
-def test_a_plan_tells_what_was_asked_and_what_greedy_finds(example):
-    plan = finish(optimise(example.site, example.visible, example.models, Objective()))
-    assert plan.objective.count == 4
-    assert plan.greedy.objective <= plan.placement.objective
-    assert plan.deployment.seen_by.tolist() == example.visible[plan.placement.chosen].sum(axis=0).tolist()
-
-
 @pytest.mark.parametrize(
     ("goal", "sentence"),
     [
         ({"coverage": 0.0}, "share above 0 and at most 1"),
-        ({"coverage": 1.5}, "share above 0 and at most 1"),
         ({"central_weight": -1.0}, "central weight must be 1e-06 to 1,000,000, not -1"),
-        ({"central_weight": float("nan")}, "central weight must be 1e-06 to 1,000,000, not nan"),
-        ({"central_weight": 1e308}, "central weight must be 1e-06 to 1,000,000"),
         ({"budget": float("inf")}, "budget must be 0 to"),
-        ({"min_distance": -1.0}, "min distance must be 0 to 100,000 m"),
         ({"forbidden": ("a",), "mandatory": ("a",)}, "'a' is both forbidden and mandatory"),
         ({"mandatory": ("signal pole 9",)}, "did you mean 'signal pole"),
-        ({"forbidden": ("zzz",)}, "there is no position 'zzz'"),
-        ({"count": 0}, "the number of sensors must be 1 to 100,000, not 0"),
         ({"count": 10_000}, "10000 sensors are requested, but"),
         ({"budget": 10.0}, "below the cheapest sensor"),
     ],

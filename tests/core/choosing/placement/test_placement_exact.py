@@ -5,55 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from seip_addon.core.choosing.placement.cheapest import cheapest_for_coverage
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.placement.solver import solve, solve_greedy
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from tests.oracles.placement_oracle import all_placements, covered, merit, small_problems
+from tests.oracles.placement_oracle import all_placements, covered, small_problems
 from tests.oracles.random_cases import cases
 
 thorough = cases(150)
 quick = cases(40)
-
-
-@thorough
-@given(st.data())
-def test_equals_exhaustive_search_in_every_stage(data: st.DataObject) -> None:
-    problem = accepted(data, small_problems())
-    feasible = all_placements(problem)
-    if not feasible:
-        with pytest.raises(SeipError):
-            finish(solve(problem))
-        return
-    best = min(feasible, key=lambda choice: merit(problem, choice))
-    found = finish(solve(problem))
-    assert found.status == "optimal"
-    assert merit(problem, tuple(found.chosen)) == merit(problem, best)
-    assert found.objective == found.bound == pytest.approx(covered(problem, best))
-    assert found.gap == 0
-
-
-@thorough
-@given(st.data(), st.sampled_from([0.1, 0.34, 0.5, 0.75, 0.9, 1.0]))
-def test_reverse_equals_exhaustive_search(data: st.DataObject, coverage: float) -> None:
-    problem = accepted(data, small_problems())
-    goal = coverage * problem.weights.sum() - 1e-9
-    reaching = [choice for choice in all_placements(problem) if covered(problem, choice) >= goal]
-    if not reaching:
-        with pytest.raises(SeipError):
-            finish(cheapest_for_coverage(problem, coverage))
-        return
-    best = min(reaching, key=lambda choice: (problem.prices[list(choice)].sum(), merit(problem, choice)))
-    found = finish(cheapest_for_coverage(problem, coverage))
-    assert found.status == "optimal"
-    assert found.objective == found.bound == found.price == problem.prices[list(best)].sum()
-    assert tuple(found.chosen) == best
 
 
 @quick
@@ -89,17 +53,6 @@ def test_greedy_reaches_its_guarantee_under_cardinality(problem: PlacementProble
     found = solve_greedy(problem)
     assert (1 - 1 / np.e) * best <= found.objective <= best + 1e-9
     assert found.bound >= best - 1e-9
-
-
-@thorough
-@given(st.data())
-def test_greedy_is_feasible_and_its_bound_holds(data: st.DataObject) -> None:
-    problem = accepted(data, small_problems())
-    feasible = all_placements(problem)
-    assume(feasible)
-    found = solve_greedy(problem)
-    assert tuple(found.chosen) in feasible
-    assert found.bound >= max(covered(problem, choice) for choice in feasible) - 1e-9
 
 
 def accepted(data: st.DataObject, problems: st.SearchStrategy[PlacementProblem]) -> PlacementProblem:

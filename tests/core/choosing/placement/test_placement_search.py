@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seip_addon.core.choosing.placement import cheapest
 from seip_addon.core.choosing.placement.cheapest import cheapest_for_coverage
 from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.progress import finish
-from tests.oracles.placement_search import DUST, UNDECIDED, WEIGHTS, faults, search, sentence
+from tests.oracles.placement_search import DUST, UNDECIDED, WEIGHTS, faults, search
 
 
 @pytest.mark.parametrize("seed", [249, 1_000_194, 100_277])
@@ -25,15 +24,15 @@ def test_problems_that_were_answered_wrongly(seed: int) -> None:
     ("first", "number"),
     [
         pytest.param(520, 20, id="quick"),
-        pytest.param(100_000, 150, marks=pytest.mark.slow, id="many"),
-        pytest.param(100_150, 2850, marks=pytest.mark.long, id="most"),
+        pytest.param(100_000, 100, marks=pytest.mark.slow, id="many"),
+        pytest.param(100_100, 2900, marks=pytest.mark.long, id="most"),
     ],
 )
 def test_placements_of_random_problems(first: int, number: int) -> None:
     total = search(number, first)
-    assert total["FAULTS"] == 0, sentence(total)
-    assert sum(total[name] for name in UNDECIDED) <= 0.01 * total["problems"], sentence(total)
-    assert sum(total[f"  {kind}"] for kind in (*WEIGHTS, DUST)) > 0.8 * number
+    assert [what for what in total if what.startswith("FAULT")] == []
+    assert sum(total[name] for name in UNDECIDED) <= 0.01 * total["problems"], total
+    assert sum(total[kind] for kind in (*WEIGHTS, DUST)) > 0.8 * number
 
 
 def crowded(seed: int) -> PlacementProblem:
@@ -70,17 +69,3 @@ def test_where_all_prices_are_equal_the_fewest_sensors_are_the_cheapest(price: f
     problem = replace(crowded(0), weights=np.ones(5), prices=np.full(17, price), min_distance=0.0)
     placement = finish(cheapest_for_coverage(problem, 1.0))
     assert (len(placement.chosen), placement.status, placement.objective) == (2, "optimal", 2 * price)
-
-
-def test_an_unfinished_choice_among_equally_cheap_placements_states_its_bound(monkeypatch) -> None:
-    """The bound lies 0.31 of five targets above what is covered."""
-    problem = replace(crowded(0), weights=np.ones(5), prices=np.full(17, 7.0), min_distance=0.0)
-    done = cheapest.solve_within
-
-    def unfinished(*arguments):
-        found = yield from done(*arguments)
-        return replace(found, status="feasible", bound=found.covered + 0.31)
-
-    monkeypatch.setattr(cheapest, "solve_within", unfinished)
-    (note,) = finish(cheapest_for_coverage(problem, 1.0)).notes
-    assert note == "among equally cheap placements another one may cover up to 6.2 percentage points more"

@@ -1,21 +1,15 @@
 """Placements with fewer and more sensors: their bounds agree with the certificate of the placement."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from seip_addon.core.choosing.placement.cheapest import cheapest_for_coverage
-from seip_addon.core.choosing.placement.deployment import deploy
-from seip_addon.core.choosing.placement.objective import Objective, Solution, placement_problem
+from seip_addon.core.choosing.placement.objective import Objective, placement_problem
 from seip_addon.core.choosing.placement.price_front import price_front
-from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.progress import finish
 from tests.builders.report_folder import make_solution
 from tests.builders.small_junction import make_example
 
-GOAL = 0.6  # coverage that takes several sensors
 AT_ONCE = 1e-6  # work after which searches end at once, so that only what is known can bound them
 
 
@@ -52,34 +46,6 @@ def test_the_front_has_the_bound_of_the_certificate_and_bounds_do_not_cross(exam
     assert (points[3].coverage, points[3].missed) == (best.covered / whole, room / whole)
     bounds = [point.coverage + point.missed for point in points.values()]
     assert (np.diff(bounds) >= -1e-12).all()  # up to rounding of the sum above
-
-
-def test_a_budget_that_any_choice_meets_does_not_loosen_the_bound(example):
-    """The same placement is proven the best of three sensors for $240,000, which buys any three of them."""
-    problem = problem_of(example)
-    best = finish(solve(problem))
-    dearest = float(problem.prices.max())
-    found = {"objective": best.covered, "bound": best.covered, "chosen": best.chosen}
-    assert points_of(example, Objective(budget=3 * dearest), **found)[3].missed == 0
-    assert points_of(example, Objective(count=3, budget=3 * dearest), **found)[3].missed == 0
-    tight = Objective(count=3, budget=2.9 * dearest)  # excludes three of the most expensive, which may cover more
-    best = finish(solve(problem_of(example, tight)))
-    short = points_of(example, tight, objective=best.covered, bound=best.covered, chosen=best.chosen)
-    assert short[3].missed > 0
-
-
-def test_the_cheapest_placement_has_one_bound_on_its_coverage(example):
-    goal = Objective(coverage=GOAL)
-    problem = replace(problem_of(example, goal), prices=np.full(len(example.visible), 10_000.0))
-    best = finish(cheapest_for_coverage(problem, GOAL, SolverLimits(effort=1000.0)))
-    deployment = deploy(example.site, example.models, example.visible[best.chosen], best.chosen)
-    solution = Solution(goal, best, None, deployment)
-    points = {point.count: point for point in finish(price_front(problem, solution, AT_ONCE))}
-    count, whole = len(best.chosen), len(example.site.targets)
-    assert count > 1
-    assert (points[count].missed, points[count].coverage) == (0, best.covered / whole)
-    for fewer in range(1, count):  # what costs less does not reach the coverage
-        assert points[fewer].coverage + points[fewer].missed <= GOAL + 1e-9
 
 
 def test_placements_for_something_else_than_coverage_have_no_front(example):

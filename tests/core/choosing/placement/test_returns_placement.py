@@ -5,24 +5,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.choosing.placement.problem import PlacementProblem, relative_gap
-from seip_addon.core.choosing.placement.returns_bounds import (
-    HALVINGS,
-    OPERATIONS_PER_LOGARITHM,
-    OPERATIONS_PER_SLOPE,
-    Completion,
-)
-from seip_addon.core.choosing.placement.returns_instance import make_returns_instance
-from seip_addon.core.choosing.placement.returns_solver import greedy, greedy_returns, solve_returns
-from seip_addon.core.choosing.placement.search_limits import (
-    OPERATIONS_PER_UNIT,
-    OVERHEAD_OPERATIONS,
-    Clock,
-    SolverLimits,
-)
+from seip_addon.core.choosing.placement.problem import PlacementProblem
+from seip_addon.core.choosing.placement.returns_solver import solve_returns
+from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 
@@ -122,80 +110,7 @@ def test_at_the_limit_the_bound_still_holds(seed):
     assert found.bound >= best - 2e-9
 
 
-@given(st.integers(0, 10**9))
-def test_the_order_of_poses_does_not_matter(seed):
-    problem, returns = problem_of(seed, mandatory=None)
-    order = np.random.default_rng(seed).permutation(len(returns))
-    other = PlacementProblem(
-        visible=problem.visible[order],
-        weights=problem.weights,
-        prices=problem.prices[order],
-        positions=problem.positions[order],
-        xyz=problem.xyz[order],
-        labels=problem.labels[order],
-        count=problem.count,
-        budget=problem.budget,
-        min_distance=problem.min_distance,
-    )
-    one = finish(solve_returns(problem, returns))
-    again = finish(solve_returns(other, returns[order]))
-    assert sorted(one.chosen.tolist()) == sorted(order[again.chosen].tolist())
-
-
-@settings(max_examples=200, deadline=None)
-@given(
-    st.lists(st.floats(0.0, 1e5), min_size=0, max_size=6),
-    st.floats(0.0, 1e6),
-)
-def test_the_inequality_of_the_bound(returns, t):
-    c = math.log1p(t) - t / (1 + t)
-    a = [min(r / (1 + t), math.log(math.exp(c) + r) - c) for r in returns]
-    assert math.log1p(math.fsum(returns)) <= c + math.fsum(a) + 1e-9
-
-
-def test_greedy_is_no_better():
-    problem, returns = problem_of(3, count=3, budget=None, mandatory=None)
-    greedy = finish(greedy_returns(problem, returns))
-    best = finish(solve_returns(problem, returns))
-    assert greedy.objective <= best.objective + 1e-9
-    assert relative_gap(greedy.objective, greedy.bound) == math.inf
-
-
 def test_without_returns_there_is_nothing_to_choose():
     problem, returns = problem_of(5)
     with pytest.raises(SeipError, match="no candidate has returns from any road user"):
         finish(solve_returns(problem, np.zeros_like(returns)))
-
-
-def instance_of(poses, users, **limits):
-    """An instance in which each pose is at a position of its own and none is dominated."""
-    returns = np.random.default_rng(1).lognormal(1.0, 1.0, (poses, users)).astype(np.float32)
-    xyz = np.arange(3.0 * poses).reshape(poses, 3)
-    problem = PlacementProblem(
-        visible=returns > 0,
-        weights=np.ones(users),
-        prices=np.full(poses, 1000.0),
-        positions=np.arange(poses),
-        xyz=xyz,
-        labels=np.full(poses, "lidar"),
-        **limits,
-    )
-    return make_returns_instance(problem, returns)
-
-
-def test_greedy_counts_the_gains_of_each_step_as_work():
-    instance, clock = instance_of(12, 40, count=3), Clock(math.inf)
-    assert len(greedy(instance, np.zeros(0, dtype=np.int64), clock)) == 3
-    steps = 4  # the last one finds that no further sensor is allowed
-    of_each = OPERATIONS_PER_LOGARITHM * 12 * 40 + OVERHEAD_OPERATIONS
-    assert clock.work == pytest.approx(steps * of_each / OPERATIONS_PER_UNIT)
-
-
-def test_the_work_of_a_bound_includes_the_choice_that_it_begins_from():
-    instance, work = instance_of(12, 40, count=3), []
-    for chosen in (1, 11):
-        clock, share = Clock(math.inf), np.zeros(12)
-        share[:chosen] = 1.0
-        next(Completion(instance, np.zeros(40)).falling_bounds(share, clock))
-        work.append(clock.work * OPERATIONS_PER_UNIT)
-    assert work[1] - work[0] == pytest.approx(10 * 40 * HALVINGS * OPERATIONS_PER_SLOPE)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 
 from headless.studies.full_scan import seen_by_tilted_full_scan
@@ -18,12 +17,9 @@ from seip_addon.core.choosing.robustness.traffic_instants import (
     obstacles_of,
     spread_instants,
 )
-from seip_addon.core.choosing.robustness.visibility_in_traffic import (
-    visibility_in_traffic,
-)
+from seip_addon.core.choosing.robustness.visibility_in_traffic import visibility_in_traffic
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.lidar.rosette import Rosette
 from seip_addon.core.sensing.traffic.site_traffic import check_runs
 from seip_addon.core.sensing.traffic.trajectories import WARM_UP, RoadUser
@@ -124,35 +120,9 @@ def test_the_road_between_vehicles_is_that_of_a_full_scan(engine, bodies):
     assert (views([bodies], around=around)[0] == by_full_scan(bodies, engine, around)).all()
 
 
-@pytest.mark.slow
-@cases(5, 2)
-@given(bodies=crowds)
-def test_only_returns_that_are_strong_enough_count(bodies):
-    dropoff = replace(AROUND, sight=VisibilitySettings(delta=DELTA, min_intensity=0.3))
-    law = RangeEquation.of_ranges(12.0, 30.0)
-    physical = replace(AROUND, models={key: replace(model, law=law) for key, model in MODELS.items()})
-    for around in (dropoff, physical):
-        assert (views([bodies], around=around)[0] == by_full_scan(bodies, around=around)).all()
-
-
 def test_the_empty_road_is_the_visibility_grid():
     grid = finish(compute_visibility(SITE, MODELS, AROUND.sight, ANY))
     assert (views([NO_TRAFFIC])[0] == grid.visible).all()
-
-
-@pytest.mark.slow
-def test_neither_order_nor_company_of_instants_matters():
-    instants = [
-        crowd([(12.0, 2.0, 0.0)], ["bus"]),
-        NO_TRAFFIC,
-        crowd([(2.0, 14.0, 1.5), (-20.0, 0.0, 0.2)], ["truck", "car"]),
-        crowd([(0.0, 0.0, 0.8)], ["truck"]),
-    ]
-    expected = views(instants)
-    assert (views(instants) == expected).all()
-    for order in itertools.islice(itertools.permutations(range(4)), 5, 24, 9):
-        assert (views([instants[number] for number in order]) == expected[list(order)]).all()
-    assert (views([instants[2]])[0] == expected[2]).all()
 
 
 def test_a_truck_hides_the_lane_behind_it_and_shows_where_it_stands():

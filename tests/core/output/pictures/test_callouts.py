@@ -30,19 +30,6 @@ def test_with_room_no_label_hides_an_anchor_or_another_label_or_leaves_the_pictu
             assert not overlap(low[i], high[i], low[j], high[j])
 
 
-@cases(30)
-@given(st.integers(0, 10_000))
-def test_a_crowd_of_labels_is_spread_where_the_picture_has_room(seed):
-    """Sensors at one junction of a large site: far from it there is room for all labels."""
-    random = np.random.default_rng(seed)
-    anchors = random.uniform((480, 380), (520, 420), (40, 2))
-    sizes = np.full((40, 2), (90.0, 18.0))
-    centres = place_callouts(anchors, sizes, BOUNDS, CLEARANCE, NOWHERE)
-    low, high = centres - sizes / 2, centres + sizes / 2
-    assert np.all((low >= (0, 0)) & (high <= (1000, 800)))
-    assert not any(overlap(low[i], high[i], low[j], high[j]) for i in range(40) for j in range(i))
-
-
 @cases(100)
 @given(st.integers(0, 10_000), st.integers(0, 12))
 def test_boxes_are_stacked_upwards_without_overlap_and_no_farther_than_needed(seed, count):
@@ -56,55 +43,3 @@ def test_boxes_are_stacked_upwards_without_overlap_and_no_farther_than_needed(se
         assert not any(overlap(low[i], high[i], low[j], high[j] + (0.0, 1.99)) for j in range(count) if j != i)
         if rise[i] > 0.0:  # it stands on another
             assert any(abs(low[i, 1] - high[j, 1] - 2.0) < 1e-9 for j in range(count))
-
-
-@cases(100)
-@given(st.integers(0, 10_000), st.integers(1, 12), st.integers(1, 3))
-def test_boxes_are_stacked_above_boxes_that_stay(seed, count, fixed):
-    random = np.random.default_rng(seed)
-    boxes = np.column_stack([random.uniform(0, 60, (count, 2)), random.uniform(20, 40, count), np.full(count, 18.0)])
-    taken = np.column_stack([random.uniform(0, 60, (fixed, 2)), random.uniform(5, 40, (fixed, 2))])
-    rise = stack_upwards(boxes, 2.0, taken)
-    low = np.concatenate((boxes[:, :2] + np.column_stack([np.zeros(count), rise]), taken[:, :2]))
-    high = low + np.concatenate((boxes, taken))[:, 2:]
-    assert (rise >= 0.0).all()
-    for i in range(count):
-        assert not any(overlap(low[i], high[i], low[j], high[j]) for j in range(len(low)) if j != i)
-
-
-def test_without_room_labels_stay_in_the_picture():
-    anchors = np.full((40, 2), 50.0)
-    sizes = np.full((40, 2), 60.0)
-    centres = place_callouts(anchors, sizes, (0.0, 0.0, 100.0, 100.0), CLEARANCE, NOWHERE)
-    assert np.all((centres >= 30) & (centres <= 70))
-
-
-def test_a_label_goes_outwards():
-    anchors = np.array([(300.0, 400.0), (700.0, 400.0)])
-    centres = place_callouts(anchors, np.full((2, 2), 40.0), BOUNDS, CLEARANCE, NOWHERE)
-    assert centres[0, 0] < 300
-    assert centres[1, 0] > 700
-
-
-def test_a_label_keeps_off_the_subject_where_there_is_room_next_to_it():
-    x, y = np.meshgrid(np.arange(0.0, 500.0, 5.0), np.arange(0.0, 800.0, 5.0))
-    subject = np.column_stack((x.ravel(), y.ravel()))
-    anchors = np.array([(480.0, 400.0), (900.0, 400.0)])  # outwards is over the subject
-    centres = place_callouts(anchors, np.full((2, 2), 40.0), BOUNDS, CLEARANCE, subject)
-    assert centres[0, 0] - 20.0 > 495.0
-
-
-def test_nothing_to_label():
-    assert place_callouts(np.empty((0, 2)), np.empty((0, 2)), BOUNDS, CLEARANCE, NOWHERE).shape == (0, 2)
-
-
-def test_no_label_is_in_a_box_that_is_taken():
-    anchors = np.array([(50.0, 50.0), (60.0, 55.0)])
-    sizes = np.full((2, 2), 12.0)
-    taken = np.array([(0.0, 0.0, 45.0, 100.0), (45.0, 62.0, 100.0, 100.0)])
-    bounds = (0.0, 0.0, 100.0, 100.0)
-    free, kept = (place_callouts(anchors, sizes, bounds, CLEARANCE, NOWHERE, boxes) for boxes in (None, taken))
-    low, high = kept - 6.0, kept + 6.0
-    for box in taken:
-        assert np.all((high[:, 0] <= box[0]) | (low[:, 0] >= box[2]) | (high[:, 1] <= box[1]) | (low[:, 1] >= box[3]))
-    assert not np.array_equal(free, kept)

@@ -46,14 +46,6 @@ def test_parts_are_those_that_can_be_walked(places, data):
         assert any((spot.middle == targets.xyz[t]).all() for t in spot.targets)
 
 
-def test_a_blind_spot_is_named_after_the_place_that_holds_most_of_it():
-    targets = targets_at([(x, 0) for x in range(10)])
-    lane = Area("Mill Lane", "place", np.arange(10) < 4)
-    seen = np.isin(np.arange(10), (4, 5))
-    found = {spot.where: len(spot.targets) for spot in blind_spots(targets, seen, (lane,))}
-    assert found == {"Mill Lane, 7 m west of the centre": 4, "5 m east of the centre": 4}
-
-
 def test_places_are_counted_from_the_junction_and_not_from_the_middle_of_a_bounding_box():
     """The junction is at the western end of a street: all that is unseen lies east of it, or in its centre."""
     targets = targets_at([(x, y) for x in range(21) for y in (-1, 0, 1)], central=range(9))
@@ -68,34 +60,12 @@ def test_places_are_counted_from_the_junction_and_not_from_the_middle_of_a_bound
     ]
 
 
-def test_of_several_weighted_regions_the_nearest_is_counted_from():
-    targets = targets_at([(x, 0) for x in range(40)], central=(0, 1, 2, 30, 31, 32))
-    number = np.arange(40)
-    regions = {"A": (0, 1, 2), "B": (30, 31, 32)}
-    areas = [Area(name, "weighted region", np.isin(number, own)) for name, own in regions.items()]
-    found = [spot.where for spot in blind_spots(targets, ~np.isin(number, (5, 27, 35)), areas)]
-    assert found == ["8 m east of the centre of A", "8 m west of the centre of B", "8 m east of the centre of B"]
-    arms = {place.name for place in seen_places(targets, np.ones(40, dtype=int), areas)}
-    assert {"Road east of the centre of A", "Road west of the centre of B", "Road east of the centre of B"} <= arms
-
-
 def test_places_have_the_shares_that_counting_gives():
     targets = targets_at([(x, 0) for x in range(8)])
     seen_by = np.array([0, 1, 2, 3, 0, 0, 0, 1])
     lane, none = Area("Lane", "place", np.arange(8) < 4), Area("Nowhere", "place", np.zeros(8, dtype=bool))
     (found,) = seen_places(targets, seen_by, (lane, none))
     assert (found.name, found.area, found.seen, found.seen_twice) == ("Lane", 16.0, 0.75, 0.5)
-
-
-def test_without_streets_the_road_is_listed_by_its_sides():
-    targets = targets_at([(-5, 0), (5, 0), (0, 5), (0, -5), (0, 0)], central=(4,))
-    middle = Area("box", "weighted region", targets.central)
-    found = seen_places(targets, np.array([1, 0, 0, 1, 1]), (middle,))
-    sides = (("east", 0.0), ("north", 0.0), ("west", 1.0), ("south", 1.0))
-    assert [(one.name, one.seen) for one in found] == [
-        ("box (weighted)", 1.0),
-        *((f"Road {side} of the centre of box", seen) for side, seen in sides),
-    ]
 
 
 @given(st.integers(1, 5), st.integers(1, 12), st.integers(0, 2**32 - 1))

@@ -1,4 +1,3 @@
-import json
 import math
 from dataclasses import replace
 
@@ -6,7 +5,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.geometry.orientation import orientations
-from seip_addon.core.output.results.carla import carla_spawns, save_carla_spawns
+from seip_addon.core.output.results.carla import carla_spawns
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from tests.builders.small_junction import make_example
 
@@ -23,16 +22,6 @@ def test_location_is_the_map_position_with_y_negated(example):
         there = spawn["transform"]["location"]
         x, y, z = sensor.xyz + example.site.origin
         assert (there["x"], there["y"], there["z"]) == pytest.approx((x, -y, z), abs=1e-6)
-
-
-@pytest.mark.parametrize("yaw", [-3.0, -0.5, 0.0, 1.0, math.pi / 2, math.pi, 4.0])
-def test_the_sensor_faces_the_same_way_in_left_handed_axes(example, yaw):
-    sensor = replace(example.deployment.sensors[0], yaw=yaw)
-    spawn = carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))[0]
-    turn = math.radians(spawn["transform"]["rotation"]["yaw"])
-    # Unreal turns +x towards +y, and its y is our -y.
-    assert (math.cos(turn), -math.sin(turn)) == pytest.approx((math.cos(yaw), math.sin(yaw)), abs=1e-7)
-    assert -180 <= spawn["transform"]["rotation"]["yaw"] < 180
 
 
 @pytest.mark.parametrize(
@@ -71,45 +60,6 @@ def test_attributes_are_text_that_set_attribute_takes(example):
     }
 
 
-def test_a_limited_field_of_view_is_that_of_the_actor(example):
-    model = replace(load_catalogue()["type2"], field_of_view=math.radians(120))
-    sensor = replace(example.deployment.sensors[0], model=model)
-    (spawn,) = carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))
-    assert spawn["attributes"]["horizontal_fov"] == "120"
-    assert spawn["note"] == ""
-
-
-def test_uneven_beams_are_named_with_how_far_off_they_are(example):
-    model = replace(
-        load_catalogue()["type1"], elevations=np.radians([15.0, 1.0, 0.0, -15.0]), azimuth_offsets=np.zeros(4)
-    )
-    sensor = replace(example.deployment.sensors[0], model=model)
-    note = carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))[0]["note"]
-    assert "unevenly" in note
-    assert "5.0 degrees" in note  # 0 and 1 where even spacing has -5 and 5
-
-
-def note_on(example, **changes):
-    sensor = replace(example.deployment.sensors[0], model=replace(load_catalogue()["type1"], **changes))
-    return carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))[0]["note"]
-
-
-def test_azimuth_offsets_and_a_blind_near_range_are_named(example):
-    assert note_on(example, min_range=0.0) == ""
-    offsets = np.radians(np.where(np.arange(16) % 2, 6.354, -6.354))
-    assert "up to 6.35 degrees" in note_on(example, azimuth_offsets=offsets)
-    assert "0.9 m" in note_on(example, min_range=0.9)
-
-
-def test_all_that_carla_cannot_express_stands_in_one_note(example):
-    model = load_catalogue()["vls128"]
-    sensor = replace(example.deployment.sensors[0], model=model)
-    note = carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))[0]["note"]
-    assert "unevenly" in note
-    assert "6.35 degrees" in note
-    assert f"{model.min_range:g} m" in note
-
-
 def test_a_rosette_is_a_raster_over_the_square_about_it(example):
     sensor = replace(example.deployment.sensors[0], model=load_catalogue()["mid40"])
     (spawn,) = carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))
@@ -134,9 +84,3 @@ def test_every_shipped_model_has_a_field_of_view_that_holds_its_beams(example):
         low, high = float(attributes["lower_fov"]), float(attributes["upper_fov"])
         assert low < high
         assert np.all((np.degrees(model.elevations) > low - 1e-6) & (np.degrees(model.elevations) < high + 1e-6))
-
-
-def test_the_file_holds_the_list(example, tmp_path):
-    path = tmp_path / "carla_spawn.json"
-    save_carla_spawns(path, example.deployment, example.site.origin)
-    assert json.loads(path.read_text(encoding="utf-8")) == carla_spawns(example.deployment, example.site.origin)

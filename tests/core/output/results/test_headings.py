@@ -1,7 +1,5 @@
 import math
 
-import pytest
-
 from seip_addon.core.output.results.headings import clockwise_degrees, degrees
 
 
@@ -15,9 +13,3 @@ def test_clockwise_from_minus_to_below_plus_half_a_turn():
     assert clockwise_degrees(math.pi / 2) == -90.0
     assert clockwise_degrees(math.pi) == -180.0
     assert clockwise_degrees(-math.pi) == -180.0
-
-
-@pytest.mark.parametrize("write", [degrees, clockwise_degrees])
-def test_zero_has_no_sign(write):
-    assert math.copysign(1.0, write(-0.0)) == 1.0
-    assert math.copysign(1.0, write(0.0)) == 1.0

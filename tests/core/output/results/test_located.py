@@ -9,16 +9,15 @@ import pytest
 import shapely
 from shapely.geometry import shape
 
-from seip_addon.core.choosing.placement.objective import Objective, Solution, placement_constraints
-from seip_addon.core.choosing.placement.problem import Placement
+from seip_addon.core.choosing.placement.objective import Objective, placement_constraints
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.geo_reference import GeoReference
-from seip_addon.core.output.results import geojson
 from seip_addon.core.output.results.geojson import save_geojson
 from seip_addon.core.output.results.kml import NAMESPACE, save_kml
-from seip_addon.core.output.results.located import located, missing_sentence
+from seip_addon.core.output.results.located import located
 from seip_addon.core.output.results.site_file import load_site_file, save_site_file
 from seip_addon.core.site.scene_geometry import NamedArea
+from tests.builders.report_folder import make_solution
 from tests.builders.small_junction import Example, make_example
 
 OFFSET = (-4_500_000.0, 5_300_000.0, 400.0)
@@ -86,12 +85,6 @@ def test_cells_name_the_sensors_that_see_them(example, features):
     np.testing.assert_allclose(metres, (example.site.targets.xyz[5] + example.site.origin + OFFSET)[:2], atol=5e-3)
 
 
-def test_regions_are_there_by_name_and_weight(example, features):
-    (region,), (weighted,) = of_kind(features, "region of interest"), of_kind(features, "weighted region")
-    assert (weighted["properties"]["name"], weighted["properties"]["weight"]) == ("central box", 2.0)
-    assert shape(region["geometry"]).area > shape(weighted["geometry"]).area > 0
-
-
 def test_kml_is_xml_with_the_same_content(example, placed, tmp_path):
     save_kml(tmp_path / "placement.kml", placed)
     root = ET.parse(tmp_path / "placement.kml").getroot()  # noqa: S314  # our own
@@ -122,39 +115,6 @@ def test_the_same_placement_gives_the_same_bytes(placed, tmp_path):
         save(tmp_path / name, placed)
         save(tmp_path / f"again {name}", placed)
         assert (tmp_path / name).read_bytes() == (tmp_path / f"again {name}").read_bytes()
-
-
-def test_of_many_targets_those_that_the_same_sensors_see_are_joined(placed, tmp_path, monkeypatch):
-    monkeypatch.setattr(geojson, "MOST_CELLS", 10)
-    save_geojson(tmp_path / "a.geojson", placed)
-    features = json.loads((tmp_path / "a.geojson").read_text(encoding="utf-8"))["features"]
-    patches = of_kind(features, "coverage patch")
-    assert len(patches) == len(list(placed.patches()))
-    assert not of_kind(features, "coverage cell")
-    assert all(shape(one["geometry"]).is_valid for one in patches)
-
-
-def test_without_a_projection_there_is_none_and_a_sentence_says_why(example):
-    bare = replace(example.site, geo_reference=GeoReference())
-    assert located(example.geometry, bare, example.deployment) is None
-    assert missing_sentence(bare, ("a.kml",)) == "a.kml cannot be written: the scene's map names no projection"
-    assert missing_sentence(example.site, ("a.kml",)) == ""
-
-
-def make_solution(example, goal) -> Solution:
-    chosen = np.array([sensor.pose for sensor in example.deployment.sensors])
-    placement = Placement(
-        chosen=chosen,
-        objective=1.0,
-        bound=1.0,
-        gap=0.0,
-        status="optimal",
-        solver="none",
-        seconds=0.0,
-        covered=1.0,
-        price=0.0,
-    )
-    return Solution(goal, placement, None, example.deployment)
 
 
 def test_the_site_file_holds_the_problem_as_it_was_solved(example, tmp_path):

@@ -10,13 +10,10 @@ from headless.studies.full_scan import beam_directions
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.sensing.lidar.beams import BeamPattern
 from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
-from seip_addon.core.sensing.lidar.catalogue import find_models, load_catalogue
+from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.lidar.noisy_returns import measured_returns, return_chance
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
@@ -70,13 +67,6 @@ def test_the_catalogue_holds_real_sensors_with_uneven_tables() -> None:
     assert all(len(np.unique(model.elevations)) == model.channels and model.source for model in real)
 
 
-@pytest.mark.parametrize("key", sorted(CATALOGUE))
-def test_points_per_second_follow_from_channels_and_steps(key: str) -> None:
-    model = CATALOGUE[key]
-    points = model.channels * model.azimuth_count * model.rotation_rate
-    assert points == pytest.approx(model.points_per_second, rel=0.51 / model.azimuth_count)
-
-
 @pytest.mark.parametrize("key", ["type1", "vls128"])
 def test_directions_are_unit_vectors_at_the_published_angles(key: str) -> None:
     model = CATALOGUE[key]
@@ -103,23 +93,6 @@ def test_columns_of_a_limited_field_of_view_lie_evenly_and_symmetrically_about_a
     assert (azimuth + 180) % 360 - 180 == pytest.approx(expected, abs=1e-9)
     assert math.degrees(model.azimuth_step) == pytest.approx(step)
     assert not model.all_round
-
-
-def test_a_sensor_turns_all_round_and_counter_clockwise_where_nothing_else_is_said(tmp_path: Path) -> None:
-    plain = load_catalogue([write_model(tmp_path / "plain.toml")])["mine"]
-    full = {"horizontal_field_of_view_deg": "360", "clockwise": "true"}
-    said = load_catalogue([write_model(tmp_path / "said.toml", **full)])["mine"]
-    assert (plain.all_round, plain.clockwise) == (True, False)
-    assert (said.all_round, said.clockwise) == (True, True)
-    assert beam_directions(plain, 0.3).tobytes() == beam_directions(said, 0.3).tobytes()
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(1, 40), st.floats(-10, 10))
-def test_a_rays_direction_does_not_depend_on_its_company(seed: int, count: int, yaw: float) -> None:
-    model = CATALOGUE["vls128"]
-    rays = np.random.default_rng(seed).integers(0, model.channels * model.azimuth_count, count)
-    whole = BeamPattern(model, yaw).directions(np.arange(model.channels * model.azimuth_count))
-    assert (BeamPattern(model, yaw).directions(rays) == whole[rays]).all()
 
 
 def test_a_file_of_the_users_adds_and_replaces(tmp_path: Path) -> None:
@@ -232,14 +205,6 @@ def test_files_that_are_no_catalogue(tmp_path: Path) -> None:
         load_catalogue(["pandar64=unit.csv"])
 
 
-def test_an_unknown_sensor_names_close_ones() -> None:
-    assert list(find_models(CATALOGUE, ["type2", "vlp16"])) == ["type2", "vlp16"]
-    with pytest.raises(SeipError, match="vlp16"):
-        find_models(CATALOGUE, ["vlp-16"])
-    with pytest.raises(SeipError, match="type1"):
-        find_models(CATALOGUE, ["zzzzzz"])
-
-
 def test_intensity_falls_with_range_and_incidence() -> None:
     law = CATALOGUE["type1"].law
     intensity = law.intensity(np.array([0.0, 100.0, 50.0]), np.array([1.0, 1.0, 0.5]))
@@ -302,12 +267,3 @@ def test_the_documented_example_is_a_catalogue(tmp_path: Path) -> None:
 def test_the_documentation_names_every_sensor() -> None:
     text = (Path(__file__).resolve().parents[4] / "docs" / "sensors.md").read_text(encoding="utf-8")
     assert all(f"| `{key}` |" in text for key in load_catalogue())
-
-
-def test_the_documentation_says_what_each_law_rests_on() -> None:
-    text = (Path(__file__).resolve().parents[4] / "docs" / "sensors.md").read_text(encoding="utf-8")
-    for key, model in load_catalogue().items():
-        row = next(line for line in text.splitlines() if line.startswith(f"| `{key}` |"))
-        low, high = model.gains
-        sheet = f"sheet, {low:g} to {high:g}"
-        assert f"| {'sweep' if model.calibration else sheet if low < high else '–'} |" in row

@@ -38,24 +38,6 @@ def test_probability_is_the_formula(law, distance, cos, reflectivity):
     assert found == pytest.approx(exact, abs=2e-7)
 
 
-@given(law=laws, reflectivity=st.floats(0.01, 1.0), height=st.floats(0.1, 20.0), share=st.floats(0.01, 0.99))
-def test_within_reach_a_surface_is_detected_and_beyond_it_is_not(law, reflectivity, height, share):
-    probability = share * law.ceiling
-    least = law.least_strength(probability)
-    facing = law.reach(reflectivity, probability) * np.array([0.999, 1.001])
-    assert (law.strength(facing, np.full(2, reflectivity)) >= least).tolist() == [True, False]
-    level = law.reach_on_level(reflectivity, probability, height) * np.array([0.999, 1.001])
-    assert (law.strength(level, reflectivity * height / level) >= least).tolist() == [True, False]
-    bound = law.farthest_on_planes(np.array([reflectivity]), np.array([height]), least)[0]
-    assert level[0] <= bound
-
-
-def test_a_miss_is_never_detected_and_no_number_is_lost_at_no_distance():
-    law = RangeEquation.of_ranges(40.0, 120.0)
-    distance, reflected = np.array([np.inf, 0.0, 0.0]), np.array([0.5, 0.5, 0.0])
-    assert law.chance(distance, reflected).tolist() == [0.0, law.ceiling, 0.0]
-
-
 def test_light_lost_in_air_shortens_the_range():
     clear = RangeEquation.of_ranges(40.0, 110.0)
     assert clear.in_air(0.01).reach(0.1, 0.9) < 30.0 < clear.reach(0.1, 0.9)
@@ -78,9 +60,3 @@ def test_the_drop_off_in_its_place_is_right_at_two_ranges(law):
 def test_ranges_that_contradict_each_other_are_refused(at_10, at_80):
     with pytest.raises(SeipError, match="the range at 80 % reflectivity"):
         RangeEquation.of_ranges(at_10, at_80)
-
-
-@pytest.mark.parametrize("probability", [0.0, 0.985, 1.0, -1.0, math.nan])
-def test_a_probability_that_no_return_reaches_is_refused(probability):
-    with pytest.raises(SeipError, match=r"must lie above 0 and below 0\.985"):
-        RangeEquation.of_ranges(40.0, 120.0, probability)

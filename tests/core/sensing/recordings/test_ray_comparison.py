@@ -87,39 +87,6 @@ def test_removed_objects_are_found_by_name_with_their_triangles():
     assert new_objects(found, no_road) == []
 
 
-def test_a_part_of_a_mesh_is_an_object_of_its_own():
-    """The posts of a street are often one mesh."""
-    posts = [mesh for mesh in PLAN if mesh.name.startswith("post")]
-    row = type(posts[0])("posts", np.concatenate([post.triangles for post in posts]))
-    plan = (*(mesh for mesh in PLAN if mesh not in posts), row)
-    real = tuple(mesh for mesh in PLAN if mesh is not posts[2])
-    found, triangles = comparisons(plan, real)
-    (change,) = gone_objects(found, plan[1:], triangles)
-    assert change.name == "posts"
-    assert {row.tobytes() for row in triangles[change.part]} == {row.tobytes() for row in posts[2].triangles}
-
-
-def test_a_vehicle_on_the_road_is_not_joined_with_the_tree_beside_it():
-    added = (box_mesh("van", 0.0, 18.0, 5.0, 2.0, 2.4), box_mesh("tree", 0.0, 19.8, 1.6, 1.2, 6.0))
-    found, _ = comparisons(PLAN, (*PLAN, *added))
-
-    def road(xy):
-        return np.where(xy[:, 1] < 19.1, 0.0, np.nan)
-
-    changes = new_objects(found, road)
-    kinds = {kind: [change for change in changes if change.kind == kind] for kind in ("new", "vehicle")}
-    assert len(kinds["new"]) + len(kinds["vehicle"]) == len(changes)
-    for kind, (low, high) in (("vehicle", (16.9, 19.1)), ("new", (19.1, 20.5))):
-        assert kinds[kind]
-        for change in kinds[kind]:
-            assert low <= change.box[1] - min(change.box[3:5]) / 2 + 0.1
-            assert change.box[1] + min(change.box[3:5]) / 2 - 0.1 <= high
-    assert max(change.box[2] + change.box[5] / 2 for change in kinds["vehicle"]) < 2.6
-    joined = new_objects(found, no_road)
-    assert [change.kind for change in joined] == ["new"] * len(joined)
-    assert len(joined) < len(changes)
-
-
 def test_leaves_over_the_road_are_part_of_the_tree_and_a_standing_motorcycle_is_not():
     tree = box_mesh("tree", 0.0, 19.8, 2.4, 1.6, 6.0)
     motorcycle = box_mesh("motorcycle", 8.0, 17.5, 2.4, 0.8, 1.5)

@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.recordings.box_labels import BoxLabels
-from seip_addon.core.sensing.recordings.recorded_frames import UNKNOWN_INTENSITY, RecordedScene, prepare_frames
+from seip_addon.core.sensing.recordings.recorded_frames import RecordedScene, prepare_frames
 from seip_addon.core.sensing.recordings.recording import Recording
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE
 from tests.builders.scan_frames import rotation
 from tests.builders.scanned_street import box_mesh, ground_mesh, mounted, street_meshes, street_record, surface_of
-from tests.builders.street_recording import memory_record
 
 SENSORS = (mounted("vlp16"), mounted("vlp16", (10.0, 8.0, 5.0), 1.2, "S2"))
 
@@ -51,28 +49,6 @@ def test_points_intensities_and_sensors_are_those_of_the_sweeps(records):
         assert np.allclose(frame.points[own], expected, atol=1e-4)
     assert (frame.instance == STATIC_INSTANCE).all()
     assert not len(frame.labels.user)
-
-
-@pytest.mark.parametrize("unit", [0.004, 1.0, 255.0])
-def test_intensities_of_any_unit_come_to_the_scale_of_simulated_ones(records, unit):
-    """Simulated intensity is reflectivity times cosine of incidence, of which the road's is known."""
-    others = [
-        memory_record(
-            one.name, [s.points for s in one.sweeps], 2.0, [s.intensity * np.float32(unit) for s in one.sweeps]
-        )
-        for one in records
-    ]
-    frames = prepared(others)
-    for sensor in frames.sensors:
-        assert sensor.intensity_scale == pytest.approx(1 / unit, rel=0.05)
-    expected = np.concatenate([one.sweep(3).intensity for one in records])
-    assert np.allclose(frames.frame(3).intensity, expected, rtol=0.05)
-
-
-def test_without_intensities_all_points_have_one(records):
-    frames = prepared([memory_record(one.name, [sweep.points for sweep in one.sweeps], 2.0) for one in records])
-    assert all(sensor.intensity_scale is None for sensor in frames.sensors)
-    assert (frames.frame(0).intensity == np.float32(UNKNOWN_INTENSITY)).all()
 
 
 def test_the_ground_is_that_of_the_street(records):
@@ -143,11 +119,6 @@ def test_one_sensor_without_a_pose_is_levelled_above_the_ground():
     up = found.mounted.orientation.T @ [0, 0, 1]
     assert up @ (sensor.orientation.T @ [0, 0, 1]) > math.cos(math.radians(0.3))
     assert frames.region.bounds == pytest.approx((-30, -30, 30, 30), abs=1e-6)
-
-
-def test_several_sensors_need_poses(records):
-    with pytest.raises(SeipError, match=r"has several sensors, and S2 has no pose: give --poses"):
-        prepared(records, {"S1": POSES["S1"]})
 
 
 def test_points_in_a_labelled_box_are_returns_from_it(records):

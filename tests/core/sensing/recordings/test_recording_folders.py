@@ -1,12 +1,9 @@
 """Recordings of one and several sensors: folders, times, pairs and packets."""
 
-import sys
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.sensing.recordings.recording import Recording, open_recording, paired
@@ -63,29 +60,6 @@ def test_a_simulated_dataset_is_a_recording_in_the_axes_of_its_sensors(tmp_path)
             np.testing.assert_allclose(sweep.viewpoint[:3, 3], mounted.xyz, rtol=0.0, atol=1e-8)
 
 
-def test_one_sweep_is_a_recording(tmp_path):
-    sweeps(tmp_path, "a.pcd")
-    (sensor,) = open_recording(tmp_path / "a.pcd", rate=10.0).sensors
-    assert (sensor.name, sensor.times.tolist()) == ("a", [0.0])
-
-
-@pytest.mark.parametrize(
-    ("names", "times"),
-    [
-        (("1688625741_053302543_s110.bin", "1688625741_153000000_s110.bin"), (1688625741.053302543, 1688625741.153)),
-        (("a-1688625741.05.bin", "a-1688625741.15.bin"), (1688625741.05, 1688625741.15)),
-        (("1688625741050.bin", "1688625741150.bin"), (1688625741.05, 1688625741.15)),
-        (("1688625741050001.pcd.bin", "1688625741150001.pcd.bin"), (1688625741.050001, 1688625741.150001)),
-        (("t1688625741050000001.bin", "t1688625741150000001.bin"), (1688625741.050000001, 1688625741.150000001)),
-        (("000000.bin", "000001.bin"), (0.0, 0.1)),
-        (("1688625741_000001.bin", "1688625741_000002.bin"), (0.0, 0.1)),  # a run and a number
-    ],
-)
-def test_times_in_names(names, times, tmp_path):
-    (sensor,) = open_recording(sweeps(tmp_path, *names), rate=10.0).sensors
-    assert sensor.times == pytest.approx(times, abs=1e-6)
-
-
 @pytest.mark.parametrize(
     ("text", "times"),
     [
@@ -119,21 +93,6 @@ def test_wrong_times(words, text, tmp_path):
     refused(words, folder)
 
 
-def test_sweeps_are_in_order_of_the_times_in_their_names(tmp_path):
-    folder = sweeps(tmp_path, "a-1688625741.15.bin", "a-1688625741.2.bin", "b-1688625741.1.bin")
-    (sensor,) = open_recording(folder, rate=10.0).sensors
-    assert [path.name[-6:] for path in sensor.paths] == [".1.bin", "15.bin", ".2.bin"]
-    assert (np.diff(sensor.times) > 0).all()
-    refused("is not after that of", sweeps(folder, "c-1688625741.150.bin"))
-
-
-def test_folders_whose_names_have_dots_are_in_natural_order(tmp_path):
-    names = ["a.south", "a.west", "a.south10", "a.north"]
-    for name in names:
-        sweeps(tmp_path / name, "1.bin")
-    assert [sensor.name for sensor in open_recording(tmp_path, rate=10.0).sensors] == sorted(names)
-
-
 def test_refused_folders(tmp_path):
     refused("no such file or folder", tmp_path / "none")
     refused("has no sweeps", tmp_path)
@@ -145,15 +104,6 @@ def test_refused_folders(tmp_path):
     refused("b.bin has no time in its name", sweeps(tmp_path / "named", "1688625741050.bin", "b.bin"))
     sweeps(tmp_path / "only" / "merged", "a.pcd")
     refused("has no sweeps", tmp_path / "only")
-
-
-def test_a_damaged_sweep_is_named_when_it_is_read(tmp_path):
-    folder = sweeps(tmp_path, "a.pcd", "b.pcd")
-    (folder / "b.pcd").write_bytes((folder / "b.pcd").read_bytes()[:-1])
-    (sensor,) = open_recording(folder, rate=10.0).sensors
-    assert len(sensor.sweep(0)) == 20
-    with pytest.raises(SeipError, match=r"b\.pcd is damaged"):
-        sensor.sweep(1)
 
 
 def recorded(*times):
@@ -168,35 +118,9 @@ def test_pairs_are_nearest_in_time():
     assert paired(recorded(other, one)) == [(0, 0), (None, 1), (None, 2), (1, 3)]
 
 
-def test_sweeps_without_a_partner_stand_alone():
-    assert paired(recorded([0.0, 0.1, 0.2], [0.2, 0.3, 0.4], [0.3, 0.41])) == [
-        (0, None, None),
-        (1, None, None),
-        (2, 0, None),
-        (None, 1, 0),
-        (None, 2, 1),
-    ]
-    assert paired(recorded([5.0], [9.0])) == [(0, 0)]
-
-
 def test_sensors_without_a_common_time():
     with pytest.raises(SeipError, match="S0 and S1 have no time in common"):
         paired(recorded([0.0, 0.1], [1e9, 1e9 + 0.1]))
-
-
-@given(
-    starts=st.lists(st.integers(-40, 40), min_size=1, max_size=4),
-    dropped=st.lists(st.sets(st.integers(0, 29), max_size=15), min_size=4, max_size=4),
-)
-def test_pairs_of_sensors_that_drop_sweeps(starts, dropped):
-    """Sensors of one period within 40 % of it: each instant is a row, with the sensors that have a sweep of it."""
-    instants = [sorted(set(range(30)) - lost) for lost in dropped[: len(starts)]]
-    times = [[at + start / 200 for at in own] for own, start in zip(instants, starts, strict=True)]
-    if max(len(own) for own in instants) > 20:  # the median step is the period
-        rows = [
-            tuple(own.index(at) if at in own else None for own in instants) for at in sorted(set().union(*instants))
-        ]
-        assert paired(recorded(*times)) == rows
 
 
 # --- packets of Ouster sensors
@@ -276,12 +200,3 @@ def test_damaged_packets(packets):
     refused("not a readable recording of an Ouster sensor", packets.path)
     packets.path.with_suffix(".json").unlink()
     refused("put os1.json into the same folder", packets.path)
-
-
-def test_packets_without_the_sdk(tmp_path, monkeypatch):
-    for name in ("ouster.sdk", "ouster.sdk.core"):
-        monkeypatch.setitem(sys.modules, name, None)
-    (tmp_path / "a.pcap").write_bytes(b"x")
-    refused("put a.json into the same folder", tmp_path / "a.pcap")
-    (tmp_path / "a.json").write_text("{}")
-    refused("pip install ouster-sdk", tmp_path / "a.pcap")

@@ -1,7 +1,5 @@
 """Poses fitted to recordings of a street whose true pose is known."""
 
-import math
-
 import numpy as np
 import pytest
 
@@ -46,18 +44,6 @@ def test_the_pose_is_found(surface, seed, vehicles):
     assert found.match > 0.95
 
 
-def test_a_sensor_at_its_planned_pose_has_not_moved(surface):
-    found = register(surface, PLANNED, street_background(surface, PLANNED))
-    assert (np.abs(found.shift) <= 3 * found.half_width).all()
-
-
-@pytest.mark.parametrize("yaw", [-9.0, 9.0])
-def test_yaw_may_be_far_off(surface, yaw):
-    true = mounted(yaw=0.3 + math.radians(yaw))
-    found = register(surface, PLANNED, street_background(surface, true))
-    assert found.shift == pytest.approx([0, 0, 0, 0, 0, math.radians(yaw)], abs=0.001)
-
-
 def test_what_has_changed_does_not_move_the_pose(surface):
     _, north_west, *rest = street_meshes()
     new = (box_mesh("kiosk", 6, 13, 4, 3, 3), box_mesh("hoarding", -3, -16, 8, 0.2, 2.5, 0.2))
@@ -73,12 +59,6 @@ def test_another_site_is_refused(surface):
     )
     with pytest.raises(SeipError, match=r"of the rays of S1 agree with the scene: this is the recording of another"):
         fitted(surface, 0, real=other)
-
-
-def test_too_few_rays_are_refused(surface):
-    nowhere = surface_of((box_mesh("post", 5, 0, 0.3, 0.3, 6),))
-    with pytest.raises(SeipError, match=r"rays have a background: the pose cannot be fitted"):
-        register(surface, PLANNED, street_background(nowhere, PLANNED))
 
 
 @pytest.mark.slow

@@ -5,7 +5,6 @@ import zipfile
 
 import lzf
 import numpy as np
-import pypcd4
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -66,21 +65,6 @@ def test_pcd(tmp_path_factory, data, seed, count, kind, ring, names, padding, da
     same(read(tmp_path_factory.mktemp("pcd"), "a.pcd", content), points)
 
 
-@pytest.mark.parametrize("data", ["ASCII", "BINARY", "BINARY_COMPRESSED"])
-def test_pcd_of_pypcd4(data, tmp_path):
-    columns = make_points()
-    types = [column.dtype.type for column in columns.values()]
-    cloud = pypcd4.PointCloud.from_points(list(columns.values()), list(columns), types)
-    cloud.save(tmp_path / "a.pcd", encoding=pypcd4.Encoding[data])
-    same(read_sweep(tmp_path / "a.pcd"), columns)
-
-
-def test_pcd_fields_may_repeat_and_lack_a_count(tmp_path):
-    columns = make_points(count=4)
-    content = pcd_text({**columns, "p": np.zeros((4, 1), "<u1"), "q": np.zeros((4, 1), "<u1")}, COUNT=None)
-    same(read(tmp_path, "a.pcd", content.replace(b"p q\n", b"_ _\n")), columns)
-
-
 @given(st.floats(-3, 3), st.floats(-1.5, 1.5), st.floats(-3, 3), st.integers(0, 99))
 def test_a_viewpoint_is_the_pose_of_the_sensor(tmp_path_factory, yaw, pitch, roll, seed):
     columns = make_points(seed)
@@ -96,18 +80,6 @@ def test_a_viewpoint_is_the_pose_of_the_sensor(tmp_path_factory, yaw, pitch, rol
     np.testing.assert_allclose(sweep.viewpoint, expected, rtol=0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("suffix", [".pcd", ".bin", ".pcd.bin", ".npz"])
-def test_missing_returns_are_dropped(suffix, tmp_path):
-    columns = make_points(count=9)
-    for row, value in ((1, np.nan), (3, np.inf), (5, -np.inf)):
-        columns["y"][row] = value
-    for axis in "xyz":
-        columns[axis][7] = 0.0
-    content = write_sweep_file(tmp_path / f"a{suffix}", columns)
-    kept = [0, 2, 4, 6, 8]
-    same(read_sweep(content), {name: column[kept] for name, column in columns.items()})
-
-
 @pytest.mark.parametrize("more", [1, 2])
 def test_further_columns_of_bin_files_are_ignored(more, tmp_path):
     columns = make_points(count=40)  # which is a whole number of points of four columns, too
@@ -121,17 +93,6 @@ def test_pcd_of_stored_bytes(tmp_path):
     head = pcd_text(columns, "binary_compressed").partition(b"DATA binary_compressed\n")
     content = head[0] + head[1] + struct.pack("<II", len(whole), len(whole)) + whole
     same(read(tmp_path, "a.pcd", content), columns)
-
-
-def test_npz_of_points(tmp_path):
-    columns = make_points()
-    table = np.column_stack(list(columns.values()))
-    for width in (3, 4, 5):
-        np.savez(tmp_path / "a.npz", points=table[:, :width], time=12.5, note=np.array("of a test"))
-        sweep = read_sweep(tmp_path / "a.npz")
-        assert (sweep.points == table[:, :3].astype(np.float32)).all()
-        assert sweep.time == 12.5
-        assert (sweep.intensity is None) == (width < 4)
 
 
 @given(st.lists(st.binary(max_size=40) | st.tuples(st.binary(min_size=1, max_size=9), st.integers(2, 400))))
@@ -167,15 +128,6 @@ def test_cut_files(suffix, tmp_path):
         assert whole == [part for part in range(1, 50) if len(content) * part // 50 % size == 0]
     else:
         assert not whole
-
-
-@pytest.mark.parametrize("data", ["ascii", "binary_compressed"])
-def test_cut_pcd(data, tmp_path):
-    content = pcd_text(make_points(), data)
-    for part in range(50):
-        if data == "ascii" and part == 49:
-            continue
-        refused("a.pcd", tmp_path, "a.pcd", content[: len(content) * part // 50])
 
 
 @pytest.mark.parametrize(
@@ -229,24 +181,6 @@ def test_refusals(words, name, content, tmp_path):
     refused(words, tmp_path, name, content)
 
 
-@pytest.mark.parametrize(
-    ("words", "arrays"),
-    [
-        ("no x", {"a": np.zeros(3)}),
-        ("has the shape", {"points": np.zeros((3, 2))}),
-        ("has the shape", {"points": np.zeros(3)}),
-        ("intensity is not an array", {"points": np.ones((3, 3)), "intensity": np.ones(2)}),
-        ("x is not an array", {"x": np.ones((3, 1)), "y": np.ones(3), "z": np.ones(3)}),
-        ("time is not an array", {"points": np.ones((3, 3)), "time": np.array("noon")}),
-        ("x is not an array", {"points": np.full((3, 3), 1j)}),
-    ],
-)
-def test_wrong_arrays(words, arrays, tmp_path):
-    np.savez(tmp_path / "a.npz", **arrays)
-    with pytest.raises(SeipError, match=words):
-        read_sweep(tmp_path / "a.npz")
-
-
 def test_an_npz_that_unpacks_to_more_than_any_sweep(tmp_path):
     archive = zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1)
     with archive, archive.open("x.npy", "w") as file:
@@ -257,22 +191,6 @@ def test_an_npz_that_unpacks_to_more_than_any_sweep(tmp_path):
     assert (tmp_path / "a.npz").stat().st_size < 1e7
     with pytest.raises(SeipError, match="more than 1,074 MB"):
         read_sweep(tmp_path / "a.npz")
-
-
-@pytest.mark.parametrize("data", ["ascii", "binary", "binary_compressed"])
-def test_numbers_that_overflow(data, tmp_path):
-    columns = {axis: np.array([1.7e308, 2.0]) for axis in "xyz"}
-    refused("map coordinates", tmp_path, "a.pcd", pcd_text(columns, data, "1 2 3 0 0 0 1"))
-    refused("map coordinates", tmp_path, "a.pcd", pcd_text(columns, data, "1 2 3 0.5 0.5 0.5 0.5"))
-
-
-def test_missing_files(tmp_path):
-    for name in ("a.pcd", "a.bin", "a.npz"):
-        with pytest.raises(SeipError, match="no such file"):
-            read_sweep(tmp_path / name)
-    (tmp_path / "b.bin").mkdir()
-    with pytest.raises(SeipError, match="cannot read"):
-        read_sweep(tmp_path / "b.bin")
 
 
 @given(content=st.binary(max_size=300), suffix=st.sampled_from(FORMATS))

@@ -4,8 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from seip_addon.core.sensing.returns.bodies import PANELS
 from seip_addon.core.sensing.returns.occlusion import HIDING, clear_chance, returns_in_traffic
@@ -41,22 +39,6 @@ def test_chance_is_the_share_of_random_traffic_that_leaves_the_view_free(height,
     for chance, point in zip(found, points, strict=True):
         share = clear_share(sensor, np.array(point), body, draws, random)
         assert share == pytest.approx(chance, abs=4 * math.sqrt(chance * (1 - chance) / draws) + 1e-3)
-
-
-@settings(max_examples=100, deadline=None)
-@given(
-    st.lists(st.tuples(*[st.floats(-80, 80)] * 2, st.floats(-4, 4)), min_size=1, max_size=5),
-    st.floats(0.0, 12.0),
-    st.floats(0.0, 5.0),
-)
-def test_a_higher_sensor_is_hidden_less_and_a_farther_one_more(points, height, more):
-    for body in range(len(BODIES)):
-        users = users_at(points, [body] * len(points))
-        low, high = (clear_chance(np.array([0.0, 0.0, each]), users) for each in (height, height + more))
-        assert (high >= low).all()
-        assert ((low > 0) & (low <= 1)).all()
-        far = users_at([[2 * x, 2 * y, z] for x, y, z in points], [body] * len(points))
-        assert (clear_chance(np.array([0.0, 0.0, height]), far) <= low).all()
 
 
 def test_returns_in_traffic_are_those_in_plain_view_times_the_chance():

@@ -128,37 +128,7 @@ def test_a_folder_of_other_settings_is_left_alone(tmp_path, changes) -> None:
     assert contents(tmp_path) == before
 
 
-def test_frames_of_nobody_knows_whom_are_refused(tmp_path) -> None:
-    finish(steps(tmp_path, make_run()))
-    (tmp_path / "manifest.json").unlink()
-    with pytest.raises(SeipError, match=r"frames without a manifest\.json"):
-        finish(steps(tmp_path, make_run()))
-    with pytest.raises(SeipError, match="does not contain a run"):
-        load_manifest(tmp_path)
-
-
-@pytest.mark.parametrize("text", ["{", "[]", '{"schema": "seip-run/1"}', b"\xff\xfe"])
-def test_a_damaged_manifest_has_its_sentence(tmp_path, text) -> None:
-    (tmp_path / "manifest.json").write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(SeipError, match="damaged"):
-        load_manifest(tmp_path)
-
-
-def test_a_run_is_not_written_into_the_folder_of_a_placement(tmp_path) -> None:
-    (tmp_path / "placement.json").write_text("{}")
-    with pytest.raises(SeipError, match="contains a placement"):
-        finish(steps(tmp_path, make_run()))
-    assert [path.name for path in tmp_path.iterdir()] == ["placement.json"]
-
-
 def test_a_manifest_of_another_version_has_its_sentence(tmp_path) -> None:
     (tmp_path / "manifest.json").write_text(json.dumps({"schema": "seip-run/9", "key": "", "frames": []}))
     with pytest.raises(SeipError, match="written by another version"):
         load_manifest(tmp_path)
-
-
-def test_a_damaged_frame_has_its_sentence(tmp_path) -> None:
-    finish(steps(tmp_path, make_run()))
-    frame_path(tmp_path, 2).write_bytes(b"PK")
-    with pytest.raises(SeipError, match=r"000002\.npz"):
-        finish(steps(tmp_path, make_run()))

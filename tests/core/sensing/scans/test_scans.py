@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import rotations
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.carla_dropoff import CarlaDropoff
@@ -21,7 +20,7 @@ from seip_addon.core.sensing.lidar.rosette import Rosette
 from seip_addon.core.sensing.scans.beam_culling import BeamWindows
 from seip_addon.core.sensing.scans.frame import STATIC_INSTANCE, Frame, Labels
 from seip_addon.core.sensing.scans.sensor import MountedSensor, level_orientation
-from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, frame_times, prepare
+from seip_addon.core.sensing.scans.simulation import ScanSettings, Simulation, prepare
 from seip_addon.core.sensing.scans.static_scene import static_scene
 from seip_addon.core.sensing.traffic.trajectories import RoadUser
 from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
@@ -104,13 +103,6 @@ def test_visibility_is_the_share_of_rays_that_get_through() -> None:
     np.testing.assert_allclose(labels.visibility[:2], [(front + 1) / (2 * front + 1), 1.0])
     assert labels.yaw.tolist() == [0.0, -math.pi, 0.0]
     assert labels.inside.tolist() == [True, True, False]
-
-
-def test_what_no_sensor_sees_is_labelled() -> None:
-    wall = box_triangles((5.0, -20.0, 0.0), (6.0, 20.0, 10.0))
-    frame = simulation(make_static(ground(), wall), [make_sensor()], parked((20.0, 0.0, 0.0, 0.0, 0.0))).frame(0, 0.0)
-    assert (frame.labels.visibility.tolist(), frame.labels.points.tolist()) == ([0.0], [[0]])
-    assert (frame.instance == STATIC_INSTANCE).all()
 
 
 def test_a_box_on_a_slope_has_its_middle_over_its_underside() -> None:
@@ -201,22 +193,6 @@ def test_a_rosette_goes_on_from_frame_to_frame(engine) -> None:
     assert not same(frames[0], replace(frames[1], time=0.0))
 
 
-def test_frames_of_a_rosette_follow_from_their_time_and_the_seed_alone() -> None:
-    sensors = [make_sensor(**ROSETTE), make_sensor((5.0, 5.0, 6.0), yaw=-2.0)]
-    static, cars = make_static(ground()), parked((12.0, 2.0, 0.0, 0.3, 0.0))
-    made, other = (simulation(static, sensors, cars, NOISY) for _ in range(2))
-    forwards = [made.frame(number, number / 10) for number in range(4)]
-    backwards = [other.frame(number, number / 10) for number in (3, 1, 0, 2)]
-    for number, frame in zip((3, 1, 0, 2), backwards, strict=True):
-        assert same(frame, forwards[number])
-    snapshots = [cars.at(number / 10) for number in range(4)]
-    scans = [made.scans(snapshot) for snapshot in snapshots]
-    assert all(same(made.measure(n, snapshots[n], scans[n]), forwards[n]) for n in range(4))
-    alone = simulation(static, sensors[1:], cars, EXACT).frame(0, 0.0)  # the other sensor's cloud is as without it
-    both = simulation(static, sensors, cars, EXACT).frame(0, 0.0)
-    assert (both.points[both.sensor == 1] == alone.points).all()
-
-
 @each_engine
 @cases(10)
 @given(place=places(), time=st.floats(0, 9))
@@ -261,12 +237,6 @@ def test_windows_hold_every_ray_through_a_hull(seed) -> None:
         assert set(np.flatnonzero(hit)) <= set(own)
 
 
-def test_windows_are_narrow() -> None:
-    hull = box_triangles((20.0, -1.0, -1.0), (24.0, 1.0, 1.0)).reshape(1, -1, 3)
-    _, ray = BeamWindows(make_model()).rays_towards(hull)
-    assert 0 < len(ray) < 60  # 11 of 720 azimuths, 2 or 3 of 7 channels
-
-
 def test_a_seed_gives_the_same_frames_in_any_order() -> None:
     static, cars = make_static(ground()), parked((10.0, 2.0, 0.0, 0.3, 0.0), (-8.0, 5.0, 0.0, 1.0, 0.0))
     sensors = [make_sensor(), make_sensor((15.0, 15.0, 5.0), label="S2")]
@@ -278,17 +248,6 @@ def test_a_seed_gives_the_same_frames_in_any_order() -> None:
     assert not np.array_equal(frames[0].points, frames[1].points)
     other = simulation(static, sensors, cars, replace(NOISY, seed=6)).frame(0, 0.0)
     assert not np.array_equal(frames[0].points, other.points)
-
-
-def test_noise_of_what_stands_still_does_not_depend_on_the_traffic() -> None:
-    static, sensor = make_static(ground()), make_sensor()
-    cars = make_trajectories([(0.0, 10.0, 0.0, 0.0, 0.0, 0.0), (1.0, 10.0, 0.0, 0.0, 0.0, 0.0)])
-    made = simulation(static, [sensor], cars, NOISY)
-    with_car, without = made.frame(4, 0.0), made.frame(4, 5.0)
-    points = {tuple(point) for point in without.points.tolist()}
-    still = [tuple(point) for point in with_car.points[with_car.instance == STATIC_INSTANCE].tolist()]
-    assert 0 < len(still) < len(points)
-    assert set(still) <= points
 
 
 def test_without_noise_foreground_is_what_traffic_returns() -> None:
@@ -307,47 +266,6 @@ def test_noise_hardly_makes_foreground_of_the_background() -> None:
     frame = simulation(make_static(ground()), [sensor], parked(), NOISY).frame(0, 0.0)
     assert len(frame) > 1000
     assert frame.foreground.mean() < 0.003  # Φ(−3) is 0.0013
-
-
-def test_before_the_sky_all_is_foreground() -> None:
-    sensor = make_sensor((0.0, 0.0, 1.0), **ONE_RAY)
-    stands = [(time, 10.0, 0.0, 0.0, 0.0, 0.0) for time in (0.0, 10.0)]
-    wall = make_trajectories(stands, users=[RoadUser("truck", "truck", 8.0, 40.0, 4.0)])
-    frame = simulation(make_static(ground()), [sensor], wall).frame(0, 0.0)
-    assert len(frame) > 0
-    assert frame.foreground.all()
-
-
-def share_in(points: np.ndarray, others: np.ndarray) -> float:
-    """Which share of points is, bit for bit, among others."""
-    known = {tuple(point) for point in others.tolist()}
-    return sum(tuple(point) in known for point in points.tolist()) / len(points)
-
-
-def test_runs_of_traffic_have_independent_noise() -> None:
-    static, sensor = make_static(ground()), make_sensor()
-    one, other = (
-        simulation(static, [sensor], parked((10.0, y, 0.0, 0.0, 0.0)), NOISY).frame(4, 0.0) for y in (0.0, 1e-3)
-    )
-    still, elsewhere = (frame.points[frame.instance == STATIC_INSTANCE] for frame in (one, other))
-    assert len(still) > 1000
-    assert share_in(still, elsewhere) < 0.01
-
-
-def test_the_name_of_a_run_changes_no_noise() -> None:
-    static, cars = make_static(ground()), parked((10.0, 0.0, 0.0, 0.0, 0.0))
-    renamed = replace(cars, source="elsewhere", users=tuple(replace(user, name="other") for user in cars.users))
-    one, other = (simulation(static, [make_sensor()], motion, NOISY).frame(4, 0.0) for motion in (cars, renamed))
-    assert same(one, other)
-
-
-def test_sensors_have_independent_noise() -> None:
-    """Two of one model at one place: every return of one is measured anew by the other."""
-    sensors = [make_sensor(), make_sensor(label="S2")]
-    frame = simulation(make_static(ground()), sensors, parked((10.0, 0.0, 0.0, 0.0, 0.0)), NOISY).frame(4, 0.0)
-    one, other = (frame.points[frame.sensor == number] for number in (0, 1))
-    assert len(one) > 1000
-    assert share_in(one, other) < 0.01
 
 
 def test_noise_is_that_of_the_model() -> None:
@@ -418,16 +336,6 @@ def test_with_a_rolling_shutter_each_ray_of_a_rosette_meets_what_is_there_at_its
     np.testing.assert_allclose(frame.points[met], expected, atol=1e-3)
 
 
-@pytest.mark.parametrize(("degrees", "steps"), [(360.0, [0, 4, 3, 2, 1]), (120.0, [4, 3, 2, 1, 0])])
-def test_a_clockwise_sensor_looks_the_other_way_round_at_the_same_directions(degrees, steps) -> None:
-    figures = {"elevations": np.zeros(1), "points_per_second": 50.0, "field_of_view": math.radians(degrees)}
-    sensors = [make_sensor(**figures), make_sensor(**figures, clockwise=True)]
-    one, other = simulation(make_static(), sensors, parked()).scanners
-    assert one.delay == pytest.approx(np.arange(5) / 50)
-    assert other.delay == pytest.approx(np.array(steps) / 50)
-    assert one.directions.tobytes() == other.directions.tobytes()
-
-
 def test_a_rolling_shutter_moves_a_face_by_speed_times_delay() -> None:
     """A car of 30 m/s drives away along +y; a sensor that starts along +x meets its back a quarter turn later."""
     car = make_trajectories([(0.0, 0.0, 20.0, 0.0, math.pi / 2, 0.0), (1.0, 0.0, 50.0, 0.0, math.pi / 2, 0.0)])
@@ -480,33 +388,6 @@ def test_the_box_of_one_that_nobody_sees_is_that_of_mid_revolution() -> None:
     np.testing.assert_allclose(frame.labels.yaw, halfway.yaw, atol=1e-9)
 
 
-def test_a_rolling_shutter_changes_nothing_where_nothing_moves() -> None:
-    static, cars = make_static(ground()), parked((10.0, 2.0, 0.0, 0.3, 0.0))
-    still = simulation(static, [make_sensor()], cars, NOISY).frame(0, 1.0)
-    rolling = simulation(static, [make_sensor()], cars, replace(NOISY, rolling_shutter=True)).frame(0, 1.0)
-    assert rolling.delay.any()
-    assert same(still, replace(rolling, delay=still.delay))
-
-
-def test_one_that_stood_and_drives_on_is_seen_where_it_is() -> None:
-    way = [(0.0, 10.0, 0.0, 0.0, 0.0, 0.0), (1.0, 10.0, 0.0, 0.0, 0.0, 0.0), (2.0, 20.0, 3.0, 0.0, 0.5, 0.0)]
-    cars = make_trajectories(way, [(0.5, -10.0, 0.0, 0.0, 0.0, 0.0), (5.0, -10.0, 0.0, 0.0, 0.0, 0.0)])
-    made = simulation(make_static(ground()), [make_sensor()], cars, NOISY)
-    for number, time in enumerate((0.0, 0.5, 1.0, 1.5, 2.0, 0.2)):
-        fresh = simulation(make_static(ground()), [make_sensor()], cars, NOISY)
-        assert same(made.frame(number, time), fresh.frame(number, time))
-
-
-def test_nobody_on_the_road_is_a_frame_with_empty_labels() -> None:
-    cars = make_trajectories([(0.0, 10.0, 0.0, 0.0, 0.0, 0.0), (1.0, 10.0, 0.0, 0.0, 0.0, 0.0)])
-    frame = simulation(make_static(ground()), [make_sensor()], cars).frame(0, 3.0)
-    labels = frame.labels
-    assert len(frame) > 0
-    assert len(labels) == 0
-    assert labels.centre.shape == labels.size.shape == (0, 3)
-    assert labels.points.shape == (0, 1)
-
-
 def test_a_sensor_that_sees_nothing_gives_an_empty_cloud_and_a_warning(tmp_path) -> None:
     made = simulation(make_static(), [make_sensor()], parked((300.0, 0.0, 0.0, 0.0, 0.0)))
     assert "S1 sees nothing" in made.warnings[0]
@@ -514,28 +395,6 @@ def test_a_sensor_that_sees_nothing_gives_an_empty_cloud_and_a_warning(tmp_path)
     frame.save(tmp_path / "frame.npz")
     assert len(Frame.load(tmp_path / "frame.npz")) == 0
     assert not simulation(make_static(ground()), [make_sensor()], parked()).warnings
-
-
-def test_no_sensor_and_a_bad_seed_have_their_sentences() -> None:
-    with pytest.raises(SeipError, match="no sensor"):
-        simulation(make_static(), [], parked())
-    with pytest.raises(SeipError, match="seed"):
-        simulation(make_static(), [make_sensor()], parked(), ScanSettings(seed=-1, engine=ANY))
-    with pytest.raises(SeipError, match="'S1'"):
-        MountedSensor("S1", make_model(), np.zeros(3), np.diag([1.0, 1.0, -1.0]))
-
-
-def test_times_are_those_of_the_slowest_sensor() -> None:
-    cars = parked((0.0, 0.0, 0.0, 0.0, 0.0))
-    sensors = [make_sensor(), make_sensor(label="S2", rotation_rate=5.0)]
-    np.testing.assert_allclose(frame_times(cars, sensors), np.arange(51) / 5)
-    np.testing.assert_allclose(frame_times(cars, sensors[:1], start=2.3, duration=0.3), [2.3, 2.4, 2.5, 2.6])
-    np.testing.assert_allclose(frame_times(cars, sensors, start=9.0, rate=1.0), [9.0, 10.0])
-    with pytest.raises(SeipError, match="S2 rotates 5 times"):
-        frame_times(cars, sensors, rate=10.0)
-    for wrong in ({"start": -1.0}, {"start": 11.0}, {"start": 5.0, "duration": 6.0}, {"duration": -1.0}):
-        with pytest.raises(SeipError, match="lasts from 0 s to 10 s"):
-            frame_times(cars, sensors, **wrong)
 
 
 def test_a_static_scene_does_not_depend_on_the_order_of_objects() -> None:
@@ -550,13 +409,3 @@ def test_a_static_scene_does_not_depend_on_the_order_of_objects() -> None:
     assert sorted(scenes[0].reflectivity.tolist()) == [0.3] * 14 + [0.9] * 12
     assert (scenes[0].reflectivity == 0.9).sum() == 12
     assert level_orientation(math.pi / 2) @ [1, 0, 0] == pytest.approx([0, 1, 0])
-
-
-def test_bodies_that_share_triangles_share_a_tree_and_keep_their_paint() -> None:
-    cars = parked((10.0, 0.0, 0.0, 0.0, 0.0), (-10.0, 0.0, 0.0, math.pi, 0.0))
-    body = box_body(RoadUser("x", "car", 4.0, 2.0, 1.5))
-    bright = replace(body, reflectivity=np.full(12, 1.0))
-    sensor = make_sensor((0.0, 0.0, 0.75), elevations=np.zeros(1), points_per_second=20.0)
-    frame = finish(prepare(make_static(), [sensor], cars, [body, bright], EXACT)).frame(0, 0.0)
-    assert frame.instance.tolist() == [0, 1]
-    assert frame.intensity[1] == pytest.approx(2 * frame.intensity[0])

@@ -6,9 +6,7 @@ from hypothesis import strategies as st
 from seip_addon.core.errors import SeipError
 from seip_addon.core.sensing.traffic.bodies import (
     MESHES,
-    PAINT_COLOURS,
     REFLECTIVITY,
-    colour_of,
     fitted_body,
     read_mesh,
 )
@@ -119,12 +117,6 @@ def test_every_part_of_a_mesh_is_closed_and_turned_outwards(path):
     assert all(signed_volume(triangles[part]) > 0 for part in parts(triangles))
 
 
-def test_a_road_user_looks_like_the_model_nearest_in_size():
-    coach, city_bus = (fitted_body(RoadUser("u", "bus", length, 2.55, 3.2)) for length in (15.0, 11.5))
-    assert len(coach) == len(read_mesh(MESHES / "bus.coach.obj")[0])
-    assert len(city_bus) == len(read_mesh(MESHES / "bus.city_bus.obj")[0])
-
-
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl {material}\nf 1 3 2\nf 1/1/1 2/2/2 4/3/3\nf 2 3 4\nf 1 4 3\n"
 
 
@@ -136,55 +128,12 @@ def test_a_mesh_is_read_as_blender_writes_it(tmp_path):
     assert material.tolist() == ["tail lamp"] * 4
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl paint\nf 1 2 3\n", "has no length, width and height"),
-        (TETRAHEDRON.format(material="chrome"), "unknown material 'chrome'; known are cargo box"),
-        (TETRAHEDRON.format(material="paint") + "f 1 2 3 4\n", "not all faces are triangles"),
-        (TETRAHEDRON.format(material="paint") + "f 1 2 9\n", "is not a Wavefront OBJ mesh"),
-        (TETRAHEDRON.format(material="paint").replace("0 0 1", "0 0 x"), "is not a Wavefront OBJ mesh"),
-        (TETRAHEDRON.format(material="paint").replace("0 0 1", "0 0 nan"), "has no length, width and height"),
-        ("", "is not a Wavefront OBJ mesh"),
-    ],
-)
-def test_no_mesh_of_a_body_is_one_sentence(tmp_path, text, message):
-    path = tmp_path / "car.obj"
-    path.write_text(text)
-    with pytest.raises(SeipError, match=message):
-        read_mesh(path)
-
-
 @usual
 def test_a_body_has_few_triangles_and_none_without_area(user):
     body = fitted_body(user)
     assert 60 <= len(body) <= 300
     assert areas(body.triangles).min() > 1e-4
     assert len(body) == len(body.reflectivity) == len(body.material)
-
-
-@usual
-def test_front_and_rear_differ(user):
-    top = skyline(fitted_body(user).triangles, user.length)
-    assert np.abs(top - top[::-1]).max() > 0.05 * user.height
-
-
-@pytest.mark.parametrize("name", ["hatchback", "saloon", "SUV", "small van", "large van"])
-def test_the_front_is_lower_than_the_rear_half(name):
-    """The bonnet: what tells a heading from the opposite one."""
-    user = RoadUser(name, *USUAL[name])
-    top = skyline(fitted_body(user).triangles, user.length, 20)
-    assert top[-3:].max() < 0.65 * user.height
-    assert top[:10].max() > 0.9 * user.height
-
-
-def test_a_saloon_has_a_boot_and_a_hatchback_none():
-    def rear(name):
-        user = RoadUser(name, *USUAL[name])
-        return skyline(fitted_body(user).triangles, user.length, 20)[1] / user.height
-
-    assert rear("saloon") < 0.7 < rear("hatchback")
-    assert rear("SUV") > 0.7
 
 
 def test_a_truck_has_a_gap_between_tractor_and_trailer_alone():
@@ -238,34 +187,10 @@ def test_no_pane_lies_buried_in_what_carries_it(user):
 
 
 @usual
-def test_wheels_and_soles_stand_on_the_ground(user):
-    body = fitted_body(user)
-    on_ground = (body.triangles[..., 2] == 0).any(axis=1)
-    assert set(body.material[on_ground].tolist()) == ({"trim"} if user.category == "pedestrian" else {"tyre"})
-
-
-@usual
 def test_paint_and_clothes_have_the_users_reflectivity(user):
     painted = fitted_body(RoadUser(**{**vars(user), "paint": 0.3}))
     for name, reflectivity in zip(painted.material.tolist(), painted.reflectivity, strict=True):
         assert reflectivity == (0.3 if name in {"paint green", "cloth green"} else REFLECTIVITY[name])
-
-
-def test_users_of_one_size_share_arrays_that_cannot_be_written():
-    one = fitted_body(RoadUser("a", "car", 4.5, 1.8, 1.5, 0.3))
-    assert fitted_body(RoadUser("b", "car", 4.5, 1.8, 1.5, 0.3)) is one
-    other = fitted_body(RoadUser("c", "car", 4.5, 1.8, 1.5, 0.9))
-    assert other.triangles is one.triangles
-    assert set(other.material.tolist()) != set(one.material.tolist())
-    for array in (one.triangles, one.reflectivity, one.material):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 0
-
-
-def test_every_reflectivity_has_a_colour():
-    assert [colour_of(limit) for limit, _ in PAINT_COLOURS] == [name for _, name in PAINT_COLOURS]
-    assert colour_of(0.0) == "black"
-    assert colour_of(1.2) == "white"
 
 
 @pytest.mark.parametrize(
@@ -274,8 +199,3 @@ def test_every_reflectivity_has_a_colour():
 def test_no_size_is_one_sentence(size):
     with pytest.raises(SeipError, match=r"road user 'a' is .* m large; give its type"):
         fitted_body(RoadUser("a", "car", *size))
-
-
-def test_no_such_category_is_one_sentence():
-    with pytest.raises(SeipError, match="road user 'a' is a 'tram', which has no body; it may be car, van"):
-        fitted_body(RoadUser("a", "tram", 30.0, 2.65, 3.5))

@@ -1,7 +1,5 @@
 """Shapes of bodies: a body of any shape fills its box, and a run keeps the shapes of its road users."""
 
-from pathlib import Path
-
 from headless.studies.random_sites.varied_bodies import SHAPES, draw_shape
 
 import numpy as np
@@ -11,13 +9,8 @@ from hypothesis import strategies as st
 from test_bodies import areas, edges, first_hit, parts, signed_volume
 
 from seip_addon.core.sensing.traffic.bodies import MESHES, fitted_body, read_mesh
-from seip_addon.core.sensing.traffic.trajectories import CATEGORIES, MAX_BEND, RoadUser, Trajectories, bent
+from seip_addon.core.sensing.traffic.trajectories import CATEGORIES, RoadUser
 
-SCENES = Path(__file__).parents[4] / "scenes"
-RUNS = sorted(SCENES.glob("*_traffic*/run-*.npz"))
-bend = st.tuples(st.floats(-1, 1), st.floats(-1, 1)).map(
-    lambda pair: tuple(MAX_BEND * value / max(abs(pair[0]) + abs(pair[1]), 1.0) for value in pair)
-)
 within_range = st.sampled_from(CATEGORIES).flatmap(
     lambda category: st.builds(
         RoadUser,
@@ -30,14 +23,6 @@ within_range = st.sampled_from(CATEGORIES).flatmap(
         st.tuples(*(st.floats(-most, most) for most in SHAPES[category])),
     )
 )
-
-
-@given(bend)
-def test_bent_shares_keep_both_ends_and_their_order(shape):
-    share = np.linspace(0.0, 1.0, 301)
-    moved = bent(share, *shape)
-    assert (moved[0], moved[-1]) == (0.0, 1.0)
-    assert np.diff(moved).min() >= (1.0 - MAX_BEND) / 300 - 1e-12
 
 
 @given(within_range)
@@ -73,21 +58,3 @@ def test_shaped_meshes_stay_closed_turned_outwards_and_their_panes_in_front(path
                 panes += 1
                 buried += first_hit(triangles, (a + b + c) / 3 + 0.05 * normal, -normal) != front
     assert buried <= 0.02 * panes
-
-
-def test_a_shape_moves_the_foot_of_the_windscreen():
-    def foot(shape):
-        body = fitted_body(RoadUser("u", "car", 4.5, 1.8, 1.5, shape=shape))
-        glass = body.triangles[body.material == "glass"]
-        return glass[..., 0].max()
-
-    assert foot((0.24, 0.0, 0.0, 0.0)) - foot((0.0,) * 4) == pytest.approx(0.2, abs=0.05)
-    assert foot((-0.24, 0.0, 0.0, 0.0)) - foot((0.0,) * 4) == pytest.approx(-0.2, abs=0.05)
-
-
-def test_what_has_no_shape_of_its_own_is_saved_as_before(tmp_path):
-    run = Trajectories.load(RUNS[0])
-    run.save(tmp_path / "again.npz")
-    assert Trajectories.load(tmp_path / "again.npz").key == run.key
-    with np.load(tmp_path / "again.npz") as stored:
-        assert "shape" not in str(stored["header"])

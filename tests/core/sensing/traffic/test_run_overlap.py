@@ -9,7 +9,7 @@ import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.sensing.traffic.run_overlap import overlap_of, require_independent, vehicle_positions
-from seip_addon.core.sensing.traffic.trajectories import RoadUser, Trajectories
+from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from tests.builders.traffic_by_hand import make_trajectories
 
 SHIPPED = Path(__file__).parents[4] / "scenes"
@@ -53,31 +53,9 @@ def test_shipped_runs_are_independent(folder):
     assert max(shares(*runs)) < 0.3
 
 
-def test_of_many_pairs_the_range_and_the_closest_are_said():
-    paths = sorted((SHIPPED / "junction_traffic").glob("*.npz"))[:5]
-    runs = [vehicle_positions(path.stem, Trajectories.load(path)) for path in paths]
-    said = require_independent(combinations(runs, 2))
-    closest = max(combinations(runs, 2), key=lambda pair: overlap_of(*pair))
-    assert f"in 10 pairs, most for {closest[0].name} and {closest[1].name} {overlap_of(*closest):.0%}" in said
-    assert said.count(" and ") == 1
-
-
 def test_the_share_is_that_of_the_vehicles_within_a_metre():
     def standing(*places):
         return [[(0.0, x, 0.0, 0.0, 0.0, 0.0), (10.0, x, 0.0, 0.0, 0.0, 0.0)] for x in places]
 
     one, other = make_trajectories(*standing(0, 10, 20, 30)), make_trajectories(*standing(0.9, 11.1, 50))
     assert shares(one, other) == [pytest.approx(1 / 3)]  # of the other's three; of the four a quarter
-
-
-def test_pedestrians_on_their_crossings_do_not_count():
-    walker = RoadUser("walker", "pedestrian", 0.5, 0.5, 1.8)
-    way = [(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (10.0, 5.0, 0.0, 0.0, 0.0, 0.0)]
-    assert shares(*[make_trajectories(way, users=[walker])] * 2) == [0.0]
-
-
-def test_runs_without_a_common_instant_cannot_be_told():
-    brief = make_trajectories([(0.2, 0.0, 0.0, 0.0, 0.0, 0.0), (0.8, 5.0, 0.0, 0.0, 0.0, 0.0)])
-    assert shares(brief, RUN) == [None]
-    said = require_independent([(vehicle_positions("a", brief), vehicle_positions("b", RUN))])
-    assert said.endswith("a and b unknown")

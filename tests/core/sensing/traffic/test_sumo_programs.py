@@ -54,29 +54,6 @@ def test_sumo_is_found_in_a_named_folder_its_bin_or_where_pip_installed_it(tmp_p
         find_sumo([tmp_path / "not there"])
 
 
-@pytest.mark.usefixtures("nowhere")
-def test_the_programs_precede_scripts_of_the_same_name_that_pip_writes(tmp_path):
-    write_programs(tmp_path)
-    write_programs(tmp_path / "sumo")
-    assert find_sumo([tmp_path]).netconvert == tmp_path / "sumo" / "bin" / "netconvert"
-
-
-def test_a_named_folder_precedes_the_path_and_its_data_are_used(tmp_path, monkeypatch):
-    write_programs(tmp_path / "path")
-    write_programs(tmp_path / "named")
-    monkeypatch.setenv("PATH", str(tmp_path / "path" / "bin"))
-    monkeypatch.setenv("SUMO_HOME", str(tmp_path / "path"))
-    assert find_sumo([tmp_path / "named"]) == Sumo(
-        tmp_path / "named" / "bin" / "sumo", tmp_path / "named" / "bin" / "netconvert", tmp_path / "named"
-    )
-    assert find_sumo().home == tmp_path / "path"
-
-
-def test_the_version_is_the_one_that_netconvert_states(tmp_path):
-    write_programs(tmp_path, version="1.20.3")
-    assert sumo_version(find_sumo([tmp_path])) == "1.20.3"
-
-
 @pytest.mark.parametrize("script", ["echo 'libGL.so.1 is missing' >&2; exit 127", "echo nonsense"])
 def test_a_sumo_that_does_not_start_is_named(tmp_path, script):
     write_programs(tmp_path, script=script)

@@ -2,22 +2,16 @@
 
 import gzip
 import math
-import tracemalloc
-from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.traffic.floating_car_data import (
     Extent,
-    listed,
     read_floating_car_data,
     read_trajectories,
-    unwrapped,
 )
 from seip_addon.core.sensing.traffic.source import read_net_offset
 from seip_addon.core.sensing.traffic.vehicle_types import BUILT_IN, CAR, VehicleType, read_vehicle_types
@@ -103,13 +97,6 @@ def test_the_middle_is_half_a_length_behind_the_bumper(tmp_path):
     assert "5 × 1.8 × 1.5 m" in sentence
 
 
-def test_paint_goes_by_the_name_alone(tmp_path):
-    data = read(written(tmp_path, "f.xml", FCD))
-    paints = [read_trajectories(data, BUILT_IN, np.zeros(3), source)[0].users[0].paint for source in ("x", "y")]
-    assert paints[0] == paints[1]
-    assert 0.1 <= paints[0] <= 0.8
-
-
 def test_types_fall_back_to_what_sumo_assumes(tmp_path):
     types = finish(read_vehicle_types([written(tmp_path, "r.xml.gz", ROUTES)]))
     assert types["default_truck"] == VehicleType("truck", 7.1, 2.4, 2.4)
@@ -124,13 +111,6 @@ def test_only_the_window_is_kept(tmp_path):
     assert data.names == ("b",)
     assert data.elsewhere == 1  # a, at 112 m; the walker was there before
     assert data.time.tolist() == [0.2, 0.4]
-
-
-def test_a_vehicle_and_a_person_may_share_an_id(tmp_path):
-    both = '<vehicle id="0" x="0" y="0" angle="0" lane="e_0"/><person id="0" x="1" y="1" angle="0" edge="e"/>'
-    data = read(written(tmp_path, "f.xml", one(both)))
-    assert data.names == ("0", "person 0")
-    assert data.person.tolist() == [False, True]
 
 
 def test_the_offset_of_a_network(tmp_path):
@@ -175,19 +155,6 @@ def test_a_wrong_file_gets_one_sentence(tmp_path, name, text, complaint):
     assert name in str(caught.value)
 
 
-def test_blank_lines_of_a_table_say_nothing(tmp_path):
-    blank = read(written(tmp_path, "f.csv", NATIVE_CSV.replace("\n0.20", "\n\n0.20") + "\n\n"))
-    np.testing.assert_array_equal(blank.time, read(written(tmp_path, "g.csv", NATIVE_CSV)).time)
-
-
-def test_a_long_name_is_cut_in_sentences(tmp_path):
-    path = written(tmp_path, "r.xml", f'<routes><vType id="{50_000 * "t"}" length="0"/></routes>')
-    with pytest.raises(SeipError, match="is not a valid size") as caught:
-        finish(read_vehicle_types([path]))
-    assert len(str(caught.value)) < 300
-    assert len(listed([50_000 * "a"])) < 100
-
-
 def test_damaged_or_missing_files_get_one_sentence(tmp_path):
     whole = gzip.compress(FCD.encode())
     (tmp_path / "f.xml.gz").write_bytes(whole[:-20])
@@ -202,60 +169,7 @@ def test_damaged_or_missing_files_get_one_sentence(tmp_path):
         read(tmp_path / "f.csv")
 
 
-@pytest.mark.parametrize("size", ["0", "-1", "long", "nan", "1e9"])
-def test_a_senseless_size_is_refused(tmp_path, size):
-    path = written(tmp_path, "r.xml", f'<routes><vType id="t" length="{size}"/></routes>')
-    with pytest.raises(SeipError, match="of vType 't' is not a valid size"):
-        finish(read_vehicle_types([path]))
-
-
-@pytest.mark.parametrize("offset", [None, "nan,0", "5,nan", "here", "1e300,0"])
-def test_a_network_without_offset_is_refused(tmp_path, offset):
-    text = "<net/>" if offset is None else f'<net><location netOffset="{offset}"/></net>'
-    with pytest.raises(SeipError, match="netOffset"):
-        read_net_offset(written(tmp_path, "n.xml", text))
-
-
 def test_nobody_near_the_scene_is_refused(tmp_path):
     data = read(written(tmp_path, "f.xml", FCD), window=Extent(bounds=(1e6, 1e6, 2e6, 2e6)))
     with pytest.raises(SeipError, match=r"FCD of another map.* none of the 3 road users in f comes near"):
         read_trajectories(data, BUILT_IN, np.zeros(3), "f")
-
-
-@pytest.mark.slow
-def test_what_lies_elsewhere_takes_no_memory(tmp_path):
-    """Four times as long a file takes hardly more memory: two road users' samples, where 200 would be kept.
-
-    Both files are longer than it takes the XML parser's own buffer to reach its full size.
-    """
-    row = "".join(f'<vehicle id="v{i}" x="{i}" y="0" angle="0" type="t" lane="e_0" speed="1"/>' for i in range(200))
-    path = tmp_path / "f.xml"
-    sizes, peaks = [], []
-    for steps in (200, 800):
-        with path.open("w") as file:
-            file.write("<fcd-export>")
-            file.writelines(f'<timestep time="{number}">{row}</timestep>' for number in range(steps))
-            file.write("</fcd-export>")
-        tracemalloc.start()
-        data = read(path, window=Extent(bounds=(-1, -1, 1.5, 1)))
-        peaks.append(tracemalloc.get_traced_memory()[1])
-        tracemalloc.stop()
-        sizes.append(path.stat().st_size)
-        assert data.names == ("v0", "v1")
-        assert data.elsewhere == 198
-    assert peaks[1] - peaks[0] < 0.05 * (sizes[1] - sizes[0])
-
-
-angles = st.lists(st.lists(st.floats(-20.0, 20.0), min_size=1, max_size=8), min_size=1, max_size=5)
-
-
-@given(angles)
-def test_unwrapping_adds_whole_turns_and_leaves_no_jump(users):
-    yaw = np.concatenate(users)
-    first = np.concatenate([[0], np.cumsum([len(user) for user in users])])
-    smooth = unwrapped(yaw, first)
-    turns = (smooth - yaw) / (2.0 * np.pi)
-    np.testing.assert_allclose(turns, np.round(turns), atol=1e-9)
-    np.testing.assert_array_equal(smooth[first[:-1]], yaw[first[:-1]])
-    for begin, end in pairwise(first):
-        assert (np.abs(np.diff(smooth[begin:end])) <= np.pi + 1e-9).all()

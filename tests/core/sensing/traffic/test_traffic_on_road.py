@@ -78,14 +78,6 @@ def test_height_and_pitch_are_those_of_the_road(yaw, slope):
     np.testing.assert_allclose(fit.pitch, np.arctan(slope), atol=1e-4)
 
 
-@given(st.floats(-70.0, 70.0), st.floats(-3.5, 3.5), st.floats(-np.pi, np.pi))
-@cases(25)
-def test_any_vehicle_on_an_inclined_road_lies_in_its_plane(x, y, yaw):
-    fit = fit_to_road(moving([x, x], y, yaw=yaw), scene()).trajectories
-    assert fit.position[0, 2] == pytest.approx(GRADE * x, abs=1e-3)
-    assert np.tan(fit.pitch[0]) == pytest.approx(GRADE * np.cos(yaw), abs=2e-4)
-
-
 def test_another_origin_is_minded():
     fit = fit_to_road(moving([10.0, 11.0], 0.0), scene()).trajectories
     away = replace(moving([10.0, 11.0], 0.0), origin=np.array([30.0, 1.0, 0.0]))
@@ -111,15 +103,6 @@ def test_pedestrians_walk_on_pavements_and_vehicles_do_not():
         fit_to_road(moving([0.0, 1.0], 8.0), scene(ground=ground, region=region))
 
 
-def test_a_little_beside_the_road_still_counts():
-    region = shapely.box(-80.0, -9.0, 80.0, 9.0)
-    near = fit_to_road(moving([10.0, 11.0], 4.0 + 0.9 * ROAD_TOLERANCE), scene(region=region))
-    assert not near.warnings
-    np.testing.assert_allclose(near.trajectories.position[:, 2], [0.5, 0.55], atol=1e-3)
-    with pytest.raises(SeipError, match="off the road"):
-        fit_to_road(moving([10.0, 11.0], 4.0 + 1.1 * ROAD_TOLERANCE), scene(region=region))
-
-
 def test_who_leaves_the_road_is_named_and_cut_in_two():
     region = shapely.box(-80.0, -20.0, 80.0, 20.0)
     y = np.where(np.abs(np.arange(-20.0, 21.0)) < 3.0, 15.0, 0.0)
@@ -133,30 +116,10 @@ def test_who_leaves_the_road_is_named_and_cut_in_two():
     assert fit.trajectories.position[18, 0] == 3.0
 
 
-def test_who_leaves_the_scene_and_comes_back_is_no_mistake():
-    x = np.concatenate([np.arange(95.0, 106.0), np.arange(105.0, 94.0, -1.0)])
-    fit = fit_to_road(together(moving(x, 0.0), moving([0.0, 1.0], 0.0)), scene())
-    assert not fit.warnings
-    assert [user.name for user in fit.trajectories.users] == ["car", "car/2", "car"]
-    assert fit.trajectories.position[:, 0].max() <= 100.0 + ROAD_TOLERANCE
-
-
 def test_a_gap_in_time_ends_a_stay():
     fit = fit_to_road(moving([0.0, 1.0, 2.0, 3.0], 0.0, time=[0.0, 0.1, 5.0, 5.1]), scene()).trajectories
     assert [user.name for user in fit.users] == ["car", "car/2"]
     assert len(fit.at(2.0)) == 0
-
-
-@pytest.mark.parametrize(("gap", "stays"), [(0.2, 1), (0.3, 2)])
-def test_a_stay_outlives_the_loss_of_one_sample_and_not_of_two(gap, stays):
-    time = np.cumsum([0.0, 0.1, 0.1, gap, 0.1, 0.1])
-    fit = fit_to_road(moving(10.0 * time, 0.0, time=time), scene()).trajectories
-    assert len(fit.users) == stays
-
-
-def test_who_is_put_somewhere_else_is_another_one_there():
-    fit = fit_to_road(moving([0.0, 0.1, 20.0, 20.1], 0.0), scene()).trajectories
-    assert [user.name for user in fit.users] == ["car", "car/2"]
 
 
 def test_pedestrians_walk_without_leaps_and_vehicles_stay_as_they_are():
@@ -171,19 +134,6 @@ def test_pedestrians_walk_without_leaps_and_vehicles_stay_as_they_are():
     assert np.diff(smooth.yaw[:60]).max() == pytest.approx(3.0 / 19)
     np.testing.assert_allclose(smooth.position[[0, 59], 0], x[[0, 59]])
     np.testing.assert_allclose(smooth.position[:20, 0], x[:20], atol=1e-12)  # straight on nothing changes
-
-
-def test_a_walker_put_somewhere_else_does_not_walk_there():
-    x = np.where(np.arange(40) < 20, 0.0, 50.0)
-    smooth = smooth_walks(moving(x, 0.0, WALKER))
-    np.testing.assert_array_equal(smooth.position[:, 0], x)
-
-
-def test_a_single_sample_is_no_stay():
-    fit = fit_to_road(together(moving([0.0], 0.0), moving([5.0, 6.0], 0.0)), scene()).trajectories
-    assert len(fit) == 1
-    with pytest.raises(SeipError, match="for two samples"):
-        fit_to_road(moving([0.0], 0.0), scene())
 
 
 def test_the_traffic_of_another_map_is_refused_and_named():
@@ -221,12 +171,6 @@ def test_footprints_and_overlaps_by_hand():
     assert apart.first.tolist() == [0, 101, 202]
     np.testing.assert_array_equal(apart.position, crossing.position[101:])
     assert not len(finish(find_overlaps(apart)))
-
-
-def test_who_is_in_the_most_ways_goes_first():
-    middle = moving([0.0, 0.0], 0.0, replace(CAR, name="middle", length=9.0))
-    ends = [moving([x, x], 0.0, replace(CAR, name=f"end {x:g}")) for x in (-4.0, 4.0)]
-    assert finish(without_overlaps(together(ends[0], middle, ends[1])))[1] == ("middle",)
 
 
 @given(st.lists(st.floats(-50.0, 50.0), min_size=2, max_size=20), st.floats(0.0, 1.0))

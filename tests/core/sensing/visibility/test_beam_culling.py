@@ -8,7 +8,6 @@ from dataclasses import replace
 from headless.studies.full_scan import beam_directions
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -126,22 +125,6 @@ def test_hardly_a_ray_is_kept_that_passes_over_its_target() -> None:
     assert (gap < 1.03).all()
 
 
-@pytest.mark.slow
-def test_steep_surfaces_are_met_by_few_rays_more_than_needed() -> None:
-    """A wall beside the sensor's view: of all rays within its heights only those that end on its line are kept."""
-    wall = np.array([[[10.0, -9, -1], [10, 9, -1], [10, 9, 3]], [[10.0, -9, -1], [10, 9, 3], [10, -9, 3]]])
-    target = np.array([[10.0, 4.0, 0.0]])
-    model = replace(load_catalogue()["type3"], min_range=0.0)
-    origin = np.array([0.0, 0.0, 1.0])
-    surfaces = surfaces_near(wall, target, 1.0)
-    patches, planes = disc_patches(origin, surfaces, np.array([True]))
-    kept = rays_by_target(near_rays(Beams.of([model], 0.0, VisibilitySettings()), patches, planes), model, 1)[0]
-    points = hits(origin, beam_directions(model, 0.0).reshape(-1, 3), wall)
-    returns = (np.linalg.norm(points - target, axis=2) < 1.0).any(axis=1)
-    assert kept[returns].all()
-    assert kept.sum() < 1.6 * returns.sum()
-
-
 def test_targets_out_of_range_and_without_surface_need_no_ray() -> None:
     model = replace(random_model(np.random.default_rng(0)), min_range=0.5)
     patches = Patches(
@@ -161,49 +144,11 @@ def test_least_range_is_measured_along_the_ray() -> None:
         assert (len(near_rays(beams, patches)) > 0) == some
 
 
-def test_the_sign_of_a_level_beam_does_not_matter() -> None:
-    wall = np.array([[[10.0, -9, -1], [10, 9, -1], [10, 9, 3]]])
-    surfaces = surfaces_near(wall, np.array([[10.0, 4.0, 0.5]]), 1.0)
-    patches, planes = disc_patches(np.array([0.0, 0.0, 0.5]), surfaces, np.array([True]))
-    model = replace(random_model(np.random.default_rng(0)), points_per_second=10.0 * 360)
-    one = {"azimuth_offsets": np.zeros(1)}
-    kept = [
-        near_rays(
-            Beams.of([replace(model, elevations=np.array([level]), **one)], 0.0, VisibilitySettings()), patches, planes
-        )
-        for level in (0.0, -0.0)
-    ]
-    assert kept[0].width.tolist() == kept[1].width.tolist() != []
-
-
 def test_a_sensor_as_far_above_a_face_as_returns_may_lie_off_it() -> None:
     surfaces = surfaces_near(road(20.0), np.array([[0.2, 0.0, 0.0]]), 1.0)
     patches, planes = disc_patches(np.array([0.0, 0.0, surfaces.tolerance]), surfaces, np.array([True]))
     model = replace(random_model(np.random.default_rng(0)), elevations=np.full(1, -1.2), azimuth_offsets=np.zeros(1))
     assert (near_rays(Beams.of([model], 0.0, VisibilitySettings()), patches, planes).width == model.azimuth_count).any()
-
-
-def test_the_likeliest_ray_ends_at_the_target_on_a_level_road() -> None:
-    model = LidarModel(
-        key="k",
-        name="N",
-        manufacturer="M",
-        source="S",
-        elevations=np.radians([-5.0, -20.0]),
-        min_range=0.0,
-        max_range=100.0,
-        points_per_second=7200.0,
-        rotation_rate=10.0,
-        price_range=(1.0, 2.0),
-    )
-    radius = 4 / math.tan(math.radians(20))
-    targets = np.array([[0.0, radius, 0.0], [30.0, 0.0, 0.0]])
-    beams = Beams.of([model], 0.0, VisibilitySettings())
-    surfaces = surfaces_near(road(50.0), targets, 1.0)
-    near = near_rays(beams, target_patches(np.array([0.0, 0, 4]), surfaces, all_of(surfaces))).likeliest(beams.sensor)
-    assert near.target.tolist() == [0]
-    assert (near.channel.tolist(), near.middle.tolist()) == ([1], [90])
-    assert near.miss.min() == pytest.approx(0, abs=0.1)
 
 
 def test_sensors_share_the_rays_of_equal_channels() -> None:
@@ -213,22 +158,3 @@ def test_sensors_share_the_rays_of_equal_channels() -> None:
     assert equal.any()
     assert beams.rays == 7500 * (32 + 128 - equal.sum())
     assert set(beams.first_ray[32:][equal]) <= set(beams.first_ray[:32])
-
-
-def test_sensors_share_rays_only_where_these_have_the_same_directions() -> None:
-    model = load_catalogue()["type1"]
-    half, third = (replace(model, field_of_view=math.tau / part) for part in (2, 3))
-    rays = model.channels * model.azimuth_count
-    for others, numbers in (([model], 1), ([half], 2), ([half, half], 2), ([half, third], 3)):
-        assert Beams.of([model, *others], 0.2, VisibilitySettings()).rays == numbers * rays
-
-
-@given(st.integers(1, 40), st.integers(-50, 50))
-def test_bundles_fall_into_single_rays(width: int, first: int) -> None:
-    left = NearRays(*(np.array([value]) for value in (0, 0, 0, first, width)), np.zeros(1))
-    steps = []
-    while len(left):
-        steps += left.middle.tolist()
-        left, part_of = left.beside_middle()
-        assert len(part_of) == len(left)
-    assert sorted(steps) == list(range(first, first + width))

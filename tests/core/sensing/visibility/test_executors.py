@@ -38,24 +38,12 @@ def cluster() -> Iterator[object]:
         yield started
 
 
-@pytest.mark.skipif(HAS_DASK, reason="Dask is installed")
-def test_a_missing_dask_has_its_sentence() -> None:
-    with pytest.raises(SeipError, match="the extra 'cluster'"):
-        finish(compute_visibility(SITE, MODELS, SETTINGS, ANY, scheduler="tcp://127.0.0.1:1"))
-
-
 @needs_dask
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://"])
 def test_a_scheduler_that_does_not_answer_has_its_sentence(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("seip_addon.core.dask_client._CONNECT_TIMEOUT", 0.5)
     with pytest.raises(SeipError, match="no Dask scheduler answers at"):
         finish(compute_visibility(SITE, MODELS, SETTINGS, ANY, scheduler=address))
-
-
-@needs_dask
-def test_an_encrypted_scheduler_without_certificates_has_its_sentence() -> None:
-    with pytest.raises(SeipError, match=r"tls://127\.0\.0\.1:1 needs certificates"):
-        finish(compute_visibility(SITE, MODELS, SETTINGS, ANY, scheduler="tls://127.0.0.1:1"))
 
 
 @needs_dask
@@ -109,11 +97,3 @@ def test_a_cluster_writes_the_same_bytes_though_a_worker_dies(cluster, tmp_path:
     assert killed
     assert (tmp_path / "hurt.npz").read_bytes() == (tmp_path / "here.npz").read_bytes()
     assert not (tmp_path / "hurt.pieces").exists()
-
-
-@pytest.mark.slow
-@needs_embree
-def test_the_number_of_threads_changes_nothing() -> None:
-    grids = [finish(compute_visibility(SITE, MODELS, SETTINGS, "embree", threads=threads)) for threads in (1, 2)]
-    assert (grids[0].packed == grids[1].packed).all()
-    assert grids[0].parameters == grids[1].parameters

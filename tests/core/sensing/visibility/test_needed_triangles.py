@@ -46,12 +46,3 @@ def test_each_reason_is_counted_and_said() -> None:
     assert needed.counts == {"all": 6, "kept": 1} | reasons
     sentence = culling_message(needed.counts)
     assert sentence.startswith("rays are cast against 1 of 6 triangles; dropped: 1 without area, 1 above")
-
-
-def test_what_ends_a_ray_within_range_is_kept_however_far_its_target_is() -> None:
-    """A surface before a target that itself is out of range: a return from it sees the target."""
-    upright = np.array([[0.0, -1, -1], [0, 1, -1], [0, 0, 1]])
-    poses, targets = np.array([[0.0, 0, 0]]), np.array([[30.5, 0, 0]])
-    inside, outside = (needed_triangles(upright[None] + (x, 0, 0), poses, targets, 1.0, 30.0) for x in (29.8, 30.2))
-    assert inside.keep.tolist() == [True]
-    assert outside.counts["out_of_range"] == 1

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from seip_addon.core.errors import SeipError
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
 from seip_addon.core.sensing.visibility.settings import Engine
-from tests.engines import each_engine, needs_embree
+from tests.engines import each_engine
 from tests.oracles.float64_rays import first_hits
 
 SQUARE = np.array([[[-1, -1, 5], [1, -1, 5], [1, 1, 5]], [[-1, -1, 5], [1, 1, 5], [-1, 1, 5]]], dtype=np.float64)
@@ -41,37 +41,6 @@ def test_both_sides_stop_a_ray(engine: Engine) -> None:
     caster = make_ray_caster(SQUARE, engine)
     assert caster.cast(np.array([0.1, 0.2, 9.0]), -UP, 100.0)[0][0] == pytest.approx(4)
     assert caster.cast(np.array([0.1, 0.2, 0.0]), UP, 100.0)[0][0] == pytest.approx(5)
-
-
-@each_engine
-def test_triangles_without_area_stop_nothing(engine: Engine) -> None:
-    point = np.broadcast_to([0.1, 0.2, 1.0], (1, 3, 3))
-    line = np.array([[[-1.0, 0, 2], [1, 0, 2], [3, 0, 2]]])
-    caster = make_ray_caster(np.concatenate([point, line, SQUARE]), engine)
-    distance, triangle = caster.cast(np.array([0.1, 0.2, 0.0]), UP, 100.0)
-    assert distance[0] == pytest.approx(5)
-    assert triangle[0] == 3
-
-
-@each_engine
-def test_an_empty_scene_stops_nothing(engine: Engine) -> None:
-    distance, triangle = make_ray_caster(np.zeros((0, 3, 3)), engine).cast(np.zeros(3), UP, 100.0)
-    assert (distance[0], triangle[0]) == (np.inf, -1)
-
-
-@each_engine
-def test_no_rays_have_no_hits(engine: Engine) -> None:
-    distance, triangle = make_ray_caster(SQUARE, engine).cast(np.zeros(3), np.zeros((0, 3)), 100.0)
-    assert distance.shape == triangle.shape == (0,)
-
-
-@each_engine
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_coordinates_that_are_not_finite(engine: Engine, bad: float) -> None:
-    triangles = SQUARE.copy()
-    triangles[1, 2, 0] = bad
-    with pytest.raises(SeipError, match="not finite, the first is 1"):
-        make_ray_caster(triangles, engine)
 
 
 @each_engine
@@ -146,15 +115,3 @@ def test_threads_cast_alike(engine: Engine) -> None:
 def test_an_unknown_engine_names_the_known() -> None:
     with pytest.raises(SeipError, match="auto, bvh or embree"):
         make_ray_caster(SQUARE, "optix")  # type: ignore[arg-type]
-
-
-@needs_embree
-def test_auto_takes_embree_where_it_is() -> None:
-    assert make_ray_caster(SQUARE).name == "embree"
-
-
-@needs_embree
-def test_there_may_be_more_casters_than_embree_may_have_devices() -> None:
-    casters = [make_ray_caster(SQUARE, "embree") for _ in range(1100)]  # a device each ends the process at 1,024
-    above, down = SQUARE.mean(axis=(0, 1)) + np.array([0.0, 0.0, 1.0]), np.array([[0.0, 0.0, -1.0]])
-    assert all(caster.cast(above, down, 2.0)[1].item() >= 0 for caster in casters)

@@ -10,13 +10,11 @@ from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.visibility.road_range import (
     range_warnings,
     road_range,
-    road_reflectivity,
     upright_range,
 )
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
 from seip_addon.core.sensing.weather import Weather
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.site.scene_geometry import Mesh
 from seip_addon.core.workflows.survey import carla_warnings
 from seip_addon.core.workflows.survey_settings import SurveySettings
 from tests.builders.synthetic_junction import junction_site
@@ -47,12 +45,6 @@ def test_range_on_an_upright_body_is_that_of_the_law_within_the_longest_range():
     assert upright_range(CATALOGUE["type1"], 0.283, SIGHT) == CATALOGUE["type1"].max_range
 
 
-def test_the_reflectivity_of_a_road_is_that_of_most_of_its_area():
-    wide, narrow = np.array([[[0.0, 0, 0], [9, 0, 0], [0, 9, 0]]]), np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
-    meshes = [Mesh("asphalt", wide, np.array([0.17])), *(Mesh("paint", narrow, np.array([0.6])) for _ in range(9))]
-    assert road_reflectivity(meshes) == 0.17
-
-
 def test_warnings_say_which_share_lies_beyond_every_candidate():
     site = junction_site(positions=1, sensors=["type1"], heights=[8.0])
     (warning,) = range_warnings(site, short_sighted(30.0), 0.17, SIGHT)
@@ -75,12 +67,3 @@ def test_sensors_that_see_through_any_weather_are_named():
     assert "do not compare the two" not in warning
     (warning,) = carla_warnings(models, alike)
     assert warning.endswith("os1_128 must detect it: do not compare the two")
-
-
-def test_there_is_no_warning_where_all_is_in_range_but_for_what_is_assumed():
-    site = junction_site(positions=8, sensors=["type1"], heights=[8.0])
-    seeing = short_sighted(900.0)
-    assert range_warnings(site, seeing, 0.17, SIGHT) == ()
-    assert range_warnings(site, CATALOGUE, 0.17, SIGHT) == ()
-    assumed = {"type1": replace(seeing["type1"], assumed_law="its range is a guess")}
-    assert range_warnings(site, assumed, 0.17, SIGHT)[0].endswith("; its range is a guess")

@@ -3,8 +3,6 @@
 import math
 from dataclasses import replace
 
-from headless.studies.full_scan import beam_directions
-from headless.studies.stability.criterion import in_view
 from headless.studies.stability.spacings import Evaluator
 
 import numpy as np
@@ -18,13 +16,12 @@ from seip_addon.core.choosing.placement.objective import Objective
 from seip_addon.core.choosing.robustness.pose_errors import PoseDraws
 from seip_addon.core.choosing.robustness.visibility_under_errors import visibility_under_errors
 from seip_addon.core.errors import SeipError
-from seip_addon.core.geometry.orientation import angles_of, describe_turn, orientation, orientations, rotated
+from seip_addon.core.geometry.orientation import orientation, orientations
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.scans.sensor import level_orientation
 from seip_addon.core.sensing.visibility import grid
-from seip_addon.core.sensing.visibility.chunks import chunks_of, sharing_rays
 from seip_addon.core.sensing.visibility.grid import (
     FILE,
     VisibilitySettings,
@@ -32,11 +29,10 @@ from seip_addon.core.sensing.visibility.grid import (
     visibility_key,
 )
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
-from seip_addon.core.sensing.visibility.ring_resolution import resolution_warnings, unresolved_from
-from seip_addon.core.sensing.visibility.sight_lines import pose_at
+from seip_addon.core.sensing.visibility.ring_resolution import resolution_warnings
 from seip_addon.core.sensing.visibility.surroundings import Surroundings
 from seip_addon.core.sensing.visibility.visibility_model import visibility_model
-from seip_addon.core.site.candidates import CandidateSettings, generate_candidates, tilts_of
+from seip_addon.core.site.candidates import CandidateSettings, generate_candidates
 from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
 from seip_addon.core.site.site import Site, Targets
 from seip_addon.core.storage.files import digest
@@ -141,28 +137,6 @@ def test_orientations_turn_then_nod_then_roll(yaw, tilt, roll):
     assert math.cos(tilt) * np.array([math.cos(yaw), math.sin(yaw)]) == pytest.approx(ahead[:2], abs=1e-9)
 
 
-def test_rays_are_turned_to_the_same_bits_in_every_batch():
-    rays, turn = beam_directions(MODELS["type2"]).reshape(-1, 3), orientation(0.7, 0.2)
-    whole = rotated(rays, turn)
-    assert (np.concatenate([rotated(rays[n : n + 7], turn) for n in range(0, 700, 7)]) == whole[:700]).all()
-    assert whole == pytest.approx(rays @ turn.T, abs=1e-15)
-
-
-def test_upright_rows_are_those_of_the_upright_candidates_alone():
-    alone = generate_candidates(street(), CHOICE)
-    both = generate_candidates(street(), replace(CHOICE, tilts=(0.0, math.radians(12))))
-    upright = both.tilt == 0
-    for name in ("position_of", "sensor", "height", "xyz", "yaw", "tilt"):
-        assert getattr(both, name)[upright].tobytes() == getattr(alone, name).tobytes()
-    assert not alone.yaw.any()
-    site = street_site(alone)
-    with_tilts = replace(site, candidates=both)
-    one, other = grid_of(site), grid_of(with_tilts)
-    assert (other.packed[upright] == one.packed).all()
-    assert (other.packed[~upright] != one.packed).any(axis=1).all()
-    assert other.key != one.key
-
-
 def test_the_key_of_an_upright_grid_is_as_it_was_before_there_were_tilts():
     site = street_site(generate_candidates(street(), CHOICE))
     poses, model = site.candidates, MODELS["type1"]
@@ -248,25 +222,6 @@ def test_each_wrong_tilt_has_its_sentence(tilts, sentence):
         CandidateSettings(tilts=tilts)
 
 
-def test_tilts_are_named_in_degrees_one_by_one_or_as_a_range():
-    assert np.degrees(tilts_of(["0", "-5", "10:15:2.5"])) == pytest.approx([0, -5, 10, 12.5, 15])
-    for text in ("steep", "0:10", "10:0:1", "0:95:5", "0:10:0"):
-        with pytest.raises(SeipError, match="neither a tilt in degrees nor a range"):
-            tilts_of([text])
-    assert (describe_turn(0.0), describe_turn(math.radians(7.5))) == ("", ", tilted 7.5°")
-    assert describe_turn(math.radians(7.5), math.radians(-90)) == ", tilted 7.5°, yaw 270°"
-
-
-def test_places_part_tilts_and_pieces_keep_each_pose_once():
-    xyz = np.zeros((6, 3))
-    tilt = np.array([0.0, 0.1, 0.0, 0.1, 0.2, 0.0])
-    assert [group.tolist() for group in sharing_rays(xyz, np.zeros(6), tilt)] == [[0, 2, 5], [1, 3], [4]]
-    site = patch(3)
-    assert sorted(np.concatenate(chunks_of(site)).tolist()) == list(range(len(site.candidates)))
-    poses = site.candidates
-    assert len(sharing_rays(poses.xyz, poses.yaw, poses.tilt)) == 3
-
-
 def test_visibility_without_errors_is_the_grid_whatever_hangs_at_one_place():
     site = patch(5, poses=2)
     poses = site.candidates
@@ -277,15 +232,6 @@ def test_visibility_without_errors_is_the_grid_whatever_hangs_at_one_place():
     views = finish(visibility_under_errors(Surroundings(site, MODELS, SIGHT, (), ANY), np.arange(4), nothing))
     assert (views.seen(0) == grid_of(site).visible).all()
     assert (views.seen(0)[0] != views.seen(0)[2]).any()
-
-
-def test_a_draw_turns_a_tilted_pose_about_itself():
-    draws = PoseDraws(np.zeros((1, 1, 3)), *(np.array([[angle]]) for angle in (0.05, -0.02, 0.03)))
-    planned = orientation(1.0, 0.3)
-    hangs = draws.orientations(np.array([1.0]), np.array([0.3]))[0, 0]
-    off = math.acos((np.trace(planned.T @ hangs) - 1) / 2)
-    assert 0.0 < off < 0.05 + 0.02 + 0.03
-    assert hangs == pytest.approx(orientations(np.array(1.05), np.array(0.28), np.array(0.03)), abs=1e-12)
 
 
 def test_a_chosen_sensor_is_turned_as_its_candidate_and_evaluated_so():
@@ -312,30 +258,6 @@ def test_a_placement_of_tilted_sensors_is_evaluated_as_they_are_mounted():
     assert as_it_hangs != looks.see(sensor.model, sensor.xyz, level_orientation(sensor.yaw)).mean()
 
 
-def test_what_is_in_view_turns_with_the_sensor():
-    caster, model = make_ray_caster(street_site(generate_candidates(street(), CHOICE)).triangles, ANY), MODELS["type1"]
-    xyz, near = (
-        np.array([0.0, 0.0, 5.0]),
-        np.array([[8.0, 0.0, 0.0]]),
-    )  # 32 degrees below the horizon, the beams end at 15
-    assert not in_view(caster, model, xyz, orientation(0.0, 0.0), near).any()
-    assert in_view(caster, model, xyz, orientation(0.0, math.radians(20)), near).all()
-    assert not in_view(caster, model, xyz, orientation(math.pi, math.radians(20)), near).any()
-    one_way = replace(model, field_of_view=math.radians(60))
-    assert in_view(caster, one_way, xyz, orientation(0.5, math.radians(20)), near).all()
-    assert not in_view(caster, one_way, xyz, orientation(0.8, math.radians(20)), near).any()
-
-
-def test_a_sensor_hangs_at_the_pose_of_its_own_tilt():
-    candidates = generate_candidates(street(), replace(CHOICE, tilts=(0.0, 0.1, 0.2)))
-    for pose in (0, 1, 2, 7):
-        xyz, turn = candidates.xyz[pose] + 1e-4, candidates.orientation(pose) + 1e-7
-        assert pose_at(candidates, "type1", xyz, turn) == pose
-    assert pose_at(candidates, "type1", candidates.xyz[0], orientation(0.0, 0.15)) is None
-    assert pose_at(candidates, "type1", candidates.xyz[0] + 0.1, candidates.orientation(0)) is None
-    assert pose_at(candidates, "type2", candidates.xyz[0], candidates.orientation(0)) is None
-
-
 def test_the_warning_of_rings_tells_upright_from_tilted_sensors():
     site, models = junction_site(positions=8, sensors=("type1",), heights=(3.5,)), load_catalogue()
     upright = resolution_warnings(site, models, SIGHT)
@@ -348,20 +270,3 @@ def test_the_warning_of_rings_tells_upright_from_tilted_sensors():
     only = resolution_warnings(tilted(site, 0.0, 0.2), models, SIGHT)
     assert len(only) == 1
     assert only[0].startswith("type1: if tilted")
-
-
-def test_rings_before_a_tilted_sensor_are_where_its_rays_meet_the_road():
-    model, height, tilt = load_catalogue()["type1"], 5.0, 0.15
-    ahead = np.column_stack([np.cos(model.elevations), 0 * model.elevations, np.sin(model.elevations)])
-    rays = ahead @ orientation(0.0, tilt).T
-    rays = rays[rays[:, 2] < 0]
-    rings = np.sort(height * rays[:, 0] / -rays[:, 2])
-    border = rings[np.flatnonzero(np.diff(rings) > 2.0)[0]]
-    assert unresolved_from(model, height, 1.0, 1000.0, tilt) == pytest.approx(border)
-
-
-@pytest.mark.parametrize("tilt", [0.0, 0.3, -1.4, math.pi / 2, -math.pi / 2])
-@pytest.mark.parametrize(("yaw", "roll"), [(0.0, 0.0), (2.0, -0.5), (-3.0, 3.0)])
-def test_angles_say_how_a_sensor_is_turned_in_any_way(yaw, tilt, roll):
-    matrix = orientation(yaw, tilt, roll)
-    np.testing.assert_allclose(orientation(*angles_of(matrix)), matrix, atol=1e-7)

@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 from shapely import box
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.geometry.orientation import orientation
-from seip_addon.core.progress import Progress, finish
-from seip_addon.core.sensing.lidar.beams import BeamPattern
+from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
@@ -29,12 +27,12 @@ from seip_addon.core.sensing.visibility.grid import (
     visibility_key,
 )
 from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
-from seip_addon.core.sensing.visibility.ring_resolution import resolution_warnings, unresolved_from
+from seip_addon.core.sensing.visibility.ring_resolution import resolution_warnings
 from seip_addon.core.sensing.visibility.settings import Engine
 from seip_addon.core.sensing.visibility.store import CheckpointFolder, stored_visibility
 from seip_addon.core.site.site import Site, Targets
 from tests.builders.synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity
-from tests.engines import ANY, each_engine, needs_any, needs_bvh, needs_embree
+from tests.engines import ANY, each_engine, needs_any
 from tests.oracles.float64_rays import nearest_return
 from tests.oracles.full_scan import full_scan
 from tests.oracles.random_cases import cases
@@ -173,32 +171,6 @@ def test_same_as_the_full_scan_on_a_junction(engine: Engine, key: str) -> None:
     assert (lazy.visible == full).all()
     assert 0.02 < lazy.visible.mean() < 0.98
     assert lazy.parameters["rays_cast"] < 0.03 * rays
-
-
-@pytest.mark.slow
-@needs_bvh
-@needs_embree
-def test_engines_differ_only_where_the_distance_is_delta_but_for_rounding() -> None:
-    settings = VisibilitySettings(0.6)
-    different = total = 0
-    for seed in range(40):
-        site = random_site(seed)
-        differs = grid_of(site, settings, "bvh").visible != grid_of(site, settings, "embree").visible
-        assert (np.abs(nearest_returns(site) - settings.delta)[differs] < 1e-3).all()
-        different += differs.sum()
-        total += differs.size
-    assert different <= 1e-3 * total
-
-
-@pytest.mark.slow
-@needs_bvh
-@needs_embree
-def test_engines_differ_in_few_targets_of_a_junction() -> None:
-    site, models = junction_site(positions=4), load_catalogue()
-    bvh, embree = (
-        finish(compute_visibility(site, models, VisibilitySettings(), engine)).visible for engine in ("bvh", "embree")
-    )
-    assert (bvh != embree).sum() <= 1e-4 * bvh.sum()
 
 
 @needs_any
@@ -399,16 +371,6 @@ def test_the_road_is_seen_as_far_as_its_returns_are_detected() -> None:
     assert everything.visible[0][away > reach + 0.6].any()
 
 
-@needs_any
-def test_progress_counts_poses() -> None:
-    site = random_site(1)
-    seen: list[Progress] = []
-    steps = compute_visibility(site, MODELS, VisibilitySettings(), ANY)
-    finish(steps, seen.append)
-    assert [step.done for step in seen] == [0, 3]
-    assert {step.total for step in seen} == {3}
-
-
 @pytest.mark.parametrize(
     "values",
     [(0,), (-1,), (math.nan,), (math.inf,), (1, -0.1), (1, 1.1), (1, math.nan), (1, 0, 0), (1, 0, 1), (1, 0, math.nan)],
@@ -416,40 +378,6 @@ def test_progress_counts_poses() -> None:
 def test_settings_that_mean_nothing(values: tuple[float, ...]) -> None:
     with pytest.raises(SeipError):
         VisibilitySettings(*values)
-
-
-def test_a_probability_that_a_sensor_never_reaches_is_refused_by_its_name() -> None:
-    with pytest.raises(SeipError, match=r"coarse: a probability of detection must lie above 0 and below 0\.985"):
-        VisibilitySettings(detection=0.99).least_strength(PHYSICAL["coarse"])
-
-
-@needs_any
-def test_sites_that_mean_nothing() -> None:
-    site = random_site(1)
-
-    def compute(changed: Site) -> VisibilityGrid:
-        return finish(compute_visibility(changed, MODELS, VisibilitySettings(), ANY))
-
-    nowhere = make_candidates(np.zeros((0, 3)), [], np.zeros(0))
-    with pytest.raises(SeipError, match="no candidate"):
-        compute(replace(site, candidates=nowhere))
-    with pytest.raises(SeipError, match="no target"):
-        compute(replace(site, targets=Targets(np.zeros((0, 3)), np.zeros(0), np.zeros(0, dtype=bool), 1.0)))
-    with pytest.raises(SeipError, match="target are not finite"):
-        compute(replace(site, targets=replace(site.targets, xyz=site.targets.xyz * np.nan)))
-    with pytest.raises(SeipError, match="did you mean"):
-        compute(replace(site, candidates=make_candidates(np.zeros((1, 3)), ["finest"], np.zeros(1))))
-
-
-def test_a_grid_answers_for_chosen_poses() -> None:
-    visible = np.array([[1, 0, 1, 0, 0, 0, 0, 0, 1], [1, 1, 0, 0, 0, 0, 0, 0, 0]], dtype=bool)
-    grid = VisibilityGrid(np.packbits(visible, axis=1), (2, 9), "key", {})
-    assert (grid.visible == visible).all()
-    assert grid.times_seen(np.array([0, 1])).tolist() == [2, 1, 1, 0, 0, 0, 0, 0, 1]
-    assert grid.coverage(np.array([0])) == pytest.approx(3 / 9)
-    assert grid.coverage(np.array([0, 1])) == pytest.approx(4 / 9)
-    assert grid.coverage(np.array([], dtype=np.int64)) == 0
-    assert grid.coverage(np.array([1]), weight=np.array([3.0, 1, 1, 1, 1, 1, 1, 1, 1])) == pytest.approx(4 / 11)
 
 
 @needs_any
@@ -531,25 +459,6 @@ def test_warnings_name_the_radius_from_which_a_rosette_leaves_gaps() -> None:
     assert "mid40: beyond 24 m (at 8 m height)" in warning
     assert "more than δ = 1 m from all rays of a frame of 0.1 s" in warning
     assert resolution_warnings(site, models, VisibilitySettings(80.0)) == ()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("height", "delta", "tilt"), [(5.4, 1.0, 0.0), (8.0, 2.0, 0.2)])
-def test_no_road_nearer_than_a_rosettes_gaps_is_missed(height: float, delta: float, tilt: float) -> None:
-    """Of random points on a level road in view, hardly any before the radius that is named is far from all rays."""
-    model = replace(load_catalogue()["mid70"], rotation_rate=2.0)
-    border = unresolved_from(model, height, delta, 90.0, tilt)
-    assert 20.0 < border < 80.0
-    turned = orientation(0.0, tilt)
-    ways = BeamPattern(model).directions(np.arange(model.channels)) @ turned.T
-    ends = ways[ways[:, 2] < 0]
-    ends = ends[:, :2] * (-height / ends[:, 2:])
-    road = np.random.default_rng(4).uniform((0, -60), (90, 60), (2000, 2))
-    road = road[model.faces(np.column_stack([road, np.full(len(road), -height)]) @ turned)]
-    gap = np.array([np.hypot(*(ends - point).T).min() for point in road])
-    radius = np.hypot(*road.T)
-    assert (gap[radius < border] < delta).mean() > 0.99  # gaps are looked for at points, not everywhere
-    assert (gap[radius > border] > delta).any()
 
 
 def test_warnings_say_when_targets_are_too_far_apart_for_delta() -> None:

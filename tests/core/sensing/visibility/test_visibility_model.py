@@ -7,8 +7,6 @@ from headless.studies.full_scan import beam_directions
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.sensor import level_orientation
@@ -20,7 +18,6 @@ from seip_addon.core.sensing.visibility.visibility_model import visibility_model
 from tests.builders.synthetic_junction import junction_site
 from tests.engines import ANY, each_engine
 from tests.few import few
-from tests.oracles.random_cases import cases
 
 MODELS = load_catalogue()
 SITE = junction_site()
@@ -57,20 +54,6 @@ def test_a_turned_sensor_sees_what_its_full_scan_sees(engine, angles):
     assert seen.any()
 
 
-@pytest.mark.slow
-@given(
-    angles=st.tuples(st.floats(-4, 4), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)),
-    place=st.tuples(st.floats(-12, 12), st.floats(-12, 12), st.floats(2, 9)),
-    delta=st.sampled_from([0.3, 1.0, 2.5]),
-)
-@cases(25)
-def test_wherever_it_hangs(angles, place, delta):
-    caster = make_ray_caster(SITE.triangles, ANY)
-    xyz, orientation = np.array(place), turned(*angles)
-    seen = visibility_model(SITE, replace(SIGHT, delta=delta), ANY).see(MODEL, xyz, orientation)
-    assert (seen == by_full_scan(caster, MODEL, xyz, orientation, delta)).all()
-
-
 def test_a_level_sensor_sees_what_its_candidate_sees():
     poses = SITE.candidates
     some = np.arange(0, len(poses), max(1, len(poses) // 6))
@@ -81,11 +64,3 @@ def test_a_level_sensor_sees_what_its_candidate_sees():
         model = MODELS[str(poses.sensor[pose])]
         seen = looks.see(model, poses.xyz[pose], level_orientation(float(poses.yaw[pose])))
         assert (seen == row).all()
-
-
-def test_a_sensor_that_looks_up_sees_no_road():
-    upside = turned(0.0, 0.0, math.pi)
-    narrow = replace(MODEL, elevations=np.radians(np.linspace(-60, -30, 16)))
-    looks = visibility_model(SITE, SIGHT, ANY)
-    assert looks.see(narrow, np.array([0.0, 0.0, 6.0]), np.eye(3)).any()
-    assert not looks.see(narrow, np.array([0.0, 0.0, 6.0]), upside).any()

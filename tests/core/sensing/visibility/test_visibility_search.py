@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 
-import numpy as np
 import pytest
 
-from seip_addon.core.sensing.visibility.near_surfaces import near_surfaces
 from seip_addon.core.sensing.visibility.settings import Engine
-from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY
 from tests.engines import each_engine
 from tests.oracles.visibility_search import FAULTS, assess, draw_case, search, sentence
 
@@ -48,15 +45,3 @@ def test_the_arithmetic_decides_nearly_all_by_itself() -> None:
     undecided = sum(int(verdict.undecided.sum()) for verdict in verdicts)
     assert undecided < 0.01 * sum(verdict.seen.size for verdict in verdicts)
     assert all(not (verdict.seen & verdict.undecided).any() for verdict in verdicts)
-
-
-@pytest.mark.parametrize("delta", [0.3, 1.0, 3.0])
-def test_a_level_face_lies_near_each_target_over_and_under_it(delta: float) -> None:
-    z = float(np.float32(-0.2))
-    face = np.array([[[-9.0, -9, z], [9, -9, z], [0, 9, z]]])
-    targets = np.zeros((200, 3))
-    targets[:, 2] = np.round(np.linspace(z - 0.9 * delta, z + 0.9 * delta, 200), 6)
-    surfaces = near_surfaces(face, targets, delta, np.full(len(face), DEFAULT_REFLECTIVITY))
-    assert np.unique(surfaces.discs.target).tolist() == list(range(200))
-    assert (surfaces.low < z).all()
-    assert (surfaces.high > z).all()
