@@ -45,22 +45,6 @@ def record(scene: bpy.types.Scene) -> dict:
     return json.loads(scene.seip.result.record)
 
 
-def test_the_post_of_a_deleted_sensor_is_not_exported(placed, tmp_path):
-    bodies = {label: empty.children[0].name for label, empty in placed_sensors(placed).items()}
-    move(placed)
-    bpy.ops.seip.evaluate_sensors()
-    placed.seip.result.render = False
-    assert bpy.ops.seip.export_result() == {"FINISHED"}
-    names = {node["name"] for node in gltf_nodes(tmp_path / "out" / "scene.glb")}
-    assert {label for label, name in bodies.items() if name in names} == {"S1", "S2"}
-
-
-def gltf_nodes(path: Path) -> list[dict]:
-    """Return the nodes of a binary glTF: its first chunk, after 12 bytes of header and 8 of its own, is JSON."""
-    content = path.read_bytes()
-    return json.loads(content[20 : 20 + int.from_bytes(content[12:16], "little")])["nodes"]
-
-
 def full_scan(scene: bpy.types.Scene) -> np.ndarray:
     """Return which targets the sensors see as followed sensors do, which go another way through the code."""
     bpy.ops.seip.follow_sensors()
@@ -144,34 +128,6 @@ def test_an_evaluated_deployment_is_kept_compared_and_exported(placed, tmp_path)
     assert session.state_of(scene).solution.certificate == MOVED_MESSAGE
 
 
-def test_an_added_sensor_counts_and_one_below_the_ground_has_its_sentence(placed):
-    first = placed_sensors(placed)["S1"]
-    copy = first.copy()
-    copy.location.x += 5.0
-    bpy.data.collections["SEIP Sensors"].objects.link(copy)
-    bpy.context.view_layer.update()
-    bpy.ops.seip.evaluate_sensors()
-    assert [line["id"] for line in record(placed)["sensors"]] == ["S1", "S2", "S3", "S4"]
-    first.location.z -= 100.0
-    bpy.context.view_layer.update()
-    with pytest.raises(RuntimeError, match=r"sensor S1 is 9\d\.\d\d m below the ground: raise it"):
-        bpy.ops.seip.evaluate_sensors()
-
-
-def test_undo_brings_the_placement_back_that_was_moved(placed):
-    before = placed.seip.result.record
-    bpy.ops.ed.undo_push(message="placed")
-    move(placed)
-    bpy.ops.ed.undo_push(message="moved")
-    bpy.ops.seip.evaluate_sensors()
-    bpy.ops.ed.undo_push(message="evaluated")
-    bpy.ops.ed.undo()
-    bpy.ops.ed.undo()
-    scene = bpy.context.scene
-    assert scene.seip.result.record == before
-    assert not sensor_edits(scene)
-
-
 def test_an_export_that_fails_or_is_stopped_leaves_the_earlier_one_whole(placed, tmp_path, monkeypatch):
     bpy.ops.seip.export_result()
     out = tmp_path / "out"
@@ -196,14 +152,3 @@ def test_an_export_that_fails_or_is_stopped_leaves_the_earlier_one_whole(placed,
     monkeypatch.setattr("seip_addon.preferences.cache_folder", lambda: tmp_path / "cache")
     bpy.ops.seip.export_result()
     assert (out / "placement.json").read_bytes() != before["placement.json"]
-
-
-@pytest.mark.slow
-def test_the_view_is_rendered_elsewhere_and_ends_with_who_asked(placed, tmp_path):
-    placed.seip.result.render = True
-    work = bpy.types.SEIP_OT_export_result.prepare(type("Operator", (), {})(), placed)
-    rendering = [progress.done for progress in work if progress.what == "rendering"]
-    assert rendering == sorted(rendering)
-    assert rendering[-1] > rendering[0] == 0
-    assert (tmp_path / "out" / "view.png").stat().st_size > 50_000
-    assert load_placement(tmp_path / "out" / "placement.json").settings["render"] is True

@@ -13,11 +13,7 @@ import pytest
 from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
 from seip_addon.core.output.results.placement_file import comparable, load_placement, parsed_record
 from seip_addon.operators.placement import SEIP_OT_solve_placement
-from seip_addon.panels import placement as placement_panel
 from seip_addon.session import session
-from tests.builders.drawn_layout import DrawnLayout
-from tests.builders.scene_by_hand import make_scene
-from tests.builders.small_junction import make_example
 from tests.builders.small_scene import make_run
 
 OPTIONS = [
@@ -75,18 +71,6 @@ def test_evaluate_only_states_what_traffic_leaves_of_the_placement_for_the_empty
     assert comparable(panel) == comparable(load_placement(tmp_path / "placement.json"))
 
 
-def test_the_panel_shows_what_the_objective_asks_for(coarse):
-    layout = DrawnLayout()
-    coarse.seip.sections.objective = True
-    placement_panel.draw(layout, bpy.context)
-    drawn = dict(layout.properties)
-    names = list(drawn)[list(drawn).index("criterion") :]
-    assert names == ["criterion", "scenarios", "runs", "risk"]
-    assert all(hasattr(coarse.seip.goal, name) for name in names)
-    assert drawn["runs"] == {"placeholder": "small_traffic"}
-    assert "Rays are cast from every candidate in 2 instants, which takes minutes." in layout.text
-
-
 def test_runs_are_read_in_work_that_can_be_stopped(coarse):
     work = SEIP_OT_solve_placement.prepare(SimpleNamespace(), coarse)
     assert any(progress.what == "reading runs of traffic" for progress in work)
@@ -116,8 +100,6 @@ def damaged(folder):
     ("wrong", "words"),
     [
         (shutil.rmtree, r"there is no run of traffic \(\.npz\) in .*runs: choose another folder, or make two or more"),
-        (lambda folder: None, "there is no run of traffic"),
-        (lambda folder: make_run(1, 30.0).save(folder / "run.npz"), "two runs of traffic or more are needed, not 1"),
         (other_place, "traffic of another place"),
         (copies, r"run-1\.npz and .*run-2\.npz are nearly the same traffic"),
         (damaged, r"run-2\.npz is damaged.*file of trajectories.*import or simulate them again"),
@@ -132,19 +114,3 @@ def test_runs_that_are_of_no_use_are_refused_before_any_ray_is_cast(coarse, tmp_
         bpy.ops.seip.solve_placement()
     assert not coarse.seip.result.record
     assert not (tmp_path / "cache").exists()
-
-
-def test_runs_beside_a_file_that_was_never_saved_have_their_sentence(add_on):
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    scene = make_scene(make_example().geometry)
-    scene.seip.goal.scenarios = "traffic"
-    for folder in ("", "//runs"):
-        scene.seip.goal.runs = folder
-        with pytest.raises(RuntimeError, match="the file has not been saved: save it first, or choose another folder"):
-            bpy.ops.seip.solve_placement()
-
-
-def test_a_coverage_to_reach_is_of_the_empty_road(coarse):
-    coarse.seip.goal.limit = "COVERAGE"
-    with pytest.raises(RuntimeError, match="needs a number of sensors or a budget"):
-        bpy.ops.seip.solve_placement()

@@ -4,16 +4,13 @@ import re
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
-from unittest.mock import patch
 
-from headless import build_scene, traffic
+from headless import traffic
 
 import bpy
 import pytest
 
-from seip_addon import preferences
-from seip_addon.core.choosing.placement.scenarios import DEFAULT_COUNTS
-from seip_addon.operators.simulation import NO_MAP, SEIP_OT_simulate_traffic
+from seip_addon.operators.simulation import SEIP_OT_simulate_traffic
 from seip_addon.panels import simulation as simulation_panel
 from seip_addon.session import session
 from tests.builders.drawn_layout import DrawnLayout
@@ -48,18 +45,7 @@ def drawn():
 def test_runs_are_those_of_the_command_and_used_by_the_next_buttons(site, tmp_path):
     assert dict(drawn().properties)["map"] == {"placeholder": "junction.xodr"}
     assert bpy.ops.seip.simulate_traffic() == {"FINISHED"}
-    folder = tmp_path / "seip-traffic"
-    for seed in (1, 2):
-        path = tmp_path / f"{seed}.npz"
-        traffic.main([
-            str(SCENES / "junction.blend"), "--simulate", str(SCENES / "junction.xodr"), "--flow", "450",
-            "--pedestrians", "60", "--duration", "5", "--seed", str(seed), "-o", str(path),
-        ])  # fmt: skip
-        assert path.read_bytes() == (folder / f"run-{seed}.npz").read_bytes()
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "junction.blend"))
-    scene = short(bpy.context.scene)
-    bpy.ops.seip.simulate_traffic()
-    seip = scene.seip
+    scene, seip = site, site.seip
     assert (seip.detection.runs, seip.goal.runs) == ("//seip-traffic/", "//seip-traffic/")
     assert seip.traffic.file == "//seip-traffic/run-1.npz"
     users = len(session.traffic[scene.session_uid].trajectories)
@@ -72,26 +58,25 @@ def test_runs_are_those_of_the_command_and_used_by_the_next_buttons(site, tmp_pa
     assert simulation_panel.CHANGED not in text
     seip.simulation.flow = 500.0
     assert simulation_panel.CHANGED in drawn().text
+    traffic.main([
+        str(SCENES / "junction.blend"), "--simulate", str(SCENES / "junction.xodr"), "--flow", "450",
+        "--pedestrians", "60", "--duration", "5", "--seed", "2", "-o", str(tmp_path / "2.npz"),
+    ])  # fmt: skip
+    assert (tmp_path / "2.npz").read_bytes() == (tmp_path / "seip-traffic" / "run-2.npz").read_bytes()
 
 
 @needs_sumo
-def test_the_streets_of_an_extract_are_simulated_on_wherever_its_site_was_built(add_on, tmp_path):
+def test_the_streets_of_an_extract_are_simulated_on(add_on, tmp_path):
     extract = crossing().write(tmp_path / "place.osm")
     assert bpy.ops.seip.choose_map(filepath=str(extract)) == {"FINISHED"}
     chosen = bpy.context.scene.seip.site
-    chosen.junction = chosen.junctions[0].name
+    chosen.junction, chosen.radius = chosen.junctions[0].name, 40.0
     assert bpy.ops.seip.build_site() == {"FINISHED"}
     scene = short(bpy.context.scene)
     assert scene.seip.simulation.map in bpy.data.texts
     scene.seip.simulation.folder = str(tmp_path / "panel")
     assert bpy.ops.seip.simulate_traffic() == {"FINISHED"}
     assert scene.seip.traffic.file == str(tmp_path / "panel" / "run-1.npz")
-    latitude, longitude = chosen.junctions[0].id.split(",")
-    build_scene.main([
-        str(extract), "--near-latlon", latitude.strip(), longitude.strip(), "-o", str(tmp_path / "site.blend")
-    ])  # fmt: skip
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
-    assert bpy.context.scene.seip.simulation.street_map() == tmp_path / "site.xodr"
 
 
 @needs_sumo
@@ -109,53 +94,6 @@ def test_a_map_of_another_place_is_refused_and_nothing_is_written(site, tmp_path
     assert not site.seip.detection.runs
 
 
-def test_the_map_of_the_example_is_known(add_on):
-    bpy.ops.seip.load_example()
-    assert bpy.context.scene.seip.simulation.street_map() == SCENES / "junction.xodr"
-
-
-def test_the_map_of_a_site_built_from_a_description_is_known(add_on):
-    bpy.ops.seip.choose_map(filepath=str(SCENES / "junction.toml"))
-    bpy.ops.seip.build_site()
-    assert bpy.context.scene.seip.simulation.street_map() == SCENES / "junction.xodr"
-
-
-def test_the_map_beside_the_file_is_known_by_its_relative_name(add_on, tmp_path):
-    shutil.copy(SCENES / "corridor.xodr", tmp_path)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "mine.blend"))
-    bpy.ops.seip.choose_map(filepath="//corridor.xodr")
-    bpy.ops.seip.build_site()
-    simulation = bpy.context.scene.seip.simulation
-    assert simulation.map == "//corridor.xodr"
-    assert simulation.street_map() == tmp_path / "corridor.xodr"
-
-
-def test_a_scene_without_a_map_asks_for_one(junction, monkeypatch):
-    monkeypatch.setattr(preferences, "sumo", SimpleNamespace)
-    assert NO_MAP in drawn().text
-    with pytest.raises(RuntimeError, match=r"There is no map to simulate traffic on: name the OpenDRIVE map"):
-        bpy.ops.seip.simulate_traffic()
-    junction.seip.simulation.map = "/nowhere/map.xodr"
-    assert NO_MAP not in drawn().text
-    assert bpy.ops.seip.simulate_traffic.poll()
-
-
-def test_where_sumo_is_missing_the_section_installs_it(site, monkeypatch):
-    monkeypatch.setattr(preferences, "sumo", lambda: None)
-    layout = drawn()
-    assert layout.text.count(preferences.NO_SUMO) == 1
-    assert "seip.install_sumo" in dict(layout.operators)
-    with pytest.raises(RuntimeError, match=preferences.NO_SUMO):
-        bpy.ops.seip.simulate_traffic()
-
-
-def test_a_file_that_was_never_saved_has_no_folder_beside_it(add_on, monkeypatch):
-    monkeypatch.setattr(preferences, "sumo", SimpleNamespace)
-    bpy.ops.seip.load_example()
-    with pytest.raises(RuntimeError, match="the file has not been saved: save it first"):
-        bpy.ops.seip.simulate_traffic()
-
-
 @needs_sumo
 def test_stopped_simulation_leaves_nothing(site, tmp_path):
     work = SEIP_OT_simulate_traffic.prepare(SimpleNamespace(), site)
@@ -164,18 +102,3 @@ def test_stopped_simulation_leaves_nothing(site, tmp_path):
     work.close()
     assert not (tmp_path / "seip-traffic").exists()
     assert "SEIP Traffic" not in bpy.data.collections
-
-
-@pytest.mark.slow
-@needs_sumo
-def test_a_placement_in_traffic_uses_the_simulated_runs(site):
-    site.seip.simulation.count, site.seip.simulation.duration = 3, 20.0
-    bpy.ops.seip.simulate_traffic()
-    survey, goal = site.seip.survey, site.seip.goal
-    bpy.ops.seip.list_sensor_types()
-    survey.heights, survey.grid, survey.spacing = "5", 8.0, 25.0
-    for one in survey.types:
-        one.use = one.name == "vlp16"
-    goal.scenarios, goal.count = "traffic", 2
-    with patch.dict(DEFAULT_COUNTS, traffic=(2, 4)):
-        assert bpy.ops.seip.solve_placement() == {"FINISHED"}

@@ -8,7 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon import scene_status
+from seip_addon.core.site.installed_cost import load_installed_cost
+from seip_addon.core.world.elevation.at_place import TerrainRequest
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 
@@ -39,16 +40,13 @@ def test_a_map_s_junctions_are_listed(scene):
     assert scene.seip.site.radius == 30.0
 
 
-@pytest.mark.parametrize(
-    ("shape", "option"), [("APPROACHES", "--approaches"), pytest.param("CIRCLE", "--radius", marks=pytest.mark.slow)]
-)
-def test_the_panel_builds_what_the_batch_command_builds(scene, tmp_path, shape, option):
-    site = choose(scene)
+def test_the_panel_builds_what_the_batch_command_builds(scene, tmp_path):
+    site = choose(scene, radius=20.0)
     site.junction = site.junctions[0].name
-    site.region_shape = shape
+    site.region_shape = "APPROACHES"
     assert bpy.ops.seip.build_site() == {"FINISHED"}
     by_panel = shapes(scene), read_scene(scene).geometry
-    build_scene.main([str(MAP), "--junction", "100", option, "30", "-o", str(tmp_path / "site.blend")])
+    build_scene.main([str(MAP), "--junction", "100", "--approaches", "20", "-o", str(tmp_path / "site.blend")])
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
     by_batch = shapes(bpy.context.scene), read_scene(bpy.context.scene).geometry
     assert by_panel[0] == by_batch[0]
@@ -56,56 +54,19 @@ def test_the_panel_builds_what_the_batch_command_builds(scene, tmp_path, shape, 
     assert by_panel[1].origin.tolist() == by_batch[1].origin.tolist()
 
 
-def test_without_a_junction_it_is_the_middle_of_the_map(scene):
-    choose(scene)
-    bpy.ops.seip.build_site()
-    assert "Region of interest" in scene.objects
-
-
-def test_a_description_says_where_and_how_large(scene):
-    site = choose(scene, SCENES / "junction.toml")
-    assert site.is_described()
-    bpy.ops.seip.build_site()
-    shipped = SCENES / "junction.blend"
-    area = read_scene(scene).geometry.region.area
-    bpy.ops.wm.open_mainfile(filepath=str(shipped))
-    assert area == pytest.approx(read_scene(bpy.context.scene).geometry.region.area)
-
-
-def test_a_site_of_the_same_place_is_changed_and_own_objects_stay(scene):
-    site = choose(scene)
-    site.junction = site.junctions[0].name
+def test_a_site_of_the_same_place_is_changed_and_one_of_another_place_is_a_scene_of_its_own(scene):
+    site = choose(scene, radius=20.0)
     bpy.ops.seip.build_site()
     small = read_scene(scene).geometry.region.area
-    count = len(scene.objects)
     bpy.ops.mesh.primitive_cube_add(location=(200.0, 0.0, 0.0))
     bpy.context.object.name = "Own kiosk"
-    site.radius = 50.0
+    site.radius = 30.0
     assert bpy.ops.seip.build_site() == {"FINISHED"}
     assert bpy.context.scene == scene
     assert len(bpy.data.scenes) == 1
     assert "Own kiosk" in scene.objects
     assert [obj.name for obj in scene.objects if obj.type in {"CAMERA", "LIGHT"}] == ["Sun", "Overview"]
     assert read_scene(scene).geometry.region.area > 1.3 * small
-    site.radius = 30.0
-    bpy.ops.seip.build_site()
-    assert read_scene(scene).geometry.region.area == pytest.approx(small)
-    assert len(scene.objects) == count + 1
-
-
-def test_a_changed_site_makes_its_placement_stale(junction):
-    site = choose(junction)
-    junction[contract.BUILT] = site.place()
-    bpy.ops.seip.solve_placement()
-    assert not scene_status.stale_placement(junction)
-    bpy.ops.seip.build_site()
-    bpy.context.view_layer.update()
-    assert scene_status.stale_placement(junction)
-
-
-def test_a_scene_that_has_a_site_of_another_place_keeps_it(scene):
-    site = choose(scene)
-    bpy.ops.seip.build_site()
     before = shapes(scene)
     site.junction = site.junctions[0].name
     bpy.ops.seip.build_site()
@@ -114,8 +75,6 @@ def test_a_scene_that_has_a_site_of_another_place_keeps_it(scene):
     other = next(each for each in bpy.data.scenes if each != scene)
     assert contract.find(other, contract.ROADS) != contract.find(scene, contract.ROADS)
     assert other.seip.site.source == scene.seip.site.source
-    assert [one.id for one in other.seip.site.junctions] == ["100"]
-    assert [one.name for one in other.seip.survey.types] == [one.name for one in scene.seip.survey.types]
 
 
 @pytest.mark.parametrize(
@@ -130,16 +89,27 @@ def test_a_bad_map_is_one_sentence(scene, tmp_path, text, complaint):
     assert not scene.seip.site.source
 
 
-def test_without_a_map_there_is_nothing_to_build(scene):
-    with pytest.raises(RuntimeError, match="Choose a map first"):
-        bpy.ops.seip.build_site()
+def test_further_files_are_those_of_the_request(scene):
+    site = choose(scene)
+    site.terrain, site.terrain_epsg, site.osm = "/survey.laz", 25832, "/around.osm"
+    request = site.request()
+    assert request.terrain == TerrainRequest(MAP.joinpath("/survey.laz"), 25832)
+    assert request.osm == MAP.joinpath("/around.osm")
+    site.terrain = site.osm = ""
+    assert (site.request().terrain, site.request().osm) == (None, None)
 
 
-def test_an_unknown_junction_is_named(scene):
-    choose(scene).junction = "777"
-    with pytest.raises(RuntimeError, match="no junction '777'"):
-        bpy.ops.seip.build_site()
-    assert not any(contract.base_name(collection) in contract.INPUTS for collection in bpy.data.collections)
+def test_installed_costs_are_in_the_survey(junction, tmp_path):
+    survey = junction.seip.survey
+    assert survey.settings().installed_cost is None
+    survey.installed = True
+    assert survey.settings().installed_cost == load_installed_cost()
+    (tmp_path / "mine.toml").write_text("new_post_usd = 9000\n", encoding="utf-8")
+    survey.installed_cost = str(tmp_path / "mine.toml")
+    assert survey.settings().installed_cost == load_installed_cost(tmp_path / "mine.toml")
+    survey.installed_cost = str(tmp_path / "none.toml")
+    with pytest.raises(RuntimeError, match="cannot read the installed costs"):
+        bpy.ops.seip.solve_placement()
 
 
 def test_roles_by_operator(scene):
@@ -152,19 +122,6 @@ def test_roles_by_operator(scene):
     bpy.ops.object.select_all(action="DESELECT")
     with pytest.raises(RuntimeError, match="Select objects first"):
         bpy.ops.seip.assign_role(role="ROADS")
-
-
-def test_a_drawn_area_is_active_and_can_be_undone(scene):
-    scene.cursor.location = (5.0, 6.0, 1.0)
-    bpy.ops.ed.undo_push()
-    bpy.ops.seip.add_area(role="WEIGHTED_REGIONS", size=(10.0, 20.0))
-    obj = bpy.context.object
-    assert obj.name == "Weighted regions"
-    assert obj.select_get()
-    assert tuple(obj.location[:2]) == (5.0, 6.0)
-    bpy.ops.ed.undo_push()
-    bpy.ops.ed.undo()
-    assert "Weighted regions" not in bpy.data.objects
 
 
 def test_weights_and_rules_are_the_contract_s_own(scene):
@@ -186,13 +143,8 @@ def test_weights_and_rules_are_the_contract_s_own(scene):
     assert obj.seip_region_weight == 2.0
 
 
-def test_the_check_lists_and_shows(scene):
-    bpy.ops.wm.open_mainfile(filepath=str(SCENES / "junction.blend"))
-    scene = bpy.context.scene
-    scene.seip.survey.grid, scene.seip.survey.spacing, scene.seip.survey.heights = 4.0, 12.0, "8"
-    scene.seip.survey.delta = 20.0
-    for one in scene.seip.survey.types:
-        one.use = one.name == "type1"
+def test_the_check_lists_and_shows(junction):
+    scene = junction
     pole = contract.find(scene, contract.POLES).objects[0]
     pole.location.z += 3.0
     assert bpy.ops.seip.check_site() == {"FINISHED"}
@@ -207,12 +159,3 @@ def test_the_check_lists_and_shows(scene):
     pole.hide_set(True)
     with pytest.raises(RuntimeError, match="is hidden"):
         bpy.ops.seip.show_problem(number=number)
-
-
-def test_the_check_lists_bad_settings(scene):
-    choose(scene)
-    bpy.ops.seip.build_site()
-    scene.seip.survey.heights = "high"
-    bpy.ops.seip.check_site()
-    assert scene.seip.site.problems[0].is_error
-    assert "'high' is neither a height" in scene.seip.site.problems[0].text

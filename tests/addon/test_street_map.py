@@ -3,20 +3,18 @@
 from types import SimpleNamespace
 
 import bpy
-import numpy as np
 import pytest
 
 from seip_addon.core.progress import finish
 from seip_addon.core.workflows.site_places import site_places
 from seip_addon.session import session
-from seip_addon.viewport.free_frame import uncovered
-from seip_addon.viewport.street_map import DOT_SPACING, STEP, StreetMap, wrapped
+from seip_addon.viewport.street_map import StreetMap
 from tests.builders.osm_text import Extract, crossing
 
 FRAME = (60.0, 0.0, 860.0, 600.0)
 
 
-def grid(side=24, spacing=40):
+def grid(side=12, spacing=40):
     """Streets on a grid, every fourth of them a main one."""
     extract = Extract()
     for number in range(side):
@@ -52,95 +50,6 @@ def test_a_click_picks_the_junction_under_the_mouse(street_map):
             assert street_map.handle(event(kind, value), (x + 2, y - 1)) == ""
         assert street_map.handle(event("LEFTMOUSE", "RELEASE"), (x + 3, y - 1)) == "PICK"
         assert street_map.hovered == junction
-
-
-def test_a_click_beside_all_junctions_picks_none(street_map):
-    left, bottom, _, _ = street_map.view.frame
-    street_map.handle(event("LEFTMOUSE"), (left + 1, bottom + 1))
-    assert street_map.handle(event("LEFTMOUSE", "RELEASE"), (left + 1, bottom + 1)) == ""
-    assert street_map.hovered is None
-
-
-@pytest.mark.parametrize("button", ["LEFTMOUSE", "MIDDLEMOUSE"])
-def test_a_drag_pans_and_picks_nothing(street_map, button):
-    start = pixel(street_map, int(street_map.shown()[0]))
-    before = street_map.view.to_pixels(street_map.plan.junctions)
-    street_map.handle(event("MOUSEMOVE", "NOTHING"), start)
-    street_map.handle(event(button), start)
-    assert street_map.is_dragged()
-    for part in (1, 20, 50):
-        street_map.handle(event("MOUSEMOVE", "NOTHING"), (start[0] + part, start[1] - part))
-    assert street_map.handle(event(button, "RELEASE"), (start[0] + 50, start[1] - 50)) == ""
-    assert not street_map.is_dragged()
-    assert street_map.view.to_pixels(street_map.plan.junctions) == pytest.approx(before + np.array((50, -50)))
-
-
-def test_the_wheel_zooms_about_the_mouse_and_home_shows_all_again(street_map):
-    fitted, mouse = street_map.view, (300.0, 200.0)
-    street_map.handle(event("WHEELUPMOUSE"), mouse)
-    assert street_map.view.scale == pytest.approx(STEP * fitted.scale)
-    assert street_map.view.to_metres(mouse) == pytest.approx(fitted.to_metres(mouse))
-    street_map.handle(event("WHEELDOWNMOUSE"), mouse)
-    assert street_map.view.scale == pytest.approx(fitted.scale)
-    street_map.handle(event("WHEELUPMOUSE"), mouse)
-    street_map.handle(event("HOME"), mouse)
-    assert street_map.view == fitted
-
-
-@pytest.mark.parametrize(("key", "action"), [("ESC", "CANCEL"), ("RET", "LIST"), ("NUMPAD_ENTER", "LIST"), ("G", "")])
-def test_keys(street_map, key, action):
-    assert street_map.handle(event(key), (300.0, 200.0)) == action
-    assert street_map.handle(event(key, "RELEASE"), (300.0, 200.0)) == ""
-
-
-def test_junctions_of_main_streets_are_drawn_first_and_all_once_they_have_room(street_map):
-    shown = street_map.shown()
-    assert street_map.plan.importance[shown].tolist() == [2] * 36
-    middle = pixel(street_map, int(shown[14]))
-    for _ in range(6):
-        street_map.handle(event("WHEELUPMOUSE"), middle)
-    left, bottom, right, top = street_map.view.frame
-    pixels = street_map.view.to_pixels(street_map.plan.junctions)
-    inside = np.all((pixels >= (left, bottom)) & (pixels <= (right, top)), axis=1)
-    assert street_map.shown().tolist() == np.flatnonzero(inside).tolist()
-    assert 0 < inside.sum() < len(pixels)
-
-
-def test_junctions_that_would_cover_each_other_are_drawn_once(street_map):
-    for _ in range(8):
-        street_map.handle(event("WHEELDOWNMOUSE"), (460.0, 300.0))
-    pixels = street_map.view.to_pixels(street_map.plan.junctions)[street_map.shown()]
-    cells = {tuple(cell) for cell in np.floor((pixels - street_map.view.origin) / DOT_SPACING).tolist()}
-    assert len(cells) == len(pixels)
-
-
-def test_the_map_lies_between_help_and_credit(street_map):
-    left, bottom, right, top = street_map.view.frame
-    assert (left, right) == (FRAME[0], FRAME[2])
-    assert FRAME[1] < bottom < top < FRAME[3]
-
-
-def test_parts_of_a_text_are_wrapped_without_loss(add_on):
-    parts = ["Click a junction", "Esc: cancel", "Enter: list of names"]
-    for room in (10.0, 150.0, 1e6):
-        lines = wrapped(parts, " · ", room)
-        assert " · ".join(lines) == " · ".join(parts)
-    assert len(wrapped(parts, " · ", 10.0)) == 3
-    assert len(wrapped(parts, " · ", 1e6)) == 1
-
-
-def test_the_free_frame_is_what_no_region_covers():
-    window = (0, 0, 1000, 700)
-    others = [
-        ("TOP", (0, 670, 1000, 700)),
-        ("TOP", (0, 640, 1000, 670)),
-        ("LEFT", (0, 0, 50, 640)),
-        ("RIGHT", (800, 0, 1000, 640)),
-        ("RIGHT", (1000, 0, 1200, 640)),
-        ("FLOAT", (60, 10, 200, 40)),
-    ]
-    assert uncovered(window, others) == (50, 0, 800, 640)
-    assert uncovered(window, []) == window
 
 
 def test_another_file_forgets_the_choice_and_the_same_one_keeps_it(add_on, tmp_path):

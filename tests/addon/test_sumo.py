@@ -1,7 +1,6 @@
 """Where SUMO is missing, panel, dialog and preferences say so and install it."""
 
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
@@ -12,12 +11,10 @@ from seip_addon.core import sumo_programs
 from seip_addon.core.errors import SeipError
 from seip_addon.core.sumo_installation import SUMO_VERSION, sumo_size
 from seip_addon.panels import front_door, site, sumo
-from seip_addon.panels import preferences as preferences_panel
 from tests.builders.drawn_layout import DrawnLayout
 from tests.builders.osm_text import crossing
 from tests.builders.sumo_wheel import write_programs, write_wheel
 
-SCENES = Path(__file__).resolve().parents[2] / "scenes"
 BUTTON = f"Install SUMO ({sumo_size().download} MB)"
 
 
@@ -71,7 +68,7 @@ def dialog():
     return panel.layout
 
 
-def test_panel_dialog_and_button_say_that_sumo_is_missing_before_the_last_click(chosen):
+def test_panel_dialog_and_button_say_that_sumo_is_missing_before_the_last_click(chosen, online):
     for layout in (drawn(site.draw, bpy.context), dialog()):
         assert layout.text.count(preferences.NO_SUMO) == 1
         assert ("seip.install_sumo", BUTTON) in layout.operators
@@ -81,12 +78,9 @@ def test_panel_dialog_and_button_say_that_sumo_is_missing_before_the_last_click(
         bpy.ops.seip.build_site()
     with pytest.raises(SeipError, match=preferences.NO_SUMO):
         front_door._build(chosen)  # noqa: SLF001  # a dialog cannot be confirmed without a window
-
-
-def test_a_map_needs_no_sumo(scene, machine):
-    bpy.ops.seip.choose_map(filepath=str(SCENES / "junction.xodr"))
-    assert preferences.NO_SUMO not in drawn(site.draw, bpy.context).text
-    assert bpy.ops.seip.build_site.poll()
+    online(False)
+    with pytest.raises(RuntimeError, match="Allow Online Access"):
+        bpy.ops.seip.install_sumo()
 
 
 def test_after_the_installation_nothing_is_missing(chosen, tmp_path):
@@ -104,63 +98,8 @@ def test_after_the_installation_nothing_is_missing(chosen, tmp_path):
     assert chosen.seip.site.request().sumo == (tmp_path / "own" / SUMO_VERSION,)
 
 
-def test_offline_one_sentence_says_how_to_allow_it_or_name_a_folder(chosen, online):
-    online(False)
-    for layout in (drawn(site.draw, bpy.context), drawn(sumo.draw_status)):
-        assert preferences.OFFLINE in layout.text
-    with pytest.raises(RuntimeError, match="Allow Online Access in Preferences, System, or install Eclipse SUMO"):
-        bpy.ops.seip.install_sumo()
-
-
-def test_without_pip_the_folder_is_what_remains(chosen, monkeypatch):
-    monkeypatch.setattr(preferences, "pip", list)
-    assert preferences.NO_PIP in drawn(sumo.draw_status).text
-    with pytest.raises(RuntimeError, match="has no pip"):
-        bpy.ops.seip.install_sumo()
-
-
-def test_the_folder_in_the_preferences_comes_first(machine, tmp_path, monkeypatch):
-    write_programs(tmp_path / "mine", version="1.22.0")
-    monkeypatch.setattr(preferences, "own", lambda: SimpleNamespace(sumo=str(tmp_path / "mine")))
-    assert preferences.sumo_folders() == (tmp_path / "mine", tmp_path / "own" / SUMO_VERSION)
-    assert preferences.sumo_status() == (f"SUMO 1.22.0 in {tmp_path / 'mine' / 'bin'}", True)
-
-
 def test_a_sumo_that_does_not_start_can_be_replaced(scene, machine, tmp_path):
     write_programs(tmp_path / "own" / SUMO_VERSION, script="echo 'libGL.so.1 is missing' >&2; exit 127")
     status = drawn(sumo.draw_status)
     assert "libGL.so.1 is missing" in status.text
     assert ("seip.install_sumo", BUTTON) in status.operators
-
-
-def test_the_preferences_draw_folder_status_and_button(scene, machine):
-    entry = bpy.context.preferences.addons.new()
-    entry.module = preferences.ADDON_ID
-    try:
-        layout = DrawnLayout()
-        stand_in = SimpleNamespace(layout=layout, catalogues=())
-        preferences_panel.SEIP_AP_preferences.draw(stand_in, bpy.context)
-        assert "sumo" in {name for name, _ in layout.properties}
-        assert preferences.NO_SUMO in layout.text
-        assert ("seip.install_sumo", BUTTON) in layout.operators
-    finally:
-        bpy.context.preferences.addons.remove(entry)
-
-
-def test_no_choice_of_a_place_changes_the_size_of_the_dialog(chosen):
-    def rows():
-        layout = dialog()
-        return [name for name, _ in layout.properties], len(layout.labels)
-
-    chosen_site = chosen.seip.site
-    without = rows()
-    chosen_site.position = "52.5, 13.4"
-    assert rows() == without
-    chosen_site.junction = chosen_site.junctions[0].name
-    assert rows() == without
-    for path in ("junction.xodr", "junction.toml"):
-        bpy.ops.seip.choose_map(filepath=str(SCENES / path))
-        chosen_site.junction = ""
-        without = rows()
-        chosen_site.junction = chosen_site.junctions[0].name
-        assert rows() == without

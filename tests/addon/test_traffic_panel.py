@@ -7,12 +7,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.sensing.scans.frame import Frame
-from seip_addon.scene.write import write_result
 from seip_addon.session import session
-from seip_addon.viewport import overlays
-from seip_addon.viewport.point_cloud import NAME as CLOUD
-from tests.builders.scene_by_hand import make_scene
-from tests.builders.small_junction import ORIGIN, make_example
 
 
 @pytest.fixture
@@ -79,31 +74,6 @@ def test_a_scan_at_a_time_of_the_run_is_the_runs_frame(placed, tmp_path):
     assert shown.labels.points.tolist() == recorded.labels.points.tolist()
 
 
-def test_the_cloud_is_drawn_in_the_colours_asked_for(placed):
-    bpy.ops.seip.scan_frame()
-    frame = session.scan_of(placed).frame
-    seen = []
-    for by in ("sensor", "intensity", "instance"):
-        placed.seip.view.cloud_colour = by
-        (layer,) = overlays.find(placed, CLOUD).layers
-        assert layer.colours.shape == (len(frame), 4)
-        assert layer.colours.dtype == np.float32
-        seen.append(layer.colours)
-    assert not np.array_equal(seen[0], seen[1])
-    assert len(np.unique(seen[0], axis=0)) == 2
-    bpy.ops.seip.hide_scan()
-    assert overlays.find(placed, CLOUD) is None
-
-
-def test_other_traffic_ends_the_scan_of_the_earlier(placed, small_scene):
-    bpy.ops.seip.load_traffic()
-    bpy.ops.seip.scan_frame()
-    placed.seip.traffic.file = str(small_scene.parent / "small_traffic" / "run-2.npz")
-    bpy.ops.seip.load_traffic()
-    assert session.scan_of(placed) is None
-    assert overlays.find(placed, CLOUD) is None
-
-
 def test_animated_objects_are_scanned_as_the_file_is(placed):
     bpy.ops.seip.load_traffic()
     placed.frame_set(480)
@@ -117,57 +87,19 @@ def test_animated_objects_are_scanned_as_the_file_is(placed):
     assert np.allclose(np.sort(animated.labels.centre[:, 0]), np.sort(from_file.labels.centre[:, 0]), atol=0.01)
 
 
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        (lambda scene: setattr(scene.seip.traffic, "file", "/nowhere/run.npz"), "there is no .*run.npz"),
-        (lambda scene: setattr(scene.seip.traffic, "file", ""), "There is nothing to scan: name a traffic file"),
-        (
-            lambda scene: bpy.data.batch_remove(bpy.data.collections["SEIP Sensors"].objects),
-            "There is no sensor to scan with",
-        ),
-        (lambda scene: setattr(scene.seip.traffic, "folder", ""), "name a folder"),
-    ],
-)
-def test_each_mistake_has_its_sentence(placed, tmp_path, wrong, words):
-    placed.seip.traffic.folder = str(tmp_path / "run")
-    wrong(placed)
-    with pytest.raises(RuntimeError, match=words):
+def test_each_mistake_has_its_sentence(placed, tmp_path):
+    traffic = placed.seip.traffic
+    run, folder = traffic.file, str(tmp_path / "run")
+    for file, output, words in (
+        ("/nowhere/run.npz", folder, "there is no .*run.npz"),
+        ("", folder, "There is nothing to scan"),
+        (run, "", "name a folder"),
+    ):
+        traffic.file, traffic.folder = file, output
+        with pytest.raises(RuntimeError, match=words):
+            bpy.ops.seip.write_dataset()
+    traffic.folder = folder
+    bpy.data.batch_remove(bpy.data.collections["SEIP Sensors"].objects)
+    with pytest.raises(RuntimeError, match="There is no sensor to scan with"):
         bpy.ops.seip.write_dataset()
     assert not (tmp_path / "run").exists()
-
-
-def test_a_folder_beside_a_file_that_was_never_saved_has_its_sentence(add_on, small_scene):
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    scene = make_scene(make_example().geometry)
-    write_result(scene, make_example().site, make_example().deployment)
-    scene.seip.traffic.file = str(small_scene.parent / "small_traffic" / "run-1.npz")
-    with pytest.raises(RuntimeError, match="the file has not been saved: save it first"):
-        bpy.ops.seip.write_dataset()
-
-
-def test_a_second_scan_of_the_same_scene_needs_no_preparation(placed):
-    bpy.ops.seip.scan_frame()
-    first = session.scan_of(placed).simulation
-    placed.frame_set(300)
-    bpy.ops.seip.scan_frame()
-    assert session.scan_of(placed).simulation is first
-    empty = next(obj for obj in bpy.data.collections["SEIP Sensors"].objects if obj.type == "EMPTY")
-    empty.location.z += 1.0
-    bpy.ops.seip.scan_frame()
-    assert session.scan_of(placed).simulation is not first
-
-
-def test_floating_car_data_are_put_on_the_road(placed, tmp_path):
-    car = '<vehicle id="a" x="{}" y="{}" angle="90" type="car" speed="5"/>'
-    lines = [
-        f'<timestep time="{time}">{car.format(ORIGIN[0] + 5 * time - 20, ORIGIN[1] - 2.0)}</timestep>'
-        for time in range(6)
-    ]
-    fcd = tmp_path / "run.fcd.xml"
-    fcd.write_text(f"<fcd-export>{''.join(lines)}</fcd-export>", encoding="utf-8")
-    placed.seip.traffic.file = str(fcd)
-    assert bpy.ops.seip.load_traffic() == {"FINISHED"}
-    assert placed.seip.traffic.loaded.startswith("1 road user, 0 to 5 s\n1 car")
-    bpy.ops.seip.scan_frame()
-    assert session.scan_of(placed).run.trajectories.source == "run.fcd.xml"

@@ -1,15 +1,13 @@
 """Where detection fails, on frames that are told."""
 
-import math
-
 import pytest
 
-from tests.builders.labelled_frames import box, detected, frame, near_and_far, traffic, truth, values
+from tests.builders.labelled_frames import box, detected, frame, near_and_far, truth, values
 
 pytest.importorskip("torch", reason="the detector's torch is optional")
 
 from headless.detection.average_precision import evaluate
-from headless.detection.breakdown import DISTANCE_EDGES, average_precision_by, recall_by, recall_by_category
+from headless.detection.breakdown import average_precision_by, recall_by_category
 from headless.detection.matching import Rule
 
 AT_07 = Rule()
@@ -29,24 +27,3 @@ def test_average_precision_by_distance():
     bins = average_precision_by(evaluate([near_and_far()], AT_07), "distance", (0, 40, 60, 100))
     assert [(one.low, one.high, one.wanted) for one in bins] == [(0, 40, 2), (40, 60, 2), (60, 100, 0)]
     assert values(bins) == [5 / 6, 1 / 4, None]
-
-
-def test_average_precision_by_returns():
-    """Up to 100 returns: false 0.8 with 7 returns, false 0.7 with 2, hit 0.5 of two: 1/2 · 1/3; the rest is perfect."""
-    bins = average_precision_by(evaluate([near_and_far()], AT_07), "points", (0, 100, math.inf))
-    assert values(bins) == [1 / 6, 1]
-
-
-def test_the_parts_hold_everything():
-    evaluation = evaluate(traffic(1), AT_07)
-    bins = average_precision_by(evaluation, "distance", DISTANCE_EDGES)
-    assert sum(one.wanted for one in bins) == len(evaluation.wanted)
-    whole = average_precision_by(evaluation, "distance", (0, math.inf))
-    assert whole[0].value == evaluation.average_precision
-
-
-def test_recall_by_visibility_at_a_score():
-    evaluation = evaluate([near_and_far()], AT_07)
-    assert values(recall_by(evaluation, "visibility", (0, 0.5, 0.95, 2), 0.1)) == [1 / 2, 1, 1]
-    assert values(recall_by(evaluation, "visibility", (0, 0.5, 0.95, 2), 0.6)) == [0, 1, 1]
-    assert values(recall_by(evaluation, "visibility", (2, 3), 0.1)) == [None]

@@ -5,17 +5,14 @@ import math
 from headless.detection import centre_head
 from headless.detection.centre_head import CentreHead, TrainingTargets
 from headless.detection.pillars import PillarGrid
-from headless.detection.rotated_boxes import in_plan, paired_iou
 from headless.detection.settings import CLASSES
 
 import numpy as np
-import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
 GRID = PillarGrid(west=-8.0, south=-6.4, bottom=-1.0, top=4.0, columns=40, rows=32, pillar=0.4)
-CAR = 0
 SIZES = ((4.5, 1.8, 1.6), (8.0, 2.5, 3.3), (1.9, 0.7, 1.7), (0.6, 0.6, 1.75))  # of each class, metres
 
 
@@ -36,10 +33,6 @@ def random_targets(seed, count=4):
         place = random.uniform([-7.5, -6.0], [7.5, 6.0])
         rows.append((category, *place, shape[2] / 2, *shape, random.uniform(-math.pi, math.pi)))
     return targets(*rows)
-
-
-def losses(head, output, wanted, margin):
-    return head.loss(output, head.target_maps(wanted, GRID, margin), GRID)
 
 
 def perfect_output(wanted, grid):
@@ -66,102 +59,3 @@ def test_a_centre_head_that_knows_the_boxes_says_them(seed):
     assert found.category.tolist() == wanted.category.tolist()
     torch.testing.assert_close(found.boxes, wanted.boxes, atol=1e-4, rtol=1e-4)
     assert found.score[0] > 0.99
-
-
-def test_what_is_known_costs_nothing():
-    wanted = targets((CAR, 0.1, 0.3, 0.8, 4.5, 1.8, 1.6, 0.4))
-    output = perfect_output(wanted, GRID)
-    row, column = torch.nonzero(output[0, CAR] > 0)[0].tolist()
-    told = output[:, len(CLASSES) :, row, column].clone()
-    middles = centre_head.reference_points(GRID, torch.tensor([row]), torch.tensor([column]))
-    parts = centre_head.box_losses(told, wanted.boxes, middles, torch.ones(1))
-    for name in ("offset", "size", "axis"):
-        assert float(parts[name]) < 1e-5
-    turned = wanted.boxes.clone()
-    turned[:, 6] += math.pi
-    again = centre_head.box_losses(told, turned, middles, torch.ones(1))
-    assert float(again["axis"]) < 1e-5  # front and back are none of the axis's business
-    assert float(again["ahead"]) > float(parts["ahead"])
-
-
-def test_heat_lies_along_the_road_user():
-    box = torch.tensor([[0.4, 0.4, 1.5, 12.0, 2.5, 3.2, 0.5]])
-    heat, _ = centre_head.heat_of(box, GRID, torch.device("cpu"))
-    assert float(heat[8, 10]) == 1.0  # the cell of the centre
-    ahead = (int(8 + math.sin(0.5) * 2.4 / 0.8), int(10 + math.cos(0.5) * 2.4 / 0.8))
-    aside = (int(8 + math.cos(0.5) * 2.4 / 0.8), int(10 - math.sin(0.5) * 2.4 / 0.8))
-    assert float(heat[ahead]) > 0.4
-    assert float(heat[aside]) < 0.05
-
-
-def test_losses_are_finite_and_lead_downhill():
-    torch.manual_seed(1)
-    head, features = CentreHead(6, 8), torch.randn(2, 6, 16, 20)
-    wanted = [random_targets(1), targets()]
-    optimiser = torch.optim.Adam(head.parameters(), lr=0.02)
-    values = []
-    for _ in range(40):
-        loss = torch.stack(list(losses(head, head(features), wanted, 0.8).values())).sum()
-        assert torch.isfinite(loss)
-        values.append(float(loss.detach()))
-        optimiser.zero_grad()
-        loss.backward()
-        optimiser.step()
-    assert values[-1] < 0.7 * values[0]
-
-
-@pytest.mark.parametrize("places", [6, pytest.param(40, marks=pytest.mark.slow)])
-def test_gradients_of_the_losses_are_their_slopes(places):
-    torch.manual_seed(2)
-    head = CentreHead(3, 4).double().eval()
-    wanted = TrainingTargets(
-        *(part.double() if part.is_floating_point() else part for part in vars(random_targets(3)).values())
-    )
-    output = head(torch.randn(1, 3, 16, 20, dtype=torch.float64)).detach().requires_grad_()
-
-    def parts(values):
-        return [part for name, part in losses(head, values, [wanted], 0.0).items() if name != "overlap"]
-
-    torch.stack(parts(output)).sum().backward()
-    step = 1e-6
-    random = np.random.default_rng(4)
-    steepest = output.grad.abs().flatten().topk(places).indices.tolist()
-    for index in [*steepest, *random.integers(0, output.numel(), places).tolist()]:
-        moved = output.detach().clone()
-        moved.view(-1)[index] += step
-        higher = float(torch.stack(parts(moved)).sum())
-        moved.view(-1)[index] -= 2 * step
-        lower = float(torch.stack(parts(moved)).sum())
-        assert output.grad.view(-1)[index] == pytest.approx((higher - lower) / (2 * step), abs=1e-5, rel=1e-4)
-
-
-def test_the_border_and_the_unseen_are_trained_on_by_nobody():
-    torch.manual_seed(3)
-    head = CentreHead(3, 4)
-    output = head(torch.randn(1, 3, 16, 20)).detach().requires_grad_()
-    hidden = targets((CAR, 0.4, 0.0, 0.8, 4.5, 1.8, 1.6, 0.0), trained=[False])
-    torch.stack(list(losses(head, output, [hidden], 1.6).values())).sum().backward()
-    slope = output.grad[0].abs().sum(dim=0)
-    assert (slope[:2] == 0).all()
-    assert (slope[:, -2:] == 0).all()
-    assert (slope[4] > 0).any()
-    assert output.grad[0, CAR, 8, 10] == 0
-
-
-def test_the_predicted_overlap_is_taught_the_true_one():
-    wanted = targets((CAR, 0.1, 0.3, 0.8, 4.5, 1.8, 1.6, 0.4))
-    shifted = wanted.boxes.clone()
-    shifted[:, 0] += 0.5
-    true = float(paired_iou(in_plan(shifted), in_plan(wanted.boxes)))
-    middle = torch.zeros(1, 3)
-    told = torch.zeros(1, centre_head.BOX_CHANNELS)
-    told[0, :3] = shifted[0, :3]
-    told[0, 3:6] = torch.log(shifted[0, 3:6] / torch.tensor(centre_head.TYPICAL_SIZE))
-    told[0, 6], told[0, 7] = math.sin(0.8), math.cos(0.8)
-    told[0, 8], told[0, 9] = math.cos(0.4), math.sin(0.4)
-    losses = []
-    for guess in (0.3, true, 0.95):
-        told[0, 10] = math.log(guess / (1 - guess))
-        losses.append(float(centre_head.box_losses(told, wanted.boxes, middle, torch.ones(1))["overlap"]))
-    assert losses[1] < losses[0]
-    assert losses[1] < losses[2]

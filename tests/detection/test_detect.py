@@ -16,14 +16,8 @@ from headless import detect
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, TrainingRecord
 from headless.detection.settings import NetworkSettings
 
-import bpy
-import numpy as np
-
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.datasets.detection_files import kitti_results, openpcdet_results
-from seip_addon.scene import contract
-from seip_addon.scene.blend_file import open_blend, save_blend
-from seip_addon.scene.sensors import labelled_sensors
+from seip_addon.scene.blend_file import save_blend
 from seip_addon.scene.write import write_result
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import make_example
@@ -128,32 +122,3 @@ def test_mistakes_are_named(folder, tmp_path):
     with pytest.raises(SeipError, match="traffic of another site: 100% of the vehicle positions of far"):
         detect.main(arguments(folder, "x", str(tmp_path / "far.npz")))
     assert not (folder / "x" / "detection.json").exists()
-
-
-def test_sensors_with_other_beams_than_they_were_placed_with_are_told_of_in_the_record(folder, tmp_path):
-    open_blend(folder / "placed.blend")
-    for empty in labelled_sensors(bpy.context.scene).values():
-        empty[contract.BEAMS] = "others"
-    save_blend(tmp_path / "changed.blend")
-    detect.main(arguments(folder, "changed", "first.npz", scene=tmp_path / "changed.blend"))
-    record = json.loads((folder / "changed" / "detection.json").read_text(encoding="utf-8"))
-    assert any("was placed with other beams" in sentence for sentence in record["warnings"])
-
-
-def test_the_same_run_twice_is_refused(folder):
-    with pytest.raises(SeipError):
-        detect.main(arguments(folder, "twice", "first.npz", "first.npz"))
-
-
-def test_results_read_back_as_the_boxes_that_they_are():
-    boxes = np.array([[10.0, -2.0, 0.8, 4.5, 1.8, 1.6, 0.3], [1.0, 2.0, 1.6, 12.0, 2.5, 3.2, -1.2]])
-    lines = openpcdet_results(boxes, ["car", "bus"], np.array([0.9, 0.25])).splitlines()
-    back = np.array([line.split()[:7] for line in lines], dtype=np.float64)
-    assert back.tolist() == boxes.tolist()
-    assert [line.split()[7:] for line in lines] == [["Car", "0.9"], ["Bus", "0.25"]]
-    kitti = [line.split() for line in kitti_results(boxes, ["car", "bus"], np.array([0.9, 0.25])).splitlines()]
-    assert [len(row) for row in kitti] == [16, 16]
-    height, width, length, right, down, ahead, turn = map(float, kitti[0][8:15])
-    assert (height, width, length) == (1.6, 1.8, 4.5)
-    assert (ahead, -right, height / 2 - down) == pytest.approx((10.0, -2.0, 0.8))
-    assert turn == pytest.approx(-0.3 - np.pi / 2)

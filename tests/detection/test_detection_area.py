@@ -1,22 +1,11 @@
 """Where a detector looks: the foreground, with heights above the road."""
 
-from dataclasses import replace
-
 from headless.detection.detection_area import area_of
-from headless.detection.detector import Detector
-from headless.detection.inference import detect
-from headless.detection.settings import NetworkSettings
 
 import numpy as np
-import pytest
-import shapely
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.site.scene_geometry import Mesh
 from tests.builders.sloping_road import hill
-from tests.builders.street_clouds import cloud_frame, street_frame
-
-NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0))
+from tests.builders.street_clouds import cloud_frame
 
 
 def test_heights_are_those_above_the_road():
@@ -35,41 +24,3 @@ def test_boxes_come_back_to_where_they_were():
     boxes = np.column_stack([np.random.default_rng(2).uniform(-15, 15, (50, 3)), np.ones((50, 4))])
     np.testing.assert_allclose(area.raised(area.levelled(boxes)), boxes, atol=1e-12)
     assert not np.allclose(area.levelled(boxes), boxes)
-
-
-def test_the_background_is_left_out():
-    area = area_of(hill(0.0, 0.0, 0.0), 0.4)
-    frame = street_frame(3)
-    assert 0 < len(area.cloud(frame)) <= np.count_nonzero(frame.instance >= 0)
-    assert len(area.cloud(replace(frame, foreground=np.zeros(len(frame), dtype=np.bool_)))) == 0
-
-
-def test_a_hill_changes_nothing_that_the_network_sees():
-    flat, steep = area_of(hill(0.0, 0.0, 0.0), 0.4), area_of(hill(), 0.4)
-    frame = street_frame(5)
-    rise = (100 + frame.points[:, :2] @ [0.06, 0.02]).astype(np.float32)
-    raised = replace(frame, points=frame.points + rise[:, None] * np.array([0, 0, 1], dtype=np.float32))
-    one, other = flat.cloud(frame), steep.cloud(raised)
-    assert len(one) > 1000
-    np.testing.assert_allclose(other, one, atol=1e-4)
-
-
-def test_the_road_goes_on_beyond_its_edges():
-    geometry = hill()
-    narrow = replace(geometry, roads=(Mesh("lane", geometry.roads[0].triangles * [1, 0.1, 1]),))
-    area = area_of(narrow, 0.4)
-    assert np.isfinite(area.road.heights).all()
-    beside = area.road.at(np.array([[0.0, 12.0]]))[0]
-    assert beside == pytest.approx(100.0, abs=0.5)
-
-
-def test_a_site_without_road_or_region_is_refused():
-    with pytest.raises(SeipError, match="no road in the region of interest"):
-        area_of(replace(hill(), roads=()), 0.4)
-    with pytest.raises(SeipError, match="region of interest with an area"):
-        area_of(replace(hill(), region=shapely.box(3, 0, 3, 0)), 0.4)
-
-
-def test_a_grid_of_other_pillars_is_refused():
-    with pytest.raises(SeipError, match=r"pillars of 0.32 m does not work with pillars of 0.5 m"):
-        detect(Detector(NETWORK), area_of(hill(), 0.5), street_frame(1))

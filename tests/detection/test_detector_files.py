@@ -5,7 +5,6 @@ import math
 from headless.detection.detector import Detector, TrainingRecord, save_state
 from headless.detection.settings import NetworkSettings
 
-import numpy as np
 import pytest
 import torch
 
@@ -54,12 +53,8 @@ def _experience(value):
 
 CHANGES = {
     "a weight that is no number": (_first(math.nan), "weights are not finite numbers"),
-    "an endless weight": (_first(math.inf), "weights are not finite numbers"),
     "a width out of range": (_set("settings", "width", 10**6), "width must lie between"),
-    "a width in halves": (_set("settings", "width", 8.5), "width must lie between"),
     "a setting that nobody knows": (_set("settings", "depth", 3), "damaged"),
-    "a number for what it has been trained on": (_experience(3), "damaged"),
-    "numbers for sensors": (_experience({"sensors": [1, 2]}), "not a list of names"),
     "letters for sensors": (_experience({"sensors": "type1"}), "not a list of names"),
 }
 
@@ -70,44 +65,3 @@ def test_detectors_that_make_no_sense_are_refused(stored, change, sentence):
         Detector.load(written(stored, change))
     assert sentence in str(refusal.value)
     assert "\n" not in str(refusal.value)
-
-
-def test_tensors_larger_than_the_file_are_refused(stored):
-    state = torch.load(stored, weights_only=True)
-    state["weights"][next(iter(state["weights"]))] = torch.zeros(1).expand(2**34)
-    torch.save(state, stored)
-    with pytest.raises(SeipError, match="tensors are larger than the file"):
-        Detector.load(stored)
-
-
-def test_a_file_of_another_version_is_refused(stored):
-    state = torch.load(stored, weights_only=True) | {"version": 2}
-    torch.save(state, stored)
-    with pytest.raises(SeipError, match="not a detector of this version of the program: train it again"):
-        Detector.load(stored)
-
-
-def test_other_weights_than_were_written_are_noticed(stored):
-    state = torch.load(stored, weights_only=True)
-    next(iter(state["weights"].values())).flatten()[0] += 1.0
-    torch.save(state, stored)
-    with pytest.raises(SeipError, match="digest does not match"):
-        Detector.load(stored)
-
-
-def test_a_flipped_bit_is_a_sentence_or_nothing_lost(stored):
-    whole, before = stored.read_bytes(), Detector.load(stored)
-    random = np.random.default_rng(3)
-    refused = 0
-    for place in random.integers(len(whole), size=150).tolist():
-        damaged = bytearray(whole)
-        damaged[place] ^= 1 << int(random.integers(8))
-        stored.write_bytes(damaged)
-        try:
-            after = Detector.load(stored)
-        except SeipError:
-            refused += 1
-        else:
-            assert after.description() == before.description()
-            assert all(bool((after.state_dict()[name] == value).all()) for name, value in before.state_dict().items())
-    assert refused > 50

@@ -47,49 +47,6 @@ def result(points, boxes):
     return frame_result(frame, found, region=REGION, sensors=SENSORS, run="a")
 
 
-def test_road_users_are_those_of_the_frame():
-    told = result([], [])
-    assert (told.run, told.time) == ("a", 1.5)
-    assert told.truth.boxes.tolist() == [[3, 4, 6, 5, 2, 2.2, 0.5], [30, 8, 0, 12, 2.5, 3, -2]]
-    assert told.truth.points.tolist() == [7, 0]
-    assert told.truth.distance.tolist() == [5, 10]
-    assert told.truth.inside.tolist() == [True, False]
-    assert len(told.detected) == 0
-
-
-def test_who_is_parked_goes_by_the_trajectories():
-    frame = simulated([])
-    known = {"region": REGION, "sensors": SENSORS, "run": "a"}
-    nothing = Detections(np.empty((0, 7)), np.empty(0), np.empty(0, dtype=np.int64))
-    parked = np.zeros(int(frame.labels.user.max()) + 1, dtype=bool)
-    parked[frame.labels.user[1]] = True
-    assert frame_result(frame, nothing, parked=parked, **known).truth.parked.tolist() == [False, True]
-    assert frame_result(frame, nothing, **known).truth.parked.tolist() == [False, False]
-
-
-def test_detections_get_their_class_place_and_distance():
-    told = result([[0, 0, 0]], [[3, 4, 6, 4, 2, 2, 0], [30, 8, 0, 4, 2, 2, 0]])
-    assert told.detected.category.tolist() == ["car", "truck"]
-    assert told.detected.inside.tolist() == [True, False]
-    assert told.detected.distance.tolist() == [5, 10]
-    assert told.detected.score.tolist() == [0.1, 0.9]
-
-
-def test_returns_in_and_around_a_box():
-    """A box 4 × 2 × 2 m at a right angle: 2 returns lie in it, 4 within 3 m of its middle in plan."""
-    points = [
-        [10.0, 11.9, 1.0],  # in it
-        [10.9, 10.0, 0.1],  # in it
-        [11.1, 10.0, 1.0],  # beside it
-        [10.0, 10.0, 2.5],  # above it
-        [10.0, 13.1, 1.0],  # before it, too far
-        [-10.0, 10.0, 1.0],
-    ]
-    told = result(points, [[10, 10, 1, 4, 2, 2, math.pi / 2]])
-    assert told.detected.points.tolist() == [2]
-    assert told.detected.density.tolist() == pytest.approx([4 / (math.pi * DENSITY_RADIUS**2)])
-
-
 def test_returns_as_a_plain_search_counts_them():
     rng = np.random.default_rng(1)
     points = rng.uniform(-10, 10, (3000, 3)).astype(np.float32)
@@ -102,9 +59,3 @@ def test_returns_as_a_plain_search_counts_them():
         assert told.detected.points[row] == inside.sum()
         near = np.hypot(offset[:, 0], offset[:, 1]) <= DENSITY_RADIUS
         assert told.detected.density[row] == pytest.approx(near.sum() / (math.pi * DENSITY_RADIUS**2))
-
-
-def test_an_empty_cloud_has_no_returns():
-    told = result([], [[0, 0, 1, 4, 2, 2, 0]])
-    assert told.detected.points.tolist() == [0]
-    assert told.detected.density.tolist() == [0]

@@ -1,18 +1,14 @@
 """Pillars against a slow loop, and what must not matter to them."""
 
 import math
-from dataclasses import replace
 
 from headless.detection.network import PillarEncoder
-from headless.detection.pillars import POINT_FEATURES, PillarGrid, fill_pillars, grid_over, stacked
+from headless.detection.pillars import PillarGrid, fill_pillars
 
 import numpy as np
-import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-
-from seip_addon.core.errors import SeipError
 
 GRID = PillarGrid(west=-3.0, south=-2.0, bottom=-1.0, top=4.0, columns=12, rows=8, pillar=0.5)
 
@@ -79,29 +75,6 @@ def test_pillars_keep_the_same_points_in_any_order_and_no_more_than_they_may(cou
     np.testing.assert_array_equal(np.bincount(one.pillar, minlength=len(GRID)), np.minimum(met, most))
 
 
-def test_choosing_among_those_chosen_changes_nothing():
-    points = cloud(4000, 5)
-    once = fill_pillars(points, GRID, 6)
-    twice = fill_pillars(points[np.sort(once.chosen)], GRID, 6)
-    np.testing.assert_array_equal(points[once.chosen], points[np.sort(once.chosen)][twice.chosen])
-
-
-def test_points_are_chosen_evenly():
-    """Of 20,000 points side by side in one pillar the 1,000 kept are from all over it: no corner is preferred."""
-    points = cloud(20_000, 6) * np.array([0, 0, 0, 1], dtype=np.float32)
-    points[:, 0] = np.linspace(0.001, 0.499, len(points))
-    kept = points[fill_pillars(points, GRID, 1000).chosen, 0]
-    share = np.histogram(kept, bins=5, range=(0, 0.5))[0] / 1000
-    assert (np.abs(share - 0.2) < 0.05).all()
-
-
-def test_an_empty_cloud_has_no_pillars():
-    pillars = fill_pillars(np.zeros((0, 4), dtype=np.float32), GRID, 8)
-    assert pillars.features.shape == (0, POINT_FEATURES)
-    far = fill_pillars(np.full((5, 4), 99.0, dtype=np.float32), GRID, 8)
-    assert len(far.pillar) == 0
-
-
 def encoder(seed=0, width=8):
     torch.manual_seed(seed)
     module = PillarEncoder(width)
@@ -129,64 +102,3 @@ def test_the_encoder_takes_the_maximum_of_each_pillar():
         scaled = (linear - normal.running_mean) / torch.sqrt(normal.running_var + normal.eps)
         expected = (scaled * normal.weight + normal.bias).clamp(min=0).max(dim=0).values
         torch.testing.assert_close(got[number], expected, atol=1e-5, rtol=1e-5)
-
-
-def test_a_cloud_looks_the_same_beside_a_fuller_one():
-    """There is no padding that could show: neither in the features nor in what training normalises over."""
-    few, many = fill_pillars(cloud(60, 8), GRID, 8), fill_pillars(cloud(2000, 9), GRID, 8)
-    both = stacked([few, many], GRID)
-    module = encoder()
-    together = encoded(module, both, 2 * len(GRID))
-    torch.testing.assert_close(together[: len(GRID)], encoded(module, few, len(GRID)), atol=0, rtol=0)
-    module.train()
-    encoded(module, both, 2 * len(GRID))
-    linear = torch.from_numpy(both.features) @ module.linear.weight.T
-    module.normalisation.reset_running_stats()
-    module.normalisation.momentum = 1.0
-    encoded(module, both, 2 * len(GRID))
-    torch.testing.assert_close(module.normalisation.running_mean, linear.mean(dim=0), atol=1e-5, rtol=1e-4)
-
-
-def test_grids_cover_the_region_and_fit_the_network():
-    grid = grid_over((-95.0, -95.0, 95.0, 94.887), (-1.0, 6.0), 0.4)
-    assert (grid.columns, grid.rows) == (480, 480)
-    assert max(grid.west, grid.south) <= -95
-    assert min(grid.east, grid.north) >= 95
-    exact = grid_over((0.0, 0.0, 12.8, 6.4), (0.0, 3.0), 0.4)
-    assert (exact.columns, exact.rows) == (32, 16)
-    assert grid.centre == pytest.approx((0.0, -0.0565))
-
-
-def test_what_no_grid_can_be_laid_over_is_refused():
-    with pytest.raises(SeipError, match="extent of the detector is empty"):
-        grid_over((5.0, 0.0, 5.0, 9.0), (0.0, 3.0), 0.4)
-    with pytest.raises(SeipError, match="too many"):
-        grid_over((0.0, 0.0, 9000.0, 9000.0), (0.0, 3.0), 0.4)
-
-
-def test_a_detector_meets_in_whole_clouds_what_it_was_trained_on_chosen_points():
-    points = cloud(3000, 4)
-    whole = fill_pillars(points, GRID, 3)
-    again = fill_pillars(points[np.sort(whole.chosen)], GRID, 3)
-    np.testing.assert_array_equal(whole.features, again.features)
-    np.testing.assert_array_equal(whole.pillar, again.pillar)
-
-
-def test_padding_is_points_of_nothing_but_zeros():
-    most = 4
-    pillars = fill_pillars(cloud(700, 5), GRID, most)
-    module = PillarEncoder(16, most).eval()
-    plain = PillarEncoder(16).eval()
-    plain.load_state_dict(module.state_dict())
-    with torch.no_grad():
-        module.normalisation.bias += 0.7
-        plain.normalisation.bias += 0.7
-    padded, masked = (encoded(one, pillars, len(GRID)) for one in (module, plain))
-    phantom = encoded(plain, replace(pillars, features=np.zeros_like(pillars.features)), len(GRID)).max(dim=0).values
-    places = np.bincount(pillars.pillar, minlength=len(GRID))
-    full, some = places == most, (places > 0) & (places < most)
-    assert full.any()
-    assert some.any()
-    torch.testing.assert_close(padded[full], masked[full])
-    torch.testing.assert_close(padded[some], torch.maximum(masked[some], phantom))
-    assert (padded[places == 0] == 0).all()

@@ -14,7 +14,6 @@ from headless.detection.rotated_boxes import iou_matrix, iou_matrix_3d, paired_i
 
 EXACT = 1e-9
 GRID = 1e-13  # lengths of the first box
-PAIRS = 50_000
 
 
 def outlines(boxes):
@@ -88,32 +87,13 @@ def varied_pairs(count):
     return a, b, kinds
 
 
-@pytest.mark.parametrize("count", [3_000, pytest.param(PAIRS, marks=pytest.mark.slow)])
-def test_pairs_agree_with_shapely(count):
-    a, b, kinds = varied_pairs(count)
+def test_pairs_agree_with_shapely():
+    a, b, kinds = varied_pairs(3_000)
     ours = paired_iou(torch.from_numpy(a), torch.from_numpy(b)).numpy()
     wrong = np.abs(ours - by_shapely(a, b))
     assert wrong.max() < EXACT, f"{wrong.max()} in pairs of kind {kinds[wrong.argmax()]}"
     assert np.all(ours[kinds == 1] == pytest.approx(1, abs=EXACT))
     assert np.mean(ours > 0) > 0.6  # the comparison would mean little among boxes that miss each other
-
-
-def test_flat_boxes_share_nothing_with_anything():
-    flat = torch.tensor([[0, 0, 4, 0, 0.3], [0, 0, 0, 0, 0], [1, 0, 4, 0, 0.3]], dtype=torch.float64)
-    full = torch.tensor([[0, 0, 4, 2, 0.3]], dtype=torch.float64).repeat(3, 1)
-    assert paired_iou(flat, full).tolist() == [0, 0, 0]
-    assert paired_iou(full, flat).tolist() == [0, 0, 0]
-    assert paired_iou(flat, flat).tolist() == [0, 0, 0]
-
-
-def test_overlap_by_hand():
-    box = torch.tensor([[0, 0, 4, 2, 0]], dtype=torch.float64)
-    ahead = torch.tensor([[1, 0, 4, 2, 0]], dtype=torch.float64)  # shares 3 × 2 of 8 + 8 − 6
-    crossed = torch.tensor([[0, 0, 4, 2, math.pi / 2]], dtype=torch.float64)  # shares 2 × 2 of 8 + 8 − 4
-    diamond = torch.tensor([[0, 0, math.sqrt(2), math.sqrt(2), math.pi / 4]], dtype=torch.float64)  # area 2, inside
-    assert paired_iou(box, ahead).item() == pytest.approx(6 / 10, abs=1e-15)
-    assert paired_iou(box, crossed).item() == pytest.approx(4 / 12, abs=1e-15)
-    assert paired_iou(box, diamond).item() == pytest.approx(2 / 8, abs=1e-15)
 
 
 def test_overlap_in_space_by_hand():
@@ -137,43 +117,9 @@ def test_matrices_hold_every_pair():
     assert torch.allclose(iou_matrix_3d(a, b).ravel(), paired_iou_3d(a[i.ravel()], b[j.ravel()]), rtol=0, atol=1e-15)
 
 
-def test_matrices_hold_boxes_that_meet_with_their_corners():
-    """Two squares on their corners, 2.8 m apart, share a square on its corner of width 2√2 − 2.8."""
-    squares = torch.tensor([[0, 0, 2, 2, math.pi / 4], [2.8, 0, 2, 2, math.pi / 4]], dtype=torch.float64)
-    shared = (2 * math.sqrt(2) - 2.8) ** 2 / 2
-    assert iou_matrix(squares[:1], squares[1:]).item() == pytest.approx(shared / (8 - shared), abs=1e-12)
-
-
-def test_matrices_of_no_boxes():
-    none, one = torch.zeros(0, 5), torch.ones(1, 5)
-    assert iou_matrix(none, one).shape == (0, 1)
-    assert iou_matrix(one, none).shape == (1, 0)
-    assert iou_matrix_3d(torch.zeros(0, 7), torch.zeros(0, 7)).shape == (0, 0)
-    assert suppress(none, torch.zeros(0), 0.1).tolist() == []
-
-
 coordinates = st.floats(-20, 20)
 sizes = st.floats(0.1, 15)
 boxes = st.tuples(coordinates, coordinates, sizes, sizes, st.floats(-10, 10))
-
-
-@given(boxes, boxes, st.floats(-4, 4), coordinates, coordinates)
-def test_overlap_is_mutual_and_moves_with_the_boxes(one, other, turn, east, north):
-    a, b = (torch.tensor([box], dtype=torch.float64) for box in (one, other))
-    overlap = paired_iou(a, b).item()
-    assert 0 <= overlap <= 1 + EXACT
-    assert paired_iou(b, a).item() == pytest.approx(overlap, abs=EXACT)
-    assert paired_iou(moved(a, turn, east, north), moved(b, turn, east, north)).item() == pytest.approx(
-        overlap, abs=EXACT
-    )
-
-
-def moved(box, turn, east, north):
-    x, y, length, width, yaw = box[0].tolist()
-    cosine, sine = math.cos(turn), math.sin(turn)
-    return torch.tensor(
-        [[cosine * x - sine * y + east, sine * x + cosine * y + north, length, width, yaw + turn]], dtype=torch.float64
-    )
 
 
 @given(st.lists(st.tuples(st.floats(0, 30), st.floats(0, 30), st.integers(0, 3)), max_size=25), st.floats(0.05, 0.9))
@@ -186,9 +132,3 @@ def test_suppression_is_the_plain_loop(rows, threshold):
         if all(overlap[best, row] <= threshold for best in kept):
             kept.append(row)
     assert suppress(torch.from_numpy(table), torch.from_numpy(scores), threshold).tolist() == kept
-
-
-def test_equal_scores_keep_the_earlier_box():
-    boxes = torch.tensor([[0.1, 0, 4, 2, 0], [0, 0, 4, 2, 0], [9, 9, 4, 2, 0]], dtype=torch.float64)
-    assert suppress(boxes, torch.tensor([0.5, 0.5, 0.5]), 0.2).tolist() == [0, 2]
-    assert suppress(boxes, torch.tensor([0.5, 0.6, 0.5]), 0.2).tolist() == [1, 2]

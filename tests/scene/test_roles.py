@@ -5,7 +5,7 @@ import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.site.roles import Role
-from seip_addon.scene import contract, roles
+from seip_addon.scene import roles
 from seip_addon.scene.read import read_scene
 
 
@@ -40,23 +40,6 @@ def test_roles_add_up(scene, plate):
     assert roles.roles_of(scene, plate) == (Role.CANDIDATE_AREAS,)
 
 
-def test_what_would_be_nowhere_goes_to_the_scene(scene, plate):
-    roles.assign(scene, [plate], Role.ROADS)
-    scene.collection.objects.unlink(plate)
-    roles.take_out(scene, [plate], Role.ROADS)
-    assert list(plate.users_collection) == [scene.collection]
-
-
-def test_sub_collections_count(scene, plate):
-    roads = contract.find_or_make(scene, contract.ROADS)
-    north = bpy.data.collections.new("north")
-    roads.children.link(north)
-    north.objects.link(plate)
-    assert roles.roles_of(scene, plate) == (Role.ROADS,)
-    assert roles.take_out(scene, [plate], Role.ROADS) == 1
-    assert roles.roles_of(scene, plate) == ()
-
-
 def test_a_light_is_nothing_and_an_empty_a_pole(scene):
     light = bpy.data.objects.new("light", bpy.data.lights.new("light", "POINT"))
     empty = bpy.data.objects.new("empty", None)
@@ -67,11 +50,6 @@ def test_a_light_is_nothing_and_an_empty_a_pole(scene):
     with pytest.raises(SeipError, match="instance a collection"):
         roles.assign(scene, [empty], Role.ROADS)
     assert roles.assign(scene, [light, empty], Role.POLES) == 1
-
-
-def test_nothing_to_take_out_is_said(scene, plate):
-    with pytest.raises(SeipError, match="nothing to take out"):
-        roles.take_out(scene, [plate], Role.POLES)
 
 
 @pytest.mark.parametrize(("corners", "area"), [(4, 200.0), (360, 157.07)])

