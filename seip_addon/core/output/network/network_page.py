@@ -37,6 +37,8 @@ MAP_STYLE = f"""
 .mark circle {{ stroke: {INK}; }}
 .mark .hit {{ fill: transparent; stroke: none; }}
 .mark .bare {{ fill: {PAPER}; stroke: {SOFT_INK}; }}
+.mark text {{ font: 600 11px system-ui, sans-serif; text-anchor: middle; fill: {PAPER};
+  stroke: {INK}; stroke-width: 2px; paint-order: stroke; }}
 .cross {{ fill: none; stroke: {SOFT_INK}; stroke-width: 2; }}
 .mark:hover circle, .mark:focus circle, .mark:target circle {{ stroke-width: 3; }}
 .mark:focus {{ outline: none; }}
@@ -127,7 +129,7 @@ def _mark(record: NetworkRecord, one: RankedSite, place: tuple[int, int], radius
     site, (x, y) = one.site, place
     shape = '<path class="cross" d="M-5-5 5 5M-5 5 5-5"/>'
     if site.status == "equipped":
-        shape = f'<circle r="{radius:.1f}" fill="{SHARE_COLOURS[level(record, site)]}"/>'
+        shape = f'<circle r="{radius:.1f}" fill="{SHARE_COLOURS[level(record, site)]}"/><text dy=".35em">{one.rank or ""}</text>'
     elif site.status == "without sensor":
         shape = f'<circle class="bare" r="{BARE_RADIUS}"/>'
     words = escape(f"{site.name}: {_described(record, site)}")
