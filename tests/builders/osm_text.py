@@ -115,13 +115,14 @@ def roundabout():
     return corner_houses(extract, near=30.0)
 
 
-def dual_carriageway():
-    """Return a crossing of a dual carriageway with a street."""
+def dual_carriageway(*, backward=False):
+    """Return a crossing of a dual carriageway with a street; ``backward`` draws one of its ways against the traffic."""
     extract = Extract()
     south, north = extract.node(0, -8, highway="traffic_signals"), extract.node(0, 8, highway="traffic_signals")
     usual = {"highway": "primary", "oneway": "yes", "lanes": 3, "name": "Avenue"}
     extract.way([(-250, -8), south, (250, -8)], **usual)
-    extract.way([(250, 8), north, (-250, 8)], **usual)
+    line = [(250, 8), north, (-250, 8)]
+    extract.way(line[::-1] if backward else line, **(usual | ({"oneway": "-1"} if backward else {})))
     extract.way([(0, -200), south, north, (0, 200)], highway="residential", name="Side Street")
     return corner_houses(extract, near=24.0)
 

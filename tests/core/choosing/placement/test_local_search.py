@@ -1,11 +1,13 @@
 """Local search by swaps: its sums, and placements under budgets against enumeration and a plain tabu search."""
 
 import math
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 import pytest
 
+from seip_addon.core.choosing.placement.feasibility import starting_choice
 from seip_addon.core.choosing.placement.greedy import greedy_with_swaps
 from seip_addon.core.choosing.placement.local_search import composition_search
 from seip_addon.core.choosing.placement.problem import PlacementProblem
@@ -19,8 +21,10 @@ NONE = np.zeros(0, np.int64)  # no candidate chosen
 def searched(problem: PlacementProblem) -> float:
     """Return the weight that the local search covers."""
     instance, _ = make_instance(problem)
-    first = finish(greedy_with_swaps(instance, NONE))
-    chosen = finish(composition_search(instance, NONE, first, Clock(math.inf, math.inf)))
+    start = finish(starting_choice(problem, instance, "auto"))
+    first = finish(greedy_with_swaps(instance, start))
+    chosen = finish(composition_search(instance, start, first, Clock(math.inf, math.inf)))
+    assert instance.feasible(chosen)
     return problem.covered(instance.original[chosen])
 
 
@@ -48,7 +52,8 @@ def most_covered(problem: PlacementProblem) -> float:
     for size in range(1, (problem.count or number) + 1):
         for choice in map(list, combinations(range(number), size)):
             affordable = math.fsum(problem.prices[choice]) <= problem.budget * (1 + 1e-9)
-            if affordable and len(np.unique(problem.positions[choice])) == size:
+            served = problem.mandatory_groups[:, choice].any(axis=1).all()
+            if affordable and served and len(np.unique(problem.positions[choice])) == size:
                 best = max(best, float(problem.weights[problem.visible[choice].any(axis=0)].sum()))
     return best
 
@@ -63,4 +68,12 @@ def most_covered(problem: PlacementProblem) -> float:
 def test_local_search_finds_the_best_of_small_budget_problems(seeds: range) -> None:
     for seed in seeds:
         problem = budget_of_few(seed)
+        assert (seed, searched(problem)) == (seed, most_covered(problem))
+
+
+def test_local_search_keeps_the_required_positions() -> None:
+    for seed in range(4):
+        problem = budget_of_few(seed)
+        required = problem.positions == problem.positions[problem.prices.argmin()]
+        problem = replace(problem, mandatory=required[None])
         assert (seed, searched(problem)) == (seed, most_covered(problem))

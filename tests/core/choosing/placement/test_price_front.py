@@ -1,5 +1,7 @@
 """Placements with fewer and more sensors: their bounds agree with the certificate of the placement."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,17 @@ def test_the_front_has_the_bound_of_the_certificate_and_bounds_do_not_cross(exam
     assert (points[3].coverage, points[3].missed) == (best.covered / whole, room / whole)
     bounds = [point.coverage + point.missed for point in points.values()]
     assert (np.diff(bounds) >= -1e-12).all()  # up to rounding of the sum above
+
+
+def test_a_budget_certifies_no_more_sensors_than_it_pays(example):
+    problem = problem_of(example)
+    two, three = (finish(solve(replace(problem, count=count))) for count in (2, 3))
+    goal = Objective(count=3, budget=2 * float(problem.prices.max()))
+    points = points_of(example, goal, effort=0.2, chosen=two.chosen, objective=two.covered, bound=two.covered)
+    whole = len(example.site.targets)
+    assert (points[2].coverage, points[2].missed) == (two.covered / whole, 0)
+    assert points[3].coverage == pytest.approx(three.covered / whole)
+    assert points[3].coverage > points[2].coverage
 
 
 def test_placements_for_something_else_than_coverage_have_no_front(example):

@@ -9,8 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.choosing.placement.problem import PlacementProblem
+from seip_addon.core.choosing.placement.returns_bounds import Completion
+from seip_addon.core.choosing.placement.returns_instance import make_returns_instance
 from seip_addon.core.choosing.placement.returns_solver import solve_returns
-from seip_addon.core.choosing.placement.search_limits import SolverLimits
+from seip_addon.core.choosing.placement.search_limits import Clock, SolverLimits
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 
@@ -108,6 +110,17 @@ def test_at_the_limit_the_bound_still_holds(seed):
     best = best_by_brute_force(problem, returns)
     assert found.objective <= best + 2e-9
     assert found.bound >= best - 2e-9
+
+
+@given(st.integers(0, 10**9))
+def test_no_set_adds_more_than_any_of_the_falling_bounds(seed):
+    problem, returns = problem_of(seed, budget=None, count=2, mandatory=None)
+    instance = make_returns_instance(problem, returns)
+    completion = Completion(instance, np.zeros(len(instance.weight)))
+    share = np.full(len(instance), 1 / len(instance))
+    bounds = itertools.islice(completion.falling_bounds(share, Clock(math.inf)), 12)
+    best = best_by_brute_force(problem, returns)
+    assert min(bound.value for bound, _ in bounds) >= best * (1 - 1e-9)
 
 
 def test_without_returns_there_is_nothing_to_choose():

@@ -46,6 +46,13 @@ def features(placed, tmp_path_factory):
     return collection["features"]
 
 
+def in_plan(example, degrees):
+    """Return longitudes and latitudes (n, 2) in metres of the site."""
+    mercator = example.site.geo_reference.mercator
+    east_north = np.array([mercator(latitude, longitude) for longitude, latitude in np.radians(degrees).tolist()])
+    return east_north - (example.site.origin + OFFSET)[:2]
+
+
 def of_kind(features, kind):
     return [one for one in features if one["properties"]["kind"] == kind]
 
@@ -85,7 +92,13 @@ def test_cells_name_the_sensors_that_see_them(example, features):
     np.testing.assert_allclose(metres, (example.site.targets.xyz[5] + example.site.origin + OFFSET)[:2], atol=5e-3)
 
 
-def test_kml_is_xml_with_the_same_content(example, placed, tmp_path):
+def test_the_region_lies_where_it_is(example, features):
+    (region,) = of_kind(features, "region of interest")
+    found = shapely.transform(shape(region["geometry"]), lambda degrees: in_plan(example, degrees))
+    assert found.symmetric_difference(example.site.region).area < 1e-3 * example.site.region.area
+
+
+def test_kml_is_xml_with_the_same_content(example, placed, features, tmp_path):
     save_kml(tmp_path / "placement.kml", placed)
     root = ET.parse(tmp_path / "placement.kml").getroot()  # noqa: S314  # our own
     assert root.tag == f"{{{NAMESPACE}}}kml"
@@ -93,7 +106,13 @@ def test_kml_is_xml_with_the_same_content(example, placed, tmp_path):
     sensors, areas, coverage = root.findall("k:Document/k:Folder", NAMES)
     for mark, sensor in zip(sensors.findall("k:Placemark", NAMES), example.deployment.sensors, strict=True):
         assert mark.find("k:Point/k:altitudeMode", NAMES).text == "relativeToGround"
-        assert float(mark.find("k:Point/k:coordinates", NAMES).text.split(",")[2]) == pytest.approx(sensor.height)
+        longitude, latitude, height = map(float, mark.find("k:Point/k:coordinates", NAMES).text.split(","))
+        np.testing.assert_allclose(in_plan(example, [(longitude, latitude)])[0], sensor.xyz[:2], atol=2e-3)
+        assert height == pytest.approx(sensor.height)
+    (region,) = of_kind(features, "region of interest")
+    ring = areas.find("k:Placemark//k:outerBoundaryIs//k:coordinates", NAMES).text.split()
+    outer = shapely.get_parts(shape(region["geometry"]))[0].exterior
+    np.testing.assert_allclose([[float(one) for one in corner.split(",")] for corner in ring], outer.coords, atol=1e-8)
     assert len(areas.findall("k:Placemark", NAMES)) == 2
     styles = {style.get("id") for style in root.iter(f"{{{NAMESPACE}}}Style")}
     assert {link.text.removeprefix("#") for link in root.iter(f"{{{NAMESPACE}}}styleUrl")} <= styles

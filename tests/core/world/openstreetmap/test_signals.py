@@ -72,6 +72,20 @@ def test_the_direction_of_signals_counts(tmp_path, direction, arms, at_junction)
     assert bool(result.lone_signals) is not at_junction
 
 
+@pytest.mark.parametrize(
+    ("oneway", "inwards", "at_junction"),
+    [("yes", True, True), ("yes", False, False), ("-1", True, False), ("-1", False, True)],
+)
+def test_signals_control_the_traffic_of_a_one_way_street(tmp_path, oneway, inwards, at_junction):
+    extract = Extract()
+    line = [(0, 0), extract.node(20, 0, highway="traffic_signals"), (200, 0)]
+    extract.way(line[::-1] if inwards else line, highway="secondary", oneway=oneway)
+    for end in ((-200, 0), (0, 200), (0, -200)):
+        extract.way([(0, 0), end], highway="secondary")
+    numbers, _ = written(extract, tmp_path)
+    assert (extract.node(0, 0) in numbers) is at_junction
+
+
 def test_signals_that_stand_behind_a_junction_are_its(tmp_path):
     for away, number in ((10.0, 1), (30.0, 0)):
         extract = approached(away, ("east",), traffic_signals__direction="forward")

@@ -119,8 +119,9 @@ def test_pavements_are_those_of_the_tags_or_usual_for_the_street(tmp_path, tags,
     assert streets(extract, tmp_path)[1][0]["sidewalk"] == side
 
 
-def test_a_dual_carriageway_has_pavements_at_its_outer_sides(tmp_path):
-    _, ways, _ = streets(dual_carriageway(), tmp_path)
+@pytest.mark.parametrize("backward", [False, True])
+def test_a_dual_carriageway_has_pavements_at_its_outer_sides(tmp_path, backward):
+    _, ways, _ = streets(dual_carriageway(backward=backward), tmp_path)
     assert [way["sidewalk"] for way in ways] == ["right", "right", "both"]
 
 
