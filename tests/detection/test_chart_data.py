@@ -14,8 +14,8 @@ pytest.importorskip("torch", reason="the detector's torch is optional")
 from headless.charts.detection import save_parts_chart
 from headless.detection.average_precision import evaluate
 from headless.detection.breakdown import average_precision_by
-from headless.detection.chart_data import curve, error_view
 from headless.detection.matching import Rule
+from headless.detection_results import curve, error_view
 from headless.studies.detection.claims import SeedResult
 from headless.studies.detection.results import cells
 from headless.studies.false_positives import false_by

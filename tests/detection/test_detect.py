@@ -15,12 +15,12 @@ pytest.importorskip("torch", reason="torch is not installed: make detection")
 from headless import detect
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, TrainingRecord
 from headless.detection.settings import NetworkSettings
+from headless.detection_results import kitti_results, openpcdet_results
 
 import bpy
 import numpy as np
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.output.datasets.detection_files import kitti_results, openpcdet_results
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import open_blend, save_blend
 from seip_addon.scene.sensors import labelled_sensors

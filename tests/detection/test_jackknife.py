@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 pytest.importorskip("torch", reason="the detector's torch is optional")
 
-from headless.detection.jackknife import jackknife_reach, share_interval
+from headless.detection.average_precision import jackknife_reach, share_interval
 
 
 def test_jackknife_of_a_mean_is_students_interval():
