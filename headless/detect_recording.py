@@ -24,18 +24,18 @@ from headless.detection.detector_evaluation import DetectorEvaluation
 from headless.detection.frame_results import Detections, FrameResult, frame_result
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
-from headless.detection.recorded_detection import RECOMMENDED_SCORE, area_of_recording
+from headless.detection.pillars import grid_over
 from headless.detection.rules import MAIN_RULE
-from headless.detection.settings import CLASS_CATEGORIES, CLASS_OF
+from headless.detection.settings import BOTTOM, CLASS_CATEGORIES, CLASS_OF, TOP
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import deterministic
 from headless.detection_results import print_precision, save_charts, save_detections
 from headless.options import real_number
-from headless.video import save_video
 
 import bpy
 import numpy as np
 import shapely
+from PIL import Image
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Float
@@ -61,8 +61,71 @@ from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.storage.files import digest, natural_order, save_json, whole_file
 from seip_addon.core.storage.json_dataclass import as_json
 from seip_addon.core.storage.source_digest import source_digest
+from seip_addon.scene.interrupts import held_signals
 from seip_addon.scene.read import read_scene
+from seip_addon.scene.render import silenced
 from seip_addon.scene.sensors import read_sensors
+
+
+def save_video(path: Path, pictures: Sequence[Path], rate: float) -> None:
+    """Write pictures of one size as an MP4 video (H.264).
+
+    Parameters
+    ----------
+    rate : float, hertz
+        Pictures per second.
+    """
+    scene = bpy.data.scenes.new("video")
+    try:
+        with Image.open(pictures[0]) as first:
+            render = scene.render
+            render.resolution_x, render.resolution_y = first.size
+        render.resolution_percentage = 100
+        render.fps, render.fps_base = max(1, round(rate)), max(1, round(rate)) / rate
+        scene.view_settings.view_transform = "Standard"  # pictures keep their colours
+        sequencer = scene.sequence_editor_create()
+        strips = sequencer.strips if hasattr(sequencer, "strips") else sequencer.sequences
+        strip = strips.new_image("pictures", str(pictures[0]), channel=1, frame_start=1)
+        for picture in pictures[1:]:
+            strip.elements.append(picture.name)
+        scene.frame_start, scene.frame_end = 1, len(pictures)
+        if hasattr(render.image_settings, "media_type"):  # Blender 5
+            render.image_settings.media_type = "VIDEO"
+        render.image_settings.file_format = "FFMPEG"
+        render.ffmpeg.format, render.ffmpeg.codec = "MPEG4", "H264"
+        render.ffmpeg.constant_rate_factor = "HIGH"
+        render.use_file_extension = False
+        with whole_file(path) as temporary, silenced(), held_signals():
+            render.filepath = str(temporary)
+            bpy.ops.render.render(animation=True, scene=scene.name)
+    finally:
+        bpy.data.scenes.remove(scene)
+
+
+RECOMMENDED_SCORE = 0.5
+"""Score from which detections in recordings are drawn and listed.
+
+Measured with the shipped detector on recordings simulated at the shipped junction and corridor (two OS1-128 each, 40
+sweeps in 40 s, background and ground estimated). Moving vehicles with 10 returns or more count as found if a box is
+within 2 m; vehicles near no road user are false. Recall is that within 50 and 80 m of a sensor.
+
+===== ================================== ================================
+score false vehicles per frame (80 m)    recall (50 m, 80 m)
+      junction, corridor                 junction; corridor
+===== ================================== ================================
+0.4   2.8, 2.4                           99.6 %, 88 %; 97 %, 96 %
+0.5   0.5, 0.5                           99.6 %, 87 %; 95 %, 90 %
+0.6   0.0, 0.0                           99.1 %, 85 %; 87 %, 80 %
+===== ================================== ================================
+"""
+
+
+def area_of_recording(frames: RecordedFrames, detector: Detector, name: str) -> DetectionArea:
+    """Return the detection area of a recording: its region, with heights above the estimated ground."""
+    west, south, east, north = map(float, frames.region.bounds)
+    grid = grid_over((west, south, east, north), (BOTTOM, TOP), detector.settings.pillar)
+    return DetectionArea(grid, frames.ground, name)
+
 
 RADIUS = 80.0
 """Radius of the region around each sensor, metres: the detector was trained on regions of about this size."""

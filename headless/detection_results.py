@@ -3,24 +3,102 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from headless import runtime
-from headless.charts.detection import BinnedFigure, save_parts_chart, save_precision_recall_chart
-from headless.charts.error_view import save_error_view
+from headless.charts.detection import BinnedFigure, PrecisionRecallLine, save_parts_chart, save_precision_recall_chart
+from headless.charts.error_view import ErrorView, save_error_view
+from headless.detection.average_precision import Evaluation, precision_recall
 from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
-from headless.detection.chart_data import curve, error_view
 from headless.detection.detector_evaluation import DetectorEvaluation
+from headless.detection.frame_results import FrameResult
+from headless.detection.matching import NO_MATCH, Rule, match
 from headless.detection.rules import MAIN_RULE
 
 import numpy as np
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.output.datasets.detection_files import kitti_results, openpcdet_results
+from seip_addon.core.output.datasets.kitti import CLASSES as KITTI_CLASSES
+from seip_addon.core.output.datasets.kitti import PIXELS, camera_boxes
+from seip_addon.core.output.datasets.label_files import CLASSES
+from seip_addon.core.output.datasets.sample import shortest
 from seip_addon.core.output.results.detection_record import FORMATS
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.storage.files import whole_file
+
+
+def kitti_results(boxes: Float, categories: Sequence[str], score: Float) -> str:
+    """Return a line of KITTI's results for each detection: a label, and the score.
+
+    Parameters
+    ----------
+    boxes : (k, 7) float64
+        x, y, z of the middle, length, width, height (metres), yaw (radians), local site axes.
+    categories : sequence of str
+        Category of each box.
+    score : (k,) float64, 0 to 1
+    """
+    numbers, alpha = camera_boxes(boxes[:, :3], boxes[:, 3:6], boxes[:, 6])
+    return "".join(
+        f"{KITTI_CLASSES[category]} -1 -1 {shortest(angle)} 0 0 {PIXELS} {PIXELS} "
+        f"{' '.join(shortest(value) for value in row)} {shortest(points)}\n"
+        for category, angle, row, points in zip(categories, alpha, numbers, score, strict=True)
+    )
+
+
+def openpcdet_results(boxes: Float, categories: Sequence[str], score: Float) -> str:
+    """Return a line ``x y z dx dy dz heading class score`` for each detection; see `kitti_results`."""
+    return "".join(
+        f"{' '.join(shortest(value) for value in row)} {CLASSES[category]} {shortest(points)}\n"
+        for row, category, points in zip(boxes, categories, np.asarray(score), strict=True)
+    )
+
+
+PLAN_COLUMNS = [0, 1, 3, 4, 6]
+
+
+def curve(sensor: str, count: int, evaluation: Evaluation) -> PrecisionRecallLine:
+    """Return precision and recall of one type and number of sensors."""
+    found = precision_recall(evaluation)
+    return PrecisionRecallLine(sensor, count, found.recall, found.precision, evaluation.average_precision)
+
+
+def error_view(  # noqa: PLR0913 - a frame, how it is evaluated, and where it is
+    name: str,
+    frame: FrameResult,
+    rule: Rule,
+    *,
+    score: float,
+    cloud: NDArray[np.float32],
+    region: BaseGeometry,
+    sensors: Float,
+) -> ErrorView:
+    """Return a frame with the detections of at least some score, and what of them is wrong.
+
+    Parameters
+    ----------
+    cloud : (n, 3) float32, metres
+    region : shapely geometry
+    sensors : (s, 3) float64, metres
+    """
+    kept = frame.detected.score >= score
+    columns = {column: values[kept] for column, values in vars(frame.detected).items()}
+    shown = replace(frame, detected=replace(frame.detected, **columns))
+    found = match(shown, rule)
+    return ErrorView(
+        name=name,
+        cloud=cloud[:, :2].astype(np.float64),
+        region=region,
+        sensors=sensors[:, :2],
+        truth=frame.truth.boxes[:, PLAN_COLUMNS],
+        wanted=found.counted,
+        missed=found.counted & (found.found_by == NO_MATCH),
+        detected=shown.detected.boxes[:, PLAN_COLUMNS],
+        false=found.evaluated & ~found.hit,
+    )
 
 
 def save_charts(

@@ -176,16 +176,6 @@ def add_settings(group: argparse._ActionsContainer, kind: type, *names: str) -> 
         group.add_argument(_option(name, about), help=about.help, **_arguments(hints[name], default, about))
 
 
-def add_rolling_shutter(group: argparse._ActionsContainer) -> None:
-    """Add the option that lets traffic stand still while sensors turn, to a command for which it moves."""
-    group.add_argument(
-        "--rolling-shutter",
-        action=argparse.BooleanOptionalAction,
-        default=True,
-        help="rolling shutter: traffic moves during a revolution, and boxes are at the time of their points (on)",
-    )
-
-
 def add_weather(group: argparse._ActionsContainer) -> None:
     """Add the option of the weather."""
     group.add_argument(

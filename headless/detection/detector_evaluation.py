@@ -1,23 +1,124 @@
 """Detections of a trained detector with the sensors of a placement, on runs of traffic."""
 
+import os
+import threading
 from collections.abc import Generator, Sequence
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from contextlib import closing
 from dataclasses import dataclass
-
-from headless.detection.run_detection import AT_ONCE, detect_in_runs
-from headless.side_by_side import side_by_side
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.output.results.detection_record import Precision
-from seip_addon.core.progress import Progress
+from seip_addon.core.progress import REPORT_INTERVAL, Progress, Result, finish
 from seip_addon.core.sensing.scans.frame import Frame
 
 from .average_precision import Evaluation, balanced_score, evaluate
 from .breakdown import recall_by_category
+from .detection_area import DetectionArea
 from .detector import Detector
-from .frame_results import FrameResult
+from .frame_results import FrameResult, frame_result
+from .inference import detect
 from .recordings import MountedSensors, SampledRun, Simulator
 from .rules import MAIN_RULE, precisions
 from .training import deterministic
+
+
+def side_by_side(
+    works: Sequence[Generator[Progress, None, Result]], threads: int
+) -> Generator[Progress, None, list[Result]]:
+    """Run pieces of work in parallel threads, for work that mostly releases Python's global lock.
+
+    Parameters
+    ----------
+    works : sequence of generators
+        Pieces of work, each with its own units of progress.
+    threads : int
+        Largest number of pieces that run at the same time.
+
+    Yields
+    ------
+    Progress
+        Sum over the pieces that have begun, ten times a second, with the description of the last one.
+
+    Returns
+    -------
+    list
+        Results in the order of the pieces.
+    """
+    stop = threading.Event()
+    latest: dict[int, Progress] = {}
+
+    def run(number: int) -> Result:
+        def report(progress: Progress) -> None:
+            # A thread cannot be stopped from outside: it stops itself at its next report.
+            latest[number] = progress
+            if stop.is_set():
+                raise _Stopped
+
+        with closing(works[number]) as work:
+            return finish(work, report)
+
+    pool = ThreadPoolExecutor(threads)
+    try:
+        futures = [pool.submit(run, number) for number in range(len(works))]
+        while any(not future.done() for future in futures):
+            for ended in wait(futures, REPORT_INTERVAL, FIRST_EXCEPTION).done:
+                ended.result()  # raises the exception of that thread
+            yield _sum_of(list(latest.values()), len(works))
+        return [future.result() for future in futures]
+    finally:
+        stop.set()
+        pool.shutdown(wait=False, cancel_futures=True)  # do not wait for the next report of each piece
+
+
+class _Stopped(BaseException):
+    """Raised in a worker thread whose result is no longer wanted."""
+
+
+def _sum_of(parts: Sequence[Progress], works: int) -> Progress:
+    if not parts:
+        return Progress(0, 0, "begin")
+    done, total = sum(part.done for part in parts), sum(part.total for part in parts)
+    counted = all(part.counted and part.total for part in parts)
+    return Progress(done, total * works // len(parts), parts[-1].what, counted)
+
+
+AT_ONCE = (os.cpu_count() or 1) + 1  # works in threads on the CPU: one more than cores, as each also waits
+
+
+def detect_in_runs(  # what measures where, what looks at it, and how
+    simulator: Simulator,
+    placed: MountedSensors,
+    runs: Sequence[SampledRun],
+    detectors: Sequence[Detector],
+    threads: int,
+    areas: Sequence[DetectionArea] | None = None,
+) -> Generator[Progress, None, list[list[FrameResult]]]:
+    """Detect road users in every frame of some runs; return the frames' results by detector.
+
+    Parameters
+    ----------
+    areas : sequence of DetectionArea, optional
+        Where each detector looks, where that is not the scene's own.
+    """
+    region = simulator.static.region
+    looking = areas or [simulator.area(detector.settings.pillar) for detector in detectors]
+    results: list[list[FrameResult]] = [[] for _ in detectors]
+    total = sum(len(run.times) for run in runs)
+    done = 0
+    for run in runs:
+        for number in range(len(run.times)):
+            yield Progress(done, total, f"detect with {placed.name}")
+            done += 1
+            frame = simulator.frame(placed, run, number)
+            for detector, area, own in zip(detectors, looking, results, strict=True):
+                with deterministic(threads):
+                    found = detect(detector, area, frame)
+                own.append(
+                    frame_result(frame, found, region=region, sensors=placed.places, run=run.name, parked=run.parked)
+                )
+    yield Progress(total, total, f"detect with {placed.name}")
+    return results
 
 
 @dataclass(frozen=True, eq=False)

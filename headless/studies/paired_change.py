@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from headless.detection.average_precision import Evaluation, average_precisions_without_each_run
-from headless.detection.jackknife import jackknife_reach, share_interval
+from headless.detection.average_precision import (
+    Evaluation,
+    average_precisions_without_each_run,
+    jackknife_reach,
+    share_interval,
+)
 from headless.studies.mean_over_seeds import CHANGE_OF_SHARE, within
 
 import numpy as np

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from headless.detection.detector import Detector
+from headless.detection.detector_evaluation import detect_in_runs
 from headless.detection.frame_results import EvaluatedBoxes, FrameResult, GroundTruth
 from headless.detection.recordings import MountedSensors, SampledRun, Simulator
-from headless.detection.run_detection import detect_in_runs
 from headless.studies.simulated_recordings import frames_key
 
 import numpy as np

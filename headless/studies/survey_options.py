@@ -18,6 +18,16 @@ def add_survey_options(parser: argparse.ArgumentParser) -> None:
         _name_only(group, "see: seip place --help")
 
 
+def add_rolling_shutter(group: argparse._ActionsContainer) -> None:
+    """Add the option that lets traffic stand still while sensors turn, to a command for which it moves."""
+    group.add_argument(
+        "--rolling-shutter",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="rolling shutter: traffic moves during a revolution, and boxes are at the time of their points (on)",
+    )
+
+
 def _name_only(group: argparse._ArgumentGroup, reference: str) -> None:
     """Replace the help of a group of options by their names and a reference."""
     names = (action.option_strings[-1] for action in group._group_actions)  # noqa: SLF001 -- argparse has no other way

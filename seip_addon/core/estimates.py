@@ -47,14 +47,14 @@ class IntervalEstimate:
         value, low, high = (f"{100 * part:.{decimals}f}" for part in (self.value, self.low, self.high))
         return f"{value} points [{low}, {high}]"
 
-    def as_change(self, decimals: int = 2) -> str:
+    def as_change(self) -> str:
         """Return a difference of shares as a number of percentage points more, or less for a loss."""
         gain = self.value >= 0.0
         size = self if gain else IntervalEstimate(-self.value, -self.high, -self.low)
         word = "more" if gain else "less"
         if not math.isfinite(self.high - self.low):
-            return f"{100 * size.value:.{decimals}f} points {word} [too few data for an interval]"
-        return f"{size.as_points(decimals)} {word}"
+            return f"{100 * size.value:.2f} points {word} [too few data for an interval]"
+        return f"{size.as_points()} {word}"
 
 
 def mean_of(values: Float) -> IntervalEstimate:
@@ -168,7 +168,7 @@ def quantile_of(values: Float, share: float) -> IntervalEstimate:
     )
 
 
-def quantile_gain(values: Float, others: Float, share: float, seed: int = 0) -> IntervalEstimate:
+def quantile_gain(values: Float, others: Float, share: float) -> IntervalEstimate:
     """Estimate the difference between the quantiles of two samples of paired draws.
 
     The interval is that of `RESAMPLES` resamples of the pairs (the percentile bootstrap, Efron 1979).
@@ -179,12 +179,10 @@ def quantile_gain(values: Float, others: Float, share: float, seed: int = 0) -> 
         Independent draws; values with the same index are a pair.
     share : float
         Probability of the quantile, 0 to 1, both excluded.
-    seed : int
-        Seed of the resamples.
     """
     number = len(values)
     rank = math.ceil(share * number) - 1
-    picked = np.random.default_rng(seed).integers(0, number, (RESAMPLES, number))
+    picked = np.random.default_rng(0).integers(0, number, (RESAMPLES, number))
     gains = _at_rank(values[picked], rank) - _at_rank(others[picked], rank)
     return IntervalEstimate(float(_at_rank(values, rank) - _at_rank(others, rank)), *percentiles(gains))
 

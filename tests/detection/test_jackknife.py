@@ -6,7 +6,7 @@ import scipy.stats
 
 pytest.importorskip("torch", reason="the detector's torch is optional")
 
-from headless.detection.jackknife import jackknife_reach
+from headless.detection.average_precision import jackknife_reach
 
 
 def test_jackknife_of_a_mean_is_students_interval():

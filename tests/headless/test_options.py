@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 from headless import place
-from headless.objective_options import add_objective, read_objective
 from headless.options import add_settings, new_parser, read_settings, real_number
+from headless.place import add_objective, read_objective
 from headless.survey import add_options
 
 import pytest

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from headless import place, report
 from headless import survey as surveys
-from headless.objective_options import read_objective
+from headless.place import read_objective
 
 import bpy
 import pytest

@@ -2,7 +2,7 @@
 
 import threading
 
-from headless.side_by_side import side_by_side
+from headless.detection.detector_evaluation import side_by_side
 
 import pytest
 

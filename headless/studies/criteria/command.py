@@ -15,7 +15,7 @@ from typing import Any
 from headless import runtime, survey
 from headless.detection.detector import SHIPPED_DETECTOR, Detector
 from headless.detection.recordings import Simulator, sampled_runs
-from headless.options import add_rolling_shutter, new_parser, real_number, whole_number
+from headless.options import new_parser, real_number, whole_number
 from headless.studies.criteria.criteria_table import (
     CriteriaStudySettings,
     record_of,
@@ -25,7 +25,7 @@ from headless.studies.criteria.criteria_table import (
 )
 from headless.studies.criteria.site_criteria import CRITERIA
 from headless.studies.detection.case_study import split_untrained
-from headless.studies.survey_options import add_survey_options
+from headless.studies.survey_options import add_rolling_shutter, add_survey_options
 
 import bpy
 

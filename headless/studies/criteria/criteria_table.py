@@ -7,10 +7,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from headless.detection.average_precision import Evaluation, average_precisions_without_each_run, evaluate
+from headless.detection.average_precision import (
+    Evaluation,
+    average_precisions_without_each_run,
+    evaluate,
+    jackknife_reach,
+    share_interval,
+)
 from headless.detection.detector import Detector
 from headless.detection.frame_results import FrameResult
-from headless.detection.jackknife import jackknife_reach, share_interval
 from headless.detection.recordings import SampledRun, Simulator
 from headless.detection.rules import RULES, precision_by
 from headless.studies.detection.sensor_configuration import SensorConfiguration

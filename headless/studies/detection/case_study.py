@@ -13,15 +13,14 @@ from pathlib import Path
 
 from headless.detection.average_precision import ADVISED_TEST_RUNS, Evaluation, balanced_score, evaluate
 from headless.detection.detector import Detector
+from headless.detection.detector_evaluation import AT_ONCE, detect_in_runs, side_by_side
 from headless.detection.frame_results import FrameResult
 from headless.detection.frames import SampledRecording
 from headless.detection.recordings import MountedSensors, SampledRun, Simulator, sampled_runs
 from headless.detection.rules import MAIN_RULE, precisions
-from headless.detection.run_detection import AT_ONCE, detect_in_runs
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import LearningCurve, TrainedDetector, deterministic, train
-from headless.side_by_side import side_by_side
 from headless.studies.coverage.cells import COUNTS, Case, Cell, solve_cell
 from headless.studies.detection.sensor_configuration import SensorConfiguration
 from headless.studies.false_positives import false_positives

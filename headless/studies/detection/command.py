@@ -15,14 +15,14 @@ from headless.detection.average_precision import too_few_runs
 from headless.detection.detector import SHIPPED_DETECTOR, Detector, check_device
 from headless.detection.recordings import Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
-from headless.options import add_rolling_shutter, new_parser, real_number, whole_number
+from headless.options import new_parser, real_number, whole_number
 from headless.studies.claims import save_claims
 from headless.studies.coverage.cells import COUNTS
 from headless.studies.detection import case_study
 from headless.studies.detection import results as study_results
 from headless.studies.detection.claims import detection_claims
 from headless.studies.detection.sensor_configuration import SensorConfiguration
-from headless.studies.survey_options import add_survey_options
+from headless.studies.survey_options import add_rolling_shutter, add_survey_options
 
 import bpy
 

@@ -15,10 +15,10 @@ from headless.charts.detection import (
 )
 from headless.charts.error_view import save_error_view
 from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
-from headless.detection.chart_data import curve, error_view
 from headless.detection.recordings import Simulator
 from headless.detection.rules import MAIN_RULE, RULES
 from headless.detection.training import LearningCurve, TrainedDetector
+from headless.detection_results import curve, error_view
 from headless.studies.claims import Claim
 from headless.studies.false_positives import DENSITY_EDGES, false_by
 from headless.studies.mean_over_seeds import mean_interval

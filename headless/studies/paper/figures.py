@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
-from headless.detection.jackknife import jackknife_reach
+from headless.detection.average_precision import jackknife_reach
 from headless.studies.rank_correlation import rank_correlation
 
 import numpy as np

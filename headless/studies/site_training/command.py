@@ -17,13 +17,12 @@ from typing import TypeVar
 from headless import runtime, survey
 from headless.charts.detection import save_training_chart
 from headless.detection.detector import Detector, check_device
+from headless.detection.detector_evaluation import AT_ONCE, side_by_side
 from headless.detection.frames import SampledRecording
 from headless.detection.recordings import Simulator, sampled_runs
-from headless.detection.run_detection import AT_ONCE
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import train
 from headless.options import add_settings, new_parser, read_settings, real_number
-from headless.side_by_side import side_by_side
 from headless.studies.detection.case_study import simulated
 from headless.studies.site_training.training_site import TrainingSite, field_runs
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from seip_addon.core.choosing.placement.deployment import weighted_share
 from seip_addon.core.choosing.placement.objective import Objective, Solution, target_weights
-from seip_addon.core.choosing.placement.optimisation import optimise
 from seip_addon.core.progress import Progress
 from seip_addon.core.sensing.lidar.model import fields_of_view
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.visibility_model import VisibilityModel, visibility_model
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site, make_site
+from seip_addon.core.workflows.placing import optimise
 from seip_addon.core.workflows.survey_settings import SurveySettings
 
 GRID_SPACINGS = (4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)

@@ -108,13 +108,13 @@ def excluded_posts(
     return excluded
 
 
-def narrow_islands(road: BaseGeometry, width: float = MIN_ISLAND_WIDTH) -> BaseGeometry:
-    """Return the islands and medians between carriageways that are narrower than ``width`` metres.
+def narrow_islands(road: BaseGeometry) -> BaseGeometry:
+    """Return the islands and medians between carriageways that are narrower than ``MIN_ISLAND_WIDTH`` metres.
 
     These are the gaps filled by a morphological closing of the carriageway. Mitred offsets preserve the corners of
     wider areas, which a closing with a disc would fill as well.
     """
-    return road if road.is_empty else without(closed(road, width / 2), road)
+    return road if road.is_empty else without(closed(road, MIN_ISLAND_WIDTH / 2), road)
 
 
 def _within(plan: Float, area: BaseGeometry, distance: float) -> Boolean:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..acceptance import Acceptance
+from ..choosing.placement.cheapest import cheapest_for_coverage
 from ..choosing.placement.deployment import deploy
 from ..choosing.placement.objective import (
     CHOSEN_FOR,
@@ -18,10 +20,10 @@ from ..choosing.placement.objective import (
     target_weights,
     with_count,
 )
-from ..choosing.placement.optimisation import optimise
 from ..choosing.placement.price_front import price_front
 from ..choosing.placement.risk import Risk
-from ..choosing.placement.search_limits import SolverLimits
+from ..choosing.placement.search_limits import DEFAULT_LIMITS, SolverLimits
+from ..choosing.placement.solver import solve, solve_greedy
 from ..choosing.robustness.gain_band import with_gain_band
 from ..choosing.robustness.pose_error_evaluation import PoseErrorEvaluation
 from ..choosing.robustness.pose_study import PoseStudySettings, pose_message, pose_study
@@ -30,9 +32,41 @@ from ..choosing.robustness.traffic_instants import spread_instants
 from ..choosing.robustness.traffic_study import traffic_message, traffic_scenarios, traffic_study
 from ..errors import SeipError
 from ..progress import Progress
+from ..sensing.lidar.model import LidarModel
+from ..site.site import Site
 from .returns import crossing_returns, place_by_returns, with_returns_front
 from .survey import Survey, surroundings
 from .traffic_runs import TrafficRuns
+
+
+def optimise(
+    site: Site,
+    visible: NDArray[np.bool_],
+    models: Mapping[str, LidarModel],
+    objective: Objective,
+    limits: SolverLimits = DEFAULT_LIMITS,
+) -> Generator[Progress, None, Solution]:
+    """Optimise a placement on a site: the most coverage, or the least price for a coverage.
+
+    Parameters
+    ----------
+    visible : (c, t) bool
+
+    Raises
+    ------
+    SeipError
+        Same as for `placement_problem`, `solve` and `cheapest_for_coverage`.
+    """
+    problem = placement_problem(site, visible, models, objective)
+    if objective.coverage is not None:
+        placement = yield from cheapest_for_coverage(problem, objective.coverage, limits)
+        greedy = None
+    else:
+        placement = yield from solve(problem, limits)
+        greedy = solve_greedy(problem)
+    deployment = deploy(site, models, visible[placement.chosen], placement.chosen)
+    return Solution(with_count(objective, site), placement, greedy, deployment)
+
 
 DRAWS_OF_KIND = 100
 """Largest number of draws with one kind of pose error only."""

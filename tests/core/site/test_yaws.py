@@ -9,7 +9,6 @@ import pytest
 import shapely
 
 from seip_addon.core.choosing.placement.objective import Objective
-from seip_addon.core.choosing.placement.optimisation import optimise
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
@@ -19,6 +18,7 @@ from seip_addon.core.sensing.visibility.sight_lines import pose_at
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import Mesh, NamedArea
 from seip_addon.core.site.site import make_site
+from seip_addon.core.workflows.placing import optimise
 from tests.builders.plain_street import PLAIN, block, street
 from tests.engines import ANY, needs_any
 

@@ -16,7 +16,7 @@ Any p in P gives an upper bound,
 
 With p = 1/K it is the largest expectation. A p with a small bound is found by fictitious play (Brown 1951): each
 placement maximises the mean of the scenarios that were worst for the placements before. Branch and bound on F_p then
-proves the best T (`robust_search`), if it ends within the limits. A second bound assumes that each scenario is known
+proves the best T (`BestUnderRisk`), if it ends within the limits. A second bound assumes that each scenario is known
 beforehand (Madansky 1960), and takes K problems of t targets:
 
 .. math::
@@ -26,15 +26,15 @@ the mean of the m smallest of the K largest coverages.
 """
 
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ...arrays import Float, Integer
 from ...progress import Progress, within
-from ..placement.bounds import lagrangian_bound
-from ..placement.branch_and_bound import FIRST_STEPS
+from ..placement.bounds import Bound, lagrangian_bound
+from ..placement.branch_and_bound import FIRST_STEPS, Search
 from ..placement.feasibility import starting_choice
 from ..placement.greedy import swap_search
 from ..placement.problem import TIE_TOLERANCE, Placement, PlacementProblem, assess, relative_gap
@@ -42,8 +42,84 @@ from ..placement.reduced_problem import WHOLE_SLACK, Instance, common_unit, make
 from ..placement.risk import Risk
 from ..placement.search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 from ..placement.solver import solve, solve_within
-from .robust_search import BestUnderRisk
 from .scenario_visibility import ScenarioVisibility
+
+
+class BestUnderRisk(Search):
+    r"""Search for the placement of largest T.
+
+    The targets of all scenarios are those of the instance, whose value is, in whole units, with φ the value of a target
+    by the number n of sensors that see it,
+
+    .. math::
+        F(S) = \sum_k p_k \sum_j w_j\, φ(n_{jk}(S)) \ge T(S).
+
+    Branches in which F cannot reach the best T so far are cut, and T is computed for every set that is left.
+
+    Parameters
+    ----------
+    unit : float
+        Unit of F: F divided by it bounds T.
+    evaluate : callable
+        Function that returns T of candidates of the instance.
+    chosen : (k,) int64
+        Placement to begin from.
+    slack : float
+        Largest difference between equal values of T.
+    root : (n,) int64 and Bound
+        Candidates that a placement as good as ``chosen`` may contain, and an upper bound on the F of placements of
+        these.
+
+    Attributes
+    ----------
+    best : (k,) int64
+        Best placement so far.
+    value : float
+        T of the best placement so far. Of equally good ones, which are those within ``slack`` of the largest T, it is
+        the one with fewest sensors, then the cheapest, then the first in the order of candidates.
+    """
+
+    def __init__(
+        self,
+        instance: Instance,
+        unit: float,
+        evaluate: Callable[[Integer], float],
+        chosen: Integer,
+        slack: float,
+        root: tuple[Integer, Bound],
+    ) -> None:
+        super().__init__(instance, 0.0, root=root)
+        self._unit, self._evaluate, self._slack = unit, evaluate, slack
+        self._highest = root[1].value
+        self._front: list[tuple[float, tuple[int, float, list[int]], Integer]] = []
+        self._keep(np.sort(chosen), evaluate(chosen))
+
+    @property
+    def bound(self) -> float:
+        """Upper bound on the T of any placement."""
+        return max(self.value, min(super().bound, self._highest) / self._unit)
+
+    def _take(self, placement: Integer) -> float:
+        if self.instance.feasible(placement):
+            self._keep(placement, self._evaluate(placement))
+        return self.goal
+
+    def _keep(self, placement: Integer, value: float) -> None:
+        """Keep the Pareto front of placements in T and rank; the best placement is in it."""
+        # Of placements within the slack of the largest T the one of best rank is the result. As the largest T may still
+        # rise, a placement of better rank may drop out later: the next best ones must be kept until then.
+        rank = self._rank(placement)
+        if any(kept >= value and better <= rank for kept, better, _ in self._front):
+            return
+        front = [one for one in self._front if one[0] > value or one[1] < rank]
+        least = max([value, *(kept for kept, _, _ in front)]) - self._slack
+        self._front = [one for one in [*front, (value, rank, placement)] if one[0] >= least]
+        self.value, _, self.best = min(self._front, key=lambda one: one[1])
+        self.goal = least * self._unit
+
+    def _rank(self, chosen: Integer) -> tuple[int, float, list[int]]:
+        return len(chosen), round(math.fsum(self.instance.price[chosen]), 6), chosen.tolist()
+
 
 ROUNDS = 16  # rounds of fictitious play; weights of scenarios are multiples of 1 / (ROUNDS · m)
 SCENARIO_SHARE = 0.5  # share of the time for the problems of single scenarios

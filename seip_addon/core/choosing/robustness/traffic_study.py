@@ -27,7 +27,6 @@ from .visibility_in_traffic import visibility_in_traffic
 
 NOTABLE_LOSS = 0.01  # share of the targets' weight whose loss in traffic is worth a warning
 IN_TRAFFIC = "in traffic"  # first words of a `traffic_message`, and of no other
-MOSTLY_SEEN_SHARE = 0.9  # least share of time for which a target must be seen to be mostly seen
 
 MEAN = Risk()
 
@@ -89,11 +88,6 @@ class TrafficCoverage:
     def hidden(self) -> IntervalEstimate:
         """Share of the weight seen on the empty road that vehicles hide, on average over time."""
         return mean_over_time(self.hidden_at / self.empty if self.empty else self.hidden_at, self.batch)
-
-    @property
-    def rarely_seen(self) -> float:
-        """Share of the targets seen on the empty road that are seen less than `MOSTLY_SEEN_SHARE` of the time."""
-        return float((self.time[self.empty_targets] < MOSTLY_SEEN_SHARE).mean()) if self.empty_targets.any() else 0.0
 
     def more_than(self, other: TrafficCoverage) -> IntervalEstimate:
         """Estimate the gain in coverage over another placement at the same instants."""

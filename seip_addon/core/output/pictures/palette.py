@@ -24,31 +24,18 @@ SHARE_COLOURS = ("#dcebf6", "#a9cfe9", "#6fa9d4", "#2c72a8", "#123f68")
 """Of whole sites, from the least coverage or the fewest returns to the most; lightness alone tells them apart."""
 HIDDEN_COLOUR, MISSED_COLOUR = INK, "#a3abb2"
 """Of road that something hides from a sensor, and of road in its view that no beam of it returns from."""
-COVERAGE_COLOURS = (
-    *SEEN_COLOURS,
-    RETURNS_COLOURS[1],
-    *COMPARED_COLOURS,
-    DENSE_BEAMS,
-    WIDE_BEAMS,
-    *SHARE_COLOURS,
-    HIDDEN_COLOUR,
-    MISSED_COLOUR,
-)
 
 SENSOR_COLOURS = ("#f0e442", "#12b886", "#f783c5", "#a8e05f", "#d6358c", "#7ff0d8", "#1f9d8a", "#cfd8dc")
 """Of the points of each sensor, on a dark ground; neighbours differ in lightness too."""
 SENSOR_BODY, SIGHT_LINE = "#f2c230", "#ffd940"
 POLE_COLOUR, ASSUMED_POLE_COLOUR = "#f2c94c", "#8a7400"
 """Of where a sensor may be mounted."""
-ALL_SENSOR_COLOURS = (*SENSOR_COLOURS, SENSOR_BODY, SIGHT_LINE, POLE_COLOUR, ASSUMED_POLE_COLOUR)
 
 WEIGHTED, FORBIDDEN, MANDATORY = "#5d1f7d", "#8f1d2c", "#4b3fb0"
 REGION_VEIL, WEIGHTED_VEIL, FORBIDDEN_VEIL, MANDATORY_VEIL = "#d9d2ee", "#c04df0", "#f0304f", "#6f5dff"
 """Of areas in the viewport, where three quarters of what is below shine through."""
 WEIGHT_COLOURS = ("#f1e6f7", "#d7b8e8", "#b584d3", "#8a4fb3", "#4f2374")
 """From the lightest weight to the heaviest, in the hue of weighted areas; lightness alone tells them apart."""
-AREA_VEILS = (REGION_VEIL, WEIGHTED_VEIL, FORBIDDEN_VEIL, MANDATORY_VEIL)
-AREA_COLOURS = (WEIGHTED, FORBIDDEN, MANDATORY, *AREA_VEILS, *WEIGHT_COLOURS)
 
 MAP_GROUND, MAP_STREETS, MAP_JUNCTION = "#17191b", ("#53575b", "#83888d", "#b4b9be"), "#ffffff"
 """Of the map on which a junction is chosen: streets by importance. Greys: nothing on it is coverage or a sensor."""

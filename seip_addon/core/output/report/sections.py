@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Float
+from ...arrays import Boolean, Float
 from ...choosing.placement.deployment import BAND, UNRANKED
 from ...choosing.placement.objective import CHOSEN_FOR, MOVED, SAME_PRICE, purpose
 from ...choosing.placement.returns_summary import FEW, FEW_RETURNS, SURFACE_SEEN, ReturnsSummary, returns_text
@@ -38,7 +39,6 @@ from .blind_spots import BlindSpot, blind_spots, centres, seen_places
 from .blocks import Block, Bullets, Card, Code, Facts, Paragraph, Picture, Pictures, Report, Section, Table
 from .evidence import Evidence
 from .figures import blind_spot_map, front_chart
-from .losses import failures
 from .repeat import repeating_command
 from .wording import (
     date,
@@ -51,6 +51,44 @@ from .wording import (
     points,
     proof,
 )
+
+
+@dataclass(frozen=True)
+class Failures:
+    """Share of the targets that is still seen when each sensor fails.
+
+    Parameters
+    ----------
+    left : tuple of float
+        In the order of the sensors.
+    """
+
+    left: tuple[float, ...]
+
+    @property
+    def worst(self) -> float:
+        """Coverage after the worst failure."""
+        return min(self.left)
+
+    @property
+    def mean(self) -> float:
+        """Mean coverage over the failures of each sensor."""
+        return sum(self.left) / len(self.left)
+
+
+def failures(seen: Boolean) -> Failures | None:
+    """Return what is left when a sensor fails, None where there is none.
+
+    Parameters
+    ----------
+    seen : (k, t) bool
+        What each sensor sees.
+    """
+    if not len(seen):
+        return None
+    times = seen.sum(axis=0)
+    return Failures(tuple(float(np.count_nonzero(times - row > 0)) / seen.shape[1] for row in seen))
+
 
 MOST_SPOTS = 8
 LEAST_TILT = 0.05  # degrees, below which a sensor is upright

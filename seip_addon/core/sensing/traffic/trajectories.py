@@ -16,7 +16,6 @@ from ...storage.files import digest
 
 WARM_UP = 2.0  # seconds from the first sample of a run to the first instant that is used
 MAX_BEND = 0.6  # largest bend of the lines of a body along one axis
-MAX_EXTENT = 1e6  # largest distance between two samples along each axis, metres
 
 _ARRAYS = {
     "origin": "f8",

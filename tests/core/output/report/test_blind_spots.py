@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.output.report.blind_spots import blind_spots, seen_places
-from seip_addon.core.output.report.losses import failures
+from seip_addon.core.output.report.sections import failures
 from seip_addon.core.output.results.site_file import Area
 from seip_addon.core.site.targets import Targets
 

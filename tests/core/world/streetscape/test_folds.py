@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from seip_addon.core.world.opendrive.lanes import LaneSurface
-from seip_addon.core.world.streetscape.folds import without_folds
+from seip_addon.core.world.streetscape.model import without_folds
 
 
 def bent_lane(inner=3.2, outer=5.7):
