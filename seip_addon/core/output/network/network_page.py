@@ -129,7 +129,8 @@ def _mark(record: NetworkRecord, one: RankedSite, place: tuple[int, int], radius
     site, (x, y) = one.site, place
     shape = '<path class="cross" d="M-5-5 5 5M-5 5 5-5"/>'
     if site.status == "equipped":
-        shape = f'<circle r="{radius:.1f}" fill="{SHARE_COLOURS[level(record, site)]}"/><text dy=".35em">{one.rank or ""}</text>'
+        colour = SHARE_COLOURS[level(record, site)]
+        shape = f'<circle r="{radius:.1f}" fill="{colour}"/><text dy=".35em">{one.rank or ""}</text>'
     elif site.status == "without sensor":
         shape = f'<circle class="bare" r="{BARE_RADIUS}"/>'
     words = escape(f"{site.name}: {_described(record, site)}")
