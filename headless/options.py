@@ -60,6 +60,8 @@ class _BriefHelp(argparse.HelpFormatter):
         default = action.default
         if not action.option_strings or isinstance(default, bool) or default in (None, [], argparse.SUPPRESS, math.inf):
             return action.help
+        if action.help and "(default: " in action.help:
+            return action.help
         shown = default if isinstance(default, tuple | list) else [default]
         return f"{action.help} (default: {' '.join(map(_as_typed, shown))})"
 

@@ -61,7 +61,7 @@ def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: 
     if settings.delta < site.targets.spacing / math.sqrt(2):
         warnings.append(
             f"targets are {site.targets.spacing:g} m apart and δ is {settings.delta:g} m: some of the road is not "
-            f"within δ of any target; use a δ of at least {site.targets.spacing / math.sqrt(2):.2g} m or a finer grid"
+            f"within δ of any target; use a grid of at most {math.floor(141 * settings.delta) / 100:g} m"
         )
     return tuple(warnings)
 
