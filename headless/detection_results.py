@@ -21,41 +21,10 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.output.datasets.kitti import CLASSES as KITTI_CLASSES
-from seip_addon.core.output.datasets.kitti import PIXELS, camera_boxes
-from seip_addon.core.output.datasets.label_files import CLASSES
-from seip_addon.core.output.datasets.sample import shortest
+from seip_addon.core.output.datasets.detection_files import kitti_results, openpcdet_results
 from seip_addon.core.output.results.detection_record import FORMATS
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.storage.files import whole_file
-
-
-def kitti_results(boxes: Float, categories: Sequence[str], score: Float) -> str:
-    """Return a line of KITTI's results for each detection: a label, and the score.
-
-    Parameters
-    ----------
-    boxes : (k, 7) float64
-        x, y, z of the middle, length, width, height (metres), yaw (radians), local site axes.
-    categories : sequence of str
-        Category of each box.
-    score : (k,) float64, 0 to 1
-    """
-    numbers, alpha = camera_boxes(boxes[:, :3], boxes[:, 3:6], boxes[:, 6])
-    return "".join(
-        f"{KITTI_CLASSES[category]} -1 -1 {shortest(angle)} 0 0 {PIXELS} {PIXELS} "
-        f"{' '.join(shortest(value) for value in row)} {shortest(points)}\n"
-        for category, angle, row, points in zip(categories, alpha, numbers, score, strict=True)
-    )
-
-
-def openpcdet_results(boxes: Float, categories: Sequence[str], score: Float) -> str:
-    """Return a line ``x y z dx dy dz heading class score`` for each detection; see `kitti_results`."""
-    return "".join(
-        f"{' '.join(shortest(value) for value in row)} {CLASSES[category]} {shortest(points)}\n"
-        for row, category, points in zip(boxes, categories, np.asarray(score), strict=True)
-    )
-
 
 PLAN_COLUMNS = [0, 1, 3, 4, 6]
 

@@ -501,8 +501,7 @@ def _read_poses(path: Path, _: bytes) -> None:
 
 
 def _box_labels(_: Path) -> list[bytes]:
-    from headless.detection_results import kitti_results, openpcdet_results  # noqa: PLC0415
-
+    from seip_addon.core.output.datasets.detection_files import kitti_results, openpcdet_results  # noqa: PLC0415
     from tests.builders.recording_files import dair_text, openlabel_text  # noqa: PLC0415
 
     kinds = ["car", "bus", "pedestrian"]
