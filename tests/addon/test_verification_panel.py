@@ -117,6 +117,7 @@ def test_the_panel_tells_poses_changes_and_coverage(verified, tmp_path):
     assert [name for name, _ in drawn().operators] == ["seip.verify", "seip.correct_scene", "seip.show_changes"]
 
 
+@pytest.mark.slow
 def test_the_scene_is_corrected_once_and_verified_again_without_changes(verified):
     before = names(verified)
     assert bpy.ops.seip.correct_scene() == {"FINISHED"}

@@ -110,7 +110,7 @@ def check(road_map, most=STEEPEST):
     assert max(gaps(road_map)) < GAP
 
 
-@pytest.mark.parametrize("half", [10.0, 20.0, 40.0])
+@pytest.mark.parametrize("half", [10.0, pytest.param(40.0, marks=pytest.mark.slow)])
 def test_a_short_bridge_is_as_high_as_it_needs_and_its_ramps_are_gentle(tmp_path, half):
     extract = Extract()
     bridge(extract, half)
@@ -265,9 +265,9 @@ def check_exit(seed, tmp_path):
 @pytest.mark.parametrize(
     "seed",
     [
-        *range(3),
-        *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 9)),
-        *(pytest.param(seed, marks=pytest.mark.long) for seed in range(9, 66)),
+        0,
+        *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 5)),
+        *(pytest.param(seed, marks=pytest.mark.long) for seed in range(5, 66)),
     ],
 )
 def test_random_exits_have_gentle_grades_and_no_steps(tmp_path, seed):

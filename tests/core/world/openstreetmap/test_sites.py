@@ -23,6 +23,7 @@ from tests.builders.osm_text import (
     roundabout,
     slope,
 )
+from tests.few import few
 from tests.oracles.face_areas import check_surfaces
 from tests.sumo_here import needs_sumo
 
@@ -42,7 +43,7 @@ def plan(model, name):
     return shapely.union_all([shapely.Polygon(face).buffer(0) for face in faces if len(face) > 2], grid_size=1e-4)
 
 
-@pytest.mark.parametrize("name", JUNCTIONS)
+@pytest.mark.parametrize("name", few(JUNCTIONS, 3))
 def test_a_kind_of_junction_becomes_a_sound_site(name, tmp_path):
     site = built(JUNCTIONS[name](), tmp_path)
     model = site.model
@@ -267,7 +268,7 @@ def test_slip_lanes_leave_islands_and_the_weighted_box_lies_along_the_roads(tmp_
     assert box.area == pytest.approx((high_x - low_x) * (high_y - low_y), rel=0.1)
 
 
-@pytest.mark.parametrize("radius", [30, 60])
+@pytest.mark.parametrize("radius", few([30, 60], 1))
 def test_a_roundabout_is_one_place_with_all_its_approaches(radius, tmp_path):
     extract = Extract()
     ring = [extract.node(radius * np.cos(at), radius * np.sin(at)) for at in np.arange(24) * np.pi / 12]
@@ -428,7 +429,7 @@ def points(text):
     return [tuple(map(float, pair.split(","))) for pair in text.split()]
 
 
-@pytest.mark.parametrize("name", RINGS)
+@pytest.mark.parametrize("name", few(RINGS, 1))
 def test_the_island_and_the_pavements_of_a_small_roundabout_are_whole(tmp_path, name):
     ring, arms, tags = points(RINGS[name][0]), *RINGS[name][1:]
     extract = Extract()

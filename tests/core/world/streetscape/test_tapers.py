@@ -35,7 +35,13 @@ def across(area, x):
 
 
 @pytest.mark.parametrize(
-    ("kind", "lanes"), [("two ways", (2, 4)), ("two ways", (4, 2)), ("one way", (2, 4)), ("left hand", (2, 4))]
+    ("kind", "lanes"),
+    [
+        ("two ways", (2, 4)),
+        pytest.param("two ways", (4, 2), marks=pytest.mark.slow),
+        pytest.param("one way", (2, 4), marks=pytest.mark.slow),
+        pytest.param("left hand", (2, 4), marks=pytest.mark.slow),
+    ],
 )
 def test_edges_do_not_jog_where_lanes_are_added(tmp_path, kind, lanes):
     parts = street(tmp_path, lanes=lanes, one_way=kind == "one way", left_hand=kind == "left hand")
