@@ -28,12 +28,18 @@ class Progress:
     counted : bool
         Whether all units take about the same time, so that the remaining time follows from their number; false for
         stages of work. A search, which may end at any step, has a total of 0.
+    best : str
+        Best value that a search has found so far, in the words of the answer: "71% of the road"; "" before the first.
+    gap : float or None
+        Largest share by which a better value is still possible; None without a bound.
     """
 
     done: int
     total: int
     what: str
     counted: bool = True
+    best: str = ""
+    gap: float | None = None
 
 
 class Pace:
