@@ -17,9 +17,9 @@ from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.choosing.robustness.pose_study import PoseStudySettings, pose_study
 from seip_addon.core.choosing.robustness.robust_study import robust_study
-from seip_addon.core.choosing.robustness.traffic_instants import spread_instants
 from seip_addon.core.choosing.robustness.traffic_study import traffic_scenarios, traffic_study
 from seip_addon.core.progress import Progress
+from seip_addon.core.sensing.scenarios.traffic_instants import spread_instants
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.workflows.survey import Survey, surroundings
 from seip_addon.core.workflows.traffic_runs import split_runs

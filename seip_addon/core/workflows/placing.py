@@ -28,11 +28,11 @@ from ..choosing.robustness.gain_band import with_gain_band
 from ..choosing.robustness.pose_error_evaluation import PoseErrorEvaluation
 from ..choosing.robustness.pose_study import PoseStudySettings, pose_message, pose_study
 from ..choosing.robustness.robust_study import robust_study
-from ..choosing.robustness.traffic_instants import spread_instants
 from ..choosing.robustness.traffic_study import traffic_message, traffic_scenarios, traffic_study
 from ..errors import SeipError
 from ..progress import Progress
 from ..sensing.lidar.model import LidarModel
+from ..sensing.scenarios.traffic_instants import spread_instants
 from ..site.site import Site
 from .returns import crossing_returns, place_by_returns, with_returns_front
 from .survey import Survey, surroundings

@@ -13,11 +13,11 @@ import numpy as np
 from ...arrays import Boolean, Float
 from ...estimates import IntervalEstimate, mean_of, quantile_of
 from ...progress import Progress
+from ...sensing.scenarios.pose_errors import ERROR_KINDS, PoseErrors
+from ...sensing.scenarios.scenario_visibility import ScenarioVisibility
+from ...sensing.scenarios.visibility_under_errors import draws_for, visibility_under_errors
 from ...sensing.visibility.surroundings import Surroundings
 from ..placement.deployment import Deployment
-from ..placement.scenarios import ERROR_KINDS, PoseErrors
-from .scenario_visibility import ScenarioVisibility
-from .visibility_under_errors import draws_for, visibility_under_errors
 
 LOW_QUANTILE = 0.05  # quantile of coverage that is reported, and by which placements are compared
 

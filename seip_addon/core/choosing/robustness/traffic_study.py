@@ -15,15 +15,15 @@ import numpy as np
 from ...arrays import Boolean, Float, Integer
 from ...estimates import IntervalEstimate, mean_over_time
 from ...progress import Progress
+from ...sensing.scenarios.scenario_visibility import ScenarioVisibility
+from ...sensing.scenarios.traffic_instants import NO_TRAFFIC, Instants, TrafficObstacles
+from ...sensing.scenarios.visibility_in_traffic import visibility_in_traffic
 from ...sensing.visibility.surroundings import Surroundings
 from ..placement.problem import Placement, PlacementProblem
 from ..placement.risk import Risk
 from ..placement.search_limits import DEFAULT_LIMITS, SolverLimits
 from ..placement.solver import solve
 from .robust_placement import at_least, outcomes_of, solve_robust
-from .scenario_visibility import ScenarioVisibility
-from .traffic_instants import NO_TRAFFIC, Instants, TrafficObstacles
-from .visibility_in_traffic import visibility_in_traffic
 
 NOTABLE_LOSS = 0.01  # share of the targets' weight whose loss in traffic is worth a warning
 IN_TRAFFIC = "in traffic"  # first words of a `traffic_message`, and of no other

@@ -131,6 +131,38 @@ class ScanPosition:
             strong[ray[model.law.strength(distance[ray], reflected) < least]] = False
         return strong
 
+    def pairs_seen(
+        self,
+        model: LidarModel,
+        directions: Float,
+        distance: Float,
+        triangle: Integer,
+        surfaces: NearSurfaces,
+        index: TargetIndex,
+    ) -> tuple[Integer, Integer]:
+        """Return each ray of a sensor with each target that its return sees, from the hits of n rays.
+
+        Parameters
+        ----------
+        directions, distance, triangle : (n, 3) and (n,) float64, (n,) int64
+            Directions of the rays, and their hits.
+        surfaces : NearSurfaces
+            Surfaces near the targets.
+        index : TargetIndex
+            Index of the targets.
+
+        Returns
+        -------
+        ray, target : (p,) int64
+            Indices of the pairs, rays ascending.
+        """
+        # A return may see several targets, and the strength at borders depends on the target's surfaces: pairs of both
+        returns = np.flatnonzero(self.counting(model, directions, distance, triangle))
+        directions, distance = directions[returns], distance[returns]
+        ray, target = index.pairs_within_delta(self.origin + distance[:, None] * directions)
+        strong = self.counting_at_borders(model, surfaces, directions[ray], distance[ray], target)
+        return returns[ray[strong]], target[strong]
+
 
 def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
     """Find the targets that are seen, casting only rays that can affect the result.
@@ -229,12 +261,7 @@ def seen_by_rays(
     for begin in range(0, len(rays), _RAYS_AT_ONCE):
         directions = pattern.directions(rays[begin : begin + _RAYS_AT_ONCE])
         distance, triangle = position.caster.cast(position.origin, directions, model.max_range)
-        # A return may see several targets, and the strength at borders depends on the target's surfaces: pairs of both
-        counts = position.counting(model, directions, distance, triangle)
-        directions, distance = directions[counts], distance[counts]
-        ray, target = index.pairs_within_delta(_points(position.origin, directions, distance))
-        strong = position.counting_at_borders(model, surfaces, directions[ray], distance[ray], target)
-        seen[target[strong]] = True
+        seen[position.pairs_seen(model, directions, distance, triangle, surfaces, index)[1]] = True
     return seen
 
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
-from seip_addon.core.choosing.robustness.traffic_instants import spread_instants
 from seip_addon.core.choosing.robustness.traffic_study import traffic_scenarios, traffic_study
-from seip_addon.core.choosing.robustness.visibility_in_traffic import visibility_in_traffic
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.scenarios.traffic_instants import spread_instants
+from seip_addon.core.sensing.scenarios.visibility_in_traffic import visibility_in_traffic
 from seip_addon.core.sensing.traffic.trajectories import RoadUser
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
