@@ -25,7 +25,6 @@ from ..visibility.ray_casting import RayCaster, engine_name, make_ray_caster
 from ..visibility.scanning import ScanPosition
 from ..visibility.surroundings import Surroundings
 from ..visibility.target_index import TargetIndex
-from ..visibility.visibility_model import in_sensor_axes
 from .scenario_visibility import ScenarioVisibility, each_in_threads
 from .traffic_instants import TrafficObstacles
 
@@ -109,13 +108,12 @@ class _StaticScan:
         candidates, delta = around.site.candidates, around.sight.delta
         self._model = model = around.models[str(candidates.sensor[pose])]
         xyz, yaw = candidates.xyz[pose], float(candidates.yaw[pose])
-        self._in_site = ScanPosition(caster, xyz, yaw, [model], around.sight, around.site.reflectivity)
-        # A tilted sensor is computed in its own axes, as visibility on the empty road is.
-        self._orientation = candidates.orientation(pose) if candidates.tilt[pose] != 0 else None
-        if self._orientation is not None:
-            surfaces = rotated_surfaces(surfaces, xyz, self._orientation)
-        self._position, self._surfaces = self._in_own_axes(self._in_site), surfaces
-        self._pattern, self._windows = BeamPattern(model, self._position.yaw), BeamWindows(model)
+        position = ScanPosition(caster, xyz, yaw, [model], around.sight, around.site.reflectivity)
+        if candidates.tilt[pose] != 0:  # computed in the axes of the sensor, as visibility on the empty road is
+            orientation = candidates.orientation(pose)
+            position, surfaces = position.in_sensor_axes(orientation), rotated_surfaces(surfaces, xyz, orientation)
+        self._position, self._surfaces = position, surfaces
+        self._pattern, self._windows = BeamPattern(model, position.yaw), BeamWindows(model)
         self._index = TargetIndex(surfaces.xyz, delta)
         # A ray that passes no point nearer than δ sees none, with or without traffic: only those through the box of all
         # points, enlarged by δ, are cast.
@@ -132,9 +130,9 @@ class _StaticScan:
         pairs = []
         for ray in np.array_split(matters, max(1, -(-len(matters) // _RAYS_AT_ONCE))):
             directions = self._pattern.directions(ray)
-            distance, triangle = self._position.caster.cast(self._position.origin, directions, model.max_range)
+            distance, triangle = position.cast(directions, model.max_range)
             self._distance[ray] = distance
-            pairs.append(self._seen_by(self._position, ray, directions, distance, triangle))
+            pairs.append(self._seen_by(position, ray, directions, distance, triangle))
         self._target = np.concatenate([target for _, target in pairs]).astype(np.int32)
         # rays ascend, and pairs come in their order: so the counts by ray give the lists' beginnings
         count = np.bincount(np.concatenate([ray for ray, _ in pairs]), minlength=rays)
@@ -146,15 +144,12 @@ class _StaticScan:
         # Bodies are in a caster of their own. A ray ends at the nearer of the two hits, so that the full scan with
         # traffic follows from the scan of the empty road and the few rays towards vehicles. Where both are equally far
         # the road keeps the ray.
-        hulls = vehicles.hulls
-        if self._orientation is not None:
-            hulls = (hulls - self._in_site.origin) @ self._orientation
         towards = np.zeros(len(self._matters), dtype=bool)
-        towards[self._through(hulls)] = True
+        towards[self._through(self._position.to_axes(vehicles.hulls))] = True
         ray = np.flatnonzero(towards & self._matters)
         directions = self._pattern.directions(ray)
-        present = self._in_own_axes(replace(self._in_site, caster=vehicles.caster, reflectivity=vehicles.reflectivity))
-        distance, triangle = present.caster.cast(present.origin, directions, self._model.max_range)
+        present = replace(self._position, caster=vehicles.caster, reflectivity=vehicles.reflectivity)
+        distance, triangle = present.cast(directions, self._model.max_range)
         sooner = distance < self._distance[ray]
         stopped = ray[sooner]
         # A road user that stops a ray takes it away from all targets of its list. A target stays seen if more rays see
@@ -166,9 +161,6 @@ class _StaticScan:
         # The stopped rays that return from the road user may see targets near its surface: these are added.
         seen[self._seen_by(present, stopped, directions[sooner], distance[sooner], triangle[sooner])[1]] = True
         return seen
-
-    def _in_own_axes(self, position: ScanPosition) -> ScanPosition:
-        return position if self._orientation is None else in_sensor_axes(position, self._orientation)
 
     def _through(self, hulls: Float) -> Integer:
         """Return the rays that may pass through hulls (k, 8, 3), given in the axes of the scan."""
