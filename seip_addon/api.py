@@ -141,5 +141,5 @@ def scan(
     Frame
         Merged point cloud with the boxes of all road users.
     """
-    run = make_run(geometry, solution.deployment.mounted, traffic, RecordingSettings(settings or ScanSettings()), {})
+    run = make_run(geometry, solution.deployment.sensors, traffic, RecordingSettings(settings or ScanSettings()), {})
     return finish(simulation_of(run)).frame(*frame_number(run, time))

@@ -231,7 +231,7 @@ def weather(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     study = yield from weather_study(survey.geometry, survey.settings)
     best = yield from solve(scene.problem(scene.sensor), survey.settings.limits)
     deployment = deploy(survey.site, survey.models, survey.grid.rows(best.chosen), best.chosen)
-    sensors = deployment.mounted
+    sensors = deployment.sensors
     rows = weather_rows(study, untouched_types(survey, scene.placed, sensors))
     limits_charts.save_weather_chart(scene.charts / "weather.png", study, f"{scene.name} in rain and fog")
     caption = "Coverage by weather: placements for clear air and for the weather, and sensors with a longer range"

@@ -61,7 +61,7 @@ def test_traffic_scenarios_need_runs(small_survey):
 def test_a_sensor_moved_by_hand_sees_what_its_rays_see(small_survey):
     solution = finish(place(small_survey, Objective(count=1)))
     (one,) = solution.deployment.sensors
-    mounted = one.mounted
+    mounted = one
     aside = replace(mounted, xyz=mounted.xyz + np.array([0.05, 0.0, 0.0]))
     moved = finish(evaluate_moved_sensors(small_survey, solution.objective, [aside], {aside.label: "here"}))
     (sensor,) = moved.deployment.sensors
