@@ -86,10 +86,6 @@ class TypeBand:
     low: float
     high: float
 
-    def describe(self) -> str:
-        """Return the band as text: one share where both ends read the same."""
-        return _span(self.low, self.high)
-
 
 @dataclass(frozen=True)
 class GainBand:
@@ -127,14 +123,14 @@ class GainBand:
             )
         types = dict.fromkeys(one for pair in self.unranked for one in pair)
         if types:
-            bands = ", ".join(f"{one.sensor} {one.describe()}" for one in types)
+            bands = ", ".join(f"{one.sensor} {_span(one.low, one.high)}" for one in types)
             messages.append(f"{UNRANKED}, as their bands overlap where the sensors are mounted: {bands}")
         return tuple(messages)
 
 
 def _span(low: float, high: float) -> str:
-    ends = dict.fromkeys(f"{share:.1%}" for share in (low, high))
-    return " to ".join(ends)
+    """Return two shares as text: one where both read the same."""
+    return " to ".join(dict.fromkeys((f"{low:.1%}", f"{high:.1%}")))
 
 
 @dataclass(frozen=True, eq=False)
