@@ -27,10 +27,11 @@ import bpy
 from seip_addon.core.choosing.placement.deployment import price_text
 from seip_addon.core.choosing.placement.objective import Objective, Solution, check_objective
 from seip_addon.core.choosing.placement.returns_summary import share_reached
-from seip_addon.core.choosing.placement.scenarios import PoseErrors, ScenarioKind, Scenarios
+from seip_addon.core.choosing.placement.scenarios import ScenarioKind, Scenarios
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import CHOSEN_WEIGHT
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.scenarios.pose_errors import PoseErrors
 from seip_addon.core.workflows.placing import place, with_context
 from seip_addon.core.workflows.survey import Layout
 from seip_addon.core.workflows.traffic_runs import TrafficRuns, read_runs

@@ -28,11 +28,11 @@ from ..choosing.robustness.gain_band import with_gain_band
 from ..choosing.robustness.pose_error_evaluation import PoseErrorEvaluation
 from ..choosing.robustness.pose_study import PoseStudySettings, pose_message, pose_study
 from ..choosing.robustness.robust_study import robust_study
-from ..choosing.robustness.traffic_instants import spread_instants
-from ..choosing.robustness.traffic_study import traffic_message, traffic_scenarios, traffic_study
+from ..choosing.robustness.traffic_study import evaluate_in_traffic, traffic_scenarios, traffic_study
 from ..errors import SeipError
 from ..progress import Progress
 from ..sensing.lidar.model import LidarModel
+from ..sensing.scenarios.traffic_instants import spread_instants
 from ..site.site import Site
 from .returns import crossing_returns, place_by_returns, with_returns_front
 from .survey import Survey, surroundings
@@ -180,9 +180,9 @@ def _evaluated(survey: Survey, solution: Solution, runs: TrafficRuns | None) -> 
         return [pose_message((yield from pose_study(around, solution.deployment, settings)))]
     if scenarios.kind == "traffic":
         held_out = spread_instants(_required(runs).evaluation, scenarios.evaluated, scenarios.seed + 1)
-        poses = np.array([one.pose for one in solution.deployment.sensors if one.pose is not None], dtype=np.int64)
-        weights = target_weights(survey.site, objective)
-        return [(yield from traffic_message(around, poses, weights, held_out))]
+        weights, placements = target_weights(survey.site, objective), {"the empty road": solution.placement}
+        (evaluation,) = yield from evaluate_in_traffic(around, placements, weights, held_out)
+        return [evaluation.message]
     return []
 
 

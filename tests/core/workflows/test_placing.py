@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from seip_addon.core.choosing.placement.objective import Objective
-from seip_addon.core.choosing.placement.scenarios import PoseErrors, Scenarios
+from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.scenarios.pose_errors import PoseErrors
 from seip_addon.core.workflows.moved_sensors import evaluate_moved_sensors
 from seip_addon.core.workflows.placing import place
 
@@ -60,7 +61,7 @@ def test_traffic_scenarios_need_runs(small_survey):
 def test_a_sensor_moved_by_hand_sees_what_its_rays_see(small_survey):
     solution = finish(place(small_survey, Objective(count=1)))
     (one,) = solution.deployment.sensors
-    mounted = one.mounted
+    mounted = one
     aside = replace(mounted, xyz=mounted.xyz + np.array([0.05, 0.0, 0.0]))
     moved = finish(evaluate_moved_sensors(small_survey, solution.objective, [aside], {aside.label: "here"}))
     (sensor,) = moved.deployment.sensors
