@@ -132,7 +132,7 @@ def main(argv: list[str]) -> None:
     acceptance = runtime.accepted_by_enter()
     solution = watch.run("placement", place(surveyed, objective, runs, acceptance))
     runtime.print_line(_describe(solution))
-    solution = watch.run("fewer and more sensors", with_context(surveyed, solution))
+    solution = watch.run("fewer and more sensors", with_context(surveyed, solution, acceptance))
     with runtime.incomplete_if_interrupted(options.output):
         save_evaluation_charts(options.output, surveyed, solution)
         survey.save_solution(surveyed, watch, solution, options.output, render=not options.no_render)
