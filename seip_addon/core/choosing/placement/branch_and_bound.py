@@ -112,7 +112,7 @@ class BranchAndBound:
         self.incumbent, self.instance, self._block = incumbent, incumbent.instance, block
         self._rounding, self._total = block.rounding, block.value(np.arange(len(block)))
         self._number = self._met = 0
-        self._tried: dict[int, tuple[int, int]] = {}
+        self._tried: dict[int, tuple[int, float]] = {}
         self._open: list[_Node] = []
         self._waiting: list[_Node] = []
         self._goal = -math.inf
@@ -189,7 +189,7 @@ class BranchAndBound:
         heapify(self._open)
         self._note(self.bound)
         if not self._open:
-            incumbent.bound = incumbent.value
+            incumbent.close()
         distance = self.bound - incumbent.value
         self._goal = incumbent.value + GOAL_SHARE * distance if distance > LEAST_GAP * self.bound else -math.inf
         return not self._open
@@ -353,7 +353,8 @@ class BranchAndBound:
                 self._complete(child.chosen, left, reach[row, own])
             elif block.has_product and rest.count == LISTED:
                 able = own & (reach[row] >= self.incumbent.least_better)
-                self._list_pairs(problem, child, order.candidates[rows[row]], order.candidates[able], values[row] + gains[row, able])
+                members = order.candidates[able]
+                self._list_pairs(problem, child, order.candidates[rows[row]], members, values[row] + gains[row, able])
             else:
                 self._push_unlikely(child, reach[row, own])
                 kept = np.sort(left[reach[row, own] >= max(self._goal, self.incumbent.least_better)])
@@ -482,7 +483,7 @@ class _Order:
 
 
 def _with_largest(rest: Rest, order: _Order, rows: Integer, value: Float, gains: Float) -> tuple[Float, Float]:
-    """Return values of children (k,) with the largest gains (k, n) of each kind, and with each gain among them (k, n)."""
+    """Return values of children (k,) with the largest gains (k, n) of each kind, and with each gain (k, n) too."""
     most, weakest = value.copy(), np.zeros(gains.shape)
     for kind, quota in enumerate(rest.quota):
         own = np.flatnonzero(order.kind == kind)
