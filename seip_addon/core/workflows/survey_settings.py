@@ -110,7 +110,7 @@ class SurveySettings:
             "engine": self.engine,
             "solver": self.solver,
             "installed_cost": self.installed_cost and asdict(self.installed_cost),
-            "effort": self.limits.work,
+            "effort": self.effort,
         }
 
 

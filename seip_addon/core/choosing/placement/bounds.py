@@ -146,8 +146,8 @@ class Rest:
         taken = [self.clique[one] for group, one in zip(self.groups, forced, strict=True) if self._is_single(group)]
         best_first = np.argsort(-net, kind="stable")
         best_first = best_first[net[best_first] > 0]
-        if taken:
-            best_first = best_first[~np.isin(self.clique[best_first], taken)]
+        if forced:
+            best_first = best_first[~np.isin(self.clique[best_first], taken) & ~np.isin(best_first, forced)]
         picked, weakest = [np.array(forced, dtype=np.int64)], np.zeros(len(self.quota))
         for kind, quota in enumerate(self.quota):
             own = best_first[self.kind[best_first] == kind] if len(self.quota) > 1 else best_first

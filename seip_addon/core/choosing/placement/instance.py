@@ -92,6 +92,11 @@ class Instance:
         """The same for gains that follow others of similar placements."""
         return sum(block.update_operations for block in self.blocks)
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether the objective is the value of a single block without failures."""
+        return len(self.blocks) == 1 and self.risk.failure == "none"
+
     def affordable(self, price: Float | float) -> Boolean | bool:
         """Return whether a total price is within the budget, except for rounding."""
         return price <= self.budget * (1 + TIE_TOLERANCE)

@@ -94,7 +94,7 @@ def search_and_prove(
     yield from search.restarts(RESTART_SHARE * work.left)
     rest, part = branches.left(), work.part(PROGRAM_SHARE * work.left)
     tight = isinstance(problem.g, Steps) and incumbent.gap <= TIGHT_GAP
-    if instance.risk.is_nominal and (tight or solver != "auto") and is_affordable(instance.of(rest), part):
+    if instance.is_plain and (tight or solver != "auto") and is_affordable(instance.of(rest), part):
         name = f"{name}, {check_solver(solver)}"
         yield from prove_by_program(incumbent, rest, solver, part)
     if not incumbent.proven:
@@ -145,7 +145,7 @@ def placement_of(problem: PlacementProblem, incumbent: Incumbent, solver: str) -
         solver=solver,
         seconds=incumbent.work.seconds,
         notes=tuple(notes),
-        objective=None if instance.risk.is_nominal else incumbent.value * instance.unit,
+        objective=incumbent.value * instance.unit,
     )
 
 
