@@ -164,18 +164,21 @@ class Instance:
         """Return a sum that is nowhere below the objective: the mean of the blocks by shares (K,) that add up to 1.
 
         Any shares of at most 1/m give a bound on the mean of the m worst of K outcomes. After a failure the value of a
-        target by the number of sensors is that of the mean over failures, which the worst one does not exceed.
+        target by the number of sensors that see it is that of the mean over failures, which the worst one does not
+        exceed; for other functions than `Steps` the bound is that without failures.
         """
         used = np.flatnonzero(shares)
         blocks = [self.blocks[k] for k in used]
-        weight: Float = np.concatenate([shares[k] * self.blocks[k].weight for k in used])
-        g = blocks[0].g
-        if self.risk.failure != "none":
-            weight, g = weight / self.count, Steps((self.count - 1.0, 1.0))
         if len(blocks) == 1 and self.risk.failure == "none":
             only: ConcaveSum = blocks[0]
             return only
-        amounts, weight = _merged(np.concatenate([block.amounts > 0 for block in blocks], axis=1), weight)
+        weight: Float = np.concatenate([shares[k] * self.blocks[k].weight for k in used])
+        amounts = np.concatenate([block.amounts for block in blocks], axis=1)
+        g = blocks[0].g
+        if isinstance(g, Steps):
+            amounts, weight = _merged(amounts > 0, weight)
+            if self.risk.failure != "none":
+                weight, g = weight / self.count, Steps((self.count - 1.0, 1.0))
         relaxed: ConcaveSum = g.sum_over(amounts, weight, single=amounts.size > MAX_DOUBLE)
         return relaxed
 
