@@ -120,8 +120,11 @@ class _Cheapest:
         instance = self._instance
         if self._equal_prices:
             return replace(instance, count=len(chosen) - 1) if len(chosen) > 1 else None
-        below = math.fsum(instance.price[chosen]) * (1 - 3 * TIE_TOLERANCE)
-        return replace(instance, budget=min(below, instance.budget)) if below >= instance.price.min() else None
+        price = math.fsum(instance.price[chosen])
+        below = price * (1 - 3 * TIE_TOLERANCE)
+        if price == 0 or below < instance.price.min():
+            return None
+        return replace(instance, budget=min(below, instance.budget))
 
     def _least_price(self, chosen: Integer) -> Generator[Progress, None, float]:
         """Return a price below which no placement reaches the goal."""

@@ -21,6 +21,7 @@ MAX_EXACT = 2.0**52  # sums of whole numbers up to here are exact in double prec
 MAX_SINGLE_TOTAL = 20_000.0  # total of whole weights up to which single precision tells sums apart
 MAX_DOUBLE = 20_000_000  # entries of A up to which several blocks together are kept in double precision
 WHOLE_SLACK = 0.25  # whole weights differ by one or not at all
+BINARY_PARTS = 16  # whole numbers, halves and so on up to this have a common unit
 DENOMINATORS = range(1, 13)  # a common unit of all weights is sought among these parts of the smallest one
 
 
@@ -246,6 +247,9 @@ def common_unit(weights: Float) -> tuple[float, bool]:
         Positive.
     """
     total = math.fsum(weights)
+    parts = weights * BINARY_PARTS
+    if total * BINARY_PARTS <= MAX_EXACT and np.array_equal(np.rint(parts), parts):
+        return float(np.gcd.reduce(parts.astype(np.int64))) / BINARY_PARTS, True
     for share in DENOMINATORS:
         unit = float(weights.min()) / share
         if total / unit <= MAX_EXACT and np.array_equal(np.rint(weights / unit) * unit, weights):
