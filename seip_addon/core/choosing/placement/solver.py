@@ -73,6 +73,7 @@ def solve(
         The constraints cannot be met together, no candidate adds anything, fewer sensors are allowed than the risk
         measure needs, or the solver is not available.
     """
+    check_solver(limits.solver)
     risk.require_sensors(problem.most_sensors)
     instance = make_instance(problem, cases, risk)
     incumbent = Incumbent(instance, limits.work(), describe)
