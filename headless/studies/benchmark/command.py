@@ -30,7 +30,12 @@ def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
     parser.add_argument(
         "--places", type=int, default=12, help="number of sampled positions; a full scan of each takes seconds"
     )
-    parser.add_argument("--time-limit", type=float, default=60.0, help="time limit of each solve, seconds")
+    parser.add_argument(
+        "--effort",
+        type=float,
+        default=60.0,
+        help="limit of each solve: units of counted work, and seconds for the methods of others",
+    )
     models = parser.add_argument_group("models of the sensor")
     models.add_argument("--sensor-models", action="store_true", help="measure only this chapter; keep the others")
     models.add_argument(
@@ -50,14 +55,14 @@ def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
         findings, checks = kept
     else:
         runtime.open_scene(options.scene)
-        findings, names = measure(read_scene(bpy.context.scene).geometry, options.places, options.time_limit, scope)
+        findings, names = measure(read_scene(bpy.context.scene).geometry, options.places, options.effort, scope)
         checks = bars(findings.costs, findings.runs, names, findings.scans)
     for bar in checks:
         verdict = "" if bar.met else " – NOT MET"
         runtime.print_line(f"{bar.what}: required {bar.asked}, measured {bar.measured}{verdict}")
     steps = compare_sensor_models(
         [options.scene, *options.site],
-        options.time_limit,
+        options.effort,
         scope,
         seed=options.seed,
         steps=options.steps,

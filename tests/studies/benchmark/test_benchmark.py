@@ -39,7 +39,7 @@ def folder(small_scene, tmp_path_factory):
     pytest.importorskip("embreex", reason="embreex is not installed")
     folder = tmp_path_factory.mktemp("benchmark")
     work = ["--steps", "2", "--work", str(folder / "work")]
-    benchmark.main([str(small_scene), "-o", str(folder), "--places", "1", "--time-limit", "5", *work], SMALL)
+    benchmark.main([str(small_scene), "-o", str(folder), "--places", "1", "--effort", "5", *work], SMALL)
     return folder
 
 
