@@ -125,7 +125,7 @@ def measure(
     rates = {engine: cast_rate(make_ray_caster(site.triangles, engine), site.candidates.xyz[0]) for engine in ENGINES}
     limits = {str(engine): c.seconds * rates[engine] / c.seen for engine in ENGINES for c in [costs[f"lazy {engine}"]]}
     runs, names = placements(site, models, settings, effort, scope)
-    growths = growth(geometry, settings, effort, scope)
+    growths = [*growth_of_visibility(geometry, settings, scope), *growth_of_placement(effort, scope)]
     LOG.info("scans of traffic")
     scans = scan_costs(site, static_scene(geometry), load_catalogue()[scope.scanned_by], scope.frames)
     setting = {
@@ -142,6 +142,22 @@ def measure(
         "versions": {name: importlib.metadata.version(name) for name in ("bpy", "numpy", "embreex", "PuLP", "highspy")},
     }
     return Findings(setting, costs, degradation, limits, runs, growths, scans), names
+
+
+def with_placement(
+    findings: Findings, geometry: SceneGeometry, effort: float, scope: BenchmarkScope
+) -> tuple[Findings, tuple[str, str, str]]:
+    """Measure placement and its growth again; return the findings with these, and the names as `measure` does."""
+    models = find_models(load_catalogue(), scope.layout.sensors)
+    site = make_site(geometry, scope.layout, fields_of_view=fields_of_view(models))
+    runs, names = placements(site, models, VisibilitySettings(), effort, scope)
+    others = [one for one in findings.growths if one.what.startswith("visibility")]
+    return replace(
+        findings,
+        setting={**findings.setting, "effort": effort},
+        runs=runs,
+        growths=[*others, *growth_of_placement(effort, scope)],
+    ), names
 
 
 def compare_sensor_models(
@@ -224,9 +240,9 @@ def placements(
     return runs, (names[0], names[1], names[2])
 
 
-def growth(geometry: SceneGeometry, settings: VisibilitySettings, effort: float, scope: BenchmarkScope) -> list[Growth]:
+def growth_of_visibility(geometry: SceneGeometry, settings: VisibilitySettings, scope: BenchmarkScope) -> list[Growth]:
     """Measure growth with one size at a time, then with all: copies of the scene side by side."""
-    LOG.info("growth, each size in a process of its own")
+    LOG.info("growth of visibility, each size in a process of its own")
     models = find_models(load_catalogue(), scope.layout.sensors)
     site = make_site(geometry, scope.layout, fields_of_view=fields_of_view(models))
     rows = {copies: repeated(site, copies) for copies in scope.copies}
@@ -235,9 +251,6 @@ def growth(geometry: SceneGeometry, settings: VisibilitySettings, effort: float,
     finer = [
         make_site(geometry, scope.layout, spacing, fields_of_view=fields_of_view(models)) for spacing in scope.spacings
     ]
-    positions, targets, blocks = scope.street
-    posts = [positions * times // scope.multiples[-1] for times in scope.multiples]
-    points = [targets * times // 2 for times in scope.multiples]
     found = [
         visibility_growth(
             "visibility",
@@ -263,10 +276,25 @@ def growth(geometry: SceneGeometry, settings: VisibilitySettings, effort: float,
             models,
             settings,
         ),
+    ]
+    return _logged_growth(found)
+
+
+def growth_of_placement(effort: float, scope: BenchmarkScope) -> list[Growth]:
+    """Measure growth in street grids, with their positions and with their targets."""
+    LOG.info("growth of placement, each size in a process of its own")
+    positions, targets, blocks = scope.street
+    posts = [positions * times // scope.multiples[-1] for times in scope.multiples]
+    points = [targets * times // 2 for times in scope.multiples]
+    found = [
         placement_growth("poses", [3 * n for n in posts], [(n, targets, blocks) for n in posts], effort),
         placement_growth("targets", points, [(positions, n, blocks) for n in points], effort),
         relaxation_growth([(n, targets, blocks) for n in posts]),
     ]
+    return _logged_growth(found)
+
+
+def _logged_growth(found: list[Growth]) -> list[Growth]:
     for one in found:
         LOG.info(f"{one.what} against {one.size_of}: exponent {one.time_exponent:.2f}")
     return found
