@@ -84,7 +84,8 @@ def _place(folder: Path, job: PlaceJob) -> Generator[Progress, None, None]:
     now = Provenance(datetime.now(UTC), {}, versions(blender=bpy.app.version_string))
     placed = folder / PLACED_FILES
     placed.mkdir()
-    write_result_folder(placed, bpy.context.scene, survey, solution, record_of(survey, solution, now), render=False)
+    record = record_of(survey, solution, now)
+    yield from write_result_folder(placed, bpy.context.scene, survey, solution, record, render=False)
 
 
 def _surveyed(folder: Path, settings: SurveySettings) -> Generator[Progress, None, Survey]:

@@ -27,10 +27,11 @@ import bpy
 from seip_addon.core.choosing.placement.deployment import price_text
 from seip_addon.core.choosing.placement.objective import Objective, Solution, check_objective
 from seip_addon.core.choosing.placement.returns_summary import share_reached
-from seip_addon.core.choosing.placement.scenarios import PoseErrors, ScenarioKind, Scenarios
+from seip_addon.core.choosing.placement.scenarios import ScenarioKind, Scenarios
 from seip_addon.core.errors import SeipError
 from seip_addon.core.limits import CHOSEN_WEIGHT
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.scenarios.pose_errors import PoseErrors
 from seip_addon.core.workflows.placing import place, with_context
 from seip_addon.core.workflows.survey import Layout
 from seip_addon.core.workflows.traffic_runs import TrafficRuns, read_runs
@@ -131,7 +132,7 @@ def main(argv: list[str]) -> None:
     acceptance = runtime.accepted_by_enter()
     solution = watch.run("placement", place(surveyed, objective, runs, acceptance))
     runtime.print_line(_describe(solution))
-    solution = watch.run("fewer and more sensors", with_context(surveyed, solution))
+    solution = watch.run("fewer and more sensors", with_context(surveyed, solution, acceptance))
     with runtime.incomplete_if_interrupted(options.output):
         save_evaluation_charts(options.output, surveyed, solution)
         survey.save_solution(surveyed, watch, solution, options.output, render=not options.no_render)

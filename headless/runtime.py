@@ -12,7 +12,6 @@ import signal
 import stat
 import sys
 import threading
-import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -27,7 +26,7 @@ from headless.system_libraries import complaint, missing_libraries
 
 from seip_addon.core.acceptance import Acceptance
 from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Pace, Progress, finish
+from seip_addon.core.progress import Progress, finish, progress_line, reporter
 from seip_addon.core.storage import files as storage
 
 try:
@@ -55,8 +54,7 @@ Result = TypeVar("Result")
 
 EXIT_STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl-C
 SECONDS_BETWEEN_LINES = float(os.environ.get("SEIP_SECONDS_BETWEEN_LINES", "10"))  # of progress, in a log
-ELAPSED_FORMAT = "{desc} [{elapsed}]"  # how progress of unknown length is shown
-STAGES_FORMAT = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}]"  # and that of units of unequal length
+SECONDS_BETWEEN_BARS = 0.1  # of progress, in a terminal
 LOG = logging.getLogger("headless")  # progress and warnings of commands and modules; results go through `print_line`
 _LOCKS: dict[Path, int] = {}  # folders that this process has locked, and what holds each lock
 _MADE: list[Path] = []  # folders that this process has made for results
@@ -210,26 +208,25 @@ def finish_with_bar(steps: Generator[Progress, None, Result]) -> Result:
 def progress_bar() -> Iterator[Callable[[Progress], None]]:
     """Yield a callable for `finish` that shows work done and time left on standard error.
 
-    A terminal sees one bar, which stays on its line and restarts where the work does (a smaller count, another
-    total); work of unknown length shows what it does and for how long. A log gets a line every ten seconds at most,
-    or as often as ``SEIP_SECONDS_BETWEEN_LINES`` in the environment says.
+    A terminal has one line (`progress_line`), which stays in its place, with a bar where the length of the work is
+    known. A log gets such a line whenever a search has found a better placement, and otherwise every ten seconds, or
+    as often as ``SEIP_SECONDS_BETWEEN_LINES`` in the environment says.
     """
     if not sys.stderr.isatty():
-        yield _line_reporter()
+        yield reporter(_write_line, SECONDS_BETWEEN_LINES)
         return
-    with tqdm(file=sys.stderr, leave=False, mininterval=0.1, maxinterval=0.1, bar_format=ELAPSED_FORMAT) as bar:
+    with tqdm(file=sys.stderr, leave=False, bar_format="{desc}") as bar:
 
-        def report(progress: Progress) -> None:
-            known = progress.total > 0
-            bar.set_description(progress.what, refresh=False)
-            bar.bar_format = _format_of(progress)
-            if (progress.total or None) != bar.total or (known and progress.done < bar.n):
-                bar.total = progress.total or None
-                bar.reset()
-                bar.initial = bar.n = progress.done if known else 0  # what an earlier run has done took no time
-            bar.update(progress.done - bar.n if known else 1)
+        def show(progress: Progress, time: str) -> None:
+            line = progress_line(progress, time)
+            if bar.ncols and len(line) > bar.ncols:  # rather a shorter phase than no time
+                phase = progress.what[: bar.ncols - len(line) - 1]
+                line = f"{phase}…{line[len(progress.what) :]}"
+            bar.bar_format = "{desc} |{bar}|" if progress.total else "{desc}"
+            bar.n, bar.total = progress.done, progress.total or None
+            bar.set_description_str(line)
 
-        yield report
+        yield reporter(show, SECONDS_BETWEEN_BARS)
 
 
 def accepted_by_enter() -> Acceptance | None:
@@ -248,39 +245,10 @@ def accepted_by_enter() -> Acceptance | None:
     return acceptance
 
 
-def _line_reporter() -> Callable[[Progress], None]:
-    """Return what writes a line on progress where `SECONDS_BETWEEN_LINES` have passed since the last one."""
-    start = shown = time.monotonic()
-    pace = Pace()
-
-    def report(progress: Progress) -> None:
-        nonlocal shown
-        now = time.monotonic()
-        pace.note(progress, now)
-        if now - shown < SECONDS_BETWEEN_LINES:
-            return
-        shown = now
-        first = progress.done if pace.first is None else pace.first.done
-        timed = progress.counted and progress.total > 0
-        meter = tqdm.format_meter(
-            progress.done,
-            progress.total or None,
-            now - (pace.began if timed else start),
-            prefix=progress.what,
-            bar_format=_format_of(progress),
-            initial=first if timed else 0,
-        )
-        sys.stderr.write(f"{meter}\n")
-        sys.stderr.flush()
-
-    return report
-
-
-def _format_of(progress: Progress) -> str | None:
-    """Return how progress is shown: with the time left, which is tqdm's default, only where the work is counted."""
-    if progress.total == 0:
-        return ELAPSED_FORMAT
-    return None if progress.counted else STAGES_FORMAT
+def _write_line(progress: Progress, time: str) -> None:
+    """Write a line on progress to a log."""
+    sys.stderr.write(f"{progress_line(progress, time)}\n")
+    sys.stderr.flush()
 
 
 def _end(status: int, message: str = "") -> NoReturn:

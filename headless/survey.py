@@ -133,14 +133,9 @@ def survey(options: argparse.Namespace, check: Callable[[Layout], None]) -> tupl
 def save_solution(surveyed: Survey, watch: Stopwatch, solution: Solution, folder: Path, *, render: bool) -> None:
     """Write a solution of a survey, with its record, to the folder of results."""
     now = Provenance(datetime.now(UTC), watch.seconds, versions(blender=bpy.app.version_string))
-    write_result_folder(
-        folder,
-        bpy.context.scene,
-        surveyed,
-        solution,
-        record_of(surveyed, solution, now, render=render),
-        render=render,
-    )
+    record = record_of(surveyed, solution, now, render=render)
+    steps = write_result_folder(folder, bpy.context.scene, surveyed, solution, record, render=render)
+    runtime.finish_with_bar(steps)
 
 
 def describe_sensor(sensor: Sensor) -> str:

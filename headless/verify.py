@@ -51,13 +51,12 @@ def main(argv: list[str]) -> None:
     spacing = read_settings(SurveySettings, options).grid_spacing
     found = runtime.finish_with_bar(verify(geometry, planned, recording, VisibilitySettings(), spacing=spacing))
     folder = options.output
-    for one in found.sensors:
-        runtime.warn(one.background.warnings(one.registration.sensor.label))
+    runtime.warn(found.warnings)
     with runtime.incomplete_if_interrupted(folder):
         save_changes_picture(folder / "changes.png", geometry, planned, found)
         save_returns_chart(folder / "returns.png", found)
         save_changes(folder / CHANGES_FILE, found)
-        units = save_units(folder / "units.toml", recording.name, found.sensors)
+        units = save_units(folder / "units.toml", recording.name, found)
         runtime.warn(correct_scene(bpy.context.scene, found))
         save_blend(folder / "verified.blend")
         record = verification_record(geometry.name, recording.name, found)
@@ -71,12 +70,12 @@ def main(argv: list[str]) -> None:
 def _lines(found: Verification) -> list[str]:
     lines = []
     for one in found.sensors:
-        pose, gain = one.registration, one.gain
-        errors = zip(pose.shift[:3], pose.half_width[:3], strict=True)
+        gain = one.gain
+        errors = zip(one.shift_m, one.shift_half_width_m, strict=True)
         east, north, up = (f"{value:+.3f} ± {math.ceil(1000 * half) / 1000:.3f}" for value, half in errors)
         received = "" if gain is None else f"; gain {gain.value:.2f} ({gain.low:.2f} to {gain.high:.2f})"
         lines.append(
-            f"{pose.sensor.label}: {pose.distance:.2f} m and {math.degrees(pose.angle):.1f}° from its plan "
+            f"{one.id}: {math.hypot(*one.shift_m):.2f} m and {math.hypot(*one.rotation_deg):.1f}° from its plan "
             f"(x {east}, y {north}, z {up} m){received}"
         )
     for change, cost in zip(found.changes, found.costs, strict=True):

@@ -34,10 +34,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .core.choosing.placement.objective import Objective, Solution
-from .core.choosing.placement.scenarios import PoseErrors, Scenarios
+from .core.choosing.placement.scenarios import Scenarios
 from .core.progress import finish
 from .core.sensing.scans.frame import Frame
 from .core.sensing.scans.simulation import ScanSettings
+from .core.sensing.scenarios.pose_errors import PoseErrors
 from .core.sensing.traffic.source import TrafficFiles
 from .core.sensing.traffic.source import load_traffic as _load_traffic
 from .core.sensing.traffic.trajectories import Trajectories
@@ -140,5 +141,5 @@ def scan(
     Frame
         Merged point cloud with the boxes of all road users.
     """
-    run = make_run(geometry, solution.deployment.mounted, traffic, RecordingSettings(settings or ScanSettings()), {})
+    run = make_run(geometry, solution.deployment.sensors, traffic, RecordingSettings(settings or ScanSettings()), {})
     return finish(simulation_of(run)).frame(*frame_number(run, time))

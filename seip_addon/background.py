@@ -1,13 +1,11 @@
 """Background thread for long work, polled from Blender's event loop."""
 
 import threading
-import time
 from collections.abc import Generator
 from concurrent.futures import CancelledError, Future
-from contextlib import closing
 from typing import Generic, TypeVar
 
-from .core.progress import Pace, Progress, finish
+from .core.progress import Progress, finish
 
 Result = TypeVar("Result")
 
@@ -27,9 +25,8 @@ class Background(Generic[Result]):
     """
 
     def __init__(self, steps: Generator[Progress, None, Result]) -> None:
-        self.progress = Progress(0, 0, "begin")
+        self.progress = Progress(0, 0, "starting")
         self._stop = threading.Event()
-        self._pace = Pace()
         self._end: Future[Result] = Future()
         self._thread = threading.Thread(target=self._run, args=(steps,), daemon=True)
         self._thread.start()
@@ -38,11 +35,6 @@ class Background(Generic[Result]):
     def ended(self) -> bool:
         """Whether there is a result, or an error in its place."""
         return self._end.done()
-
-    @property
-    def seconds_left(self) -> float | None:
-        """How long it will take still, or None where nothing tells."""
-        return self._pace.seconds_left
 
     def result(self) -> Result:
         """Return the result, or raise what went wrong; waits for the end."""
@@ -60,13 +52,11 @@ class Background(Generic[Result]):
     def _run(self, steps: Generator[Progress, None, Result]) -> None:
         def report(progress: Progress) -> None:
             self.progress = progress
-            self._pace.note(progress, time.monotonic())
             if self._stop.is_set():
                 raise CancelledError
 
         try:
-            with closing(steps):
-                result = finish(steps, report)
+            result = finish(steps, report)
         except BaseException as error:  # noqa: BLE001  # raised again when the result is read
             self._end.set_exception(error)
         else:

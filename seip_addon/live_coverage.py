@@ -77,15 +77,13 @@ def _update(followed: FollowedSensors, scene: bpy.types.Scene) -> None:
 def _moved(followed: FollowedSensors, sensors: dict[str, MountedSensor]) -> tuple[str, ...]:
     solution = followed.state.solution
     placed = {} if solution is None else {sensor.label: sensor for sensor in solution.deployment.sensors}
-    return tuple(
-        label for label, sensor in sensors.items() if label not in placed or not _same(sensor, placed[label].mounted)
-    )
+    return tuple(label for label, sensor in sensors.items() if label not in placed or not _same(sensor, placed[label]))
 
 
 def _as_placed(deployment: Deployment) -> dict[str, tuple[MountedSensor, Boolean]]:
     """Return the visibility of sensors at candidate poses; that of the others is computed again."""
     seen = zip(deployment.sensors, deployment.rows, strict=True)
-    return {sensor.label: (sensor.mounted, row) for sensor, row in seen if sensor.pose is not None}
+    return {sensor.label: (sensor, row) for sensor, row in seen if sensor.pose is not None}
 
 
 def _same(one: MountedSensor, other: MountedSensor) -> bool:

@@ -20,6 +20,7 @@ from .core.acceptance import Acceptance
 from .core.arrays import Boolean
 from .core.choosing.placement.objective import Solution
 from .core.errors import SeipError
+from .core.progress import Progress
 from .core.sensing.lidar.model import LidarModel
 from .core.sensing.recordings.verification import Verification
 from .core.sensing.scans.frame import Frame
@@ -143,8 +144,8 @@ class RunningWork:
     ----------
     operator : str
         Its ``bl_idname``.
-    began : float
-        Reading of `time.monotonic`.
+    shown : (Progress, str)
+        Progress and time that are shown; see `progress_line`.
     timer : bpy.types.Timer or None
         Has somebody look at it from time to time.
     acceptance : Acceptance, optional
@@ -153,7 +154,7 @@ class RunningWork:
 
     operator: str
     work: Background[Any]
-    began: float = field(default_factory=time.monotonic)
+    shown: tuple[Progress, str] = (Progress(0, 0, "starting"), "")
     timer: bpy.types.Timer | None = None
     stop: bool = False
     acceptance: Acceptance | None = None

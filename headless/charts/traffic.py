@@ -47,11 +47,10 @@ def save_time_map(
     """Draw the share of time for which each target is visible, as PNG."""
     limits, shape = limits_around(site.region.bounds, MARGIN_SHARE)
     figure, (panel,) = new_figure(PICTURE_SIDE + 0.9, PICTURE_SIDE * shape + 0.9)
-    seen = placed.seen
     panel.set(**limits)
-    panel.set_title(f"road: {seen.mean.describe(1)}, empty {seen.empty:.1%}", color=INK, fontsize=10)
+    panel.set_title(f"road: {placed.mean.describe(1)}, empty {placed.empty:.1%}", color=INK, fontsize=10)
     panel.set(xticks=(), yticks=())
-    squares, colours = target_squares(site.targets)[:, :, :2], TIME_CMAP(seen.time)
+    squares, colours = target_squares(site.targets)[:, :, :2], TIME_CMAP(placed.time)
     draw_polygons(panel, squares, facecolors=colours, edgecolors="none", antialiaseds=False, zorder=1)
     _draw_place(panel, geometry)
     figure.draw_without_rendering()  # after the last change of the layout that moves data on the page
@@ -73,7 +72,7 @@ def save_traffic_chart(path: str | os.PathLike[str], study: TrafficStudy, sensor
         Number and types of the sensors, like ``2 × type1``.
     """
     figure, (shares, changes) = new_figure(11.5, 4.6, 2)
-    empty, traffic = study.empty.seen, study.traffic.seen
+    empty, traffic = study.empty, study.traffic
     _bar(shares, -1, IntervalEstimate(empty.empty, empty.empty, empty.empty), "empty road")
     _bar(shares, 0, empty.mean, "in traffic")
     _bar(shares, 1, traffic.mean, "in traffic, placed on traffic")

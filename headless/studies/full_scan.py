@@ -13,7 +13,7 @@ from seip_addon.core.sensing.lidar.model import LidarModel
 from seip_addon.core.sensing.visibility.near_surfaces import NearSurfaces, rotated_surfaces
 from seip_addon.core.sensing.visibility.scanning import ScanPosition, seen_by_rays
 from seip_addon.core.sensing.visibility.target_index import TargetIndex
-from seip_addon.core.sensing.visibility.visibility_model import in_sensor_axes, is_upright, yaw_of
+from seip_addon.core.sensing.visibility.visibility_model import is_upright, yaw_of
 
 
 def beam_directions(model: LidarModel, yaw: float = 0.0) -> Float:
@@ -50,4 +50,4 @@ def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, surfaces: Near
     if is_upright(orientation):
         return seen_by_all_rays(replace(position, yaw=yaw_of(orientation)), surfaces)
     in_axes = rotated_surfaces(surfaces, position.origin, orientation)
-    return seen_by_all_rays(in_sensor_axes(position, orientation), in_axes)
+    return seen_by_all_rays(position.in_sensor_axes(orientation), in_axes)

@@ -1,6 +1,13 @@
 """A user's request, from another thread, to end a search early."""
 
 import threading
+from collections.abc import Generator
+from contextlib import closing
+from typing import TypeVar
+
+from .progress import Progress
+
+Result = TypeVar("Result")
 
 
 class Acceptance:
@@ -24,3 +31,18 @@ class Acceptance:
     def accepted(self) -> bool:
         """Whether the search is to end."""
         return self._event.is_set()
+
+
+def until_accepted(
+    steps: Generator[Progress, None, Result], acceptance: Acceptance | None, otherwise: Result
+) -> Generator[Progress, None, Result]:
+    """Run work that a result can be without, and return ``otherwise`` in its place once the user has accepted."""
+    with closing(steps):
+        while acceptance is None or not acceptance.accepted:
+            try:
+                step = next(steps)
+            except StopIteration as stop:
+                result: Result = stop.value
+                return result
+            yield step
+    return otherwise

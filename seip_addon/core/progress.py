@@ -5,10 +5,14 @@ batch command shows a bar, a test exhausts them with `finish`.
 """
 
 import threading
+import time
 from collections.abc import Callable, Generator
 from concurrent.futures import Future
-from dataclasses import dataclass
+from contextlib import closing
+from dataclasses import dataclass, replace
 from typing import TypeVar
+
+from .counts import duration_text
 
 Result = TypeVar("Result")
 
@@ -28,12 +32,45 @@ class Progress:
     counted : bool
         Whether all units take about the same time, so that the remaining time follows from their number; false for
         stages of work. A search, which may end at any step, has a total of 0.
+    best : str
+        Best value that a search has found so far, in the words of the answer: "71% of the road"; "" before the first.
+    gap : float or None
+        Largest share by which a better value is still possible; None without a bound.
     """
 
     done: int
     total: int
     what: str
     counted: bool = True
+    best: str = ""
+    gap: float | None = None
+
+
+def progress_line(progress: Progress, duration: str = "") -> str:
+    """Return progress as one line: phase, share done, best value so far, gap and time, as far as they are known.
+
+    Parameters
+    ----------
+    duration : str
+        Time elapsed or left, from `time_text`.
+
+    Examples
+    --------
+    >>> found = Progress(0, 0, "improving the placement", best="71% of the road", gap=0.052)
+    >>> progress_line(found, time_text(elapsed=8.0))
+    'improving the placement: 71% of the road, gap at most 5.2%, 8 s elapsed'
+    >>> progress_line(Progress(336, 672, "visibility"), time_text(elapsed=12.0, left=12.0))
+    'visibility: 50% done, 12 s left'
+    """
+    share = f"{progress.done / progress.total:.0%} done" if progress.done and progress.total else ""
+    gap = "" if progress.gap is None else f"gap at most {progress.gap:.1%}"
+    known = ", ".join(filter(None, (share, progress.best, gap, duration)))
+    return f"{progress.what}: {known}" if known else progress.what
+
+
+def time_text(elapsed: float, left: float | None = None) -> str:
+    """Return the seconds that work will still take, or those that it has taken if its length is not known."""
+    return f"{duration_text(elapsed)} elapsed" if left is None else f"{duration_text(left)} left"
 
 
 class Pace:
@@ -71,8 +108,35 @@ class Pace:
         self.seconds_left = (progress.total - progress.done) * (now - self.began) / gained if known else None
 
 
+def reporter(show: Callable[[Progress, str], None], interval: float) -> Callable[[Progress], None]:
+    """Return a callable for `finish` that shows progress as often as a user reads it.
+
+    Parameters
+    ----------
+    show : callable
+        Called with the progress and its `time_text` whenever a search has found a better value, and otherwise when the
+        interval has passed since the last call.
+    interval : float, seconds
+    """
+    start = shown = time.monotonic()
+    best = ""
+    pace = Pace()
+
+    def report(progress: Progress) -> None:
+        nonlocal shown, best
+        now = time.monotonic()
+        pace.note(progress, now)
+        if progress.best not in {"", best} or now - shown >= interval:
+            shown, best = now, progress.best or best
+            show(progress, time_text(now - start, pace.seconds_left))
+
+    return report
+
+
 def finish(steps: Generator[Progress, None, Result], report: Callable[[Progress], object] | None = None) -> Result:
     """Run work to its end, calling ``report`` at each step, and return its result.
+
+    The work is closed if ``report`` raises, so that it leaves no files and no child processes.
 
     Examples
     --------
@@ -85,25 +149,26 @@ def finish(steps: Generator[Progress, None, Result], report: Callable[[Progress]
     1 of 2
     12000
     """
-    while True:
-        try:
-            progress = next(steps)
-        except StopIteration as stop:
-            result: Result = stop.value
-            return result
-        if report is not None:
-            report(progress)
+    with closing(steps):
+        while True:
+            try:
+                progress = next(steps)
+            except StopIteration as stop:
+                result: Result = stop.value
+                return result
+            if report is not None:
+                report(progress)
 
 
 def within(whole: Progress, steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
-    """Run work as one unit of a larger whole, yielding the progress of the whole at each step."""
+    """Run work as one unit of a larger whole: each step yields the progress of the whole, with best value and gap."""
     while True:
         try:
-            next(steps)
+            step = next(steps)
         except StopIteration as stop:
             result: Result = stop.value
             return result
-        yield whole
+        yield replace(whole, best=step.best, gap=step.gap)
 
 
 def in_thread(work: Callable[[threading.Event], Result], what: str) -> Generator[Progress, None, Result]:

@@ -14,7 +14,7 @@ from .. import scene_status
 from ..background import Background
 from ..core.acceptance import Acceptance
 from ..core.errors import SeipError
-from ..core.progress import Progress, finish
+from ..core.progress import Progress, finish, progress_line, reporter
 from ..session import RunningWork, scene_of, session
 
 Result = TypeVar("Result")
@@ -22,6 +22,9 @@ Outcome = set[str]
 
 TIMER_INTERVAL = 0.1
 """Seconds between timer events while work is running."""
+SHOW_INTERVAL = 1.0
+"""Seconds after which the time is shown again: Blender then draws its whole window, which without a GPU takes as long
+as many steps of a search."""
 JOIN_TIMEOUT = 3.0
 """Maximum seconds that Blender waits for the thread when it closes; a thread that does not stop is abandoned."""
 
@@ -110,7 +113,7 @@ class LongWork(Generic[Result]):
         return {"RUNNING_MODAL"} if outcome == {"FINISHED"} else outcome
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
-        """Redraw the progress on timer events, and conclude once the work has ended."""
+        """Show the progress on timer events, and conclude once the work has ended."""
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         if self._running is not session.running or self._running.stop:
@@ -118,9 +121,7 @@ class LongWork(Generic[Result]):
             self.report({"INFO"}, self.stopped_message)  # type: ignore[attr-defined]  # of Blender's operators
             return {"CANCELLED"}
         if not self._running.work.ended:
-            _redraw(context)
-            name = type(self).bl_label  # type: ignore[attr-defined]  # of Blender's operators
-            _say(context, _in_short(name, self._running.work.progress))
+            self._report(self._running.work.progress)
             return {"PASS_THROUGH"}
         self._end(context)
         return attempt(self, lambda: self.conclude(scene_of(self._scene), self._running.work.result()))
@@ -138,8 +139,17 @@ class LongWork(Generic[Result]):
         name = type(self).bl_idname  # type: ignore[attr-defined]  # of Blender's operators
         work = Background(self.prepare(context.scene))
         self._running = session.running = RunningWork(name, work, acceptance=self.acceptance)
+        self._report = reporter(self._show, SHOW_INTERVAL)
         self._running.timer = context.window_manager.event_timer_add(TIMER_INTERVAL, window=context.window)
         context.window_manager.modal_handler_add(self)
+
+    def _show(self, progress: Progress, duration: str) -> None:
+        """Show the line of progress in the status bar, as the sidebar may be closed, and in the sidebar."""
+        self._running.shown = (progress, duration)
+        name = type(self).bl_label  # type: ignore[attr-defined]  # of Blender's operators
+        line = progress_line(progress, duration)
+        _say(bpy.context, f"{name}: {line} (to stop it: Object ▸ SEIP ▸ Stop, or × in the sidebar)")
+        _redraw(bpy.context)
 
     def _end(self, context: bpy.types.Context) -> None:
         _stop(self._running)
@@ -151,12 +161,6 @@ def _say(context: bpy.types.Context, text: str | None) -> None:
     """Show a text in the status bar, or Blender's own again."""
     if context.workspace is not None:
         context.workspace.status_text_set(text)
-
-
-def _in_short(work: str, progress: Progress) -> str:
-    """Return how far work is, for the status bar: the sidebar may be closed."""
-    share = f" {progress.done / progress.total:.0%}" if progress.total else ""
-    return f"{work}: {progress.what}{share} (to stop it: Object ▸ SEIP ▸ Stop, or × in the sidebar)"
 
 
 def _stop(running: RunningWork) -> None:

@@ -68,7 +68,7 @@ def _placed(
     state, survey = yield from scene_survey.with_visibility(state)
     began = time.perf_counter()
     solution = yield from place(survey, objective, runs, acceptance)
-    solution = yield from with_context(survey, solution)
+    solution = yield from with_context(survey, solution, acceptance)
     return replace(state, solution=solution, durations=state.timed("placement", began))
 
 

@@ -119,9 +119,8 @@ class SEIP_OT_verify(Conditional, LongWork[_Verified], bpy.types.Operator):
                 temporary.write_bytes(content)
         scene.seip.verification.found = "\n".join(result.sentences)
         session.verifications[scene.session_uid] = LastVerification(result.found, self._watch)
-        for one in result.found.sensors:
-            for sentence in one.background.warnings(one.registration.sensor.label):
-                self.report({"WARNING"}, sentence)
+        for sentence in result.found.warnings:
+            self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"verified; written to {self._folder}")
 
 
@@ -143,7 +142,7 @@ def _verified(
         yield Progress(0, 0, "drawing the returns")
         save_returns_chart(drawn / returns, found)
         save_changes(drawn / CHANGES_FILE, found)
-        save_units(drawn / UNITS_FILE, recording.name, found.sensors)
+        save_units(drawn / UNITS_FILE, recording.name, found)
         made = {"versions": versions(blender=bpy.app.version_string)}
         save_json(drawn / VERIFICATION_FILE, verification_record(geometry.name, recording.name, found) | made)
         sentences = summary(record_of(geometry.name, recording.name, found))

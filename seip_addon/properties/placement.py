@@ -9,7 +9,8 @@ from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProper
 
 from .. import selection
 from ..core.choosing.placement.objective import DEFAULT_COUNT, Objective
-from ..core.choosing.placement.scenarios import MAX_ANGLE_STD, PoseErrors, Scenarios
+from ..core.choosing.placement.scenarios import Scenarios
+from ..core.sensing.scenarios.pose_errors import MAX_ANGLE_STD, PoseErrors
 from .conversion import as_typed, of_setting
 
 

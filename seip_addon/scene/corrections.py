@@ -40,8 +40,8 @@ def correct_scene(scene: bpy.types.Scene, found: Verification) -> tuple[str, ...
         if change.kind == "new":
             _add_box(scene, change)
     sensors = labelled_sensors(scene)
-    for one in found.sensors:
-        problems += _move(sensors.get(one.registration.sensor.label), one.registration.sensor)
+    for one in found.comparisons:
+        problems += _move(sensors.get(one.sensor.label), one.sensor)
     return tuple(problems)
 
 

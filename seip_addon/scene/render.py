@@ -121,30 +121,18 @@ class RenderedPictures:
     places: Mapping[str, tuple[float, float]]
 
 
-def rendered_pictures(scene: bpy.types.Scene, site: Site, deployment: Deployment, folder: Path) -> RenderedPictures:
-    """Render the scene from an oblique angle in the south, and close to each sensor, into a folder for raw pictures.
+def take(shots: Sequence[Shot], scene: bpy.types.Scene, raws: Sequence[Path]) -> list[Taken]:
+    """Render pictures of a scene without labels, and return how each was taken.
 
-    The picture is taken in a scene of its own that shares the objects and is
-    removed afterwards, under its own camera, light and settings: the user's
-    scene is not touched and every scene is lit alike. Cycles renders on the
-    processor, because the other engines end the process where there is no OpenGL.
+    The pictures are taken in a scene that shares the objects and is removed afterwards, under its own camera, light and
+    settings: the user's scene is not touched and every scene is lit alike. Cycles renders on the processor, because the
+    other engines end the process where there is no OpenGL.
 
     Parameters
     ----------
     scene : bpy.types.Scene
         Holds the result of `write_result`.
-    deployment : Deployment
-        The chosen sensors and what they see.
     """
-    shots = shots_of(site, deployment)
-    raws = raw_files(folder, shots)
-    with silenced():
-        taken = take(shots, scene, raws)
-    return labelled_pictures(shots, taken, raws, site, deployment)
-
-
-def take(shots: Sequence[Shot], scene: bpy.types.Scene, raws: Sequence[Path]) -> list[Taken]:
-    """Render pictures of a scene without labels, and return how each was taken."""
     taken = []
     with _stage(scene) as stage:
         add_daylight(stage, stage.collection)

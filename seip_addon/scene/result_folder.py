@@ -25,13 +25,14 @@ from ..core.output.results.located import LOCATED_FILES, located
 from ..core.output.results.placement_file import save_placement
 from ..core.output.results.placement_record import PlacementRecord
 from ..core.output.results.site_file import save_site_file
-from ..core.progress import Progress, finish
+from ..core.progress import Progress
 from ..core.storage.files import unfinished_name
 from ..core.workflows.survey import Survey
 from .blend_file import save_blend
 from .gltf import save_glb
 from .pieces import tidy_pieces
-from .render import RenderedPictures, rendered_pictures
+from .render import RenderedPictures
+from .render_elsewhere import render_elsewhere
 from .write import shown_legend, write_result
 
 FILES = (
@@ -88,7 +89,7 @@ def write_result_folder(
     record: PlacementRecord,
     *,
     render: bool = True,
-) -> None:
+) -> Generator[Progress, None, None]:
     """Write a solution into the scene and all its files into a folder, in place of earlier ones.
 
     Parameters
@@ -106,9 +107,11 @@ def write_result_folder(
         write_result(scene, site, deployment)
         save_blend(part["placed.blend"])
         save_glb(part["scene.glb"], site.attribution)
-        finish(write_tables(part, survey, solution, record))
+        yield from write_tables(part, survey, solution, record)
         with TemporaryDirectory(prefix="seip-") as raw:
-            rendered = rendered_pictures(scene, site, deployment, Path(raw)) if render else None
+            rendered = None
+            if render:
+                rendered = yield from render_elsewhere(Path(raw), part["placed.blend"], scene.name, site, deployment)
             write_pictures(part, survey, record, deployment, rendered, shown_legend(scene))
 
 

@@ -175,11 +175,11 @@ def test_a_command_that_fails_has_its_sentence_and_leaves_nothing(placed, stand_
 
 def test_work_that_is_stopped_ends_the_command_and_leaves_nothing(placed, stand_in, tmp_path):
     package = stand_in(
-        end="sys.stderr.write('detect in run-1:  25%|##   | 5/20 [00:02<00:06]\\n'); sys.stderr.flush(); time.sleep(99)"
+        end="sys.stderr.write('detect in run-1: 25% done, 6 s left\\n'); sys.stderr.flush(); time.sleep(99)"
     )
     work = Background(SEIP_OT_detect.prepare(SimpleNamespace(), placed))
     end = time.monotonic() + 30
-    while (work.progress.done, work.progress.total) != (5, 20) and time.monotonic() < end:
+    while (work.progress.done, work.progress.total) != (25, 100) and time.monotonic() < end:
         time.sleep(0.05)
     assert work.progress.what == "detect in run-1"
     process = int((package / "pid").read_text())

@@ -17,6 +17,7 @@ from seip_addon.core.progress import Progress
 from seip_addon.operators import base, results
 from seip_addon.panels import missing_package
 from seip_addon.panels import placement as placement_panel
+from seip_addon.panels.run_button import draw_run
 from seip_addon.session import RunningWork, session
 from tests.builders.drawn_layout import DrawnLayout
 
@@ -124,3 +125,16 @@ def test_the_best_so_far_can_be_used_while_a_search_runs_and_only_then(placed, m
     SolverLimits(acceptance=acceptance).clock()
     assert bpy.ops.seip.accept() == {"FINISHED"}
     assert acceptance.accepted
+
+
+def test_progress_in_the_sidebar_names_phase_value_gap_and_time(add_on, monkeypatch):
+    acceptance = Acceptance()
+    acceptance.searching = True
+    running = RunningWork("seip.solve_placement", MagicMock(), acceptance=acceptance)
+    running.shown = (Progress(0, 0, "improving the placement", best="71% of the road", gap=0.052), "8 s elapsed")
+    monkeypatch.setattr(session, "running", running)
+    layout = DrawnLayout()
+    draw_run(layout, "seip.solve_placement")
+    assert layout.bars == [(0.0, "8 s elapsed")]
+    assert layout.text == "Improving the placement: 71% of the road, gap at most 5.2%"
+    assert [name for name, _ in layout.operators] == ["seip.accept", "seip.stop"]

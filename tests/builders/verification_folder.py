@@ -10,12 +10,11 @@ from seip_addon.core.output.results.file_names import VERIFICATION_FILE, VERIFIC
 from seip_addon.core.output.results.placement_file import load_placement
 from seip_addon.core.output.results.verification_record import (
     SCHEMA,
-    RecordedBackground,
     RecordedChange,
-    RecordedPose,
     VerificationRecord,
 )
 from seip_addon.core.sensing.recordings.figures import CoverageSteps, Gain, ReturnShare
+from seip_addon.core.sensing.recordings.verification import InstalledSensor, RecordedBackground
 from seip_addon.core.storage.files import save_json
 from seip_addon.core.storage.json_dataclass import as_json
 
@@ -35,10 +34,10 @@ def make_pose(
     shift: tuple[float, float, float] = (0.3, -0.2, 0.0),
     rotation: tuple[float, float, float] = (0.0, -2.0, -1.5),
     gain: Gain | None = Gain(0.64, 0.49, 0.81),  # noqa: B008  # frozen
-) -> RecordedPose:
+) -> InstalledSensor:
     """Return a sensor off its plan by a shift in metres and a rotation vector in degrees."""
     at = tuple(one + by for one, by in zip(planned, shift, strict=True))
-    return RecordedPose(
+    return InstalledSensor(
         id=label,
         sensor=sensor,
         local_m=at,

@@ -2,10 +2,11 @@
 
 import math
 
+import numpy as np
 import pytest
 import scipy.stats
 
-from seip_addon.core.estimates import IntervalEstimate, student_quantile
+from seip_addon.core.estimates import IntervalEstimate, quantile_of, student_quantile
 
 
 @pytest.mark.parametrize("freedom", [1, 30, 1000])
@@ -24,3 +25,13 @@ def test_student_quantiles(freedom):
 )
 def test_a_loss_is_called_a_loss(estimate, words):
     assert IntervalEstimate(*estimate).as_change() == words
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5])
+def test_a_quantile_is_in_its_interval_as_often_as_is_said(share):
+    rng, hits = np.random.default_rng(0), 0
+    for _ in range(600):
+        found = quantile_of(rng.standard_normal(200), share)
+        assert found.low <= found.value <= found.high
+        hits += found.low <= scipy.stats.norm.ppf(share) <= found.high
+    assert hits / 600 > 0.93

@@ -1,7 +1,9 @@
 import os
+import re
 import signal
 import subprocess
 import sys
+import termios
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ from typing import Never
 
 from headless import runtime
 
+from seip_addon.core import progress
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress
 
@@ -65,18 +68,36 @@ def test_control_c_ends_with_130_and_one_line() -> None:
     assert complaint == "stopped, no result written\n"
 
 
-def test_a_log_gets_a_line_every_ten_seconds_at_most(capsys, monkeypatch) -> None:
+def test_a_log_gets_a_line_every_ten_seconds_and_at_each_better_placement(capsys, monkeypatch) -> None:
     clock = iter(range(0, 100, 4))
-    monkeypatch.setattr(runtime.time, "monotonic", lambda: next(clock))
+    monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
     with runtime.progress_bar() as report:
         for done in range(8):
-            report(Progress(done, 8, "cast"))
-        for _ in range(3):
-            report(Progress(0, 0, "search"))
-    lines = capsys.readouterr().err.splitlines()
-    assert [line.partition(":")[0] for line in lines[:2]] == ["cast", "cast"]
-    assert "2/8" in lines[0]
-    assert lines[2:] == ["search [00:36]"]
+            report(Progress(done, 8, "visibility"))
+        for best in ("70% of the road", "70% of the road", "71% of the road", "71% of the road", ""):
+            report(Progress(0, 0, "improving the placement", best=best, gap=0.052))
+    assert capsys.readouterr().err.splitlines() == [
+        "visibility: 25% done, 24 s left",
+        "visibility: 62% done, 12 s left",
+        "improving the placement: 70% of the road, gap at most 5.2%, 36 s elapsed",
+        "improving the placement: 71% of the road, gap at most 5.2%, 44 s elapsed",
+    ]
+
+
+def test_a_narrow_terminal_cuts_the_phase_and_keeps_value_and_time() -> None:
+    script = (
+        "from headless import runtime\nfrom seip_addon.core.progress import Progress\n"
+        "with runtime.progress_bar() as report:\n"
+        "    report(Progress(0, 0, 'improving the placement', best='71% of the road', gap=0.052))\n"
+    )
+    ours, theirs = os.openpty()
+    termios.tcsetwinsize(theirs, (24, 60))
+    subprocess.run([sys.executable, "-c", script], cwd=ROOT, stderr=theirs, check=True)  # noqa: S603  # our own
+    os.close(theirs)
+    shown = os.read(ours, 4096).decode()
+    os.close(ours)
+    lines = [line for line in re.split(r"[\r\n]+", shown) if line.strip()]
+    assert lines == ["improving …: 71% of the road, gap at most 5.2%, 1 s elapsed"]
 
 
 def test_what_is_logged_goes_to_the_output_and_warnings_say_so(capsys) -> None:

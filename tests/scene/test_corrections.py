@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
-from seip_addon.core.sensing.recordings.comparison import Change
+from seip_addon.core.sensing.recordings.comparison import Change, RayComparison
 from seip_addon.core.sensing.recordings.figures import CoverageSteps
-from seip_addon.core.sensing.recordings.registration import Registration
-from seip_addon.core.sensing.recordings.verification import Verification, VerifiedSensor
+from seip_addon.core.sensing.recordings.verification import Verification
 from seip_addon.core.sensing.scans.sensor import MountedSensor
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.workflows.verifying import box_triangles
@@ -47,7 +46,7 @@ def scene():
     return bpy.context.scene
 
 
-def verified(scene, gone=(), new=(), sensors=(), keep=None):
+def verified(scene, gone=(), new=(), comparisons=(), keep=None):
     """Return a verification in which meshes are gone, except triangles that ``keep`` (of their middles) selects."""
     geometry: SceneGeometry = read_scene(scene).geometry
     occluders, changes = [], []
@@ -60,7 +59,8 @@ def verified(scene, gone=(), new=(), sensors=(), keep=None):
             occluders.append(replace(mesh, triangles=mesh.triangles[stays], reflectivity=None))
     changes += [Change("new", name, box, 50, NONE) for name, box in new]
     return Verification(
-        sensors=tuple(sensors),
+        sensors=(),
+        comparisons=tuple(comparisons),
         changes=tuple(changes),
         costs=(0.0,) * len(changes),
         coverage=CoverageSteps(0.5, 0.5, 0.5, 0.5, 0.5),
@@ -151,14 +151,13 @@ def test_sensors_are_moved_whatever_their_parents_and_rotation_modes(scene, mode
     turn, _ = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))
     turn *= np.linalg.det(turn)
     sensor = MountedSensor("S1", model, np.array([4.0, 5.0, 6.0]), turn)
-    pose = Registration(sensor, np.zeros(6), np.zeros(6), 1.0)
-    verified_sensor = VerifiedSensor(pose, None, None, None, ())
-    assert not correct_scene(scene, verified(scene, sensors=[verified_sensor]))
+    compared = RayComparison(sensor, *(None for _ in range(7)))
+    assert not correct_scene(scene, verified(scene, comparisons=[compared]))
     (read,) = read_sensors(scene, load_catalogue())
     assert np.allclose(read.xyz, sensor.xyz, atol=1e-5)
     assert np.allclose(read.orientation, turn, atol=1e-5)
-    other = replace(verified_sensor, registration=replace(pose, sensor=replace(sensor, label="S7")))
-    assert "S7 is no longer in the scene" in correct_scene(scene, verified(scene, sensors=[other]))[0]
+    other = replace(compared, sensor=replace(sensor, label="S7"))
+    assert "S7 is no longer in the scene" in correct_scene(scene, verified(scene, comparisons=[other]))[0]
 
 
 def _join(obj, at):

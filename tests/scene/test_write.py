@@ -12,7 +12,7 @@ from seip_addon.core.output.pictures.coverage_colours import colouring
 from seip_addon.scene import contract
 from seip_addon.scene.coverage_colours import colour_coverage
 from seip_addon.scene.materials import linear
-from seip_addon.scene.render import rendered_pictures
+from seip_addon.scene.render import labelled_pictures, raw_files, shots_of, silenced, take
 from seip_addon.scene.write import LIFT, clear_result, shown_legend, write_result
 from tests.builders.scene_by_hand import make_scene
 from tests.builders.small_junction import make_example
@@ -116,7 +116,10 @@ def test_a_second_result_replaces_the_first(example, scene):
 def save_rendered_view(path, scene, site, deployment):
     """Render and label the view as `write_result_folder` does."""
     with TemporaryDirectory() as folder:
-        taken = rendered_pictures(scene, site, deployment, Path(folder))
+        shots = shots_of(site, deployment)
+        raws = raw_files(Path(folder), shots)
+        with silenced():
+            taken = labelled_pictures(shots, take(shots, scene, raws), raws, site, deployment)
         labelled_view.save_labelled_view(path, taken.view, site, deployment, shown_legend(scene), taken.sight)
     return taken
 

@@ -20,23 +20,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import bpy
 from bl_ext.user_default.seip.seip_addon import preferences, scene_status
-from bl_ext.user_default.seip.seip_addon.panels import placement, results, run_button
+from bl_ext.user_default.seip.seip_addon.panels import placement, results
 from bl_ext.user_default.seip.seip_addon.session import SceneState, session
 from driver import Steps, Window, play
 from mathutils import Vector
 
-TIMES: list[str] = []
-"""What was drawn below bars."""
 SAID: list[str] = []
 """Sentences that the sidebar has drawn."""
-
-
-def _noted(times: Callable[..., str]) -> Callable[..., str]:
-    def times_and_note(*given: float | None) -> str:
-        TIMES.append(times(*given))
-        return TIMES[-1]
-
-    return times_and_note
 
 
 def _heard(sentence: Callable[..., None]) -> Callable[..., None]:
@@ -47,7 +37,6 @@ def _heard(sentence: Callable[..., None]) -> Callable[..., None]:
     return draw_and_note
 
 
-run_button.times_text = _noted(run_button.times_text)
 for module in (placement, results):
     module.draw_sentence = _heard(module.draw_sentence)
 
@@ -130,7 +119,7 @@ def _bar_moves(window: Window, button: tuple[int, int]) -> Generator[float, None
     stop = yield from window.beside(button, "seip.stop(")
     before = window.filled(stop)
     yield from window.until(lambda: window.filled(stop) > before + 0.02, 60)
-    yield from window.until(lambda: any("left" in words for words in TIMES), 10)
+    yield from window.until(lambda: session.running is None or "left" in session.running.shown[1], 10)
     assert session.running is not None, "the work ended before it could be stopped"
     return stop
 

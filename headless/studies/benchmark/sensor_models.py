@@ -59,11 +59,6 @@ class DivergentCaster:
     divergence: float
 
     @property
-    def name(self) -> str:
-        """Name of the engine."""
-        return self.caster.name
-
-    @property
     def triangles(self) -> Float:
         """The triangles that hits index, (n, 3, 3) float64, metres."""
         return self.caster.triangles

@@ -40,7 +40,7 @@ class SensorConfiguration(MountedSensors):
     read: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "sensors", self.deployment.mounted)
+        object.__setattr__(self, "sensors", self.deployment.sensors)
 
     @classmethod
     def of_case(cls, case: Case) -> SensorConfiguration:

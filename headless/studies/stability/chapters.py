@@ -17,9 +17,9 @@ from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.choosing.placement.solver import solve
 from seip_addon.core.choosing.robustness.pose_study import PoseStudySettings, pose_study
 from seip_addon.core.choosing.robustness.robust_study import robust_study
-from seip_addon.core.choosing.robustness.traffic_instants import spread_instants
 from seip_addon.core.choosing.robustness.traffic_study import traffic_scenarios, traffic_study
 from seip_addon.core.progress import Progress
+from seip_addon.core.sensing.scenarios.traffic_instants import spread_instants
 from seip_addon.core.sensing.traffic.trajectories import Trajectories
 from seip_addon.core.workflows.survey import Survey, surroundings
 from seip_addon.core.workflows.traffic_runs import split_runs
@@ -231,7 +231,7 @@ def weather(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     study = yield from weather_study(survey.geometry, survey.settings)
     best = yield from solve(scene.problem(scene.sensor), survey.settings.limits)
     deployment = deploy(survey.site, survey.models, survey.grid.rows(best.chosen), best.chosen)
-    sensors = deployment.mounted
+    sensors = deployment.sensors
     rows = weather_rows(study, untouched_types(survey, scene.placed, sensors))
     limits_charts.save_weather_chart(scene.charts / "weather.png", study, f"{scene.name} in rain and fog")
     caption = "Coverage by weather: placements for clear air and for the weather, and sensors with a longer range"

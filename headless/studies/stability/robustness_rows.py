@@ -4,7 +4,7 @@ import numpy as np
 
 from seip_addon.core.choosing.robustness.pose_study import LOW_QUANTILE, PoseStudy
 from seip_addon.core.choosing.robustness.robust_study import Contender, RobustStudy
-from seip_addon.core.choosing.robustness.traffic_study import NOTABLE_LOSS, TrafficCoverage, TrafficStudy
+from seip_addon.core.choosing.robustness.traffic_study import NOTABLE_LOSS, TrafficEvaluation, TrafficStudy
 from seip_addon.core.estimates import mean_of, quantile_gain, quantile_of
 
 from .rows import Row
@@ -93,7 +93,7 @@ def saving_converged(study: RobustStudy, contender: Contender) -> bool:
 def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
     """Return the results of the study of traffic as rows."""
     regime = f"{study.road_users:.0f} road users at a time"
-    seen, batch = study.empty.seen, study.empty.seen.batch
+    seen, batch = study.empty, study.empty.batch
     how = (
         f"{len(batch)} instants in {len(np.unique(batch))} stretches of time, of runs not used in the optimisation; "
         f"half of them {'give the same result' if study.is_converged() else 'give a different result: take more'}"
@@ -110,13 +110,13 @@ def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
     gain = Row(
         "placement for the empty road, to see the road",
         regime,
-        f"a placement optimised in traffic sees {study.traffic.seen.mean.describe()}, {study.gain.as_change()}",
+        f"a placement optimised in traffic sees {study.traffic.mean.describe()}, {study.gain.as_change()}",
         f"optimised for {study.chosen_at} instants; {how}",
         f"placement over instants of traffic; certificate: within {study.traffic.placement.gap:.2%} of the best",
     )
     return (loss, gain)
 
 
-def _rarely_seen(seen: TrafficCoverage) -> float:
+def _rarely_seen(seen: TrafficEvaluation) -> float:
     """Return the share of the targets seen on the empty road that are not mostly seen in traffic."""
     return float((seen.time[seen.empty_targets] < MOSTLY_SEEN_SHARE).mean()) if seen.empty_targets.any() else 0.0

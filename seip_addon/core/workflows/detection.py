@@ -17,7 +17,7 @@ RECORD, ERRORS = "detection.json", "errors.png"
 INSTALL = "run `make detection` or `pip install '.[detection]'` in a checkout of this project"
 """Instructions to install PyTorch and this project."""
 
-_BAR = re.compile(r"^(.+?): +\d+%\|.*\| (\d+)/(\d+) \[[\d:]+(<?)", re.MULTILINE)
+_LINE = re.compile(r"^(.+): (?:(\d+)% done, )?(?:.+, )?[\d.]+ (?:s|min|h) (left|elapsed)$", re.MULTILINE)
 _ERROR = re.compile(r"^(?:[\w-]+: )?error: (.+)$", re.MULTILINE)
 _SECONDS_BETWEEN_LINES = "1"
 
@@ -124,12 +124,12 @@ def detect_elsewhere(job: DetectionJob, scene: Path, folder: Path) -> Generator[
 
 
 def _progress(output: str) -> Progress:
-    """Return the progress in the last progress bar of the command's output."""
-    bars = _BAR.findall(output)
-    if not bars:
+    """Return the progress in the last `progress_line` of the command's output."""
+    lines = _LINE.findall(output)
+    if not lines:
         return Progress(0, 0, "starting PyTorch")
-    what, done, total, time_left = bars[-1]
-    return Progress(int(done), int(total), what, counted=bool(time_left))
+    what, percent, time = lines[-1]
+    return Progress(int(percent or 0), 100 if percent else 0, what, counted=time == "left")
 
 
 def _failure(output: str, status: int, program: Path) -> str:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..acceptance import Acceptance
+from ..acceptance import Acceptance, until_accepted
 from ..choosing.placement.cheapest import cheapest_for_coverage
 from ..choosing.placement.deployment import deploy
 from ..choosing.placement.objective import (
@@ -28,11 +28,11 @@ from ..choosing.robustness.gain_band import with_gain_band
 from ..choosing.robustness.pose_error_evaluation import PoseErrorEvaluation
 from ..choosing.robustness.pose_study import PoseStudySettings, pose_message, pose_study
 from ..choosing.robustness.robust_study import robust_study
-from ..choosing.robustness.traffic_instants import spread_instants
-from ..choosing.robustness.traffic_study import traffic_message, traffic_scenarios, traffic_study
+from ..choosing.robustness.traffic_study import evaluate_in_traffic, traffic_scenarios, traffic_study
 from ..errors import SeipError
 from ..progress import Progress
 from ..sensing.lidar.model import LidarModel
+from ..sensing.scenarios.traffic_instants import spread_instants
 from ..site.site import Site
 from .returns import crossing_returns, place_by_returns, with_returns_front
 from .survey import Survey, surroundings
@@ -107,15 +107,24 @@ def place(
     if acceptance is not None and acceptance.accepted and solution.placement.status != "optimal":
         notes.append(ACCEPTED_MESSAGE)
     if measure is None and deployment.sensors:
-        notes += yield from _evaluated(survey, replace(solution, deployment=deployment), runs)
+        evaluation = _evaluated(survey, replace(solution, deployment=deployment), runs)
+        notes += yield from until_accepted(evaluation, acceptance, [])
     return replace(solution, deployment=deployment, placement=replace(solution.placement, notes=tuple(notes)))
 
 
-def with_context(survey: Survey, solution: Solution) -> Generator[Progress, None, Solution]:
-    """Return a solution with what reports add: other numbers of sensors, and a pedestrian's returns on crossings."""
+def with_context(
+    survey: Survey, solution: Solution, acceptance: Acceptance | None = None
+) -> Generator[Progress, None, Solution]:
+    """Return a solution with what reports add: other numbers of sensors, and a pedestrian's returns on crossings.
+
+    Parameters
+    ----------
+    acceptance : Acceptance, optional
+        User's request to end the search. Other numbers of sensors are then left out.
+    """
     problem = placement_problem(survey.site, survey.grid.visible, survey.models, solution.objective)
-    front = yield from price_front(problem, solution)
-    solution = yield from with_returns_front(survey, solution)
+    front = yield from until_accepted(price_front(problem, solution), acceptance, ())
+    solution = yield from until_accepted(with_returns_front(survey, solution), acceptance, solution)
     return replace(solution, front=front, crossings=crossing_returns(survey, solution))
 
 
@@ -141,7 +150,7 @@ def _under_risk(
     if scenarios.errs:
         draws = scenarios.evaluated
         settings = PoseStudySettings(scenarios.pose_errors, draws, min(DRAWS_OF_KIND, draws), scenarios.seed + 1)
-        under_errors = yield from pose_study(around, deployment, settings)
+        under_errors = yield from until_accepted(pose_study(around, deployment, settings), limits.acceptance, None)
     evaluation = PoseErrorEvaluation(study, under_errors)
     over = f" over {scenarios.optimised} scenarios" if scenarios.errs else ""
     note = f"{CHOSEN_FOR}for {chosen.name}{over}: objective, bound and gap refer to that"
@@ -180,9 +189,9 @@ def _evaluated(survey: Survey, solution: Solution, runs: TrafficRuns | None) -> 
         return [pose_message((yield from pose_study(around, solution.deployment, settings)))]
     if scenarios.kind == "traffic":
         held_out = spread_instants(_required(runs).evaluation, scenarios.evaluated, scenarios.seed + 1)
-        poses = np.array([one.pose for one in solution.deployment.sensors if one.pose is not None], dtype=np.int64)
-        weights = target_weights(survey.site, objective)
-        return [(yield from traffic_message(around, poses, weights, held_out))]
+        weights, placements = target_weights(survey.site, objective), {"the empty road": solution.placement}
+        (evaluation,) = yield from evaluate_in_traffic(around, placements, weights, held_out)
+        return [evaluation.message]
     return []
 
 

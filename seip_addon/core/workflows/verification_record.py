@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ..distinct_names import distinct_names
 from ..output.results.verification_record import (
     SCHEMA,
-    RecordedBackground,
     RecordedChange,
-    RecordedPose,
     VerificationRecord,
 )
-from ..sensing.recordings.verification import Verification, VerifiedSensor
+from ..sensing.recordings.verification import Verification
 from ..storage.csv_table import save_csv
 from ..storage.files import whole_file
 from ..storage.json_dataclass import as_json
@@ -39,7 +36,7 @@ def record_of(site: str, recording: str, found: Verification) -> VerificationRec
         )
         for change, cost in zip(found.changes, found.costs, strict=True)
     ]
-    return VerificationRecord(site, recording, tuple(map(_pose, found.sensors)), tuple(changes), found.coverage)
+    return VerificationRecord(site, recording, found.sensors, tuple(changes), found.coverage)
 
 
 def verification_record(site: str, recording: str, found: Verification) -> dict[str, Any]:
@@ -47,27 +44,10 @@ def verification_record(site: str, recording: str, found: Verification) -> dict[
     return {"schema": SCHEMA, **as_json(record_of(site, recording, found))}
 
 
-def _pose(one: VerifiedSensor) -> RecordedPose:
-    pose, background = one.registration, one.background
-    return RecordedPose(
-        id=pose.sensor.label,
-        sensor=pose.sensor.model.key,
-        local_m=tuple(pose.sensor.xyz.tolist()),
-        orientation=tuple(map(tuple, pose.sensor.orientation.tolist())),  # type: ignore[arg-type]  # three rows
-        shift_m=tuple(pose.shift[:3].tolist()),
-        shift_half_width_m=tuple(pose.half_width[:3].tolist()),
-        rotation_deg=tuple(math.degrees(angle) for angle in pose.shift[3:]),  # type: ignore[arg-type]  # three
-        rotation_half_width_deg=tuple(math.degrees(angle) for angle in pose.half_width[3:]),  # type: ignore[arg-type]
-        match=pose.match,
-        background=RecordedBackground(background.sweeps, background.seconds, background.uncertain),
-        gain=one.gain,
-        returns=one.shares,
-    )
-
-
-def save_units(path: Path, recording: str, sensors: Sequence[VerifiedSensor]) -> bool:
+def save_units(path: Path, recording: str, found: Verification) -> bool:
     """Write a catalogue with a model for each unit whose gain is known, and return whether there is one."""
-    known = [(one.registration.sensor, one.gain) for one in sensors if one.gain is not None]
+    pairs = zip(found.comparisons, found.sensors, strict=True)
+    known = [(one.sensor, installed.gain) for one, installed in pairs if installed.gain is not None]
     keys = [re.sub(r"[^a-z0-9]", "_", f"{sensor.model.key}_{sensor.label}".lower()) for sensor, _ in known]
     tables = []
     for key, (sensor, gain) in zip(distinct_names(keys, "{}_{}"), known, strict=True):

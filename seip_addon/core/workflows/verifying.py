@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Generator, Sequence
 from dataclasses import replace
-from itertools import count
+from itertools import chain, count
 
 import numpy as np
 import shapely
@@ -25,12 +26,12 @@ from ..sensing.recordings.comparison import (
     gone_objects,
     new_objects,
 )
-from ..sensing.recordings.figures import CoverageSteps
+from ..sensing.recordings.figures import CoverageSteps, Gain, ReturnShare
 from ..sensing.recordings.recording import Recording
 from ..sensing.recordings.registration import Registration, register
 from ..sensing.recordings.sensor_recording import SensorRecording
 from ..sensing.recordings.unit_gain import fitted_gain, return_shares
-from ..sensing.recordings.verification import Verification, VerifiedSensor
+from ..sensing.recordings.verification import InstalledSensor, RecordedBackground, Verification
 from ..sensing.scans.scanner import ReflectiveSurface
 from ..sensing.scans.sensor import MountedSensor
 from ..sensing.scans.static_scene import StaticScene, static_scene
@@ -84,12 +85,12 @@ def verify(
     fresh = [one for one in new_objects(comparisons, lambda xy: surface_height(xy, road)) if not _is_at(one, earlier)]
     found = _named(fresh, _first_number(geometry))
     changes = (*found, *gone_objects(comparisons, geometry.occluders, static.triangles))
+    comparisons = [_without_gone(one, changes) for one in comparisons]
     sensors = []
-    for (pose, background), comparison in zip(fitted, comparisons, strict=True):
-        one = _without_gone(comparison, changes)
+    for (pose, background), one in zip(fitted, comparisons, strict=True):
         gain = fitted_gain(one)
         shares = return_shares(one, gain.value if gain else 1.0, kinds)
-        sensors.append(VerifiedSensor(pose, background, one, gain, tuple(shares)))
+        sensors.append(_installed(pose, background, gain, shares))
     targets = generate_targets(geometry.region, road, spacing, geometry.weighted_regions)
     corrected = _corrected(geometry, static, changes)
 
@@ -100,12 +101,10 @@ def verify(
         seen = np.any([model.see(one.model, one.xyz, one.orientation) for one in at], axis=0)
         return float(np.mean(seen))
 
-    installed = [one.registration.sensor for one in sensors]
+    installed = [one.sensor for one in comparisons]
     units = [
-        replace(
-            one.registration.sensor, model=one.registration.sensor.model.amplified(one.gain.value if one.gain else 1.0)
-        )
-        for one in sensors
+        replace(at, model=at.model.amplified(one.gain.value if one.gain else 1.0))
+        for at, one in zip(installed, sensors, strict=True)
     ]
     steps = (
         (geometry, [sensor for sensor, _ in pairs]),
@@ -117,7 +116,7 @@ def verify(
     for done, (scene, at) in enumerate(steps):
         yield Progress(done, len(steps), "computing coverage", counted=False)
         figures.append(coverage(scene, at))
-    figures.append(float(np.mean(_seen_in_recording(targets, sensors, settings))))
+    figures.append(float(np.mean(_seen_in_recording(targets, comparisons, settings))))
     objects = [change for change in changes if change.kind != VEHICLE][:_MOST_PRICED]
     costs = dict.fromkeys(map(id, changes), float("nan"))
     for done, change in enumerate(objects):
@@ -125,7 +124,34 @@ def verify(
         others = [other for other in changes if other is not change]
         costs[id(change)] = coverage(_corrected(geometry, static, others), installed) - figures[2]
     yield Progress(len(objects), len(objects), "computing what each change costs")
-    return Verification(tuple(sensors), changes, tuple(costs.values()), CoverageSteps(*figures), corrected)
+    return Verification(
+        sensors=tuple(sensors),
+        comparisons=tuple(comparisons),
+        changes=changes,
+        costs=tuple(costs.values()),
+        coverage=CoverageSteps(*figures),
+        corrected=corrected,
+        warnings=tuple(chain.from_iterable(known.warnings(pose.sensor.label) for pose, known in fitted)),
+    )
+
+
+def _installed(
+    pose: Registration, background: Background, gain: Gain | None, returns: Sequence[ReturnShare]
+) -> InstalledSensor:
+    return InstalledSensor(
+        id=pose.sensor.label,
+        sensor=pose.sensor.model.key,
+        local_m=tuple(pose.sensor.xyz.tolist()),
+        orientation=tuple(map(tuple, pose.sensor.orientation.tolist())),  # type: ignore[arg-type]  # three rows
+        shift_m=tuple(pose.shift[:3].tolist()),
+        shift_half_width_m=tuple(pose.half_width[:3].tolist()),
+        rotation_deg=tuple(math.degrees(angle) for angle in pose.shift[3:]),  # type: ignore[arg-type]  # three
+        rotation_half_width_deg=tuple(math.degrees(angle) for angle in pose.half_width[3:]),  # type: ignore[arg-type]
+        match=pose.match,
+        background=RecordedBackground(background.sweeps, background.seconds, background.uncertain),
+        gain=gain,
+        returns=tuple(returns),
+    )
 
 
 def _paired(planned: Sequence[MountedSensor], recording: Recording) -> list[tuple[MountedSensor, SensorRecording]]:
@@ -223,13 +249,12 @@ def box_triangles(box: Float) -> Float:
     return triangles
 
 
-def _seen_in_recording(targets: Targets, sensors: Sequence[VerifiedSensor], settings: VisibilitySettings) -> Boolean:
+def _seen_in_recording(targets: Targets, comparisons: Sequence[RayComparison], settings: VisibilitySettings) -> Boolean:
     """Return the targets (t,) with a background return within δ, in the share of sweeps that detection demands."""
     points = []
-    for one in sensors:
-        comparison = one.comparison
-        often = np.isfinite(comparison.measured) & (comparison.returned >= settings.detection)
-        points.append(comparison.sensor.xyz + comparison.directions[often] * comparison.measured[often, None])
+    for one in comparisons:
+        often = np.isfinite(one.measured) & (one.returned >= settings.detection)
+        points.append(one.sensor.xyz + one.directions[often] * one.measured[often, None])
     xyz = np.concatenate(points)
     seen = np.zeros(len(targets), dtype=bool)
     target, point = shapely.STRtree(shapely.points(xyz[:, :2])).query(

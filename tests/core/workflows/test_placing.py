@@ -6,12 +6,14 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from seip_addon.core.acceptance import Acceptance
 from seip_addon.core.choosing.placement.objective import Objective
-from seip_addon.core.choosing.placement.scenarios import PoseErrors, Scenarios
+from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.scenarios.pose_errors import PoseErrors
 from seip_addon.core.workflows.moved_sensors import evaluate_moved_sensors
-from seip_addon.core.workflows.placing import place
+from seip_addon.core.workflows.placing import place, with_context
 
 
 def best_of_all(survey, count, worth):
@@ -52,6 +54,41 @@ def test_pose_errors_are_evaluated_on_held_out_scenarios(small_survey):
     assert len(nominal.placement.notes) > len(plain.placement.notes)
 
 
+def steps_to_end(steps, acceptance, after):
+    """Return the result of work that is accepted after some steps, and the number of steps that it takes then."""
+    for _ in range(after):
+        next(steps)
+    acceptance.accept()
+    rest = 0
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value, rest
+        rest += 1
+
+
+def test_acceptance_ends_what_follows_the_search(small_survey):
+    errors = Scenarios(kind="pose-errors", pose_errors=PoseErrors(position=0.3), held_out=200)
+    goal = Objective(count=2, scenarios=errors, risk="none")
+    acceptance = Acceptance()
+    began = len(list(place(small_survey, replace(goal, scenarios=Scenarios(), risk="auto"))))
+    solution, rest = steps_to_end(place(small_survey, goal, acceptance=acceptance), acceptance, began + 5)
+    assert rest == 0
+    assert not any("in one of twenty cases" in note for note in solution.placement.notes)
+    assert len(list(with_context(small_survey, solution))) > 3
+    solution, rest = steps_to_end(with_context(small_survey, solution, acceptance), acceptance, 0)
+    assert (solution.front, rest) == ((), 0)
+
+
+def test_acceptance_ends_the_search_for_other_numbers_of_sensors(small_survey):
+    solution = finish(place(small_survey, Objective(count=2, criterion="returns")))
+    acceptance = Acceptance()
+    solution, rest = steps_to_end(with_context(small_survey, solution, acceptance), acceptance, 2)
+    assert rest == 0
+    assert solution.deployment.returns.front == ()
+
+
 def test_traffic_scenarios_need_runs(small_survey):
     with pytest.raises(SeipError, match="traffic"):
         finish(place(small_survey, Objective(count=1, scenarios=Scenarios(kind="traffic"))))
@@ -60,7 +97,7 @@ def test_traffic_scenarios_need_runs(small_survey):
 def test_a_sensor_moved_by_hand_sees_what_its_rays_see(small_survey):
     solution = finish(place(small_survey, Objective(count=1)))
     (one,) = solution.deployment.sensors
-    mounted = one.mounted
+    mounted = one
     aside = replace(mounted, xyz=mounted.xyz + np.array([0.05, 0.0, 0.0]))
     moved = finish(evaluate_moved_sensors(small_survey, solution.objective, [aside], {aside.label: "here"}))
     (sensor,) = moved.deployment.sensors

@@ -1,65 +1,40 @@
-r"""Upper bounds by Lagrangian relaxation, and the candidates that they rule out.
+r"""Upper bounds on placements by linear bounds on their concave values.
 
-Let the i-th sensor that sees target j add at most :math:`a_{ji}` to the objective, :math:`a_{j1} \ge a_{j2} \ge …`; for
-coverage :math:`a_{j1} = w_j` and the others are 0 (`multi_cover`). Relaxing the number of sensors that see a target
-with multipliers :math:`0 \le \lambda_j \le a_{j1}` leaves
+`ConcaveSum.bound` is linear in the sensors: a constant and a score of each candidate. The largest sum of scores within
+the number of sensors and a partition into cliques is a matter of sorting; the budget is relaxed with a multiplier μ,
 
 .. math::
-    L(\lambda) = \sum_j \sum_i \max(0, a_{ji} - \lambda_j) + \max_{x \in X} \sum_i s_i x_i,
-    \qquad s_i = \sum_j V_{ij} \lambda_j,
+    \max_{x \in X} F(x) \le \sum_t w_t C_t + μ B + \max_{x \in X'} \sum_i (s_i - μ p_i) x_i .
 
-where X keeps the number of sensors and a partition into cliques (one sensor at most in each), and the budget and the
-mandatory groups are relaxed with multipliers of their own. Every L is an upper bound; subgradients lead to the
-smallest, which equals that of the linear relaxation (Galvão and ReVelle 1996; deflected steps: Camerini, Fratta and
-Maffioli 1975).
+Each choice of parameters gives an upper bound. Subgradient steps lead to a small one (Polyak 1969; deflected steps:
+Camerini, Fratta and Maffioli 1975).
 """
 
+from __future__ import annotations
+
+import itertools
 import math
-from collections.abc import Generator
-from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...arrays import Float, Integer
-from ...progress import Progress
-from .constraints import Constrained
-from .reduced_problem import Instance
-from .search_limits import Clock
+from ...arrays import Boolean, Float, Integer
+from .concave import ConcaveSum
+from .instance import Instance
+from .problem import TIE_TOLERANCE
 
-MAX_ITERATIONS = 1000
-PATIENCE = 20
-STEP_REDUCTION = 0.7
-DEFLECTION = 0.85
-MIN_STEP = 1e-3
-
-REDUCTION_INTERVAL, MAX_KEPT_SHARE = 25, 0.8
-"""Steps between two reductions, and largest share of the candidates that may be left for a reduction to be worth it."""
-
-AVERAGED_SHARE = 0.03  # weight of the last selection in the running average of all
-MIN_GAP_LEFT, MIN_BOUND_LEFT = 0.03, 0.001
-"""Shares of the distance between bound and goal, and of the bound, that further steps must be able to gain.
-
-The average of the selections nearly solves the linear relaxation, so its value shows how far the bound can fall
-(the volume algorithm: Barahona and Anbil 2000).
-"""
-
-MAX_LISTED_CHOICES = 10_000  # number of possible choices at which the search ends
+DEFLECTION = 0.7  # part of the last direction that a step keeps: successive subgradients nearly cancel
+PATIENCE, STEP_REDUCTION = 10, 0.6  # steps without a smaller bound, and the factor of the step length then
+MIN_STEP = 1e-3  # length of a step at which the descent ends
 FACTORS = (0.8, 0.95, 1.0, 1.05, 1.25)  # factors by which the budget's multiplier may change in a step
+MAX_PRICES, MAX_COMPOSITIONS = 3, 30  # different prices, and numbers of each, that are bounded separately at most
 PRICES_TRIED = 200  # multipliers of the price that are tried for a bound on it
-
-
-class HasValue(Protocol):
-    """An upper bound of any form."""
-
-    @property
-    def value(self) -> float:
-        """Upper bound on the objective value of any placement."""
 
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """The choice of largest summed scores: each candidate has a score that does not depend on the others.
+    """The candidates of largest summed scores.
 
     Parameters
     ----------
@@ -71,325 +46,265 @@ class Selection:
         Scores less the multiplier times the price.
     multiplier : float
         Multiplier of the budget.
+    weakest : (c,) float64
+        Net score that each candidate would replace at least: the smallest one picked, or 0 where there is room.
     """
 
     value: float
     picked: Integer
     net: Float
     multiplier: float
+    weakest: Float
 
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """An upper bound and the multipliers that prove it.
+    """An upper bound, and the parameters that prove it.
 
     Parameters
     ----------
     value : float
         Upper bound on the objective value of any placement.
-    targets : (t,) float64
-        Multipliers of the targets.
-    groups : (g,) float64
-        Multipliers of the mandatory groups.
+    parameters : (t,) float64
+    selection : Selection
+    step : float
+        Length of the step that led to it, as a share of the distance to the goal.
     """
 
     value: float
-    targets: Float
-    groups: Float
+    parameters: Float
     selection: Selection
-
-
-def select(instance: Constrained, score: Float, near: float = 0.0) -> Selection:
-    """Choose the candidates of largest scores, one per clique, within the number and the budget.
-
-    The budget is relaxed; its multiplier minimises the bound, by bisection, or is the best of a few near the one given.
-    """
-    # Without a multiplier the sorted choice is exact. It is the answer where its price happens to be within the budget.
-    free = _select(instance, score, 0.0)
-    if instance.affordable(float(instance.price[free.picked].sum())):
-        return free
-    if near > 0:
-        return min((_select(instance, score, near * factor) for factor in FACTORS), key=lambda choice: choice.value)
-    # The bound is convex in the multiplier, and its slope is the budget less the price of the selection: too high a
-    # price means that the smallest bound lies at a larger multiplier. At the largest ratio of score to price nothing
-    # that costs anything is picked, so that no larger multiplier is needed. Each trial is a valid bound; the best one
-    # is kept, as the last one of the bisection need not be it.
-    priced = instance.price > 0
-    low, high = 0.0, float((score[priced] / instance.price[priced]).max())
-    best = _select(instance, score, high)
-    for _ in range(30):
-        middle = (low + high) / 2
-        trial = _select(instance, score, middle)
-        if trial.value < best.value:
-            best = trial
-        if instance.price[trial.picked].sum() > instance.budget:
-            low = middle
-        else:
-            high = middle
-    return best
-
-
-class _Average:
-    """Running average of selections, whose value estimates the linear relaxation from below.
-
-    What exceeds the budget or falls short of the mandatory groups is charged at their multipliers.
-    """
-
-    def __init__(self, layers: Float) -> None:
-        self._layers = layers
-        self._seen: Float = np.zeros(layers.shape[1])
-        self._charge = 0.0
-        self._weight = 0.0
-
-    def record(self, seen: Integer, bound: Bound, instance: Instance) -> None:
-        """Add a selection, with the number of its sensors that see each target."""
-        selection = bound.selection
-        charge = bound.groups @ (1.0 - instance.mandatory[:, selection.picked].sum(axis=1))
-        if selection.multiplier > 0:
-            charge += selection.multiplier * (float(instance.price[selection.picked].sum()) - instance.budget)
-        # `_weight` follows the same recursion with ones: dividing by it removes the bias of a start at zero
-        self._seen += AVERAGED_SHARE * (seen - self._seen)
-        self._charge += AVERAGED_SHARE * (float(charge) - self._charge)
-        self._weight += AVERAGED_SHARE * (1.0 - self._weight)
+    step: float = 1.0
 
     @property
-    def value(self) -> float:
-        """Objective value of the average in the linear relaxation."""
-        # A target that is seen 1.4 times on average has its first layer in full and 40 % of the second. Layers do not
-        # increase, so this is the value of the linear relaxation.
-        depth = np.arange(len(self._layers))[:, None]
-        covered = (self._layers * np.clip(self._seen / self._weight - depth, 0.0, 1.0)).sum()
-        return float(covered) - self._charge / self._weight
+    def constant(self) -> float:
+        """Part of the bound that does not depend on the candidates, to which their net scores are added."""
+        return self.value - math.fsum(self.selection.net[self.selection.picked])
+
+    def forced(self) -> Float:
+        """Return upper bounds on placements with each candidate, (c,) float64 (reduced costs)."""
+        forced: Float = self.value + np.minimum(self.selection.net - self.selection.weakest, 0.0)
+        return forced
 
 
-B = TypeVar("B", bound=HasValue)
-
-
-class SubgradientDescent(Generic[B]):
-    """Deflected subgradient steps that lower a bound.
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """Constraints on further sensors where some are chosen: the part of an `Instance` that a `Selection` respects.
 
     Parameters
     ----------
-    bound : B
-        Bound at the multipliers to begin from.
-    total : float
-        Objective value of all targets. A bound counts as smaller if it falls by more than 1e-7 of this.
-
-    Attributes
-    ----------
-    best, current : B
-        The smallest bound so far, and the one from which the next step is made.
-    step : float
-        Length of a step, as a share of the excess over the goal. It shrinks each time that `PATIENCE` steps in a row
-        have not lowered the bound.
+    price : (c,) float64
+    clique : (c,) int64
+    kind : (c,) int64
+        Kind of each candidate, from 0 on: its price, where a composition is given.
+    groups : (g, c) bool
+        Mandatory groups without a chosen sensor. No candidate is in two of them.
+    quota : tuple of int
+        Largest number of further sensors of each kind.
+    count : int
+        Largest number of further sensors.
+    budget : float
+        Largest price of further sensors; infinite where the quotas keep the budget.
     """
 
-    def __init__(self, bound: B, total: float) -> None:
-        self._total = total
-        self.step = 1.0
-        self._stale = 0
-        self.restart(bound)
+    price: Float
+    clique: Integer
+    kind: Integer
+    groups: Boolean
+    quota: tuple[int, ...]
+    count: int
+    budget: float
 
-    def restart(self, bound: B) -> None:
-        """Continue from another bound, without the deflection by earlier steps."""
-        self.best = self.current = bound
-        self._direction: Float | float = 0.0
+    def select(self, score: Float, near: float = 0.0) -> Selection:
+        """Select the candidates of largest scores.
 
-    def move(self, slope: Float, goal: float) -> Float | None:
-        """Return the amounts to subtract from the multipliers; None where the slope shows that no bound is smaller."""
-        # Part of the last direction is kept (Camerini, Fratta and Maffioli 1975): subgradients of successive steps
-        # often nearly cancel, and the sum goes along the valley instead of across it.
-        self._direction = slope + DEFLECTION * self._direction
-        size = float(self._direction @ self._direction)
-        if size == 0:
-            return None
-        # Polyak's step: the excess over the goal, divided by the squared length. Once the bound is at the goal or
-        # below, a small part of the total keeps the steps positive.
-        length = self.step * max(self.current.value - goal, 1e-6 * self._total) / size
-        return length * self._direction
+        The budget's multiplier minimises the bound by bisection, or is the best of a few near the one given.
+        """
+        free = self._select(score, 0.0)
+        if math.isinf(self.budget) or self.price[free.picked].sum() <= self.budget:
+            return free
+        if near > 0:
+            return min((self._select(score, near * factor) for factor in FACTORS), key=lambda choice: choice.value)
+        # The bound is convex in the multiplier, and its slope is the budget less the price of the selection. At the
+        # largest ratio of score to price nothing that costs anything is picked. Each trial is a valid bound.
+        priced = self.price > 0
+        low, high = 0.0, float((score[priced] / self.price[priced]).max())
+        best = self._select(score, high)
+        for _ in range(30):
+            middle = (low + high) / 2
+            trial = self._select(score, middle)
+            best = min(best, trial, key=lambda choice: choice.value)
+            low, high = (middle, high) if self.price[trial.picked].sum() > self.budget else (low, middle)
+        return best
 
-    def record(self, bound: B) -> None:
-        """Record the bound after a step; return to the best one after `PATIENCE` steps without a smaller one."""
-        self.current = bound
-        self._stale += 1
-        if bound.value < self.best.value - 1e-7 * self._total:
-            self.best, self._stale = bound, 0
-        elif self._stale == PATIENCE:
-            self.step, self._stale = self.step * STEP_REDUCTION, 0
-            self.restart(self.best)
+    def _select(self, score: Float, multiplier: float) -> Selection:
+        """Return the selection at a multiplier of the budget, by sorting."""
+        net = score - multiplier * self.price if multiplier else score
+        # The best member of each group is picked in any case. A placement has a member of each, and what else it has
+        # is at most the largest net scores of as many other cliques; the clique of a group of one clique is taken.
+        forced = [int(np.argmax(np.where(group, net, -np.inf))) for group in self.groups]
+        taken = [self.clique[one] for group, one in zip(self.groups, forced, strict=True) if self._is_single(group)]
+        best_first = np.argsort(-net, kind="stable")
+        best_first = best_first[net[best_first] > 0]
+        if taken:
+            best_first = best_first[~np.isin(self.clique[best_first], taken)]
+        picked, weakest = [np.array(forced, dtype=np.int64)], np.zeros(len(self.quota))
+        for kind, quota in enumerate(self.quota):
+            own = best_first[self.kind[best_first] == kind] if len(self.quota) > 1 else best_first
+            heads = own[np.sort(np.unique(self.clique[own], return_index=True)[1])][:quota]
+            picked.append(heads)
+            if quota and len(heads) == quota:
+                weakest[kind] = net[heads[-1]]
+        every = np.concatenate(picked)
+        if len(every) > self.count:
+            free = every[len(forced) :]
+            free = free[np.argsort(-net[free], kind="stable")][: max(0, self.count - len(forced))]
+            every = np.concatenate([every[: len(forced)], free])
+        if len(forced) or len(every) < sum(map(len, picked)):
+            weakest[:] = min(0.0, *net[every].tolist()) if len(every) < self.count else float(net[every].min())
+        value = math.fsum(net[every]) + (multiplier * self.budget if multiplier else 0.0)
+        return Selection(value, every, net, multiplier, weakest[self.kind])
+
+    def _is_single(self, group: Boolean) -> bool:
+        return bool(np.ptp(self.clique[group]) == 0)
 
 
-def bound_from(
-    instance: Instance,
-    targets: Float,
-    groups: Float,
-    layers: Float | None = None,
-    *,
-    exact: bool = True,
-    near: float = 0.0,
+def rest_of(instance: Instance, chosen: Integer, left: Integer, composition: Composition | None = None) -> Rest:
+    """Return the constraints on candidates ``left`` after some are chosen, within a composition if one is given."""
+    unserved = instance.mandatory[~instance.mandatory[:, chosen].any(axis=1)][:, left]
+    groups: list[Boolean] = []
+    for group in unserved:  # some of the groups, disjoint from each other
+        if group.any() and not any((group & other).any() for other in groups):
+            groups.append(group)
+    count = instance.count - len(chosen)
+    spent = math.fsum(instance.price[chosen])
+    quota, kind, budget = (count,), np.zeros(len(left), dtype=np.int64), instance.budget * (1 + TIE_TOLERANCE) - spent
+    if composition is not None:
+        used = np.bincount(composition.kind[chosen], minlength=len(composition.quota))
+        quota = tuple(int(most - own) for most, own in zip(composition.quota, used, strict=True))
+        kind, budget, count = composition.kind[left], math.inf, min(count, sum(quota))
+    return Rest(
+        price=instance.price[left],
+        clique=instance.clique[left],
+        kind=kind,
+        groups=np.array(groups, dtype=bool).reshape(len(groups), len(left)),
+        quota=quota,
+        count=count,
+        budget=budget,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Composition:
+    """Numbers of sensors of each price.
+
+    Parameters
+    ----------
+    kind : (c,) int64
+        Number of the price of each candidate of an instance.
+    quota : tuple of int
+        Largest number of sensors of each price.
+    """
+
+    kind: Integer
+    quota: tuple[int, ...]
+
+
+def compositions(instance: Instance) -> list[Composition | None]:
+    """Return compositions, one of which each placement keeps to; a single None if there is no budget or there are many.
+
+    Under a budget the bound of each composition by itself is smaller than that with a multiplier, which mixes them.
+    """
+    prices, kind = np.unique(instance.price, return_inverse=True)
+    if math.isinf(instance.budget) or len(prices) > MAX_PRICES or prices[0] <= 0:
+        return [None]
+    budget = instance.budget * (1 + TIE_TOLERANCE)
+    dear = np.array(list(itertools.product(range(instance.count + 1), repeat=len(prices) - 1)), dtype=np.int64)
+    left = budget - dear @ prices[1:]
+    cheap = np.minimum((left // prices[0]).astype(np.int64), instance.count - dear.sum(axis=1))
+    full = [(int(number), *map(int, others)) for number, others in zip(cheap, dear, strict=True) if number >= 0]
+    full = [one for one in full if np.dot(one, prices) <= budget]
+    kept = [one for one in full if not any(_within(one, other) for other in full)]
+    return [Composition(kind, one) for one in kept] if len(kept) <= MAX_COMPOSITIONS else [None]
+
+
+def _within(one: tuple[int, ...], other: tuple[int, ...]) -> bool:
+    """Return whether another composition has no fewer sensors of any price, and more of one."""
+    return one != other and all(own <= more for own, more in zip(one, other, strict=True))
+
+
+def first_bound(block: ConcaveSum, rest: Rest, base: Float, rounding: float) -> Bound:
+    """Return the bound by the gains of all candidates on top of the chosen ones (Leskovec et al. 2007, section 3.2)."""
+    selection = rest.select(block.gains(base))
+    return Bound(block.value_at(base) + selection.value + rounding, block.lowest(base), selection)
+
+
+def bound_at(
+    block: ConcaveSum, rest: Rest, base: Float, parameters: Float, rounding: float, near: float = 0.0
 ) -> Bound:
-    """Return the bound for given multipliers, in double precision where ``exact``.
+    """Return the bound for given parameters (t,)."""
+    constant, score = block.bound(base, parameters)
+    selection = rest.select(score, near)
+    return Bound(constant + selection.value + rounding, parameters, selection)
+
+
+def falling_bounds(
+    block: ConcaveSum, rest: Rest, base: Float, start: Bound, goal: float, rounding: float
+) -> Iterator[Bound]:
+    """Yield the smallest bound so far after each subgradient step, without end until no step can lower it.
 
     Parameters
     ----------
-    layers : (top, t) float64, optional
-        Largest amount that each further sensor adds to each target. Default: those of targets that are not seen yet.
-    exact : bool
-        Whether to compute scores in double precision. Single precision may move the bound by more than its margin.
-    near : float
-        Multiplier of the budget near which to look for a better one; 0 to look everywhere.
-    """
-    if layers is None:
-        layers = instance.unseen_layers
-    if exact:
-        score = np.concatenate([block @ targets for block in np.array_split(instance.visible, 16)])
-    else:
-        score = instance.gains(targets)
-    # The three terms of L: what targets add beyond their multipliers; the mandatory groups, each relaxed as "at least
-    # one of its candidates", which costs its multiplier once and adds it to the score of each member; the best
-    # selection. `fsum` keeps the error of long sums below the instance's margin.
-    selection = select(instance, score + groups @ instance.mandatory, near)
-    rest = np.maximum(layers - targets, 0.0).ravel()
-    value = (math.fsum(rest) if exact else float(rest.sum())) - math.fsum(groups) + selection.value
-    return Bound(value, targets, groups, selection)
-
-
-def lagrangian_bound(
-    instance: Instance,
-    goal: float,
-    clock: Clock,
-    start: Float | None = None,
-    iterations: int = MAX_ITERATIONS,
-    layers: Float | None = None,
-) -> Generator[Progress, None, tuple[Integer, Bound]]:
-    """Search for multipliers with a small bound by deflected subgradients.
-
-    Candidates that the bound rules out are left out of the following steps, which makes these shorter and the bound
-    smaller.
-
-    Parameters
-    ----------
+    block : ConcaveSum
+        Sum over the candidates that are left.
+    rest : Rest
+    base : (t,) float64
+        Amounts of the chosen sensors.
+    start : Bound
+        Bound to begin from.
     goal : float
-        Objective value to reach; the search ends when the bound falls below.
-    start : (t,) float64, optional
-        Multipliers of the targets to begin from.
-    layers : (top, t) float64, optional
-        Layers as for `bound_from`.
-
-    Returns
-    -------
-    (k,) int64
-        Candidates that some placement reaching ``goal`` may contain.
-    Bound
-        Smallest bound found for placements of these candidates, evaluated in double precision. If no candidate is
-        left, it is the bound for those of the last step.
+        Value that the bound need not fall below; steps are as long as if it could be reached.
+    rounding : float
+        Largest rounding error, by which bounds are raised.
     """
-    layers = instance.unseen_layers if layers is None else layers
-    most = layers[0]
-    keep = np.arange(len(instance))
-    # A target that many candidates see is likely to be seen by several chosen ones: its multiplier, the share of it
-    # that each sensor is credited with, begins lower. This is a heuristic start; any multipliers give a valid bound.
-    targets = most / np.maximum(1, instance.visible.sum(axis=0)) ** 0.5 if start is None else start
-    groups = np.zeros(len(instance.mandatory))
-    # Multipliers of groups are of the size of scores, those of targets of the size of weights. One step length serves
-    # both only after scaling by the mean number of targets that a candidate sees.
-    stretch = instance.visible.sum() / len(instance) if len(groups) else 1.0
-    descent = SubgradientDescent(bound_from(instance, targets, groups, layers, exact=False), float(layers.sum()))
-    total, average = float(layers.sum()), _Average(layers)
-    for iteration in range(iterations):
-        best = descent.best
-        if best.value < goal - instance.margin or descent.step < MIN_STEP or clock.left <= 0:
-            break
-        # Every `REDUCTION_INTERVAL` steps: stop if the linear relaxation, estimated by the average, leaves hardly any
-        # room below the bound; else rule candidates out, and stop if so few are left that their choices can be listed.
-        due = iteration % REDUCTION_INTERVAL == REDUCTION_INTERVAL - 1
-        least = min(MIN_GAP_LEFT * (best.value - goal), MIN_BOUND_LEFT * best.value)
-        if due and min(best.value, total) - average.value <= least:
-            break
-        if due and len(can_reach(instance, best, goal)) <= MAX_KEPT_SHARE * len(keep):
-            # the test above used the fast bound; candidates are only removed by the one in double precision
-            within = can_reach(instance, bound_from(instance, best.targets, best.groups, layers), goal)
-            if math.comb(len(within), min(instance.count, len(within) // 2)) <= MAX_LISTED_CHOICES:
-                break
-            # earlier directions belong to the larger set of candidates, so that the descent restarts without them
-            keep, instance = keep[within], instance.of(within)
-            descent.restart(bound_from(instance, best.targets, best.groups, layers, exact=False))
-        yield Progress(0, 0, "bounding what any placement can cover")  # it mostly ends long before the limit
-        clock.spend(2 * instance.visible.size)
-        current = descent.current
-        picked = current.selection.picked
-        seen = instance.visible[picked].sum(axis=0)
-        average.record(seen, current, instance)
-        # L falls with a multiplier by one for each layer above it, and rises by one for each selected sensor that sees
-        # the target. Where the multiplier equals some layers, any number of these may count: of this interval of slopes
-        # the one nearest to zero is taken, so that a slope of zero everywhere proves that the bound is the smallest.
-        slope = np.maximum(
-            seen - (layers >= current.targets).sum(axis=0), np.minimum(seen - (layers > current.targets).sum(axis=0), 0)
-        )
-        group_slope = stretch * (instance.mandatory[:, picked].sum(axis=1) - 1.0)
-        change = descent.move(np.concatenate([slope, group_slope]), goal)
-        if change is None:
-            break
-        # clipped to where multipliers are valid: 0 <= λ <= a_1 for targets, at least 0 for groups
-        targets = np.clip(current.targets - change[: len(most)], 0.0, most)
-        groups = np.maximum(current.groups - stretch * change[len(most) :], 0.0)
-        descent.record(bound_from(instance, targets, groups, layers, exact=False, near=current.selection.multiplier))
-    best = descent.best
-    best = bound_from(instance, best.targets, best.groups, layers)
-    within = can_reach(instance, best, goal)
-    # Every placement that reaches the goal consists of the candidates that are left, so that the bound for these holds
-    # for it: a smaller selection from fewer candidates, at no further step.
-    if len(within):
-        best = bound_from(instance.of(within), best.targets, best.groups, layers)
-    return keep[within], best
+    best = current = start
+    step, stale = start.step, 0
+    direction: Float | float = 0.0
+    while step >= MIN_STEP:
+        slope = block.slope(base, current.parameters, current.selection.picked)
+        # one step length for all targets: each counts as many times as its weight
+        direction = slope + DEFLECTION * direction
+        size = float(block.weight @ (direction * direction))
+        if size == 0:
+            return
+        length = step * max(current.value - goal, 1e-6 * abs(current.value)) / size
+        moved = block.clipped(base, current.parameters - length * direction)
+        current = bound_at(block, rest, base, moved, rounding, current.selection.multiplier)
+        stale += 1
+        if current.value < best.value - 1e-7 * abs(best.value):
+            best, stale = replace(current, step=step), 0
+        elif stale == PATIENCE:
+            step, stale, direction = step * STEP_REDUCTION, 0, 0.0
+            current = best = replace(best, step=step)
+        yield best
 
 
-def least_price(instance: Instance, bound: Bound, goal: float) -> float:
-    r"""Return a price below which no placement covers ``goal``.
+def least_price(rest: Rest, bound: Bound, goal: float) -> float:
+    r"""Return a price below which no placement reaches an objective value.
 
-    With the bound's multipliers and a multiplier :math:`\mu > 0` of the price, a placement of price C covers at most
-    :math:`L(\lambda, \mu) + \mu C`, so that :math:`C \ge (goal - L(\lambda, \mu)) / \mu`.
+    With a multiplier :math:`μ > 0` of the price a placement of price P has at most the value :math:`L(μ) + μ P`, so that
+    :math:`P \ge (goal - L(μ)) / μ`.
     """
-    # `net` has the price taken off at the bound's own multiplier: adding it again gives the plain scores
-    score = bound.selection.net + bound.selection.multiplier * instance.price
-    fixed = bound.value - bound.selection.value
-    # The selection changes only where the multiplier passes a candidate's ratio of score to price: it is enough to try
-    # these, and of many an even spread. The largest of the lower bounds holds.
-    worth = np.unique(score[instance.price > 0] / instance.price[instance.price > 0])
+    selection = bound.selection
+    score = selection.net + selection.multiplier * rest.price
+    constant = bound.value - selection.value
+    worth = np.unique(score[rest.price > 0] / rest.price[rest.price > 0])
     worth = worth[worth > 0]
+    # the selection changes only where the multiplier passes a ratio of score to price: of many an even spread is tried
     tried = worth[np.linspace(0, len(worth) - 1, min(len(worth), PRICES_TRIED)).astype(np.int64)]
-    gained = [_select(instance, score, multiplier) for multiplier in tried]
-    prices = [
-        (goal - fixed - math.fsum(selection.net[selection.picked])) / selection.multiplier for selection in gained
-    ]
+    free = replace(rest, budget=math.inf)
+    prices = []
+    for multiplier in tried.tolist():
+        selected = free._select(score - multiplier * rest.price, 0.0)  # noqa: SLF001 -- of the same module
+        prices.append((goal - constant - selected.value) / multiplier)
     return max([0.0, *prices])
-
-
-def can_reach(instance: Instance, bound: Bound, goal: float) -> Integer:
-    """Return the candidates that some placement reaching ``goal`` may contain, (k,) int64.
-
-    A candidate is ruled out when the bound, with that candidate forced into the selection, falls short of the goal by
-    more than rounding errors: all optimal placements survive, ties included (reduced-cost fixing).
-    """
-    picked, net = bound.selection.picked, bound.selection.net
-    in_clique = np.zeros(int(instance.clique.max()) + 1)
-    # A forced candidate replaces the pick of its clique, or, if its clique has none and the number is used up, the
-    # weakest pick; otherwise it is added, and replaces nothing (0).
-    in_clique[:] = net[picked].min() if len(picked) == instance.count else 0.0
-    in_clique[instance.clique[picked]] = net[picked]
-    forced = bound.value + np.minimum(net - in_clique[instance.clique], 0.0)
-    return np.flatnonzero(forced >= goal - instance.margin)
-
-
-def _select(instance: Constrained, score: Float, multiplier: float) -> Selection:
-    """Return the selection at a multiplier of the budget: exact for cliques and number, by sorting."""
-    net = score - multiplier * instance.price if multiplier else score
-    # sorted by clique, and within each by falling net score: the first of each clique is its best candidate
-    best_first = np.lexsort((-net, instance.clique))
-    clique = instance.clique[best_first]
-    heads = best_first[np.concatenate([[True], clique[1:] != clique[:-1]])]
-    # no more than ``count`` of these, and none that would lower the sum
-    heads = heads[np.argsort(-net[heads], kind="stable")][: instance.count]
-    picked = heads[net[heads] > 0]
-    value = math.fsum(net[picked]) + (multiplier * instance.budget if multiplier else 0.0)
-    return Selection(value, picked, net, multiplier)

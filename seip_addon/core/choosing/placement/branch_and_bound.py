@@ -1,488 +1,499 @@
-r"""Best-first branch and bound on the marginal gains of sensors, for coverage and multi-cover.
+"""Best-first branch and bound on linear bounds, which shares its best placement with the search.
 
-A placement is built in greedy order: each sensor adds no more than the one before it, because coverage is submodular.
-At a node with k sensors still to come the best completion adds at most the sum of the k largest gains; these sums fall
-along the sorted candidates, so all children below the first that falls short are cut at once (cf. Nemhauser and Wolsey
-1981 on maximising submodular set functions). The gains on top of all children come from one matrix product, and cut
-most of them before they become nodes. Where rings of beams overlap a little everywhere the relaxed integer program is
-weak and this bound is strong.
+A node is the set of placements with some chosen candidates and any of those that are left. Its candidates are sorted by
+what they contribute to its bound; each child chooses one of them and leaves out those before it. The bounds of children
+fall along that order, so that all after the first that falls short are cut at once. A child begins its own bound from
+the parameters of its parent: few steps are enough.
 
-The value of a target by the number of sensors that see it is concave (`multi_cover`), so that the value of a placement
-is submodular, and exact for the last sensor.
-
-The largest bound among the open nodes holds for every placement that the search has not visited. It falls as the search
-continues, and a stopped search can be resumed.
-
-Weights are whole numbers, so a search meets the same placements in the same order on every machine.
+The search goes in stages, each with a goal between the best value and the bound: what cannot reach the goal waits for a
+later stage. So the bound of all falls early, at little work for each node, and a stopped search can be resumed.
 """
 
+from __future__ import annotations
+
 import math
-from collections.abc import Generator
-from dataclasses import dataclass, replace
-from heapq import heappop, heappush
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass, field, replace
+from heapq import heapify, heappop, heappush
 
 import numpy as np
 
 from ...arrays import Boolean, Float, Integer
 from ...progress import Progress
-from .bounds import Bound, lagrangian_bound, select
-from .problem import TIE_TOLERANCE
-from .reduced_problem import MAX_EXACT_DOUBLE, WHOLE_SLACK, Instance, Numbers
-from .search_limits import Clock
+from .bounds import Bound, Composition, Rest, bound_at, compositions, falling_bounds, first_bound, rest_of
+from .concave import ConcaveSum
+from .incumbent import Incumbent
 
-MIN_SENSORS = 3  # least number of sensors to come for which a node is also bounded by Lagrangian relaxation
+ROOT_STEPS, NODE_STEPS = 300, 12  # largest number of steps of the bound at the root, and at each other node
+ROUND = 25  # steps at the root after which candidates that the bound rules out are dropped
+LEAST_FALL = 0.002  # share of the bound that a round must gain for another one
+GOAL_SHARE = 0.7  # share of the gap that remains at the end of each stage
+LEAST_GAP = 0.002  # gap below which the next stage is the last one
+TRIALS, LEAST_SUCCESS = 20, 0.2
+"""Nodes of each depth whose bounds are lowered in any case, and share of them that must be cut for it to go on."""
+LISTED = 3  # sensors to come of which products of matrices give all values
+FEW = 60  # candidates up to which the gains after each child are a better use of time than steps of the bound
+MAX_PAIRS = 4_000_000  # entries of the gains after each child that are computed at once
+PAIR_OPERATIONS = 60.0  # multiplications that take as long as what is done for each pair of a child and a candidate
+PRODUCT_SHARE = 0.1  # time of a multiplication in a product of matrices, as a share of one in other steps
+REPORTED = 10  # nodes between two reports
 
-MIN_CHILDREN = 60
-"""Least number of children of a node for which it is relaxed."""
 
-TRIALS, MAX_KEPT_SHARE = 4, 0.5
-"""Trials of the relaxation for each number of sensors to come, and the mean share of children that it may keep in them.
+@dataclass(order=True)
+class _Node:
+    """A set of placements that has not been searched.
 
-If it keeps more, nodes with this number of sensors to come are no longer relaxed.
-"""
+    Parameters
+    ----------
+    rank : float
+        Negative upper bound on their values: the heap has the node of the largest bound first.
+    number : int
+        Serial number, which settles equal bounds.
+    chosen : (k,) int64
+        Candidates that all of them contain.
+    left : (n,) int64
+        Candidates that they may contain besides, ascending.
+    first : (f,) int64
+        Candidates of which they contain at least one: usually all that are left.
+    parameters : (t,) float64
+        Parameters of a bound to begin from.
+    composition : Composition, optional
+        Numbers of sensors of each price.
+    """
 
-FIRST_STEPS, LATER_STEPS = 300, 30  # steps of the multipliers at the first node, and at nodes that start from others
-MAX_ENTRIES = 30_000_000  # largest number of entries of V that the search keeps as numbers: 240 MB, or twice that
-OPERATIONS_PER_FETCH = 8  # multiplications that take as long as fetching an entry of V
-
-MAX_WAITING_FOLLOWERS = 16_000_000
-"""Largest number of followers in the queue of open nodes: 200 MB. Beyond it, new nodes are searched first."""
+    rank: float
+    number: int
+    chosen: Integer = field(compare=False)
+    left: Integer = field(compare=False)
+    first: Integer = field(compare=False)
+    parameters: Float = field(compare=False)
+    composition: Composition | None = field(compare=False, default=None)
 
 
 @dataclass(frozen=True, eq=False)
-class _Node:
-    """Sensors chosen so far and the candidates that may follow, largest gain first.
+class _Problem:
+    """The problem of a node: what the candidates that are left can add.
 
     Parameters
     ----------
-    bound : float
-        No placement below this node has a larger objective value.
-    chosen : tuple of int
-        Candidates in the order in which they were chosen.
-    value : float
-        Objective value of the chosen candidates.
-    goal : float
-        Least objective value of placements below this node that are of interest.
-    followers : (n,) int64
-        Candidates that may be added.
-    gains : (n,) float
-        Upper bound on what each follower adds.
-    multipliers : (t,) float64, optional
-        Lagrangian multipliers of the targets to begin from.
-    multiplier : float
-        Multiplier of the budget to begin from.
+    node : _Node
+    left, first : int64
+        As in `_Node`.
+    block : ConcaveSum
+        Sum over the candidates that are left, and the targets to which they may add anything.
+    rest : Rest
+    base : (t,) float64
+        Amounts of the chosen sensors at these targets.
+    raised : float
+        Value of the other targets, and the rounding error.
     """
 
-    bound: float
-    chosen: tuple[int, ...]
-    value: float
-    goal: float
-    followers: Integer
-    gains: Numbers
-    multipliers: Float | None = None
-    multiplier: float = 0.0
+    node: _Node
+    left: Integer
+    first: Integer
+    block: ConcaveSum
+    rest: Rest
+    base: Float
+    raised: float
 
 
-def is_worthwhile(instance: Instance, candidates: Integer) -> bool:
-    """Return whether a search among some candidates of an instance fits into useful memory."""
-    return len(candidates) * max(len(instance.weight), len(candidates)) <= MAX_ENTRIES
-
-
-def merit(instance: Instance, chosen: Integer) -> tuple[int, float, float, list[int]]:
-    """Return number, price, double coverage and order as a key, smallest first, rounded to what counts as equal."""
-    doubly = instance.doubly(chosen)
-    return (
-        len(chosen),
-        round(math.fsum(instance.price[chosen]) / (float(instance.price.max(initial=0.0)) or 1.0), 8),
-        -(doubly if instance.step == 1 else round(doubly / instance.slack)),
-        chosen.tolist(),
-    )
-
-
-class Search:
-    """Search of all placements in greedy order; subclasses select results in `_take`.
+class BranchAndBound:
+    """Search for a proof that no placement is better than the best one so far, and for better ones.
 
     Parameters
     ----------
-    goal : float
-        Least objective value of a result.
-    root : (n,) int64 and Bound, optional
-        Candidates to search among, and an upper bound on the value of their placements, where known.
-
-    Attributes
-    ----------
-    goal : float
-        Least value of a result. It rises as placements are found.
-    satisfied : bool
-        Whether enough placements were found.
+    incumbent : Incumbent
+        Best placement so far, with the limit of work; it is improved where a better one is met.
+    block : ConcaveSum
+        Sum over all candidates of the instance that is nowhere below the objective; see `Instance.relaxed`.
     """
 
-    def __init__(self, instance: Instance, goal: float, root: tuple[Integer, Bound] | None = None) -> None:
-        self.instance = instance
-        self.goal = instance.attainable(goal) - instance.slack
-        self.satisfied = False
-        self._clock = Clock(math.inf)
-        self._matrix = instance.matrix
-        self._by_target = np.ascontiguousarray(self._matrix.T)
-        self._seen_by = np.ascontiguousarray(instance.visible.T)
-        self._weight = instance.weight.astype(self._matrix.dtype)
-        # For plain coverage the weight that two candidates both see is the same at every node: computed once, it saves
-        # most of the work in `_overlaps`. With several values per target it depends on how often each is seen already.
-        self._overlap = (self._matrix * self._weight) @ self._by_target if instance.cover.top == 1 else None
-        self._excluded = instance.conflict | np.eye(len(instance), dtype=bool)
-        # running sums of all gains, each at most the total, are exact below MAX_EXACT_DOUBLE and rounded beyond
-        most = instance.total * (len(instance) + 1)
-        self._rounding = 0.0 if most < MAX_EXACT_DOUBLE else most * len(instance) / MAX_EXACT_DOUBLE
-        self._queue: list[tuple[tuple[float, int, int], _Node]] = []
-        self._stack: list[_Node] = []
-        self._serial = self._waiting = self._met = 0
-        self._left_over: dict[int, list[float]] = {}
-        # The root has no sensors, and all candidates as followers. The stable sort settles ties by the canonical order
-        # of candidates, so that the tree does not depend on the machine.
-        gains = self._matrix @ instance.unseen_layers[0].astype(self._matrix.dtype)
-        first = np.argsort(-gains, kind="stable")
-        bound, multipliers = math.inf, None
-        if root is not None:
-            first, bound, multipliers = first[np.isin(first, root[0])], root[1].value, root[1].targets
-        self._push([_Node(bound, (), 0.0, -math.inf, first, gains[first], multipliers)])
+    def __init__(self, incumbent: Incumbent, block: ConcaveSum) -> None:
+        self.incumbent, self.instance, self._block = incumbent, incumbent.instance, block
+        self._rounding, self._total = block.rounding, block.value(np.arange(len(block)))
+        self._number = self._met = 0
+        self._tried: dict[int, tuple[int, int]] = {}
+        self._open: list[_Node] = []
+        self._waiting: list[_Node] = []
+        self._goal = -math.inf
 
     @property
     def bound(self) -> float:
-        """Upper bound on the value of placements not visited yet; -inf once none of these can reach the goal."""
-        # the queue is a heap by bound, so that its first node has the largest; the stack has no order
-        bounds = [node.bound for node in self._stack] + [node.bound for _, node in self._queue[:1]]
-        bound = max(bounds, default=-math.inf)
-        return bound if bound >= self.goal - self._rounding else -math.inf
+        """Upper bound on the value of any placement."""
+        ranks = [node.rank for node in self._waiting] + [node.rank for node in self._open[:1]]
+        return max(self.incumbent.value, -min(ranks, default=math.inf))
 
-    def run(self, clock: Clock, seconds: float) -> Generator[Progress, None, bool]:
-        """Continue the search; return whether it ended within the limits."""
-        end = clock.elapsed + min(seconds, clock.left)
-        self._clock = clock
-        while self._is_open() and not self.satisfied:
-            if clock.elapsed > end or clock.left <= 0:
-                return False
-            yield Progress(0, 0, f"searching placements, {self._met:,} branches so far")
-            self._met += 1
-            clock.spend(len(self.instance))
-            self._push((yield from self._expand(self._pop())))
+    def left(self) -> Integer:
+        """Return the candidates of the best placement and of all open nodes, ascending."""
+        nodes = [*self._open, *self._waiting]
+        members = [part for node in nodes for part in (node.chosen, node.left)]
+        left: Integer = np.unique(np.concatenate([self.incumbent.chosen, *members]))
+        return left
+
+    def start(self) -> Generator[Progress, None, None]:
+        """Bound all placements, and open the first nodes: one, or one for each composition that spends the budget."""
+        every = np.arange(len(self.instance))
+        parameters = self._block.start(self._block.together(self.incumbent.chosen))
+        for composition in compositions(self.instance):
+            root = _Node(-math.inf, 0, np.zeros(0, dtype=np.int64), every, every, parameters, composition)
+            yield from self._start_from(root)
+        self._note(self.bound)
+        yield self.incumbent.progress("bounding")
+
+    def _start_from(self, root: _Node) -> Generator[Progress, None, None]:
+        problem, targets = self._problem(root, root.left)
+        bound = min(
+            first_bound(problem.block, problem.rest, problem.base, problem.raised),
+            bound_at(problem.block, problem.rest, problem.base, root.parameters[targets], problem.raised),
+            key=lambda one: one.value,
+        )
+        for _ in range(0, ROOT_STEPS, ROUND):
+            before = bound.value
+            bound = self._steps(problem, bound, ROUND)
+            yield self.incumbent.progress("bounding")
+            within = np.flatnonzero(bound.forced() >= self.incumbent.least_better)
+            if not len(within):
+                return
+            if len(within) < len(problem.left):
+                problem = self._restricted(problem, within)
+                lower = bound_at(problem.block, problem.rest, problem.base, bound.parameters, problem.raised)
+                bound = replace(lower, step=bound.step)
+            if before - bound.value < LEAST_FALL * bound.value or self.incumbent.work.left <= 0:
+                break
+        self.incumbent.offer(problem.left[bound.selection.picked])
+        limit = min(bound.value, self._total + self._rounding)
+        parameters = root.parameters.copy()
+        parameters[targets] = bound.parameters
+        self._push(replace(root, left=problem.left, first=problem.left, parameters=parameters), limit)
+
+    def run(self) -> Generator[Progress, None, bool]:
+        """Search until nothing can be better, or the work is done; return whether the best placement is proven."""
+        incumbent = self.incumbent
+        while not self._next_stage():
+            while self._open and -self._open[0].rank >= max(self._goal, incumbent.least_better):
+                if self._met % REPORTED == 0:
+                    self._note(self.bound)
+                    yield incumbent.progress("proving that no placement is better")
+                if incumbent.work.left <= 0:
+                    self._note(self.bound)
+                    return False
+                self._met += 1
+                self._take(heappop(self._open))
         return True
 
-    def _take(self, placement: Integer) -> float:
-        """Record a placement that may reach the goal; return the goal for placements with more sensors."""
-        raise NotImplementedError
+    def _next_stage(self) -> bool:
+        """Set the goal of the next stage, and return whether there is none, as nothing is left that could be better."""
+        incumbent = self.incumbent
+        self._open = [node for node in (*self._open, *self._waiting) if -node.rank >= incumbent.least_better]
+        self._waiting = []
+        heapify(self._open)
+        self._note(self.bound)
+        if not self._open:
+            incumbent.bound = incumbent.value
+        distance = self.bound - incumbent.value
+        self._goal = incumbent.value + GOAL_SHARE * distance if distance > LEAST_GAP * self.bound else -math.inf
+        return not self._open
 
-    def offer(self, chosen: Integer) -> float:
-        """Record a placement found elsewhere; return the goal for placements with more sensors."""
-        return self._take(np.sort(np.array(chosen, dtype=np.int64)))
+    def _note(self, bound: float) -> None:
+        self.incumbent.bound = max(self.incumbent.value, min(self.incumbent.bound, bound))
 
-    def _is_open(self) -> bool:
-        # once the largest bound in the queue is below the goal, all nodes in it are
-        if not self._stack and self._queue and self._queue[0][1].bound < self.goal - self._rounding:
-            self._queue.clear()
-        return bool(self._stack or self._queue)
-
-    def _pop(self) -> _Node:
-        if self._stack:
-            return self._stack.pop()
-        node = heappop(self._queue)[1]
-        self._waiting -= len(node.followers)
-        return node
-
-    def _push(self, children: list[_Node]) -> None:
-        # Best first keeps all open nodes in memory. Beyond the limit the search goes depth first instead, which needs
-        # little memory and finishes subtrees. The proof stays complete, since `bound` includes the stack. Children are
-        # pushed last to first, so that the one of largest gain is taken from the stack first.
-        for child in reversed(children):
-            if self._waiting > MAX_WAITING_FOLLOWERS:
-                self._stack.append(child)
-            else:
-                self._serial += 1
-                # of equal bounds the deepest node first, as it is nearest to a placement; then in the order of creation
-                heappush(self._queue, ((-child.bound, -len(child.chosen), self._serial), child))
-                self._waiting += len(child.followers)
-
-    def _expand(self, node: _Node) -> Generator[Progress, None, list[_Node]]:
-        """Return the children of a node that can still reach the goal, and record the placements that do."""
-        # The goal may have risen since the node was queued: everything about it is checked again here.
-        goal = self._wanted(node)
-        left = 0 if node.bound < goal else self._left(node)
-        if left == 0:
-            return []
-        node, children = _within_reach(node, left, goal)
-        if children == 0:
-            return []
-        if left == 1:
-            self._take_leaves(node, children)
-            return []
-        # The sum of the largest gains counts a target once for each follower that sees it. The Lagrangian bound
-        # corrects that, but takes a product with V in each step: it is computed only where it may remove many children.
-        # At the root the caller may have given its result already.
-        known = node.multipliers is not None and not node.chosen
-        if children >= MIN_CHILDREN and not known and self._relaxation_pays(left):
-            before = children
-            node, children = yield from self._relaxed(node, left, goal)
-            self._left_over.setdefault(left, []).append(children / before)
-            if children == 0:
-                return []
-        kept = self._children(node, children, left, goal)
-        # With two sensors to come the children have leaves only. These are recorded at once and not queued: their
-        # placements are known here, and bounds could not cut any more of them.
-        if left > 2:
-            return kept
-        for child in kept:
-            self._met += 1
-            self._take_leaves(child, len(child.followers))
-        return []
-
-    def _children(self, node: _Node, children: int, left: int, goal: float) -> list[_Node]:
-        """Return the children of a node whose bounds reach the goal, after offering those that reach it themselves.
-
-        Child i adds follower i and keeps as followers only those after it. So every set of followers is below exactly
-        one child, the one of its first member.
-        """
-        times = self.instance.times(node.chosen)
-        # Row i has the gains of all followers after child i is added: their gains so far, less what child i takes away.
-        # One matrix product gives all rows, and the sum of the largest gains in each is that child's bound.
-        later = self._may_follow(node, children)
-        gains_after = node.gains - self._overlaps(times, node.followers, children)
-        multiplier, best = self._best_completions(node, np.where(later, gains_after, 0.0), left - 1)
-        values = node.value + node.gains[:children].astype(np.float64)
-        kept = []
-        for row in np.flatnonzero(values + best >= goal):
-            chosen, value, wanted = (*node.chosen, int(node.followers[row])), float(values[row]), self._wanted(node)
-            # A placement that reaches the goal raises it for all placements with more sensors, so that the child, which
-            # was within reach before, may not be any longer.
-            if value >= wanted:
-                wanted = self.offer(np.array(chosen))
-            if value + best[row] < wanted:
-                continue
-            # sorted again by the gains after this child: greedy order is what makes the bounds of children fall
-            after, bound = later[row], min(node.bound, value + float(best[row]))
-            order = np.flatnonzero(after)[np.argsort(-gains_after[row, after], kind="stable")]
-            followers, gains = node.followers[order], gains_after[row, order]
-            kept.append(_Node(bound, chosen, value, wanted, followers, gains, node.multipliers, multiplier))
-        return kept
-
-    def _wanted(self, node: _Node) -> float:
-        """Return the objective value that a placement below a node must have, less the largest rounding error."""
-        return max(node.goal, self.goal) - self._rounding
-
-    def _left(self, node: _Node) -> int:
-        """Return the largest number of sensors that can follow."""
-        # the cheapest followers, in turn, until the budget is spent: no other choice buys more sensors
-        left = self.instance.count - len(node.chosen)
-        if not math.isfinite(self.instance.budget):
-            return left
-        prices = np.sort(self.instance.price[node.followers])[:left]
-        spent = math.fsum(self.instance.price[list(node.chosen)])
-        return int(np.count_nonzero(self.instance.affordable(spent + np.cumsum(prices))))
-
-    def _take_leaves(self, node: _Node, children: int) -> None:
-        """Record the placements with one sensor more."""
-        if self._left(node) == 0:
+    def _push(self, node: _Node, bound: float) -> None:
+        """Open a node with a bound, or let it wait for a later stage."""
+        if bound < self.incumbent.least_better or not len(node.first):
             return
-        # followers come by falling gain, and for the last sensor gains are exact: the first that falls short ends it
-        for candidate, gain in zip(node.followers[:children].tolist(), node.gains[:children].tolist(), strict=True):
-            if self.satisfied or node.value + gain < self._wanted(node):
-                return
-            self.offer(np.array((*node.chosen, candidate)))
+        self._number += 1
+        node = replace(node, rank=-bound, number=self._number)
+        if bound < self._goal:
+            self._waiting.append(node)
+        else:
+            heappush(self._open, node)
 
-    def _rest(self, node: _Node, left: int, targets: Integer) -> Instance:
-        """Return the instance below a node: its followers, the given targets, and the number and budget that are left.
-
-        Conflicts other than cliques, and mandatory groups, are left out. That only enlarges the set of placements, so
-        that an upper bound on it is one on the placements below the node.
-        """
-        instance, followers = self.instance, node.followers
-        spent = math.fsum(instance.price[list(node.chosen)])
-        return replace(
-            instance,
-            visible=self._seen_by[targets][:, followers].T,  # rows of targets are copied faster
-            weight=instance.weight[targets],
-            price=instance.price[followers],
-            conflict=np.broadcast_to(np.False_, (len(followers), len(followers))),  # bounds use the cliques only
-            clique=instance.clique[followers],
-            mandatory=np.zeros((0, len(followers)), bool),
-            original=instance.original[followers],
-            count=left,
-            budget=max(instance.budget * (1 + TIE_TOLERANCE) - spent, 0.0),
-        )
-
-    def _relaxation_pays(self, left: int) -> bool:
-        """Whether relaxing nodes with ``left`` sensors to come has cut enough children so far."""
-        shares = self._left_over.get(left, [])
-        return left >= MIN_SENSORS and (len(shares) < TRIALS or sum(shares) <= MAX_KEPT_SHARE * len(shares))
-
-    def _relaxed(self, node: _Node, left: int, goal: float) -> Generator[Progress, None, tuple[_Node, int]]:
-        """Drop the followers that a Lagrangian bound rules out; return also the number of children."""
-        instance = self.instance
-        layers = instance.layers(instance.times(node.chosen), left)
-        # Targets to which no sensor can add any more are left out: they would only cost time. A child starts from the
-        # multipliers of its parent, which differs by one sensor, and so needs fewer steps than the root.
-        open_targets = np.flatnonzero(layers[0] > 0)
-        rest = self._rest(node, left, open_targets)
-        start = None if node.multipliers is None else node.multipliers[open_targets]
-        steps = FIRST_STEPS if start is None else LATER_STEPS
-        keep, bound = yield from lagrangian_bound(
-            rest, goal - node.value, self._clock, start, steps, layers[:, open_targets]
-        )
-        multipliers = np.zeros(len(instance.weight))
-        multipliers[open_targets] = bound.targets
-        node = replace(
-            node,
-            bound=min(node.bound, node.value + bound.value),
-            followers=node.followers[keep],
-            gains=node.gains[keep],
-            multipliers=multipliers,
-        )
-        return _within_reach(node, left, goal)
-
-    def _may_follow(self, node: _Node, children: int) -> Boolean:
-        """Return which followers may follow each child, (children, n) bool."""
-        instance, followers = self.instance, node.followers
-        first = followers[:children]
-        # only those after the child in the order of gains: the sets with an earlier one are below that one's node
-        later: Boolean = np.arange(len(followers)) > np.arange(children)[:, None]
-        later &= ~self._excluded[first[:, None], followers]
-        if math.isfinite(instance.budget):
-            spent = math.fsum(instance.price[list(node.chosen)])
-            later &= instance.affordable(spent + instance.price[first, None] + instance.price[followers])
-        return later
-
-    def _overlaps(self, times: Integer, followers: Integer, children: int) -> Numbers:
-        """Return the loss of each follower's gain by the choice of each child, (children, n).
-
-        For plain coverage this is the weight that both see and no chosen sensor sees.
+    def _push_unlikely(self, node: _Node, reach: Float) -> None:
+        """Let the placements of a node wait that contain a candidate with which none reaches the goal of the stage.
 
         Parameters
         ----------
-        times : (t,) int64
-            Number of chosen sensors that see each target.
+        reach : (n,) float64
+            Upper bound on placements with each candidate that is left.
         """
-        instance = self.instance
-        # A target that child and follower both see, and that is seen n times, adds increment(n) before the child is
-        # chosen and increment(n + 1) after it. The sum of these differences over the common targets is the loss.
-        lost = instance.increments(times) - instance.increments(times + 1)
-        # Only targets that some child sees matter. For plain coverage there are two ways to the same whole numbers: add
-        # up the targets that nobody sees yet, or take those seen already from the overlap of all targets that was
-        # computed at the start. The product over fewer targets is the cheaper one.
-        by_child = instance.visible[followers[:children]].any(axis=0)
-        kept, changed = np.flatnonzero(by_child & (lost == 0)), np.flatnonzero(by_child & (lost != 0))
-        overlap = self._overlap if len(kept) <= len(changed) else None
-        targets = changed if overlap is None else kept
-        factor = (lost if overlap is None else instance.weight)[targets].astype(self._matrix.dtype)[:, None]
-        self._clock.spend(len(targets) * len(followers) * (children + OPERATIONS_PER_FETCH))
-        rows, by_target = followers[:children], self._by_target[targets]
-        # V is kept by target here, since whole rows are fetched fast. Fetching the columns of the followers first costs
-        # another copy, which pays where these are fewer than half of all candidates.
-        if 2 * len(followers) < len(instance):
-            by_target = by_target[:, followers]
-            shared: Numbers = (by_target[:, :children] * factor).T @ by_target
+        able = reach >= self.incumbent.least_better
+        unlikely = able & (reach < self._goal)
+        if unlikely.any():
+            waiting = replace(node, left=np.sort(node.left[able]), first=np.sort(node.left[unlikely]))
+            self._push(waiting, float(reach[unlikely].max()))
+
+    def _problem(self, node: _Node, left: Integer) -> tuple[_Problem, Integer]:
+        """Return the problem of a node, and its targets."""
+        whole = self._block.together(node.chosen)
+        targets = self._block.open_targets(whole)
+        block, base = self._block.of(left, targets), whole[targets]
+        raised = self._rounding + self._block.value_at(whole) - block.value_at(base)
+        first = np.intersect1d(node.first, left)
+        rest = rest_of(self.instance, node.chosen, left, node.composition)
+        return _Problem(node, left, first, block, rest, base, raised), targets
+
+    def _restricted(self, problem: _Problem, keep: Integer) -> _Problem:
+        """Return a problem with only some of its candidates."""
+        left = problem.left[keep]
+        return replace(
+            problem,
+            left=left,
+            first=np.intersect1d(problem.first, left),
+            block=problem.block.of(keep),
+            rest=rest_of(self.instance, problem.node.chosen, left, problem.node.composition),
+        )
+
+    def _take(self, node: _Node) -> None:
+        """Bound a node, offer the placement that its bound selects, and open its children."""
+        incumbent = self.incumbent
+        left = self._addable(node)
+        if not len(left):
+            incumbent.offer(node.chosen)
+            return
+        problem, targets = self._problem(node, left)
+        by_gains = first_bound(problem.block, problem.rest, problem.base, problem.raised)
+        incumbent.work.spend(2.0 * problem.block.operations)
+        if problem.rest.count == 1:
+            self._complete(node.chosen, left, by_gains.constant + by_gains.selection.net)
+            return
+        bound = self._lowered(node, problem, by_gains, targets)
+        incumbent.offer(np.append(node.chosen, left[bound.selection.picked]))
+        limit = min(bound.value, -node.rank)
+        parameters = node.parameters.copy()
+        parameters[targets] = bound.parameters
+        node = replace(node, left=left, parameters=parameters)
+        reach = np.minimum(np.minimum(bound.forced(), by_gains.forced()), limit)
+        goal = incumbent.least_better
+        if not self._is_small(problem):  # a small problem is not worth a division
+            self._push_unlikely(node, reach)
+            goal = max(self._goal, goal)
+        within = np.flatnonzero(reach >= goal)
+        if len(within):
+            problem = self._restricted(replace(problem, node=node), within)
+            orders = [_Order(problem.rest, one, within, limit) for one in (bound, by_gains)]
+            self._branch(problem, min(orders, key=lambda order: order.children(goal)), goal)
+
+    def _is_small(self, problem: _Problem) -> bool:
+        """Return whether products of matrices soon list all choices of a problem."""
+        return problem.block.has_product and len(problem.left) <= FEW and problem.rest.count <= LISTED
+
+    def _lowered(self, node: _Node, problem: _Problem, bound: Bound, targets: Integer) -> Bound:
+        """Lower the bound of a node by several steps, unless that has rarely helped at its depth."""
+        goal, depth = max(self._goal, self.incumbent.least_better), len(node.chosen)
+        limit = min(bound.value, -node.rank)
+        tried, closed = self._tried.get(depth, (0, 0.0))
+        if limit < goal or self._is_small(problem) or (tried >= TRIALS and closed < LEAST_SUCCESS * tried):
+            return bound
+        block, base = problem.block, problem.base
+        from_parent = bound_at(block, problem.rest, base, block.clipped(base, node.parameters[targets]), problem.raised)
+        self.incumbent.work.spend(block.operations)
+        bound = self._steps(problem, min(bound, from_parent, key=lambda one: one.value), NODE_STEPS)
+        share = (limit - max(bound.value, goal)) / (limit - goal) if limit > goal else 1.0
+        self._tried[depth] = tried + 1, closed + max(0.0, share)
+        return bound
+
+    def _steps(self, problem: _Problem, bound: Bound, most: int) -> Bound:
+        """Return the bound after a number of steps, or less if it falls below the goal."""
+        goal = max(self._goal, self.incumbent.least_better)
+        steps = falling_bounds(problem.block, problem.rest, problem.base, bound, goal, problem.raised)
+        for _, lower in zip(range(most), steps, strict=False):
+            bound = lower
+            self.incumbent.work.spend(problem.block.operations)
+            if bound.value < goal or self.incumbent.work.left <= 0:
+                break
+        return bound
+
+    def _branch(self, problem: _Problem, order: _Order, goal: float) -> None:
+        """Open the children of a node that reach a goal, and let the others wait together."""
+        node, groups = problem.node, problem.rest.groups
+        ordered = problem.left[order.candidates]
+        # With unserved groups, children choose among the members of the smallest one: all placements have one of them.
+        among = np.isin(ordered, problem.first)
+        if len(groups):
+            among &= min(groups, key=np.count_nonzero)[order.candidates]
+            rows = np.flatnonzero(among)
         else:
-            shared = ((by_target[:, rows] * factor).T @ by_target)[:, followers]
-        return shared if overlap is None else overlap[rows[:, None], followers] - shared
+            number = order.children(goal)
+            rows = np.flatnonzero(among[:number])
+            if number < len(ordered):
+                waiting = np.sort(ordered[number:]), np.sort(ordered[number:][among[number:]])
+                self._push(replace(node, left=waiting[0], first=waiting[1]), float(order.most[number]))
+        at_once = max(1, MAX_PAIRS // len(ordered))
+        for first in range(0, len(rows), at_once):
+            self._open_children(problem, order, rows[first : first + at_once], among)
 
-    def _best_completions(self, node: _Node, gains_after: Numbers, left: int) -> tuple[float, Float]:
-        """Return upper bounds on what ``left`` more sensors add to each child within the budget that is left.
+    def _open_children(self, problem: _Problem, order: _Order, rows: Integer, among: Boolean) -> None:
+        """Open some children of a node.
 
-        Returns
-        -------
-        float
-            Multiplier of the budget.
-        (children,) float64
-            Upper bound for each child.
+        Parameters
+        ----------
+        rows : (k,) int64
+            Their candidates, as indices into the order.
+        among : (n,) bool
+            Candidates of the order that have, or would have, children of their own.
         """
-        # Submodularity: what several sensors add together is at most the sum of what each adds by itself.
-        best: Float = _largest(gains_after, left).sum(axis=1, dtype=np.float64)
-        if not math.isfinite(self.instance.budget):
-            return 0.0, best
-        rest = self._rest(node, left + 1, np.zeros(0, dtype=np.int64))
-        # Under a budget C, also for any μ >= 0: gains are at most μ C plus the sum of the largest positive gains less μ
-        # times the price. Every μ gives a valid bound, so that the one for the node serves all its children, and the
-        # search for it starts from the parent's.
-        multiplier = select(rest, node.gains.astype(np.float64), node.multiplier).multiplier
-        if multiplier > 0:
-            net = np.maximum(gains_after - multiplier * rest.price, 0.0)
-            spent = multiplier * (rest.budget - rest.price[: len(net)])
-            best = np.minimum(best, _largest(net, left).sum(axis=1, dtype=np.float64) + spent)
-        return multiplier, best
+        rest, block, ordered = problem.rest, problem.block, problem.left[order.candidates]
+        # A child has no candidate whose own child comes before it.
+        later = (np.arange(len(ordered)) > rows[:, None]) | ~among
+        later[np.arange(len(rows)), rows] = False
+        later &= ~self.instance.conflict[np.ix_(ordered[rows], ordered)]
+        most, reach = order.reach(rows)
+        if block.has_product:
+            gains = block.gains_after(problem.base, order.candidates[rows])[:, order.candidates]
+            self.incumbent.work.spend(PRODUCT_SHARE * len(rows) * block.operations)
+            values = block.value_at(problem.base) + block.gains(problem.base)[order.candidates[rows]] + problem.raised
+            for bound in self._by_gains(rest, order, rows, values, np.where(later, gains, 0.0)):
+                most, reach = np.minimum(most, bound[0]), np.minimum(reach, bound[1])
+        reach = np.minimum(reach, most[:, None])
+        self.incumbent.work.spend(PAIR_OPERATIONS * reach.size)
+        for row in np.flatnonzero(most >= self.incumbent.least_better):
+            own, left = later[row], ordered[later[row]]
+            child = replace(problem.node, chosen=np.append(problem.node.chosen, ordered[rows[row]]), left=left)
+            if block.has_product and rest.count == LISTED - 1:
+                self._complete(child.chosen, left, reach[row, own])
+            elif block.has_product and rest.count == LISTED:
+                able = own & (reach[row] >= self.incumbent.least_better)
+                self._list_pairs(problem, child, order.candidates[rows[row]], order.candidates[able], values[row] + gains[row, able])
+            else:
+                self._push_unlikely(child, reach[row, own])
+                kept = np.sort(left[reach[row, own] >= max(self._goal, self.incumbent.least_better)])
+                self._push(replace(child, left=kept, first=kept), float(most[row]))
+                if not len(kept):
+                    self.incumbent.offer(child.chosen)
+
+    def _list_pairs(self, problem: _Problem, child: _Node, own: int, left: Integer, values: Float) -> None:
+        """Offer the placements of a child with two sensors more that may be better.
+
+        Parameters
+        ----------
+        own : int
+            Candidate of the child, as an index among those of the problem.
+        left : (n,) int64
+            Candidates that may follow, as such indices.
+        values : (n,) float64
+            Upper bounds on the child with each of them.
+        """
+        incumbent, block = self.incumbent, problem.block
+        incumbent.offer(child.chosen)
+        if not len(left):
+            return
+        part = block.of(left)
+        base = problem.base + block.amounts[own]
+        pairs = values[:, None] + np.maximum(part.gains_after(base, np.arange(len(left))), 0.0)
+        incumbent.work.spend(PRODUCT_SHARE * len(left) * part.operations)
+        members = problem.left[left]
+        pairs[self.instance.conflict[np.ix_(members, members)] | np.tri(len(left), dtype=bool)] = -math.inf
+        prices = math.fsum(self.instance.price[child.chosen]) + self.instance.price[members]
+        pairs[~self.instance.affordable(prices[:, None] + self.instance.price[members])] = -math.inf
+        for one in np.flatnonzero(values >= incumbent.least_better):
+            incumbent.offer(np.append(child.chosen, members[one]))
+        better = np.argwhere(pairs >= incumbent.least_better)
+        for first, second in better[np.argsort(-pairs[tuple(better.T)], kind="stable")].tolist():
+            if pairs[first, second] < incumbent.least_better:
+                return
+            incumbent.offer(np.append(child.chosen, members[[first, second]]))
+
+    def _by_gains(
+        self, rest: Rest, order: _Order, rows: Integer, values: Float, gains: Float
+    ) -> Iterator[tuple[Float, Float]]:
+        """Yield bounds on children (k,), and on those with each further candidate (k, n), by the gains after each.
+
+        What several sensors add together is at most the sum of what each adds by itself. Under a budget the same holds
+        of gains less a multiplier times the price.
+        """
+        yield _with_largest(rest, order, rows, values, gains)
+        if order.multiplier > 0:
+            net = np.maximum(gains - order.multiplier * rest.price[order.candidates], 0.0)
+            spare = order.multiplier * (rest.budget - rest.price[order.candidates[rows]])
+            yield _with_largest(rest, order, rows, values + spare, net)
+
+    def _addable(self, node: _Node) -> Integer:
+        """Return the candidates left that are within the budget and the composition, without conflicts."""
+        instance, chosen, left = self.instance, node.chosen, node.left
+        if len(chosen) == instance.count:
+            return left[:0]
+        room: Boolean = ~instance.conflict[np.ix_(chosen, left)].any(axis=0)
+        room &= instance.affordable(math.fsum(instance.price[chosen]) + instance.price[left])
+        if node.composition is not None:
+            kind, quota = node.composition.kind, np.array(node.composition.quota)
+            room &= (np.bincount(kind[chosen], minlength=len(quota)) < quota)[kind[left]]
+        return left[room]
+
+    def _complete(self, chosen: Integer, left: Integer, most: Float) -> None:
+        """Offer the placements with one sensor more that may be better, by upper bounds on their values."""
+        self.incumbent.offer(chosen)
+        for one in np.argsort(-most, kind="stable").tolist():
+            if most[one] < self.incumbent.least_better:
+                return
+            self.incumbent.offer(np.append(chosen, left[one]))
 
 
-class BestPlacements(Search):
-    """Search that lists the placements of largest coverage among those that cover at least a goal.
-
-    A placement that covers more raises the goal, and placements below the new goal leave the list.
+class _Order:
+    """Candidates of a node in the order of what they contribute to a bound, with bounds on the children.
 
     Parameters
     ----------
-    goal : float
-        Least weight to cover.
-    most : int
-        Length of the list; of more placements it has the first that the search meets.
-    bound : float
-        Upper bound on the weight that any placement covers: the search ends when the list is full of such placements.
+    rest : Rest
+        Constraints on the candidates that are left.
+    bound : Bound
+    within : (n,) int64
+        Candidates of the bound that are left.
+    limit : float
+        Another bound on all placements of the node.
 
     Attributes
     ----------
-    overflowed : bool
-        Whether there are more placements than the list has. If not, then at the end of the search it has all that cover
-        the same weight, except those with idle sensors.
+    candidates : (n,) int64
+        Indices among those left.
+    kind : (n,) int64
+        Kind of each.
+    most : (n,) float64
+        Bound on the placements with each candidate and any after it, which never rises along the order.
+    multiplier : float
+        Multiplier of the budget.
     """
 
-    def __init__(self, instance: Instance, goal: float, most: int, bound: float) -> None:
-        super().__init__(instance, goal)
-        self.overflowed = False
-        self._listed: dict[bytes, tuple[float, Integer]] = {}
-        self._most = most
-        self._bound = bound
-        self._value = -math.inf
+    def __init__(self, rest: Rest, bound: Bound, within: Integer, limit: float) -> None:
+        net = bound.selection.net[within]
+        self.candidates: Integer = np.argsort(-net, kind="stable")
+        self._net, self.multiplier = net[self.candidates], bound.selection.multiplier
+        self.kind = rest.kind[self.candidates]
+        largest = self._net.copy()
+        self._weakest = np.zeros((len(net), len(rest.quota)))
+        for kind, quota in enumerate(rest.quota):
+            own = self.kind == kind
+            added = np.maximum(self._net[own], 0.0)
+            sums = np.concatenate([[0.0], np.cumsum(added)])
+            begin = np.cumsum(own)  # of those of this kind, the first after each candidate
+            end = begin + np.minimum(quota - own, rest.count - 1)
+            largest += sums[np.minimum(end, len(added))] - sums[begin]
+            full = (end <= len(added)) & (end > begin)
+            self._weakest[full, kind] = added[end[full] - 1]
+        self.most = np.maximum.accumulate(np.minimum(limit, bound.constant + largest)[::-1])[::-1]
 
-    @property
-    def found(self) -> list[Integer]:
-        """Sorted candidates of the placements that cover most, in the order in which the search met them."""
-        return [placement for _, placement in self._listed.values()]
+    def children(self, goal: float) -> int:
+        """Return the number of children whose bounds reach a goal."""
+        return int(np.count_nonzero(self.most >= goal))
 
-    def _take(self, placement: Integer) -> float:
-        instance, value = self.instance, self.instance.value(placement)
-        if value < self.goal or not instance.feasible(placement):
-            return self.goal
-        # A placement with more sensors and the same coverage is not a result, as fewer sensors come first among ties:
-        # below this one only placements that cover at least one unit more count. Weights are whole numbers.
-        more = value + 1 - WHOLE_SLACK
-        if value > self._value:
-            self.overflowed &= value <= self._value + instance.slack
-            self._value, self.goal = value, value - instance.slack
-            self._listed = {key: tie for key, tie in self._listed.items() if tie[0] >= self.goal}
-        # a placement may come twice: from the search, and from `offer`
-        if placement.tobytes() in self._listed:
-            return more
-        if len(self._listed) < self._most:
-            self._listed[placement.tobytes()] = value, placement
-        else:
-            # the list is full: from here on only a better placement is of interest
-            self.overflowed = True
-            self.goal = max(self.goal, more)
-        self.satisfied = self.overflowed and self._bound < more
-        return more
+    def reach(self, rows: Integer) -> tuple[Float, Float]:
+        """Return the bounds on some children (k,), and on those with each further candidate (k, n)."""
+        most, weakest = self.most[rows], self._weakest[rows][:, self.kind]
+        return most, most[:, None] - weakest + np.minimum(self._net, weakest)
 
 
-def _within_reach(node: _Node, left: int, goal: float) -> tuple[_Node, int]:
-    """Drop the followers whose gains are too small, and return the number of children."""
-    gains = node.gains.astype(np.float64)
-    # If follower i comes next, those after it follow: the bound of child i is the sum of ``left`` gains from i on, a
-    # difference of running sums. The repeated total at the end makes windows that reach beyond the last follower end
-    # there. As gains fall, so do the bounds, and the children within reach are the first ones.
-    sums = np.concatenate(([0.0], np.cumsum(gains), np.full(left, gains.sum())))
-    reach = node.value + sums[left : left + len(gains)] - sums[: len(gains)]
-    # A follower is of use only if it reaches the goal together with the ``left`` - 1 largest gains. This keeps more
-    # followers than there are children: one too small to come next may still come later.
-    useful = int(np.count_nonzero(node.value + sums[left - 1] + gains >= goal))
-    node = replace(node, followers=node.followers[:useful], gains=node.gains[:useful])
-    return node, int(np.count_nonzero(reach >= goal))
-
-
-def _largest(values: Numbers, number: int) -> Numbers:
-    """Return the largest numbers of each row, in any order."""
-    if values.shape[-1] <= number:
-        return values
-    return np.partition(values, values.shape[-1] - number, axis=-1)[..., -number:]
+def _with_largest(rest: Rest, order: _Order, rows: Integer, value: Float, gains: Float) -> tuple[Float, Float]:
+    """Return values of children (k,) with the largest gains (k, n) of each kind, and with each gain among them (k, n)."""
+    most, weakest = value.copy(), np.zeros(gains.shape)
+    for kind, quota in enumerate(rest.quota):
+        own = np.flatnonzero(order.kind == kind)
+        left = np.minimum(quota - (order.kind[rows] == kind), rest.count - 1)
+        for number in np.unique(left).tolist():
+            same = np.flatnonzero(left == number)
+            part = gains[np.ix_(same, own)]
+            if number < 1 or not len(own):
+                continue
+            if number < len(own):
+                part = np.partition(part, len(own) - number, axis=1)[:, len(own) - number :]
+                weakest[np.ix_(same, own)] = part.min(axis=1)[:, None]
+            most[same] += part.sum(axis=1)
+    return most, most[:, None] - weakest + np.minimum(gains, weakest)

@@ -1,7 +1,7 @@
 """A deployment: the chosen sensors with their coverage and price."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -18,13 +18,11 @@ BAND, UNRANKED = "over plausible gains", "not ranked"
 
 
 @dataclass(frozen=True, eq=False)
-class Sensor:
-    """One chosen sensor.
+class Sensor(MountedSensor):
+    """A chosen sensor: with its position, its share of the coverage, and its price.
 
     Parameters
     ----------
-    label : str
-        Label ``S1``, ``S2``, … in the order in which each adds the most to those before it.
     pose : int or None
         Index among the site's candidates; None if a user has moved the sensor.
     position_name : str
@@ -33,8 +31,6 @@ class Sensor:
         Whether it is mounted on an existing pole.
     foot : (3,) float64, metres
         Ground point of the position, local site axes.
-    xyz : (3,) float64, metres
-        Optical centre, local site axes.
     height : float, metres
         Height above the ground point.
     yaw : float, radians
@@ -53,13 +49,11 @@ class Sensor:
         Cost of the installation; None if prices are those of sensors only.
     """
 
-    label: str
+    orientation: Float = field(init=False)
     pose: int | None
-    model: LidarModel
     position_name: str
     on_pole: bool
     foot: Float
-    xyz: Float
     height: float
     yaw: float
     tilt: float
@@ -69,20 +63,14 @@ class Sensor:
     roll: float = 0.0
     installation: float | None = None
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "orientation", orientation(self.yaw, self.tilt, self.roll))
+        super().__post_init__()
+
     @property
     def price(self) -> float:
         """Price in dollars, with the installation if its cost is given."""
         return self.model.price + (self.installation or 0.0)
-
-    @property
-    def orientation(self) -> Float:
-        """Rotation from the sensor's axes to the site's, (3, 3) float64."""
-        return orientation(self.yaw, self.tilt, self.roll)
-
-    @property
-    def mounted(self) -> MountedSensor:
-        """The sensor for scans: model and pose, without coverage and price."""
-        return MountedSensor(self.label, self.model, self.xyz, self.orientation)
 
     @property
     def turned(self) -> str:
@@ -97,10 +85,6 @@ class TypeBand:
     sensor: str
     low: float
     high: float
-
-    def describe(self) -> str:
-        """Return the band as text: one share where both ends read the same."""
-        return _span(self.low, self.high)
 
 
 @dataclass(frozen=True)
@@ -139,14 +123,14 @@ class GainBand:
             )
         types = dict.fromkeys(one for pair in self.unranked for one in pair)
         if types:
-            bands = ", ".join(f"{one.sensor} {one.describe()}" for one in types)
+            bands = ", ".join(f"{one.sensor} {_span(one.low, one.high)}" for one in types)
             messages.append(f"{UNRANKED}, as their bands overlap where the sensors are mounted: {bands}")
         return tuple(messages)
 
 
 def _span(low: float, high: float) -> str:
-    ends = dict.fromkeys(f"{share:.1%}" for share in (low, high))
-    return " to ".join(ends)
+    """Return two shares as text: one where both read the same."""
+    return " to ".join(dict.fromkeys((f"{low:.1%}", f"{high:.1%}")))
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,11 +174,6 @@ class Deployment:
     gain_band: GainBand | None = None
     returns: ReturnsSummary | None = None
     pedestrian_returns: Float | None = None
-
-    @property
-    def mounted(self) -> tuple[MountedSensor, ...]:
-        """The sensors for scans."""
-        return tuple(sensor.mounted for sensor in self.sensors)
 
     @property
     def installed(self) -> bool:

@@ -9,12 +9,10 @@ import numpy as np
 from ...arrays import Integer
 from ...errors import SeipError
 from ...progress import Progress
-from .integer_program import CoverProgram, Expression
+from .instance import Instance
+from .integer_program import Expression, PlacementProgram
 from .problem import PlacementProblem
-from .reduced_problem import Instance
-from .search_limits import Clock
-
-TIME_LIMIT = 20.0  # seconds for a program without targets: far more than it takes; the user's time limit does not apply
+from .search_limits import Work
 
 
 def starting_choice(problem: PlacementProblem, instance: Instance, solver: str) -> Generator[Progress, None, Integer]:
@@ -23,17 +21,18 @@ def starting_choice(problem: PlacementProblem, instance: Instance, solver: str) 
     Raises
     ------
     SeipError
-        The groups cannot all be served, and the message names the limit that prevents it; or the time was too short.
+        The groups cannot all be served; the message names the limit that prevents it.
     """
     if len(instance.mandatory) == 0:
         return np.zeros(0, np.int64)
     members = np.flatnonzero(instance.mandatory.any(axis=0))
-    part = instance.part(members)
-    program = CoverProgram(part)
-    program.require(program.number <= len(part.mandatory))
-    # of all choices one with much coverage by each sensor, as a start for the search
-    separately = program.number_among(np.arange(len(part)), part.visible @ part.weight * program.weight_scale)
-    chosen = yield from _decide(problem, program, separately, solver)
+    part = instance.of(members)
+    program = PlacementProgram(part)
+    program.model += program.number <= len(part.mandatory)
+    # of all choices one with a large value of each sensor, as a start for the search
+    separately = part.gains(np.zeros(0, dtype=np.int64))
+    scaled = program.number_among(np.arange(len(part)), 1e4 / max(float(separately.max()), 1e-12) * separately)
+    chosen = yield from _decide(program, scaled, solver)
     if chosen is None:
         raise SeipError((yield from _why_infeasible(problem, part, solver)))
     return members[chosen]
@@ -46,39 +45,35 @@ def _why_infeasible(problem: PlacementProblem, part: Instance, solver: str) -> G
     # a solution without one names the constraint that is at fault. The part's own count is limited by the budget too.
     unlimited = len(part)
     count = unlimited if problem.count is None else problem.count
-    fewest = yield from _least(problem, replace(part, count=unlimited), solver)
+    fewest = yield from _least(replace(part, count=unlimited), solver)
     if fewest is not None:
         return f"{groups} with {problem.count} sensors; allow at least {len(fewest)} or lift a demand"
-    cheapest = yield from _least(problem, replace(part, count=count, budget=math.inf), solver, by_price=True)
+    cheapest = yield from _least(replace(part, count=count, budget=math.inf), solver, by_price=True)
     if cheapest is not None:
         price = math.fsum(part.price[cheapest])
         return f"{groups} within the budget of {problem.budget:g}; raise it to at least {price:g} or lift a demand"
     same_position = problem.positions[part.original]
     conflict = (same_position[:, None] == same_position) & ~np.eye(len(part), dtype=bool)
     apart = replace(part, conflict=conflict)
-    if (yield from _least(problem, apart, solver)) is not None:
+    if (yield from _least(apart, solver)) is not None:
         return f"{groups} at least {problem.min_distance:g} m apart; lower the minimum distance or lift a demand"
-    if (yield from _least(problem, replace(apart, count=unlimited, budget=math.inf), solver)) is not None:
+    if (yield from _least(replace(apart, count=unlimited, budget=math.inf), solver)) is not None:
         return f"{groups} within the number, budget and minimum distance together; loosen them or lift a demand"
     return f"{groups}, because they compete for the same positions; lift a demand or add candidates there"
 
 
-def _least(
-    problem: PlacementProblem, part: Instance, solver: str, *, by_price: bool = False
-) -> Generator[Progress, None, Integer | None]:
+def _least(part: Instance, solver: str, *, by_price: bool = False) -> Generator[Progress, None, Integer | None]:
     """Return the smallest or cheapest choice that serves all groups, if there is one."""
-    program = CoverProgram(part)
-    return (yield from _decide(problem, program, -1 * (program.price if by_price else program.number), solver))
+    program = PlacementProgram(part)
+    return (yield from _decide(program, -1 * (program.price if by_price else program.number), solver))
 
 
 def _decide(
-    problem: PlacementProblem, program: CoverProgram, objective: Expression, solver: str
+    program: PlacementProgram, objective: Expression, solver: str
 ) -> Generator[Progress, None, Integer | None]:
-    """Return the choice of largest objective, or None where there is none."""
-    outcome = yield from program.maximise(objective, solver, Clock(TIME_LIMIT))
-    if outcome.chosen is None and not outcome.finished:
-        raise SeipError(
-            f"the solver did not find out within {TIME_LIMIT:g} s whether the mandatory places "
-            f"({', '.join(problem.group_names)}) can all carry a sensor; lift a demand, or choose another solver"
-        )
-    return outcome.chosen
+    """Return the choice of largest objective that is feasible in exact arithmetic, or None where there is none."""
+    while True:
+        outcome = yield from program.maximise(objective, solver, Work(math.inf))
+        if outcome.chosen is None or program.instance.feasible(outcome.chosen):
+            return outcome.chosen
+        program.exclude(outcome.chosen)  # solvers have tolerances of their own

@@ -1,15 +1,30 @@
-"""Integer programs in PuLP."""
+r"""Placement problems as integer programs, solved through PuLP.
 
+The concave value g is the minimum of lines :math:`a_k + b_k x`, or lies at most ε below it:
+
+.. math::
+    \max \sum_t w_t v_t \quad\text{subject to}\quad
+    x_t = \sum_i A_{it} s_i, \quad v_t \le a_k + b_k x_t \;\; \forall k, \quad
+    \sum_i s_i \le N, \quad \sum_i p_i s_i \le B, \quad s_i \in \{0, 1\},
+
+with the further constraints of `PlacementProblem`. For coverage these are :math:`v_t \le x_t` and :math:`v_t \le 1`,
+the vanilla and weighted programs of the SEIP paper, whose v are whole at an optimum. For the logarithm the lines are
+tangents, so that the program has an upper bound; tangents at the amounts of each placement that it finds are added
+(outer approximation: Duran and Grossmann 1986).
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
 import math
 import os
 import shutil
 import stat
 import tempfile
 import threading
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,22 +35,56 @@ from pulp.apis.coin_api import pulp_cbc_path
 from ...arrays import Boolean, Float, Integer
 from ...errors import SeipError
 from ...progress import Progress, in_thread
-from .constraints import Constrained
+from .incumbent import Incumbent
+from .instance import Instance
 from .problem import TIE_TOLERANCE
-from .reduced_problem import Instance
-from .search_limits import OPERATIONS_PER_UNIT, Clock
-from .solvers import solver_name
+from .search_limits import OPERATIONS_PER_UNIT, Work
+
+SOLVERS = ("highs", "cbc", "gurobi")  # names of solvers besides ``auto``
+_PULP_NAME = {"highs": "HiGHS", "gurobi": "GUROBI"}
+_PACKAGE = {"highs": "highspy", "gurobi": "gurobipy"}
 
 Expression = Any  # of PuLP, which has no types
-TOTAL_WEIGHT = 1e4  # total weight in a program: far above the solvers' absolute tolerances of 1e-6
-TOLERANCE = 2e-6  # share of all weight that a solver's tolerance of 1e-6 on every variable may add up to, doubled
-MAX_ENTRIES = 1_000_000  # entries of V up to which a program is built: PuLP takes 0.5 kB for each
-MAX_REJECTED = 100  # choices in a row that a solver's tolerance admits and exact arithmetic does not, before giving up
-MIN_SECONDS = 0.01  # seconds that a solver is given if no time remains
-OPERATIONS_PER_ENTRY = 1e4  # multiplications per entry of a program that count as the work of one branch of a solver
-CALL_OPERATIONS = 1e8  # multiplications that take as long as handing the smallest program to a solver
-ROOT_OPERATIONS = 5.0  # multiplications per squared entry that count as the work of the first linear relaxation
-UNLIMITED_SECONDS = 1e7  # seconds that solvers are given without a limit: not all of them accept infinity
+TOTAL_VALUE = 1e4  # largest value in a program: far above the solvers' absolute tolerances of 1e-6
+TOLERANCE = 2e-6  # share of the largest value that a solver's tolerances of 1e-6 may add up to, doubled
+MAX_ENTRIES = 1_000_000  # entries of A up to which a program is built: PuLP takes 0.5 kB for each
+MAX_REJECTED = 100  # placements in a row that a solver cannot tell from a better one, before giving up
+OPERATIONS_PER_ENTRY = 3e3  # multiplications per entry of a program that count as the work of one branch of a solver
+CALL_OPERATIONS = 3e7  # multiplications that take as long as handing the smallest program to a solver
+ROOT_OPERATIONS = 1.5  # multiplications per squared entry that count as the work of the first linear relaxation
+
+
+def solver_name(solver: str) -> str:
+    """Return the solver for a name; ``auto`` is HiGHS if it is installed, otherwise CBC."""
+    if solver == "auto":
+        return "highs" if is_available("highs") else "cbc"
+    return solver
+
+
+def check_solver(solver: str) -> str:
+    """Return name and version of a solver.
+
+    Raises
+    ------
+    SeipError
+        The solver is unknown or cannot run here; the message lists those that can.
+    """
+    solver = solver_name(solver)
+    available = ", ".join(name for name in SOLVERS if is_available(name))
+    if solver not in SOLVERS:
+        raise SeipError(f"unknown solver {solver!r}; choose among {available}")
+    if not is_available(solver):
+        raise SeipError(f"the solver {solver} is not available here; choose among {available}")
+    if solver == "cbc":
+        return f"CBC of PuLP {pulp.__version__}"
+    return f"{_PULP_NAME[solver]} {importlib.metadata.version(_PACKAGE[solver])}, PuLP {pulp.__version__}"
+
+
+def is_available(solver: str) -> bool:
+    """Return whether a known solver can run here."""
+    if solver == "cbc":
+        return os.access(pulp_cbc_path, os.R_OK)
+    return bool(pulp.getSolver(_PULP_NAME[solver], msg=False).available())
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +94,7 @@ class Outcome:
     Parameters
     ----------
     chosen : (k,) int64 or None
-        The best placement found; None if the time was too short or no placement exists.
+        The best placement found; None if the work did not suffice or no placement exists.
     bound : float
         Upper bound on the objective of any placement; infinite if the solver reports none.
     finished : bool
@@ -61,92 +110,65 @@ class Outcome:
 
 
 class PlacementProgram:
-    """An integer program that chooses candidates, for any objective; constraints can be added between solves.
+    """An integer program that chooses candidates under the constraints of an instance, for any objective."""
 
-    Parameters
-    ----------
-    rules : Constrained
-        Candidates and constraints; ``x`` has one binary variable for each candidate.
-    entries : int
-        Number of non-zero entries of the objective's matrix, with which the work of a solver grows.
-    """
-
-    def __init__(self, rules: Constrained, entries: int) -> None:
-        self._rules, self._entries = rules, entries
+    def __init__(self, instance: Instance) -> None:
+        self.instance = instance
         self.model = pulp.LpProblem("placement", pulp.LpMaximize)
-        self.x = [self.model.add_variable(f"x{i}", cat=pulp.LpBinary) for i in range(len(rules))]
-        self._checks: list[Callable[[Integer], bool]] = [rules.feasible]
-        self.model.setObjective(self.number)
-        if rules.count < len(rules):
-            self.model += self.number <= rules.count
-        if math.isfinite(rules.budget):
-            self.model += self.price <= rules.budget * self.price_scale * (1 + TIE_TOLERANCE)
-        for group in rules.mandatory:
+        self.x = [self.model.add_variable(f"x{i}", cat=pulp.LpBinary) for i in range(len(instance))]
+        self.price = _linear(self.x, instance.price * self.price_scale)
+        self.number = _linear(self.x, np.ones(len(self.x)))
+        if instance.count < len(instance):
+            self.model += self.number <= instance.count
+        if math.isfinite(instance.budget):
+            self.model += self.price <= instance.budget * self.price_scale * (1 + TIE_TOLERANCE)
+        for group in instance.mandatory:
             self.model += self.number_among(np.flatnonzero(group)) >= 1
-        for clique in cover_by_cliques(rules.conflict):
+        for clique in _cover_by_cliques(instance.conflict):
             self.model += self.number_among(clique) <= 1
-
-    @property
-    def number(self) -> Expression:
-        """The number of sensors."""
-        return _linear(self.x, np.ones(len(self.x)))
-
-    @property
-    def price(self) -> Expression:
-        """The total price, scaled by `price_scale`."""
-        return _linear(self.x, self._rules.price * self.price_scale)
 
     @property
     def price_scale(self) -> float:
         """Factor that scales the highest price to 10,000, far above the solvers' absolute tolerances."""
-        highest = float(self._rules.price.max(initial=0.0))
+        highest = float(self.instance.price.max(initial=0.0))
         return 1e4 / highest if highest > 0 else 1.0
 
     def number_among(self, candidates: Integer, factors: Float | None = None) -> Expression:
         """Return the (weighted) number of sensors among some candidates."""
         return _linear([self.x[i] for i in candidates], np.ones(len(candidates)) if factors is None else factors)
 
-    def require(self, constraint: Expression, check: Callable[[Integer], bool] | None = None) -> None:
-        """Add a constraint for this and all later solves, and its check in exact arithmetic."""
-        self.model += constraint
-        if check is not None:
-            self._checks.append(check)
-
-    def maximise(
-        self, objective: Expression, solver: str, clock: Clock, share: float = 1.0
-    ) -> Generator[Progress, None, Outcome]:
-        """Solve for the largest objective within a share of the remaining limits.
-
-        The solver runs in a thread of its own. Closing the generator asks it to stop.
-        """
-        if clock.left <= 0:
-            return Outcome(None, math.inf, finished=False)
-        self.model.setObjective(objective)
-        ends = clock.elapsed + share * clock.left
-        size = self._entries + len(self.x)
-        for _ in range(MAX_REJECTED):
-            left = max(ends - clock.elapsed, MIN_SECONDS)
-            seconds = max(clock.seconds_left, MIN_SECONDS) if clock.counts_work else left
-            nodes = math.ceil(left * OPERATIONS_PER_UNIT / (size * OPERATIONS_PER_ENTRY)) if clock.counts_work else None
-            outcome = yield from in_thread(
-                lambda stop, limits=(seconds, nodes): self._solve(solver, limits, stop),  # type: ignore[misc]
-                f"solving an integer program of {len(self.x)} candidates",
-            )
-            branching = outcome.nodes * size * OPERATIONS_PER_ENTRY
-            clock.spend(CALL_OPERATIONS + _root_operations(self._entries) + branching)
-            chosen = outcome.chosen
-            if chosen is None or all(check(chosen) for check in self._checks):
-                return outcome
-            self.exclude(chosen)  # solvers have tolerances of their own: forbid exactly what fails in exact arithmetic
-        return replace(outcome, chosen=None, finished=False)
-
     def exclude(self, chosen: Integer) -> None:
         """Forbid a single choice."""
         others = np.setdiff1d(np.arange(len(self.x)), chosen)
         self.model += self.number_among(chosen) - self.number_among(others) <= len(chosen) - 1
 
-    def _solve(self, solver: str, limits: tuple[float, int | None], stop: threading.Event) -> Outcome:
-        with _engine(solver, limits, stop) as engine:
+    def maximise(
+        self, objective: Expression, solver: str, work: Work, entries: int = 0
+    ) -> Generator[Progress, None, Outcome]:
+        """Solve for the largest objective within a limit of work, in a thread of its own.
+
+        Closing the generator, and a user's request to end the search, ask the solver to stop.
+        """
+        self.model.setObjective(objective)
+        size = entries + len(self.x)
+        each = size * OPERATIONS_PER_ENTRY
+        nodes = math.ceil(work.left * OPERATIONS_PER_UNIT / each) if math.isfinite(work.left) else None
+        solving = in_thread(
+            lambda stop: self._solve(solver, nodes, stop), f"solving an integer program of {len(self.x)} candidates"
+        )
+        outcome = Outcome(None, math.inf, finished=False)
+        while work.left > 0:
+            try:
+                yield next(solving)
+            except StopIteration as stop:
+                outcome = stop.value
+                break
+        solving.close()
+        work.spend(CALL_OPERATIONS + _root_operations(entries) + outcome.nodes * each)
+        return outcome
+
+    def _solve(self, solver: str, nodes: int | None, stop: threading.Event) -> Outcome:
+        with _engine(solver, nodes, stop) as engine:
             try:
                 self.model.solve(engine)
             except (pulp.PulpSolverError, OSError) as error:
@@ -160,88 +182,98 @@ class PlacementProgram:
         return Outcome(chosen, _bound(self.model, solver), finished, _nodes(self.model, solver))
 
 
-class CoverProgram(PlacementProgram):
-    """The integer program of maximal covering; see `PlacementProblem` for the formulation.
-
-    The covered share ``y`` of each target is continuous: it is integral at an optimum.
-    """
+class ConcaveProgram(PlacementProgram):
+    """The integer program of an instance with one block and no failures."""
 
     def __init__(self, instance: Instance) -> None:
-        super().__init__(instance, np.count_nonzero(instance.visible))
-        self.instance = instance
+        super().__init__(instance)
+        (self._block,) = instance.blocks
+        amounts = self._block.amounts.astype(np.float64)
+        self.entries = int(np.count_nonzero(amounts))
+        most: Float = np.sort(amounts, axis=0)[-instance.count :].sum(axis=0)  # amounts that targets can have at most
+        self._x = [self.model.add_variable(f"a{t}", 0, top) for t, top in enumerate(most.tolist())]
+        self._v = [self.model.add_variable(f"v{t}", 0) for t in range(len(most))]
+        intercept, slope = self._block.g.lines(float(most.max()))
+        for v, x, column in zip(self._v, self._x, amounts.T, strict=True):
+            seen = np.flatnonzero(column)
+            self.model += x == self.number_among(seen, column[seen])
+            for a, b in zip(intercept.tolist(), slope.tolist(), strict=True):
+                self.model += v <= a + b * x
+        largest = float(self._block.weight @ self._block.g(most))
+        self.scale, self.margin = TOTAL_VALUE / largest, TOLERANCE * largest
+        self.objective = _linear(self._v, self._block.weight * self.scale)
 
-    @cached_property
-    def covered(self) -> Expression:
-        """The covered weight, scaled by `weight_scale`."""
-        for y, seen in zip(self._y, self._seen, strict=True):
-            self.model += y <= seen
-        return _linear(self._y, self.instance.weight * self.weight_scale)
+    def require(self, value: float) -> None:
+        """Require an objective value, lowered by what a solver may miss it by."""
+        self.model += self.objective >= (value - self.margin) * self.scale
 
-    @property
-    def weight_scale(self) -> float:
-        """Factor that brings the total weight to `TOTAL_WEIGHT`."""
-        return TOTAL_WEIGHT / self.instance.total if self.instance.total > 0 else 1.0
+    def add_tangents(self, chosen: Integer) -> None:
+        """Add the tangents at the amounts of a choice, where the program has its value exactly from then on."""
+        for v, x, at in zip(self._v, self._x, self._block.together(chosen).tolist(), strict=True):
+            self.model += v <= math.log1p(at) - at / (1.0 + at) + x / (1.0 + at)
 
-    def require_coverage(self, goal: float) -> None:
-        """Require a covered weight, within the instance's slack."""
-        instance = self.instance
-        self.require(self._at_least(self.covered, goal), lambda c: instance.value(c) >= goal - instance.slack)
 
-    def require_better(self, than: float) -> None:
-        """Require a covered weight that is larger than ``than`` by at least the instance's step."""
-        instance, goal = self.instance, than + self.instance.step
-        self.require(self._at_least(self.covered, goal), lambda c: instance.value(c) >= goal)
+def prove_by_program(
+    incumbent: Incumbent, among: Integer, solver: str, work: Work
+) -> Generator[Progress, None, bool]:
+    """Find better placements of some candidates by an integer program until there is none, or the work is done.
 
-    def maximise_coverage(self, solver: str, clock: Clock, share: float = 1.0) -> Generator[Progress, None, Outcome]:
-        """Solve for the largest covered weight within the limits; the outcome's bound is not scaled."""
-        outcome = yield from self.maximise(self.covered, solver, clock, share)
-        return replace(outcome, bound=outcome.bound / self.weight_scale)
+    Solvers have tolerances: of two placements that differ by less they may return either. So each placement that a
+    solver finds is evaluated exactly and excluded, and the program is solved again until it has no solution.
 
-    def _at_least(self, covered: Expression, goal: float) -> Expression:
-        """Return the constraint for a least weight, lowered by a solver's tolerance."""
-        margin = max(self.instance.step / 2, TOLERANCE * self.instance.total)
-        return covered >= (goal - margin) * self.weight_scale
+    Parameters
+    ----------
+    among : (n,) int64
+        Candidates that a better placement may contain.
 
-    @cached_property
-    def _y(self) -> list[Any]:
-        return [self.model.add_variable(f"y{j}", 0, 1) for j in range(len(self.instance.weight))]
-
-    @cached_property
-    def _seen(self) -> list[Any]:
-        return [self.number_among(np.flatnonzero(column)) for column in self.instance.visible.T]
+    Returns
+    -------
+    bool
+        Whether the best placement is proven.
+    """
+    program = ConcaveProgram(incumbent.instance.of(among))
+    linear = hasattr(program.instance.blocks[0].g, "rises")
+    program.require(incumbent.least_better)
+    for _ in range(MAX_REJECTED):
+        if work.left <= 0:
+            return False
+        outcome = yield from program.maximise(program.objective, solver, work, program.entries)
+        if outcome.chosen is None and outcome.finished:
+            incumbent.bound = incumbent.value
+            return True
+        incumbent.bound = min(incumbent.bound, outcome.bound / program.scale + program.margin)
+        if incumbent.bound < incumbent.least_better:
+            return True
+        if outcome.chosen is None:
+            return False
+        program.exclude(outcome.chosen)
+        if not linear:
+            program.add_tangents(outcome.chosen)
+        if incumbent.offer(among[outcome.chosen]):
+            program.require(incumbent.least_better)
+    return False
 
 
 def _root_operations(entries: int) -> float:
     """Return the work of the first linear relaxation of a program, in multiplications.
 
-    The benchmark measures it against the entries of V (`seip study benchmark`, under “Growth”).
+    The benchmark measures it against the entries of A (`seip study benchmark`, under “Growth”).
     """
     return ROOT_OPERATIONS * float(entries) ** 2
 
 
-def is_affordable(instance: Instance, clock: Clock, share: float = 1.0) -> bool:
-    """Return whether an instance's program fits into memory and its first relaxation into the remaining limits."""
-    return fits(np.count_nonzero(instance.visible), clock, share)
-
-
-def fits(entries: int, clock: Clock, share: float = 1.0) -> bool:
-    """Return whether a program fits into memory and its first relaxation into the remaining limits.
+def is_affordable(instance: Instance, work: Work) -> bool:
+    """Return whether an instance's program fits into memory and its first relaxation into the work that is left.
 
     A solver cannot be stopped by counted work within a relaxation, and PuLP takes long to build a large program.
     """
-    if clock.left <= 0 or entries > MAX_ENTRIES:
-        return False
-    return _root_operations(entries) <= share * clock.left * OPERATIONS_PER_UNIT
+    (block,) = instance.blocks
+    lines = len(block.g.lines(float(block.together(np.arange(len(block))).max(initial=0.0)))[0])
+    entries = int(np.count_nonzero(block.amounts)) + (lines - 2) * 2 * len(block.weight)
+    return entries <= MAX_ENTRIES and _root_operations(entries) <= work.left * OPERATIONS_PER_UNIT
 
 
-def reaching(instance: Instance, goal: float) -> CoverProgram:
-    """Return the program of an instance whose placements cover at least ``goal``."""
-    program = CoverProgram(instance)
-    program.require_coverage(goal)
-    return program
-
-
-def cover_by_cliques(conflict: Boolean) -> Iterator[Integer]:
+def _cover_by_cliques(conflict: Boolean) -> Iterator[Integer]:
     """Cover all conflicts by cliques, sets of candidates of which at most one can be chosen, (k,) int64.
 
     Cliques give a tighter linear relaxation than the pairs they consist of. They are grown greedily, in order, so the
@@ -287,12 +319,11 @@ class _Highs(pulp.HiGHS):  # type: ignore[misc]
 
 
 @contextmanager
-def _engine(solver: str, limits: tuple[float, int | None], stop: threading.Event) -> Iterator[Any]:
-    """Yield PuLP's interface to a solver that proves optimality within seconds and, if given, a number of branches.
+def _engine(solver: str, nodes: int | None, stop: threading.Event) -> Iterator[Any]:
+    """Yield PuLP's interface to a solver that proves optimality within a number of branches, if given.
 
-    HiGHS ends soon after ``stop`` is set; PuLP offers no way to stop the others before their time limit.
+    HiGHS ends soon after ``stop`` is set; PuLP offers no way to stop the others.
     """
-    limit, nodes = min(limits[0], UNLIMITED_SECONDS), limits[1]
     solver = solver_name(solver)
     if solver == "highs":
         import highspy  # noqa: PLC0415 -- imported only for HiGHS: an installation may have another solver only
@@ -303,7 +334,6 @@ def _engine(solver: str, limits: tuple[float, int | None], stop: threading.Event
         kinds = highspy.cb.HighsCallbackType
         yield _Highs(
             msg=False,
-            timeLimit=limit,
             gapRel=0.0,
             threads=1,
             callbackTuple=(interrupt, None),
@@ -312,10 +342,9 @@ def _engine(solver: str, limits: tuple[float, int | None], stop: threading.Event
         )
     elif solver == "cbc":
         with _executable_cbc() as path:
-            yield pulp.COIN_CMD(path=path, msg=False, timeLimit=limit, gapRel=0.0, threads=1, maxNodes=nodes)
+            yield pulp.COIN_CMD(path=path, msg=False, gapRel=0.0, threads=1, maxNodes=nodes)
     else:
-        more = {} if nodes is None else {"NodeLimit": nodes}
-        yield pulp.GUROBI(msg=False, timeLimit=limit, gapRel=0.0, Threads=1, **more)
+        yield pulp.GUROBI(msg=False, gapRel=0.0, Threads=1, **({} if nodes is None else {"NodeLimit": nodes}))
 
 
 def _bound(model: pulp.LpProblem, solver: str) -> float:

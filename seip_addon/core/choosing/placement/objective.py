@@ -131,8 +131,12 @@ class Objective:
         if self.failures != "none" and (self.risk == "none" or kind == "traffic"):
             other = "the risk none" if self.risk == "none" else "traffic"
             raise SeipError(f"sensor failures cannot be combined with {other}: leave one out")
-        if kind == "nominal":
-            self._require_no_settings_of_scenarios()
+        idle = "the risk measure" if self.risk != "auto" else "the seed of the scenarios" if self.scenarios.seed else ""
+        if kind == "nominal" and idle:
+            raise SeipError(
+                f"{idle} has no effect on nominal poses and the empty road: choose pose errors or traffic as "
+                "scenarios, or leave it out"
+            )
         if measure is None:
             return
         # With failures the risk none is refused: only evaluating is no cure there.
@@ -149,20 +153,6 @@ class Objective:
             )
         if self.count is not None:
             measure.require_sensors(self.count)
-
-    def _require_no_settings_of_scenarios(self) -> None:
-        """Raise SeipError if a setting of several scenarios is given, which the nominal scenario would ignore."""
-        scenarios = self.scenarios
-        given = {
-            "the risk measure": self.risk != "auto",
-            "the seed of the scenarios": scenarios.seed != 0,
-        }
-        idle = next((setting for setting, there in given.items() if there), None)
-        if idle is not None:
-            raise SeipError(
-                f"{idle} has no effect on nominal poses and the empty road: choose pose errors or traffic as "
-                "scenarios, or leave it out"
-            )
 
     @property
     def measure(self) -> Risk | None:
@@ -360,11 +350,8 @@ def placement_constraints(site: Site, models: Mapping[str, LidarModel], objectiv
         The objective contradicts itself or the site.
     """
     candidates = site.candidates
-    demanded = np.array([_named(candidates, name) for name in objective.mandatory], dtype=bool)
-    groups = np.concatenate((candidates.mandatory, demanded.reshape(-1, len(candidates.position))))
-    forbidden = np.zeros(len(candidates.position), dtype=bool)
-    for name in objective.forbidden:
-        forbidden |= _named(candidates, name)
+    groups = np.concatenate((candidates.mandatory, _named(candidates, objective.mandatory)))
+    forbidden = _named(candidates, objective.forbidden).any(axis=0)
     return PlacementConstraints(
         weights=target_weights(site, objective),
         prices=pose_prices(candidates, models),
@@ -391,15 +378,16 @@ def with_count(objective: Objective, site: Site) -> Objective:
     return replace(objective, count=min(DEFAULT_COUNT, len(site.candidates.position))) if free else objective
 
 
-def _named(candidates: Candidates, name: str) -> NDArray[np.bool_]:
-    """Return the positions of a given name, (p,) bool."""
-    found: NDArray[np.bool_] = candidates.position_name == name
-    if not found.any():
-        raise SeipError(f"there is no position {name!r}{_close(name, candidates.position_name.tolist())}")
+def _named(candidates: Candidates, names: Sequence[str]) -> NDArray[np.bool_]:
+    """Return the positions of each of k names, (k, p) bool."""
+    known: list[str] = candidates.position_name.tolist()
+    for name in names:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=3, cutoff=0.4)
+            hint = f"there are {known[0]!r} to {known[-1]!r}"
+            if near:
+                hint = f"did you mean {' or '.join(map(repr, near))}?"
+            listed = "the candidates.csv of a run lists all; quote names with blanks"
+            raise SeipError(f"there is no position {name!r}; {hint} ({listed})")
+    found: NDArray[np.bool_] = np.array(names, dtype=np.str_)[:, None] == candidates.position_name
     return found
-
-
-def _close(name: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(name, known, n=3, cutoff=0.4)
-    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {known[0]!r} to {known[-1]!r}"
-    return f"; {hint} (the candidates.csv of a run lists all; quote names with blanks)"

@@ -2,11 +2,14 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Boolean, Float, Integer, Text
 from ...errors import SeipError
+from .concave import COVERAGE, Concave
 
 TIE_TOLERANCE = 1e-9  # share of all weight, or of the price, below which differences count as rounding
 
@@ -130,21 +133,32 @@ class PlacementConstraints:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlacementProblem(PlacementConstraints):
-    r"""A maximal covering location problem over candidate poses (Church and ReVelle 1974).
+    r"""The choice of sensors with the largest sum of concave values of targets.
 
     .. math::
-        \max \sum_j w_j y_j \quad\text{subject to}\quad
-        y_j \le \sum_i V_{ij} x_i, \quad
-        \sum_i x_i \le N, \quad \sum_i p_i x_i \le C, \quad
-        x_i \in \{0, 1\},\; 0 \le y_j \le 1,
+        \max_x \sum_t w_t\, g\Big(\sum_i A_{it} x_i\Big) \quad\text{subject to}\quad
+        \sum_i x_i \le N, \quad \sum_i p_i x_i \le C, \quad x_i \in \{0, 1\},
 
     with at most one pose per position, at least one pose of each mandatory group, and no two poses closer than the
-    minimum distance. The vanilla problem has unit weights.
+    minimum distance. With A the visibility of the road and :math:`g(x) = \min(x, 1)` it is the maximal covering location
+    problem (Church and ReVelle 1974), vanilla if all weights are the same; with A the expected returns from road users
+    :math:`g(x) = \ln(1 + x)`.
+
+    Over scenarios k with amounts :math:`A^k` (pose errors, instants of traffic) the objective is the mean of the m
+    smallest of the K sums
+
+    .. math::
+        F_k(x) = \sum_t w_t\, g\Big(\sum_i A^k_{it} x_i\Big),
+
+    and after the failure of one sensor f it is that of :math:`F_k(x - e_f)`, at worst or on average (`risk`).
 
     Parameters
     ----------
-    visible : (c, t) bool
-        V: whether candidate pose i sees target j. The other parameters are those of `PlacementConstraints`.
+    amounts : (c, t) bool or float
+        A: whether candidate pose i sees target t, or its expected returns from road user t. The other parameters are
+        those of `PlacementConstraints`.
+    g : Concave
+        Value of a target by its amount.
 
     Raises
     ------
@@ -156,21 +170,32 @@ class PlacementProblem(PlacementConstraints):
     >>> problem = PlacementProblem(
     ...     weights=np.ones(3), prices=np.array([4_000.0, 8_000.0]), positions=np.array([0, 1]),
     ...     xyz=np.array([[0.0, 0.0, 5.0], [20.0, 0.0, 5.0]]), labels=np.array(["vlp16", "os1_128"]),
-    ...     visible=np.array([[True, False, False], [True, True, False]]), budget=10_000.0,
+    ...     amounts=np.array([[True, False, False], [True, True, False]]), budget=10_000.0,
     ... )
-    >>> problem.most_sensors, [problem.covered(np.array([pose])) for pose in (0, 1)]
+    >>> problem.most_sensors, [problem.value(np.array([pose])) for pose in (0, 1)]
     (1, [1.0, 2.0])
     """
 
-    visible: Boolean
+    amounts: NDArray[Any]
+    g: Concave = COVERAGE
 
     def __post_init__(self) -> None:
-        _check_size(*self.visible.shape)
+        _check_size(*self.amounts.shape)
         super().__post_init__()
 
-    def covered(self, chosen: Integer) -> float:
-        """Return the weight of the targets that some chosen candidate sees."""
-        return math.fsum(self.weights[self.visible[chosen].any(axis=0)])
+    def value(self, chosen: Integer) -> float:
+        """Return the objective value of chosen candidates: for coverage, the weight that they cover."""
+        return math.fsum(self.weights * self.g(self.amounts[chosen].sum(axis=0, dtype=np.float64)))
+
+    @property
+    def nothing_added(self) -> str:
+        """Message for a problem in which no candidate adds anything."""
+        if self.g == COVERAGE:
+            return (
+                "no candidate sees any target; try other heights or sensor types, a larger δ, a lower probability of "
+                "detection or better weather, or remove obstacles"
+            )
+        return "no candidate has returns from any road user; try other heights or sensor types, or remove obstacles"
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,27 +259,20 @@ def assess(  # noqa: PLR0913 -- the fields of one record
     notes: tuple[str, ...] = (),
     objective: float | None = None,
 ) -> Placement:
-    """Return a choice with coverage, price and certificate; the objective is the coverage if none is given."""
-    covered = problem.covered(chosen)
-    if objective is None:
-        objective, bound = covered, max(bound, covered)
+    """Return a choice with value, price and certificate; the objective is the value if none is given."""
+    value = problem.value(chosen)
+    objective = value if objective is None else objective
     bound = objective if optimal else bound
     return Placement(
         chosen=chosen,
         objective=objective,
         bound=bound,
-        gap=relative_gap(objective, bound),
+        gap=problem.g.gap(objective, bound, math.fsum(problem.weights)),
         status="optimal" if optimal else "feasible",
         solver=solver,
         seconds=seconds,
-        covered=covered,
+        covered=value,
         price=math.fsum(problem.prices[chosen]),
         notes=notes,
     )
 
-
-def relative_gap(objective: float, bound: float) -> float:
-    """Return the distance of a bound from an objective, as a share of the objective."""
-    if bound == objective:
-        return 0.0
-    return abs(bound - objective) / objective if objective > 0 else math.inf

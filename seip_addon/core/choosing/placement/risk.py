@@ -23,7 +23,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from typing import Literal
 
 import numpy as np
@@ -31,7 +30,6 @@ from numpy.typing import NDArray
 
 from ...arrays import Float, Integer
 from ...errors import SeipError
-from .multi_cover import COVERAGE, MultiCover, multi_cover
 
 Failure = Literal["none", "worst", "mean"]
 
@@ -79,6 +77,11 @@ class Risk:
         return f"coverage{lost}"
 
     @property
+    def is_nominal(self) -> bool:
+        """Whether this is the value of a single scenario without failures."""
+        return self == NOMINAL
+
+    @property
     def alone(self) -> Risk:
         """Return the same measure for a single scenario, by which each draw is evaluated."""
         return replace(self, tail=1.0)
@@ -106,29 +109,32 @@ class Risk:
             return np.zeros(len(seen))
         # weight of the targets that only one sensor sees, for each sensor: it is lost with that sensor, (K, s)
         lost: Float = ((times == 1)[:, None] & seen.view(bool)) @ weight
-        after: Float = whole - (lost.max(axis=1) if self.failure == "worst" else lost.sum(axis=1) / sensors)
-        return after
+        return self.after_failure(whole, (whole[:, None] - lost).T, sensors)
+
+    def after_failure(self, whole: Float | float, left: Float, sensors: int) -> Float:
+        """Return what is left after a failure, from the value of all sensors and that without each one, (k, …)."""
+        if len(left) == 0:
+            return np.zeros_like(whole)
+        if self.failure == "worst":
+            worst: Float = left.min(axis=0)
+            return worst
+        mean: Float = (left.sum(axis=0) + (sensors - len(left)) * whole) / sensors
+        return mean
 
     def of(self, outcomes: Float) -> float:
         """Return the risk measure T of outcomes (K,)."""
         counted = self.counted(len(outcomes))
         return math.fsum(np.sort(outcomes)[:counted]) / counted
 
+    def of_each(self, outcomes: Float) -> Float:
+        """Return the risk measure of each column of outcomes (K, c), (c,) float64."""
+        counted = self.counted(len(outcomes))
+        measure: Float = np.partition(outcomes, counted - 1, axis=0)[:counted].mean(axis=0)
+        return measure
+
     def worst(self, outcomes: Float) -> Integer:
         """Return the m worst scenarios, (m,) int64; among equal ones the first."""
         return np.argsort(outcomes, kind="stable")[: self.counted(len(outcomes))]
 
-    def cover(self, sensors: int) -> MultiCover:
-        r"""Return the value of a target by the number of sensors that see it; for worst failures, an upper bound.
 
-        Without failures a target seen n times has the value 1 from n = 1 on. After a failure among N sensors its mean
-        value is :math:`1 - 1/N` at n = 1 and 1 from n = 2 on. The worst failure gives no more.
-
-        Parameters
-        ----------
-        sensors : int
-            N, the largest number of sensors; at least 2 with failures.
-        """
-        if self.failure == "none":
-            return COVERAGE
-        return multi_cover([Fraction(0), Fraction(sensors - 1, sensors), Fraction(1)])
+NOMINAL = Risk()

@@ -40,7 +40,7 @@ def with_gain_band(around: Surroundings, deployment: Deployment) -> Generator[Pr
     for done, sensor in enumerate(sensors):
         yield Progress(done, len(sensors), "coverage over plausible gains")
         # rays from one position are shared by all variants
-        variants = [variant for model in (sensor.model, *compared) for variant in _ends(model)]
+        variants = [model.amplified(gain) for model in (sensor.model, *compared) for gain in model.gains]
         seen |= visibility.see_all(variants, sensor.xyz, sensor.orientation)[0]
     shares = [float(row.mean()) for row in seen]
     band = GainBand(
@@ -56,8 +56,3 @@ def is_uncertain(model: LidarModel) -> bool:
     """Return whether the gain of a model is only known within a band."""
     low, high = model.gains
     return low < high
-
-
-def _ends(model: LidarModel) -> tuple[LidarModel, LidarModel]:
-    low, high = model.gains
-    return model.amplified(low), model.amplified(high)

@@ -5,19 +5,19 @@ errors is combined with the planned rows of the others (a first-order effect). D
 from the same standard ones, show which kind costs most.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...arrays import Boolean, Float
+from ...arrays import Float
 from ...estimates import IntervalEstimate, mean_of, quantile_of
 from ...progress import Progress
+from ...sensing.scenarios.pose_errors import ERROR_KINDS, PoseErrors
+from ...sensing.scenarios.scenario_visibility import ScenarioVisibility
+from ...sensing.scenarios.visibility_under_errors import draws_for, visibility_under_errors
 from ...sensing.visibility.surroundings import Surroundings
 from ..placement.deployment import Deployment
-from ..placement.scenarios import ERROR_KINDS, PoseErrors
-from .scenario_visibility import ScenarioVisibility
-from .visibility_under_errors import draws_for, visibility_under_errors
 
 LOW_QUANTILE = 0.05  # quantile of coverage that is reported, and by which placements are compared
 
@@ -100,37 +100,30 @@ def pose_study(
         Placement at candidate poses of the site.
     """
     poses = np.array([sensor.pose for sensor in deployment.sensors if sensor.pose is not None], dtype=np.int64)
+    every = np.arange(len(poses))
 
     def views(errors: PoseErrors, draws: int) -> Generator[Progress, None, ScenarioVisibility]:
         drawn = draws_for(around, poses, errors, draws, settings.seed)
         return (yield from visibility_under_errors(around, poses, drawn))
 
-    as_planned = yield from views(PoseErrors(0.0, 0.0, 0.0, 0.0), 1)
-    planned = as_planned.seen(0)
+    planned = (yield from views(PoseErrors(0.0, 0.0, 0.0, 0.0), 1)).seen(0)
     together = yield from views(settings.errors, settings.draws)
     by_kind = {}
     for kind in ERROR_KINDS:
         if settings.draws_of_kind and getattr(settings.errors, kind) > 0:
             of_kind = yield from views(settings.errors.alone(kind), settings.draws_of_kind)
-            by_kind[kind] = _coverage([of_kind.seen(draw) for draw in range(len(of_kind))])
+            by_kind[kind] = of_kind.seen_by_any(every).mean(axis=1)
     return PoseStudy(
         settings=settings,
         labels=tuple(sensor.label for sensor in deployment.sensors),
         planned=float(planned.any(axis=0).mean()),
-        together=_coverage([together.seen(draw) for draw in range(len(together))]),
-        alone=tuple(_one_errs(planned, together, number) for number in range(len(poses))),
+        together=together.seen_by_any(every).mean(axis=1),
+        alone=tuple(
+            (np.delete(planned, number, axis=0).any(axis=0) | together.seen_by_pose(number)).mean(axis=1)
+            for number in every
+        ),
         by_kind=by_kind,
     )
-
-
-def _coverage(views: Sequence[Boolean]) -> Float:
-    """Return the joint coverage of rows of V in each draw."""
-    return np.array([rows.any(axis=0).mean() for rows in views])
-
-
-def _one_errs(planned: Boolean, together: ScenarioVisibility, number: int) -> Float:
-    others = np.delete(planned, number, axis=0).any(axis=0)
-    return _coverage([np.stack([others, row]) for row in together.seen_by_pose(number)])
 
 
 def pose_warnings(study: PoseStudy) -> tuple[str, ...]:

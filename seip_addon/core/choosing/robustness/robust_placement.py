@@ -33,6 +33,7 @@ import numpy as np
 
 from ...arrays import Float, Integer
 from ...progress import Progress, within
+from ...sensing.scenarios.scenario_visibility import ScenarioVisibility
 from ..placement.bounds import Bound, lagrangian_bound
 from ..placement.branch_and_bound import FIRST_STEPS, Search
 from ..placement.feasibility import starting_choice
@@ -42,7 +43,6 @@ from ..placement.reduced_problem import WHOLE_SLACK, Instance, common_unit, make
 from ..placement.risk import Risk
 from ..placement.search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 from ..placement.solver import solve, solve_within
-from .scenario_visibility import ScenarioVisibility
 
 
 class BestUnderRisk(Search):

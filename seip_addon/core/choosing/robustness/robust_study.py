@@ -8,6 +8,8 @@ import numpy as np
 from ...arrays import Float, Integer
 from ...estimates import IntervalEstimate, mean_of, quantile_gain, quantile_of
 from ...progress import Progress, within
+from ...sensing.scenarios.scenario_visibility import ScenarioVisibility
+from ...sensing.scenarios.visibility_under_errors import draws_for, visibility_under_errors
 from ...sensing.visibility.surroundings import Surroundings
 from ..placement.problem import Placement, PlacementProblem
 from ..placement.risk import Risk
@@ -16,8 +18,6 @@ from ..placement.search_limits import DEFAULT_LIMITS, SolverLimits
 from ..placement.solver import solve
 from .pose_study import LOW_QUANTILE
 from .robust_placement import at_least, foresee, outcomes_of, solve_robust
-from .scenario_visibility import ScenarioVisibility
-from .visibility_under_errors import draws_for, visibility_under_errors
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ so that confidence intervals are computed from the means of batches of time (`me
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,44 +15,30 @@ import numpy as np
 from ...arrays import Boolean, Float, Integer
 from ...estimates import IntervalEstimate, mean_over_time
 from ...progress import Progress
+from ...sensing.scenarios.scenario_visibility import ScenarioVisibility
+from ...sensing.scenarios.traffic_instants import NO_TRAFFIC, Instants
+from ...sensing.scenarios.visibility_in_traffic import visibility_in_traffic
 from ...sensing.visibility.surroundings import Surroundings
 from ..placement.problem import Placement, PlacementProblem
 from ..placement.risk import Risk
 from ..placement.search_limits import DEFAULT_LIMITS, SolverLimits
 from ..placement.solver import solve
 from .robust_placement import at_least, outcomes_of, solve_robust
-from .scenario_visibility import ScenarioVisibility
-from .traffic_instants import NO_TRAFFIC, Instants, TrafficObstacles
-from .visibility_in_traffic import visibility_in_traffic
 
 NOTABLE_LOSS = 0.01  # share of the targets' weight whose loss in traffic is worth a warning
-IN_TRAFFIC = "in traffic"  # first words of a `traffic_message`, and of no other
+IN_TRAFFIC = "in traffic"  # first words of the message on a placement that is only evaluated
 
 MEAN = Risk()
 
 
 @dataclass(frozen=True, eq=False)
-class TrafficScenarios:
-    """Visibility grids of all candidates: of the empty road, and at the instants that a placement is optimised on.
+class TrafficEvaluation:
+    """Coverage of a placement on the empty road and at n held-out instants of traffic.
 
     Parameters
     ----------
-    empty : (c, t) bool
-        Visibility on the empty road.
-    views : ScenarioVisibility
-        Visibility at each instant.
-    """
-
-    empty: Boolean
-    views: ScenarioVisibility
-
-
-@dataclass(frozen=True, eq=False)
-class TrafficCoverage:
-    """Coverage of a placement on the empty road and at n instants of traffic.
-
-    Parameters
-    ----------
+    name : str
+        Purpose for which the placement was optimised.
     empty : float
         Share of the targets' weight that is seen on the empty road.
     at : (n,) float64
@@ -65,14 +51,19 @@ class TrafficCoverage:
         Share of the instants at which each target is seen.
     batch : (n,) int64
         Batch of each instant.
+    road_users : float
+        Mean number of road users at the instants.
     """
 
+    name: str
+    placement: Placement
     empty: float
     at: Float
     hidden_at: Float
     empty_targets: Boolean
     time: Float
     batch: Integer
+    road_users: float
 
     @property
     def mean(self) -> IntervalEstimate:
@@ -89,26 +80,17 @@ class TrafficCoverage:
         """Share of the weight seen on the empty road that vehicles hide, on average over time."""
         return mean_over_time(self.hidden_at / self.empty if self.empty else self.hidden_at, self.batch)
 
-    def more_than(self, other: TrafficCoverage) -> IntervalEstimate:
+    def more_than(self, other: TrafficEvaluation) -> IntervalEstimate:
         """Estimate the gain in coverage over another placement at the same instants."""
         return mean_over_time(self.at - other.at, self.batch)
 
-
-@dataclass(frozen=True, eq=False)
-class TrafficEvaluation:
-    """A placement with its coverage in held-out traffic.
-
-    Parameters
-    ----------
-    name : str
-        Purpose for which it was optimised.
-    seen : TrafficCoverage
-        Coverage of the targets.
-    """
-
-    name: str
-    placement: Placement
-    seen: TrafficCoverage
+    @property
+    def message(self) -> str:
+        """Message on the coverage in traffic and on the empty road, for a placement that is only evaluated."""
+        return (
+            f"{IN_TRAFFIC} ({self.road_users:.0f} road users at a time) this placement sees {self.mean.describe()} of "
+            f"the road on average over time, {self.empty:.2%} when it is empty"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,29 +101,31 @@ class TrafficStudy:
     ----------
     chosen_at : int
         Number of instants that the traffic-aware placement was optimised on.
-    road_users : float
-        Mean number of road users at the evaluated instants.
     """
 
     chosen_at: int
-    road_users: float
     empty: TrafficEvaluation
     traffic: TrafficEvaluation
 
     @property
+    def road_users(self) -> float:
+        """Mean number of road users at the evaluated instants."""
+        return self.empty.road_users
+
+    @property
     def gain(self) -> IntervalEstimate:
         """Gain in coverage in traffic from optimising on traffic rather than for the empty road."""
-        return self.traffic.seen.more_than(self.empty.seen)
+        return self.traffic.more_than(self.empty)
 
     def is_converged(self) -> bool:
         """Return whether every second instant gives the same means as all, within their intervals."""
-        empty, traffic, batch = self.empty.seen.at, self.traffic.seen.at, self.empty.seen.batch
+        empty, traffic, batch = self.empty.at, self.traffic.at, self.empty.batch
         rows = [empty, traffic, traffic - empty]
         return all(mean_over_time(row[::2], batch[::2]).agrees_with(mean_over_time(row, batch)) for row in rows)
 
     def messages(self) -> tuple[str, ...]:
         """Return messages on the gain or loss by optimising on traffic, and warnings if traffic costs much."""
-        gain, seen = self.gain, self.empty.seen
+        gain, seen = self.gain, self.empty
         than = "of the road than the best placement for the empty road"
         messages = [f"this placement sees {gain.as_change()} {than}, in traffic that neither was chosen on"]
         if not self.is_converged():
@@ -162,26 +146,28 @@ class TrafficStudy:
     def summary(self) -> tuple[str, ...]:
         """Return a line for each placement: its coverage in traffic and on the empty road."""
         return tuple(
-            f"chosen for {placed.name}: {placed.seen.mean.describe()} of the road on average over time, "
-            f"{placed.seen.empty:.2%} on the empty road"
+            f"chosen for {placed.name}: {placed.mean.describe()} of the road on average over time, "
+            f"{placed.empty:.2%} on the empty road"
             for placed in (self.empty, self.traffic)
         )
 
 
 def traffic_scenarios(
     around: Surroundings, problem: PlacementProblem, instants: Instants
-) -> Generator[Progress, None, TrafficScenarios]:
-    """Compute visibility at instants of traffic for the candidates that may be chosen; that of others is left false."""
+) -> Generator[Progress, None, ScenarioVisibility]:
+    """Compute visibility on the empty road, which is the first scenario, and at instants of traffic.
+
+    It is computed for the candidates that may be chosen, and left false for the others.
+    """
     every = np.flatnonzero(problem.allowed)
     views = yield from visibility_in_traffic(around, every, [NO_TRAFFIC, *instants.obstacles()])
-    spread = views.spread_to(every, len(problem.visible))
-    return TrafficScenarios(spread.seen(0), ScenarioVisibility(spread.packed[1:], spread.targets))
+    return views.spread_to(every, len(problem.visible))
 
 
 def traffic_study(
     around: Surroundings,
     problem: PlacementProblem,
-    scenarios: TrafficScenarios,
+    scenarios: ScenarioVisibility,
     evaluation: Instants,
     limits: SolverLimits = DEFAULT_LIMITS,
     risk: Risk = MEAN,
@@ -192,59 +178,43 @@ def traffic_study(
     ----------
     problem : PlacementProblem
         Problem of all candidates of the site; their visibility is taken from the scenarios.
+    scenarios : ScenarioVisibility
+        Visibility on the empty road and at the instants to optimise on; see `traffic_scenarios`.
     evaluation : Instants
         Instants of runs other than those of the scenarios.
     risk : Risk
         Risk measure over the instants to maximise.
     """
-    problem = replace(problem, visible=scenarios.empty)
+    problem = replace(problem, visible=scenarios.seen(0))
+    views = replace(scenarios, packed=scenarios.packed[1:])
     empty = yield from solve(problem, limits)
-    found = yield from solve_robust(problem, scenarios.views, risk, limits)
-    reached = risk.of(outcomes_of(problem, scenarios.views, risk, empty.chosen))
-    placed = at_least(found, empty, reached)
-    used = np.unique(np.concatenate([empty.chosen, placed.chosen]))
-    obstacles = evaluation.obstacles()
-    views = yield from visibility_in_traffic(around, used, [NO_TRAFFIC, *obstacles])
-
-    def evaluate(name: str, placement: Placement) -> TrafficEvaluation:
-        rows = np.searchsorted(used, placement.chosen)
-        return TrafficEvaluation(name, placement, _seen(views, rows, problem.weights, evaluation.batch))
-
-    return TrafficStudy(
-        chosen_at=len(scenarios.views),
-        road_users=_users(obstacles),
-        empty=evaluate("the empty road", empty),
-        traffic=evaluate("traffic", placed),
-    )
+    found = yield from solve_robust(problem, views, risk, limits)
+    reached = risk.of(outcomes_of(problem, views, risk, empty.chosen))
+    placements = {"the empty road": empty, "traffic": at_least(found, empty, reached)}
+    evaluated = yield from evaluate_in_traffic(around, placements, problem.weights, evaluation)
+    return TrafficStudy(len(views), *evaluated)
 
 
-def _seen(views: ScenarioVisibility, rows: Integer, weight: Float, batch: Integer) -> TrafficCoverage:
-    """Return the joint coverage of some poses; the first view is of the empty road."""
-    seen = views.seen_by_any(rows)
-    share, hidden = (which @ weight / weight.sum() for which in (seen, seen[0] & ~seen[1:]))
-    return TrafficCoverage(float(share[0]), share[1:], hidden, seen[0], seen[1:].mean(axis=0), batch)
-
-
-def traffic_message(
-    around: Surroundings, poses: Integer, weight: Float, instants: Instants
-) -> Generator[Progress, None, str]:
-    """Return a message on the coverage of poses in traffic, on average over time, and on the empty road.
+def evaluate_in_traffic(
+    around: Surroundings, placements: Mapping[str, Placement], weight: Float, instants: Instants
+) -> Generator[Progress, None, list[TrafficEvaluation]]:
+    """Evaluate placements at instants of traffic and on the empty road.
 
     Parameters
     ----------
-    poses : (s,) int64
-        Indices among the site's candidates.
+    placements : mapping of str to Placement
+        Placements by their purposes.
     weight : (t,) float64
         Weights of the targets.
     """
     obstacles = instants.obstacles()
-    views = yield from visibility_in_traffic(around, poses, [NO_TRAFFIC, *obstacles])
-    seen = _seen(views, np.arange(len(poses)), weight, instants.batch)
-    return (
-        f"{IN_TRAFFIC} ({_users(obstacles):.0f} road users at a time) this placement sees {seen.mean.describe()} of "
-        f"the road on average over time, {seen.empty:.2%} when it is empty"
-    )
-
-
-def _users(obstacles: Sequence[TrafficObstacles]) -> float:
-    return float(np.mean([len(instant.hulls) for instant in obstacles]))
+    users = float(np.mean([len(instant.hulls) for instant in obstacles]))
+    used = np.unique(np.concatenate([placement.chosen for placement in placements.values()]))
+    views = yield from visibility_in_traffic(around, used, [NO_TRAFFIC, *obstacles])
+    evaluations = []
+    for name, placement in placements.items():
+        seen = views.seen_by_any(np.searchsorted(used, placement.chosen))
+        share, hidden = (which @ weight / weight.sum() for which in (seen, seen[0] & ~seen[1:]))
+        shares = float(share[0]), share[1:], hidden, seen[0], seen[1:].mean(axis=0)
+        evaluations.append(TrafficEvaluation(name, placement, *shares, instants.batch, users))
+    return evaluations

@@ -45,7 +45,7 @@ def save_changes_picture(
         if change.kind != VEHICLE and shown.intersects(shapely.Point(change.box[:2])):
             style: dict[str, Any] = {"color": INK, "fontsize": 8, "ha": "center"}
             panel.annotate(change.name, tuple(change.box[:2].tolist()), (0, 9), textcoords="offset points", **style)
-    places = np.array([one.registration.sensor.xyz[:2] for one in found.sensors])
+    places = np.array([one.sensor.xyz[:2] for one in found.comparisons])
     panel.scatter(
         places[:, 0], places[:, 1], s=60, color=SENSOR_BODY, edgecolor=INK, zorder=5, label="sensor as installed"
     )
@@ -63,9 +63,9 @@ def _draw_points(panel: Axes, found: Verification) -> None:
         (FARTHER, _KINDS["gone"], "farther than the scene"),
     ):
         points = [
-            one.comparison.sensor.xyz[:2] + one.comparison.directions[rays, :2] * one.comparison.measured[rays, None]
-            for one in found.sensors
-            for rays in [np.flatnonzero(one.comparison.result == result)]
+            one.sensor.xyz[:2] + one.directions[rays, :2] * one.measured[rays, None]
+            for one in found.comparisons
+            for rays in [np.flatnonzero(one.result == result)]
         ]
         xy = np.concatenate(points)
         xy = xy[:: max(1, len(xy) // _MOST_POINTS)]
@@ -77,15 +77,15 @@ def save_returns_chart(path: str | os.PathLike[str], found: Verification) -> Non
     """Draw the share of rays that return against range, of each sensor: recorded, by its model, and with its gain."""
     figure, panels = new_figure(4.6 * len(found.sensors), 4.2, len(found.sensors), sharey=True)
     for number, (panel, one) in enumerate(zip(panels, found.sensors, strict=True)):
-        for row, surface in enumerate(sorted({share.surface for share in one.shares})):
-            own = [share for share in one.shares if share.surface == surface]
+        for row, surface in enumerate(sorted({share.surface for share in one.returns})):
+            own = [share for share in one.returns if share.surface == surface]
             middle = [(share.low + share.high) / 2 for share in own]
             words = surface if number == 0 else None
             panel.plot(middle, [share.measured for share in own], mark(row), color=colour(row), label=words)
             panel.plot(middle, [share.fitted for share in own], color=colour(row))
             panel.plot(middle, [share.predicted for share in own], color=colour(row), linestyle=":", alpha=0.8)
         gain = "" if one.gain is None else f", gain {one.gain.value:.2f} ({one.gain.low:.2f} to {one.gain.high:.2f})"
-        panel.set_title(f"{one.registration.sensor.label}{gain}", fontsize=10, color=INK)
+        panel.set_title(f"{one.id}{gain}", fontsize=10, color=INK)
         panel.set_ylim(0, 1.05)
         style_axes(panel, "range (m)", "share of rays that return" if number == 0 else "")
     if len(panels):

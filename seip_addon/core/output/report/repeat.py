@@ -9,7 +9,7 @@ from dataclasses import Field, fields
 from typing import Any
 
 from ...choosing.placement.objective import Objective
-from ...choosing.placement.scenarios import PoseErrors
+from ...sensing.scenarios.pose_errors import PoseErrors
 from ...sensing.visibility.settings import VisibilitySettings
 from ...settings import Setting, settings_of
 from ...site.candidates import CandidateSettings

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Literal
 
 from ...errors import SeipError
-from ...sensing.recordings.figures import CoverageSteps, Gain, ReturnShare
+from ...sensing.recordings.figures import CoverageSteps
+from ...sensing.recordings.verification import InstalledSensor
 from ...storage.files import read_small
 from ...storage.json_dataclass import from_json
 
@@ -16,56 +17,7 @@ SCHEMA = "seip-verification/1"
 
 _MOST_BYTES = 1 << 26
 
-Vector = tuple[float, float, float]
-Angles = tuple[float, float, float]
-Row = tuple[float, ...]
 Box = tuple[float, float, float, float, float, float, float]
-
-
-@dataclass(frozen=True)
-class RecordedBackground:
-    """Sweeps that a background was learned from; see `Background`."""
-
-    sweeps: int
-    seconds: float
-    uncertain: float
-
-
-@dataclass(frozen=True)
-class RecordedPose:
-    """A sensor as it is installed.
-
-    Parameters
-    ----------
-    id, sensor : str
-        Its label, and its type's key in the catalogue.
-    local_m, orientation
-        Fitted pose: position, and rows of the rotation from the sensor's axes to the site's.
-    shift_m, rotation_deg
-        Fitted less planned pose; the rotation vector about the site's axes.
-    shift_half_width_m, rotation_half_width_deg
-        Half the width of the 95 % interval of each of their components.
-    match : float, 0 to 1
-        Share of the rays that agree with the scene.
-    """
-
-    id: str
-    sensor: str
-    local_m: Vector
-    orientation: tuple[Row, Row, Row]
-    shift_m: Vector
-    shift_half_width_m: tuple[float, float, float]
-    rotation_deg: Angles
-    rotation_half_width_deg: Angles
-    match: float
-    background: RecordedBackground
-    gain: Gain | None
-    returns: tuple[ReturnShare, ...]
-
-    @property
-    def planned_m(self) -> tuple[float, ...]:
-        """Planned position."""
-        return tuple(at - shift for at, shift in zip(self.local_m, self.shift_m, strict=True))
 
 
 @dataclass(frozen=True)
@@ -97,7 +49,7 @@ class VerificationRecord:
 
     site: str
     recording: str
-    sensors: tuple[RecordedPose, ...]
+    sensors: tuple[InstalledSensor, ...]
     changes: tuple[RecordedChange, ...]
     coverage: CoverageSteps
 

@@ -8,8 +8,9 @@ from itertools import pairwise
 
 from ...counts import counted
 from ...sensing.recordings.figures import CoverageSteps
+from ...sensing.recordings.verification import InstalledSensor
 from ...site.locations import direction
-from .verification_record import RecordedChange, RecordedPose, VerificationRecord
+from .verification_record import RecordedChange, VerificationRecord
 
 LEAST_COST = 0.0005
 """Share of coverage that is shown as 0.1 points."""
@@ -18,7 +19,7 @@ _LEAST_SHIFT, _LEAST_ANGLE = 0.005, 0.05  # metres and degrees that are shown as
 _NAMED = 3  # changes that are named in a sentence
 
 
-def pose_text(pose: RecordedPose) -> str:
+def pose_text(pose: InstalledSensor) -> str:
     """Return two sentences: how far a sensor is from its plan, in position and in direction, with intervals."""
     east, north, up = pose.shift_m
     parts = [
@@ -32,7 +33,7 @@ def pose_text(pose: RecordedPose) -> str:
     return f"{where}, {known}. {_direction_text(pose)}"
 
 
-def _direction_text(pose: RecordedPose) -> str:
+def _direction_text(pose: InstalledSensor) -> str:
     lean_x, lean_y, turn = pose.rotation_deg
     lean = math.hypot(lean_x, lean_y)
     parts = []
@@ -47,7 +48,7 @@ def _direction_text(pose: RecordedPose) -> str:
     return f"It is {_listed(parts)}, within {within}."
 
 
-def gain_text(pose: RecordedPose) -> str:
+def gain_text(pose: InstalledSensor) -> str:
     """Return what the gain of a unit means for its range."""
     if pose.gain is None:
         return f"The recording does not determine the gain of {pose.id}; it counts as its data sheet says."
@@ -60,7 +61,7 @@ def gain_text(pose: RecordedPose) -> str:
     return f"{says}: it detects the same surface up to about {reach:.0%} of the distance ({low:.0%} to {high:.0%})."
 
 
-def returns_sentence(pose: RecordedPose) -> str:
+def returns_sentence(pose: InstalledSensor) -> str:
     """Return the range at which returns from the road differ most from the promise, or "" without any."""
     road = [one for one in pose.returns if one.surface == "road"]
     if not road:
@@ -126,7 +127,7 @@ def summary(record: VerificationRecord) -> tuple[str, ...]:
     return (_poses(record.sensors), _changes(record), coverage_text(record.coverage))
 
 
-def _poses(sensors: Sequence[RecordedPose]) -> str:
+def _poses(sensors: Sequence[InstalledSensor]) -> str:
     parts = [
         f"{one.id} by {math.hypot(*one.shift_m):.2f} m and {math.hypot(*one.rotation_deg):.1f}°" for one in sensors
     ]

@@ -42,8 +42,8 @@ _INTENSITY_SWEEPS = 5
 
 
 @dataclass(frozen=True, eq=False)
-class RecordedSensor:
-    """One sensor of a recording.
+class PosedRecording:
+    """Recording of one sensor with its pose and its background.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class RecordedFrames:
 
     Parameters
     ----------
-    sensors : tuple of RecordedSensor
+    sensors : tuple of PosedRecording
     sweeps : tuple of tuple of int or None
         Numbers of the sweeps of each frame, by sensor; None if a sensor has none at that time.
     ground : HeightRaster
@@ -107,7 +107,7 @@ class RecordedFrames:
         Region of interest in plan.
     """
 
-    sensors: tuple[RecordedSensor, ...]
+    sensors: tuple[PosedRecording, ...]
     sweeps: tuple[tuple[int | None, ...], ...]
     ground: HeightRaster
     region: BaseGeometry
@@ -194,7 +194,7 @@ def prepare_frames(
         if scene is not None:
             mounted = register(scene.surface, mounted, background).sensor
             background = _without_standing(background, compare_rays(scene.surface, mounted, background), scene)
-        sensors.append(RecordedSensor(mounted, record, background, None))
+        sensors.append(PosedRecording(mounted, record, background, None))
     ground = estimated_ground(np.concatenate([static_points(sensor) for sensor in sensors]))
     around = shapely.MultiPoint([sensor.mounted.xyz[:2] for sensor in sensors]).buffer(radius)
     region = around if scene is None else scene.region
@@ -210,7 +210,7 @@ def _without_standing(background: Background, one: RayComparison, scene: Recorde
     return replace(background, usual=np.where(standing, behind, background.usual).astype(np.float32))
 
 
-def static_points(sensor: RecordedSensor) -> Float:
+def static_points(sensor: PosedRecording) -> Float:
     """Return a sensor's background in site axes, (n, 3) metres."""
     return rotated(sensor.background.points(), sensor.mounted.orientation) + sensor.mounted.xyz
 
@@ -220,7 +220,7 @@ def _viewpoint(record: SensorRecording) -> Float | None:
     return record.sweep(0).viewpoint if len(record) else None
 
 
-def _intensity_scale(sensor: RecordedSensor, ground: HeightRaster) -> float | None:
+def _intensity_scale(sensor: PosedRecording, ground: HeightRaster) -> float | None:
     """Return the factor that gives the road near the sensor its known reflectivity.
 
     Makers report intensity in units of their own, corrected for range or not. On the road both the reflectivity and the

@@ -51,16 +51,6 @@ class Registration:
     half_width: Float
     match: float
 
-    @property
-    def distance(self) -> float:
-        """Distance between planned and fitted position, metres."""
-        return float(np.linalg.norm(self.shift[:3]))
-
-    @property
-    def angle(self) -> float:
-        """Angle between planned and fitted orientation, radians."""
-        return float(np.linalg.norm(self.shift[3:]))
-
 
 @dataclass(frozen=True, eq=False)
 class _Fit:

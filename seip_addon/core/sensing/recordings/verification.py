@@ -5,35 +5,56 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...site.scene_geometry import SceneGeometry
-from .background import Background
 from .comparison import Change, RayComparison
 from .figures import CoverageSteps, Gain, ReturnShare
-from .registration import Registration
+
+Triple = tuple[float, float, float]
 
 
-@dataclass(frozen=True, eq=False)
-class VerifiedSensor:
-    """One sensor of a verified installation.
+@dataclass(frozen=True)
+class RecordedBackground:
+    """Sweeps that a background was learned from; see `Background`."""
+
+    sweeps: int
+    seconds: float
+    uncertain: float
+
+
+@dataclass(frozen=True)
+class InstalledSensor:
+    """A sensor as it is installed, by its recording; see `verification.json`.
 
     Parameters
     ----------
-    registration : Registration
-        Its pose, fitted to the recording.
-    background : Background
-        Its static surroundings.
-    comparison : RayComparison
-        Predicted and measured ranges at that pose.
-    gain : Gain or None
-        Its received power; None if the recording does not determine it.
-    shares : tuple of ReturnShare
-        Shares of its rays that return.
+    id, sensor : str
+        Its label, and its type's key in the catalogue.
+    local_m, orientation
+        Fitted pose: position, and rows of the rotation from the sensor's axes to the site's.
+    shift_m, rotation_deg
+        Fitted less planned pose; the rotation vector about the site's axes.
+    shift_half_width_m, rotation_half_width_deg
+        Half the width of the 95 % interval of each of their components.
+    match : float, 0 to 1
+        Share of the rays that agree with the scene.
     """
 
-    registration: Registration
-    background: Background
-    comparison: RayComparison
+    id: str
+    sensor: str
+    local_m: Triple
+    orientation: tuple[Triple, Triple, Triple]
+    shift_m: Triple
+    shift_half_width_m: Triple
+    rotation_deg: Triple
+    rotation_half_width_deg: Triple
+    match: float
+    background: RecordedBackground
     gain: Gain | None
-    shares: tuple[ReturnShare, ...]
+    returns: tuple[ReturnShare, ...]
+
+    @property
+    def planned_m(self) -> tuple[float, ...]:
+        """Planned position."""
+        return tuple(at - shift for at, shift in zip(self.local_m, self.shift_m, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,16 +63,22 @@ class Verification:
 
     Parameters
     ----------
+    comparisons : tuple of RayComparison
+        Predicted and measured ranges of each sensor, at its fitted pose.
     changes : tuple of Change
         What the scene lacks, and what is no longer there.
     costs : tuple of float
         Coverage that each change costs (0 to 1, negative if it gains); NaN for vehicles and for small changes.
     corrected : SceneGeometry
         The scene with the changes, without vehicles.
+    warnings : tuple of str
+        Warnings about a short or busy recording.
     """
 
-    sensors: tuple[VerifiedSensor, ...]
+    sensors: tuple[InstalledSensor, ...]
+    comparisons: tuple[RayComparison, ...]
     changes: tuple[Change, ...]
     costs: tuple[float, ...]
     coverage: CoverageSteps
     corrected: SceneGeometry
+    warnings: tuple[str, ...] = ()

@@ -28,7 +28,7 @@ import numpy as np
 from ...arrays import Boolean, Float, Integer, concatenated_ranges
 from ..lidar.beams import BeamPattern
 from ..lidar.model import LidarModel
-from ..visibility.scanning import Caster
+from ..visibility.ray_casting import RayCaster
 from ..visibility.visibility_model import is_upright, yaw_of
 from .bodies import PANELS
 from .road_users import BODIES, RoadUsers
@@ -76,13 +76,13 @@ class PanelRows:
 
 
 def expected_returns(
-    caster: Caster, origin: Float, orientation: Float, model: LidarModel, users: RoadUsers
+    caster: RayCaster, origin: Float, orientation: Float, model: LidarModel, users: RoadUsers
 ) -> tuple[Float, int]:
     """Compute the expected returns of a sensor from each road user.
 
     Parameters
     ----------
-    caster : Caster
+    caster : RayCaster
         Ray caster of the static scene.
     origin : (3,) float64, metres
     orientation : (3, 3) float64
@@ -100,13 +100,13 @@ def expected_returns(
 
 
 def upright_returns(
-    caster: Caster, origin: Float, yaw: float, model: LidarModel, users: RoadUsers
+    caster: RayCaster, origin: Float, yaw: float, model: LidarModel, users: RoadUsers
 ) -> tuple[Float, int]:
     """Compute the expected returns of an upright sensor from each road user.
 
     Parameters
     ----------
-    caster : Caster
+    caster : RayCaster
         Ray caster of the static scene.
     origin : (3,) float64, metres
     yaw : float, radians
@@ -156,7 +156,7 @@ def upright_returns(
 
 
 def all_ray_returns(
-    caster: Caster, origin: Float, orientation: Float, model: LidarModel, users: RoadUsers
+    caster: RayCaster, origin: Float, orientation: Float, model: LidarModel, users: RoadUsers
 ) -> tuple[Float, int]:
     """Compute the expected returns of a sensor of any pattern and orientation from each road user.
 

@@ -88,7 +88,7 @@ class StoppableCaster:
 
     def __init__(self, caster: RayCaster, stop: threading.Event) -> None:
         self._caster, self._stop = caster, stop
-        self.name, self.triangles, self.threads = caster.name, caster.triangles, caster.threads
+        self.triangles, self.threads = caster.triangles, caster.threads
 
     def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
         """Cast rays; see `RayCaster.cast`."""

@@ -38,17 +38,11 @@ class RayCaster(Protocol):
 
     Attributes
     ----------
-    name : str
-        Name of the engine, ``bvh`` or ``embree``.
     triangles : (n, 3, 3) float64, metres
         All given triangles, which hits index.
     threads : int
         Useful number of threads that cast at once.
     """
-
-    @property
-    def name(self) -> str:
-        """Name of the engine."""
 
     @property
     def triangles(self) -> Float:
@@ -132,7 +126,6 @@ class BvhRayCaster:
         Triangles that stop rays; all by default.
     """
 
-    name = "bvh"
     threads = 1  # casting a ray holds Python's lock
 
     def __init__(self, triangles: Float, keep: Boolean | None = None) -> None:
@@ -172,7 +165,6 @@ class EmbreeRayCaster:
         Triangles that stop rays; all by default.
     """
 
-    name = "embree"
     threads = MAX_THREADS
 
     def __init__(self, triangles: Float, keep: Boolean | None = None) -> None:

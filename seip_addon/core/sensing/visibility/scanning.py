@@ -20,16 +20,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
 from ...arrays import Boolean, Float, Integer, concatenated_ranges
+from ...geometry.orientation import rotated
 from ..lidar.beams import BeamPattern
 from ..lidar.model import LidarModel
 from .beam_culling import Beams, NearRays, disc_patches, may_return, near_rays, target_patches
 from .near_surfaces import NearSurfaces
 from .occlusion import stopped_by
+from .ray_casting import RayCaster
 from .ray_culling import rays_near
 from .settings import VisibilitySettings
 from .target_index import TargetIndex, is_within, squared_length
@@ -38,46 +39,55 @@ _RAYS_AT_ONCE = 1 << 17  # bounds the memory of rays that are cast at once
 _PAIRS_AT_ONCE = 1 << 18  # of rays and surfaces: bounds the memory at borders of surfaces
 
 
-class Corners(Protocol):
-    """Triangles that can be indexed."""
-
-    def __getitem__(self, which: Integer, /) -> Float:
-        """Return corners, (k, 3, 3) float64, metres."""
-
-
-class Caster(Protocol):
-    """Interface of a `RayCaster` that scans use."""
-
-    @property
-    def triangles(self) -> Corners:
-        """The triangles that hits index."""
-
-    def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
-        """Cast rays; see `RayCaster.cast`."""
-
-
 @dataclass(frozen=True, eq=False)
 class ScanPosition:
     """Position of the sensors to scan from, with the conditions on their returns.
 
     Parameters
     ----------
+    caster : RayCaster
+        Ray caster in the site's axes.
     origin : (3,) float64, metres
-        Optical centre of the sensors.
+        Optical centre of the sensors, in the axes of the scan.
     yaw : float, radians
-        Direction of azimuth zero.
+        Direction of azimuth zero, in the axes of the scan.
     models : sequence of LidarModel
         Sensors at this position.
     reflectivity : (n,) float64, 0 to 1
         Reflectivity of the caster's triangles.
+    axes : ((3,) float64, (3, 3) float64), optional
+        Origin and orientation of the axes of the scan, if they are not the site's; see `in_sensor_axes`.
     """
 
-    caster: Caster
+    caster: RayCaster
     origin: Float
     yaw: float
     models: Sequence[LidarModel]
     settings: VisibilitySettings
     reflectivity: Float
+    axes: tuple[Float, Float] | None = None
+
+    def in_sensor_axes(self, orientation: Float) -> ScanPosition:
+        """Return the position in the axes of its sensors, which have the given orientation (3, 3) in the site."""
+        return replace(self, origin=np.zeros(3), yaw=0.0, axes=(self.origin, orientation))
+
+    def to_axes(self, points: Float) -> Float:
+        """Return points (..., 3) of the site in the axes of the scan."""
+        if self.axes is None:
+            return points
+        origin, orientation = self.axes
+        return (points - origin) @ orientation
+
+    def cast(self, directions: Float, max_range: float) -> tuple[Float, Integer]:
+        """Cast rays along directions (n, 3) from the sensors' optical centre; see `RayCaster.cast`."""
+        if self.axes is None:
+            return self.caster.cast(self.origin, directions, max_range)
+        origin, orientation = self.axes
+        return self.caster.cast(origin, rotated(directions, orientation), max_range)
+
+    def corners(self, triangle: Integer) -> Float:
+        """Return the corners of some of the caster's triangles (k, 3, 3), in the axes of the scan."""
+        return self.to_axes(self.caster.triangles[triangle])
 
     def counting(self, model: LidarModel, directions: Float, distance: Float, triangle: Integer) -> Boolean:
         """Return which of a sensor's hits are returns: within its range and strong enough, (n,) bool."""
@@ -86,7 +96,7 @@ class ScanPosition:
         if least > 0:
             # strength depends on distance and on reflectivity times the cosine of the angle of incidence
             met = triangle[counts]
-            corners = self.caster.triangles[met]
+            corners = self.corners(met)
             normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
             normal /= np.linalg.norm(normal, axis=1)[:, None]
             reflected = self.reflectivity[met] * np.abs((normal * directions[counts]).sum(axis=1))
@@ -130,6 +140,38 @@ class ScanPosition:
             reflected = cuts.reflectivity[cut] * np.abs((cuts.normal[cut] * directions[ray]).sum(axis=1))
             strong[ray[model.law.strength(distance[ray], reflected) < least]] = False
         return strong
+
+    def pairs_seen(
+        self,
+        model: LidarModel,
+        directions: Float,
+        distance: Float,
+        triangle: Integer,
+        surfaces: NearSurfaces,
+        index: TargetIndex,
+    ) -> tuple[Integer, Integer]:
+        """Return each ray of a sensor with each target that its return sees, from the hits of n rays.
+
+        Parameters
+        ----------
+        directions, distance, triangle : (n, 3) and (n,) float64, (n,) int64
+            Directions of the rays, and their hits.
+        surfaces : NearSurfaces
+            Surfaces near the targets.
+        index : TargetIndex
+            Index of the targets.
+
+        Returns
+        -------
+        ray, target : (p,) int64
+            Indices of the pairs, rays ascending.
+        """
+        # A return may see several targets, and the strength at borders depends on the target's surfaces: pairs of both
+        returns = np.flatnonzero(self.counting(model, directions, distance, triangle))
+        directions, distance = directions[returns], distance[returns]
+        ray, target = index.pairs_within_delta(self.origin + distance[:, None] * directions)
+        strong = self.counting_at_borders(model, surfaces, directions[ray], distance[ray], target)
+        return returns[ray[strong]], target[strong]
 
 
 def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
@@ -199,7 +241,7 @@ def _seen_by_channels(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
         # Proven before anything is cast: on a scene with large occluders one triangle may stop a whole bundle, at
         # the price of a few products. Bundles without a triangle (their last ray met nothing) cannot be proven.
         stopped = (triangle >= 0) & (bundles.width > 1)  # a single ray is cast as quickly as it is proven stopped
-        corners = position.caster.triangles[triangle[stopped]]
+        corners = position.corners(triangle[stopped])
         stopped[stopped] = stopped_by(position.origin, corners, beams, bundles.pick(stopped), planes)
         bundles = bundles.pick(~stopped)
         sees, triangle = returns.see(bundles)
@@ -228,13 +270,8 @@ def seen_by_rays(
     seen = np.zeros(len(surfaces.xyz), dtype=bool)
     for begin in range(0, len(rays), _RAYS_AT_ONCE):
         directions = pattern.directions(rays[begin : begin + _RAYS_AT_ONCE])
-        distance, triangle = position.caster.cast(position.origin, directions, model.max_range)
-        # A return may see several targets, and the strength at borders depends on the target's surfaces: pairs of both
-        counts = position.counting(model, directions, distance, triangle)
-        directions, distance = directions[counts], distance[counts]
-        ray, target = index.pairs_within_delta(_points(position.origin, directions, distance))
-        strong = position.counting_at_borders(model, surfaces, directions[ray], distance[ray], target)
-        seen[target[strong]] = True
+        distance, triangle = position.cast(directions, model.max_range)
+        seen[position.pairs_seen(model, directions, distance, triangle, surfaces, index)[1]] = True
     return seen
 
 
@@ -301,7 +338,7 @@ class _Returns:
             self._row[ray[fresh]] = np.arange(len(fresh))
             fresh = fresh[self._row[ray[fresh]] == np.arange(len(fresh))]
             directions = self._directions(channel[fresh], step[fresh])
-            distance, triangle = self._position.caster.cast(self._position.origin, directions, self._reach)
+            distance, triangle = self._position.cast(directions, self._reach)
             self._row[ray[fresh]] = np.arange(len(fresh)) + len(self._distance)
             self._direction = np.concatenate([self._direction, directions])
             self._distance = np.concatenate([self._distance, distance])

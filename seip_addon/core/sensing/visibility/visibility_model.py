@@ -8,17 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
-import numpy as np
-
-from ...arrays import Boolean, Float, Integer
-from ...geometry.orientation import rotated
+from ...arrays import Boolean, Float
 from ...site.site import Site
 from ..lidar.model import LidarModel
 from .near_surfaces import near_surfaces, rotated_surfaces
 from .ray_casting import RayCaster, engine_name, make_ray_caster
-from .scanning import Caster, ScanPosition, seen_by_near_rays
+from .scanning import ScanPosition, seen_by_near_rays
 from .settings import Engine, VisibilitySettings
 
 _MAX_LEVEL_ANGLE = 1e-6
@@ -41,6 +37,7 @@ class VisibilityModel:
 
     Examples
     --------
+    >>> import numpy as np
     >>> from seip_addon.core.sensing.lidar.catalogue import load_catalogue
     >>> road = np.array([[(0, -4, 0), (50, -4, 0), (50, 4, 0)], [(0, -4, 0), (50, 4, 0), (0, 4, 0)]], dtype=float)
     >>> wall = np.array([[[20.0, -9.0, 0.0], [20.0, 9.0, 0.0], [20.0, 0.0, 9.0]]])
@@ -83,7 +80,7 @@ class VisibilityModel:
         """
         if is_upright(orientation):
             return self.see_upright(models, xyz, yaw_of(orientation))
-        position = in_sensor_axes(self._position(models, xyz, 0.0), orientation)
+        position = self._position(models, xyz, 0.0).in_sensor_axes(orientation)
         return seen_by_near_rays(position, rotated_surfaces(self._surfaces, xyz, orientation))
 
     def see_upright(self, models: Sequence[LidarModel], xyz: Float, yaw: float) -> tuple[Boolean, int]:
@@ -108,38 +105,3 @@ def is_upright(orientation: Float) -> bool:
 def yaw_of(orientation: Float) -> float:
     """Return the direction of azimuth zero of an upright sensor, in radians."""
     return math.atan2(orientation[1, 0], orientation[0, 0])
-
-
-def in_sensor_axes(position: ScanPosition, orientation: Float) -> ScanPosition:
-    """Return a position in the axes of its sensors, which have the given orientation."""
-    caster = _RotatedCaster(position.caster, position.origin, orientation)
-    return replace(position, caster=caster, origin=np.zeros(3), yaw=0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class _RotatedCaster:
-    """A ray caster in the axes of a sensor."""
-
-    caster: Caster
-    origin: Float
-    orientation: Float
-
-    @property
-    def triangles(self) -> _RotatedTriangles:
-        return _RotatedTriangles(self)
-
-    def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
-        """Cast rays, given in the sensor's axes."""
-        start = self.origin + origin @ self.orientation.T
-        return self.caster.cast(start, rotated(directions, self.orientation), max_range)
-
-
-@dataclass(frozen=True, eq=False)
-class _RotatedTriangles:
-    """The triangles of a ray caster in the axes of a sensor, rotated on demand."""
-
-    rotated: _RotatedCaster
-
-    def __getitem__(self, which: Integer) -> Float:
-        corners: Float = (self.rotated.caster.triangles[which] - self.rotated.origin) @ self.rotated.orientation
-        return corners

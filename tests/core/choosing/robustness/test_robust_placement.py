@@ -11,9 +11,9 @@ from seip_addon.core.choosing.placement.problem import PlacementProblem
 from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.robustness.robust_placement import solve_robust
-from seip_addon.core.choosing.robustness.scenario_visibility import ScenarioVisibility
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
+from seip_addon.core.sensing.scenarios.scenario_visibility import ScenarioVisibility
 from tests.oracles.placement_oracle import all_placements, covered, small_problems
 from tests.oracles.random_cases import cases
 

@@ -11,9 +11,9 @@ from seip_addon.core.choosing.placement.risk import Risk
 from seip_addon.core.choosing.placement.scenarios import Scenarios
 from seip_addon.core.choosing.placement.search_limits import SolverLimits
 from seip_addon.core.choosing.robustness.robust_study import robust_study
-from seip_addon.core.choosing.robustness.visibility_under_errors import draws_for, visibility_under_errors
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.scenarios.visibility_under_errors import draws_for, visibility_under_errors
 from seip_addon.core.sensing.visibility.grid import VisibilitySettings, compute_visibility
 from seip_addon.core.sensing.visibility.surroundings import Surroundings
 from tests.builders.synthetic_junction import junction_site

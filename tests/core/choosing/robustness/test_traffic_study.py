@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from seip_addon.core.choosing.placement.objective import Objective, placement_problem
-from seip_addon.core.choosing.robustness.traffic_instants import spread_instants
 from seip_addon.core.choosing.robustness.traffic_study import traffic_scenarios, traffic_study
-from seip_addon.core.choosing.robustness.visibility_in_traffic import visibility_in_traffic
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
+from seip_addon.core.sensing.scenarios.traffic_instants import spread_instants
+from seip_addon.core.sensing.scenarios.visibility_in_traffic import visibility_in_traffic
 from seip_addon.core.sensing.traffic.trajectories import RoadUser
 from seip_addon.core.sensing.visibility.grid import compute_visibility
 from seip_addon.core.sensing.visibility.settings import VisibilitySettings
@@ -62,47 +62,44 @@ def test_both_are_evaluated_at_instants_that_nothing_was_chosen_on(laid_out, stu
     _, found = study
     evaluated = spread_instants([queue(3)], 8, 1)
     for placed in (found.empty, found.traffic):
-        seen, views = placed.seen, finish(visibility_in_traffic(around, placed.placement.chosen, evaluated.obstacles()))
+        views = finish(visibility_in_traffic(around, placed.placement.chosen, evaluated.obstacles()))
         rows = np.array([views.seen(instant).any(axis=0) for instant in range(8)])
-        assert seen.at == pytest.approx(rows.mean(axis=1), abs=1e-12)
-        assert seen.time == pytest.approx(rows.mean(axis=0), abs=1e-12)
-        assert seen.hidden_at == pytest.approx((seen.empty_targets & ~rows).mean(axis=1), abs=1e-12)
-        assert seen.hidden.value == pytest.approx(seen.hidden_at.mean() / seen.empty, abs=1e-12)
-        assert seen.hidden.value * seen.empty >= seen.loss.value - 1e-12
+        assert placed.at == pytest.approx(rows.mean(axis=1), abs=1e-12)
+        assert placed.time == pytest.approx(rows.mean(axis=0), abs=1e-12)
+        assert placed.hidden_at == pytest.approx((placed.empty_targets & ~rows).mean(axis=1), abs=1e-12)
+        assert placed.hidden.value == pytest.approx(placed.hidden_at.mean() / placed.empty, abs=1e-12)
+        assert placed.hidden.value * placed.empty >= placed.loss.value - 1e-12
 
 
 def test_on_the_instants_that_it_was_chosen_on_it_loses_to_none(laid_out, study):
     around, problem = laid_out
     scenarios, found = study
     instants = spread_instants([queue(1), queue(2)], 6, 0)
-    assert (scenarios.views.packed[0] == look(around, problem, instants.of(np.array([0])))).all()
+    assert (scenarios.packed[1] == look(around, problem, instants.of(np.array([0])))).all()
 
     def mean(placed):
-        return scenarios.views.seen_by_any(placed.placement.chosen).mean()
+        return scenarios.seen_by_any(placed.placement.chosen)[1:].mean()
 
     assert mean(found.traffic) >= mean(found.empty) - 1e-12
     assert found.traffic.placement.objective == pytest.approx(mean(found.traffic) * len(around.site.targets))
 
 
 def look(around, problem, instants):
-    return finish(traffic_scenarios(around, problem, instants)).views.packed[0]
+    return finish(traffic_scenarios(around, problem, instants)).packed[1]
 
 
 def test_it_says_what_traffic_hides(study):
     _, found = study
-    seen = found.empty.seen
-    costly = replace(seen, at=np.full_like(seen.at, seen.empty - 0.02))
-    costly = replace(found, empty=replace(found.empty, seen=costly))
+    seen = found.empty
+    costly = replace(found, empty=replace(seen, at=np.full_like(seen.at, seen.empty - 0.02)))
     assert any("2.0% less" in sentence for sentence in costly.messages())
     nothing = replace(seen, at=np.full_like(seen.at, seen.empty - 0.004))
-    quiet = replace(found, empty=replace(found.empty, seen=nothing))
-    quiet = replace(quiet, traffic=quiet.empty)
+    quiet = replace(found, empty=nothing, traffic=nothing)
     assert quiet.messages()[1:] == ()
-    other = replace(found.traffic, placement=replace(found.traffic.placement, chosen=np.array([0, 1])))
-    doubtful = replace(quiet, traffic=replace(other, seen=quiet.empty.seen))
+    other = replace(nothing, placement=replace(found.traffic.placement, chosen=np.array([0, 1])))
+    doubtful = replace(quiet, traffic=other)
     assert ["not significantly better" in sentence for sentence in doubtful.messages()[1:]] == [True]
-    better = replace(nothing, at=nothing.at + 0.1)
-    gains = replace(quiet, traffic=replace(other, seen=better))
+    gains = replace(quiet, traffic=replace(other, at=nothing.at + 0.1))
     assert gains.messages()[1:] == ()
     rows = traffic_rows(found)
     assert "24 road users at a time" in rows[0].regime

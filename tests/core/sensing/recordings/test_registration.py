@@ -39,8 +39,6 @@ def test_the_pose_is_found(surface, seed, vehicles):
     assert np.abs(found.sensor.xyz - true.xyz).max() < 0.001
     assert np.abs(found.sensor.orientation - true.orientation).max() < 0.0001
     assert np.allclose(found.sensor.orientation @ found.sensor.orientation.T, np.eye(3), atol=1e-12)
-    assert found.distance == pytest.approx(np.linalg.norm(shift[:3]), abs=0.002)
-    assert found.angle == pytest.approx(np.linalg.norm(shift[3:]), abs=0.0002)
     assert found.match > 0.95
 
 

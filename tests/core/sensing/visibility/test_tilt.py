@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 
 from seip_addon.core.choosing.placement.deployment import deploy
 from seip_addon.core.choosing.placement.objective import Objective
-from seip_addon.core.choosing.robustness.pose_errors import PoseDraws
-from seip_addon.core.choosing.robustness.visibility_under_errors import visibility_under_errors
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation, orientations
 from seip_addon.core.progress import finish
 from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.lidar.range_equation import RangeEquation
 from seip_addon.core.sensing.scans.sensor import level_orientation
+from seip_addon.core.sensing.scenarios.pose_errors import PoseDraws
+from seip_addon.core.sensing.scenarios.visibility_under_errors import visibility_under_errors
 from seip_addon.core.sensing.visibility import grid
 from seip_addon.core.sensing.visibility.grid import (
     FILE,

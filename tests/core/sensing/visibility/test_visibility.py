@@ -127,7 +127,7 @@ def test_same_as_the_full_scan_bit_for_bit(engine: Engine, seed: int, delta: flo
     lazy = finish(compute_visibility(site, models, settings, engine))
     full, rays = full_scan(site, models, settings, caster)
     assert (lazy.visible == full).all()
-    assert lazy.key == visibility_key(site, models, settings, caster.name)
+    assert lazy.key == visibility_key(site, models, settings, engine)
     assert lazy.parameters["rays_cast"] <= rays == lazy.parameters["rays_of_full_scan"]
 
 

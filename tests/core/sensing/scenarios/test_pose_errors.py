@@ -1,8 +1,6 @@
-"""Draws of pose errors, the estimates made of them, and what they do to a placement."""
+"""Draws of pose errors."""
 
 import math
-
-from headless.studies.stability.robustness_rows import pose_rows, poses_converged
 
 import numpy as np
 import pytest
@@ -10,25 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from seip_addon.core.choosing.placement.deployment import deploy
-from seip_addon.core.choosing.placement.scenarios import ERROR_KINDS, PoseErrors
-from seip_addon.core.choosing.robustness.pose_errors import PoseDraws, draw_errors, out_of_objects
-from seip_addon.core.choosing.robustness.pose_study import PoseStudySettings, pose_study, pose_warnings
 from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import quantile_of
-from seip_addon.core.progress import finish
-from seip_addon.core.sensing.lidar.catalogue import load_catalogue
 from seip_addon.core.sensing.scans.sensor import level_orientation
-from seip_addon.core.sensing.visibility.grid import compute_visibility
-from seip_addon.core.sensing.visibility.settings import VisibilitySettings
-from seip_addon.core.sensing.visibility.surroundings import Surroundings
+from seip_addon.core.sensing.scenarios.pose_errors import PoseDraws, PoseErrors, draw_errors, out_of_objects
 from seip_addon.core.site.obstruction import inside_any
 from seip_addon.core.site.scene_geometry import Mesh
-from tests.builders.synthetic_junction import junction_site, prism
-from tests.engines import ANY
+from tests.builders.synthetic_junction import prism
 
 FEET = np.array([[0.0, 0, 0], [5, -3, 0.12], [-5, 3, 0.12], [5, -3, 0.12]])
-MODELS = load_catalogue()
 
 
 def test_a_position_errs_alike_whatever_hangs_there_and_whoever_else_is_asked():
@@ -85,42 +72,3 @@ def test_a_sensor_leaves_the_object_that_it_would_be_in():
 def test_errors_that_cannot_be_meant_are_refused(wrong):
     with pytest.raises(SeipError, match="error of"):
         PoseErrors(**wrong)
-
-
-@pytest.mark.parametrize("share", [0.05, 0.5])
-def test_a_quantile_is_in_its_interval_as_often_as_is_said(share):
-    rng, hits = np.random.default_rng(0), 0
-    for _ in range(600):
-        found = quantile_of(rng.standard_normal(200), share)
-        assert found.low <= found.value <= found.high
-        hits += found.low <= stats.norm.ppf(share) <= found.high
-    assert hits / 600 > 0.93
-
-
-@pytest.fixture(scope="module")
-def placed():
-    site = junction_site(positions=16, sensors=("type1",), heights=(5.4,), spacing=3.0)
-    grid = finish(compute_visibility(site, MODELS, VisibilitySettings(delta=2.0), ANY))
-    return site, deploy(site, MODELS, grid.rows([0, 5]), [0, 5])
-
-
-def study_of(placed, **changed):
-    site, deployment = placed
-    chosen = PoseStudySettings(**{"draws": 40, "draws_of_kind": 10} | changed)
-    return finish(pose_study(around(site), deployment, chosen))
-
-
-def around(site):
-    return Surroundings(site, MODELS, VisibilitySettings(delta=2.0), engine=ANY)
-
-
-@pytest.mark.slow
-def test_a_study_says_who_is_to_blame(placed):
-    study = study_of(placed, errors=PoseErrors(tilt=math.radians(8)))
-    assert set(study.by_kind) == set(ERROR_KINDS)
-    assert study.together.shape == (40,)
-    losses = dict(zip(study.labels, study.loss_by_sensor(), strict=True))
-    assert study.worst_sensor()[0] == max(losses, key=lambda label: losses[label].value)
-    assert pose_warnings(study)
-    assert len(pose_rows(study)) == 3
-    assert poses_converged(study)

@@ -13,19 +13,72 @@ All errors are independent of each other and between posts. The rotations are ya
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from ...arrays import Boolean, Float
+from ...errors import SeipError
 from ...geometry.orientation import orientations
+from ...settings import setting
 from ...site.obstruction import inside_any
 from ...site.scene_geometry import Mesh
-from ..placement.scenarios import PoseErrors
 
+MAX_OFFSET_STD, MAX_ANGLE_STD = 100.0, 1.0  # metres and radians; larger standard deviations are taken for typing errors
 _MICROMETRE = 1e-6
 _KINDS_DRAWN = 6  # x, y, z, yaw, pitch, roll
+
+
+@dataclass(frozen=True)
+class PoseErrors:
+    """Standard deviations of the errors of a sensor's pose.
+
+    Parameters
+    ----------
+    position : float, metres
+        Standard deviation of x and of y.
+    height : float, metres
+        Standard deviation of the height.
+    yaw : float, radians
+        Standard deviation of the yaw.
+    tilt : float, radians
+        Standard deviation of pitch and of roll.
+
+    Raises
+    ------
+    SeipError
+        A standard deviation is negative or too large.
+    """
+
+    position: float = setting(0.3, "standard deviation of x and of y", unit="m", maximum=MAX_OFFSET_STD)
+    height: float = setting(0.3, "standard deviation of the height", unit="m", maximum=MAX_OFFSET_STD)
+    yaw: float = setting(math.radians(2.0), "standard deviation of the yaw", unit="rad", maximum=math.pi)
+    tilt: float = setting(
+        math.radians(2.0),
+        "standard deviation of pitch and of roll",
+        unit="rad",
+        maximum=MAX_ANGLE_STD,
+    )
+
+    def __post_init__(self) -> None:
+        for name in ("position", "height"):
+            value = getattr(self, name)
+            if not 0 <= value <= MAX_OFFSET_STD:
+                raise SeipError(f"the error of {name} must be 0 to {MAX_OFFSET_STD:g} m, not {value:g} m")
+        for name, most in (("tilt", MAX_ANGLE_STD), ("yaw", math.pi)):
+            value = getattr(self, name)
+            if not 0 <= value <= most:
+                limit, shown = math.degrees(most), math.degrees(value)
+                raise SeipError(f"the error of {name} must be 0 to {limit:.0f}°, not {shown:g}°")
+
+    def alone(self, kind: str) -> PoseErrors:
+        """Return the errors of one kind, all others zero."""
+        return replace(self, **{name: 0.0 for name in ERROR_KINDS if name != kind})
+
+
+ERROR_KINDS = tuple(field.name for field in fields(PoseErrors))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,12 +6,11 @@ import numpy as np
 
 from ...arrays import Integer
 from ...progress import Progress
-from ...sensing.visibility.chunks import sharing_rays
-from ...sensing.visibility.ray_casting import engine_name, make_ray_caster
-from ...sensing.visibility.surroundings import Surroundings
-from ...sensing.visibility.visibility_model import VisibilityModel
-from ..placement.scenarios import PoseErrors
-from .pose_errors import PoseDraws, draw_errors, out_of_objects
+from ..visibility.chunks import sharing_rays
+from ..visibility.ray_casting import engine_name, make_ray_caster
+from ..visibility.surroundings import Surroundings
+from ..visibility.visibility_model import VisibilityModel
+from .pose_errors import PoseDraws, PoseErrors, draw_errors, out_of_objects
 from .scenario_visibility import ScenarioVisibility, each_in_threads
 
 

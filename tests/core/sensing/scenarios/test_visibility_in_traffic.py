@@ -11,16 +11,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.choosing.robustness.traffic_instants import (
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.sensing.lidar.rosette import Rosette
+from seip_addon.core.sensing.scenarios.traffic_instants import (
     BATCH_SECONDS,
     NO_TRAFFIC,
     obstacles_of,
     spread_instants,
 )
-from seip_addon.core.choosing.robustness.visibility_in_traffic import visibility_in_traffic
-from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import finish
-from seip_addon.core.sensing.lidar.rosette import Rosette
+from seip_addon.core.sensing.scenarios.visibility_in_traffic import visibility_in_traffic
 from seip_addon.core.sensing.traffic.site_traffic import check_runs
 from seip_addon.core.sensing.traffic.trajectories import WARM_UP, RoadUser
 from seip_addon.core.sensing.visibility.grid import compute_visibility

@@ -10,8 +10,8 @@ import numpy as np
 from ...arrays import Float, Integer
 from ...errors import SeipError
 from ...geometry.orientation import rotations
-from ...sensing.traffic.bodies import fitted_body
-from ...sensing.traffic.trajectories import WARM_UP, Snapshot, Trajectories
+from ..traffic.bodies import fitted_body
+from ..traffic.trajectories import WARM_UP, Snapshot, Trajectories
 
 BATCH_SECONDS = 12.0  # seconds of a run whose instants count as one draw, since the same queues block the view
 _MARGIN = 1e-3  # metres by which bounding boxes are larger than their contents: ray casters compute in float32

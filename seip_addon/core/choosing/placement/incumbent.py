@@ -1,0 +1,81 @@
+"""The best placement of a search so far, with its bound and the work that is left."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ...arrays import Integer
+from ...progress import Progress
+from .instance import Instance
+from .search_limits import Work
+
+
+class Incumbent:
+    """The best feasible placement so far, which all algorithms share.
+
+    Parameters
+    ----------
+    instance : Instance
+    work : Work
+        Limit of the search.
+    describe : callable, optional
+        Description of candidates of the problem for the user, such as "71 % of the road".
+
+    Attributes
+    ----------
+    chosen : (k,) int64
+        Candidates of the instance, ascending.
+    value : float
+        Objective value; minus infinity while there is no feasible placement.
+    bound : float
+        Upper bound on the value of any placement.
+    """
+
+    def __init__(self, instance: Instance, work: Work, describe: Callable[[Integer], str] | None = None) -> None:
+        self.instance, self.work = instance, work
+        self._describe = describe
+        self.chosen: Integer = np.zeros(0, dtype=np.int64)
+        self.value, self.bound, self.best = -math.inf, math.inf, ""
+
+    @property
+    def least_better(self) -> float:
+        """Least value of a better placement: lower bounds than this are proof enough."""
+        return self.value + self.instance.step
+
+    def offer(self, chosen: Integer) -> bool:
+        """Take a placement if it is feasible and better: of a larger value, or as good with fewer or cheaper sensors."""
+        chosen = np.sort(np.asarray(chosen, dtype=np.int64))
+        if not self.instance.feasible(chosen):
+            return False
+        value = self.instance.value(chosen)
+        if value <= self.value + self.instance.slack and not (
+            value >= self.value and self._effort(chosen) < self._effort(self.chosen)
+        ):
+            return False
+        self.chosen, self.value = chosen, value
+        if self._describe is not None:
+            self.best = self._describe(self.instance.original[chosen])
+        return True
+
+    @property
+    def proven(self) -> bool:
+        """Whether no placement is better."""
+        return self.bound < self.least_better
+
+    @property
+    def gap(self) -> float:
+        """Gap of the best placement so far; infinite while there is no bound."""
+        if not (math.isfinite(self.bound) and math.isfinite(self.value)):
+            return math.inf
+        block = self.instance.blocks[0]
+        return block.g.gap(self.value, max(self.value, self.bound), float(block.weight.sum()))
+
+    def progress(self, phase: str) -> Progress:
+        """Return the progress of a phase, with the best placement so far and its gap."""
+        return Progress(0, 0, phase, best=self.best, gap=self.gap if math.isfinite(self.gap) else None)
+
+    def _effort(self, chosen: Integer) -> tuple[int, float]:
+        return len(chosen), math.fsum(self.instance.price[chosen])

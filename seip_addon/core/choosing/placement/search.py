@@ -1,0 +1,185 @@
+"""Anytime search: greedy choices, swaps, other mixtures of prices, and restarts from a part of the best placement.
+
+The greedy algorithm has at least 1 - 1/e (63 %) of the best value if only the number of sensors is limited (Nemhauser,
+Wolsey and Fisher 1978). Swaps end where no sensor has a better replacement; restarts lead to other such ends.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+
+import numpy as np
+
+from ...arrays import Float, Integer
+from ...progress import Progress
+from .incumbent import Incumbent
+
+PATIENCE = 80
+"""Restarts without a better placement after which the search ends, in addition to as many as led to the best one."""
+TOLERATED_LOSS, RETURN = 0.005, 10  # share of the value that a restart may lose, and restarts between those from the best
+FIRST_CHOICES = 20  # candidates of largest gain, one of which begins a restart
+PRICE_POWERS = (0.0, 0.5, 1.0, 1.5)
+"""Powers of the price by which gains are divided: different ones lead to different mixtures of prices."""
+MAX_PRICES = 8  # different prices that are tried in place of each sensor
+
+Steps = Generator[Progress, None, None]
+
+
+class Search:
+    """Search for better placements than the incumbent.
+
+    Parameters
+    ----------
+    incumbent : Incumbent
+    start : (s,) int64
+        Candidates that serve the mandatory groups.
+    seed : int
+    """
+
+    def __init__(self, incumbent: Incumbent, start: Integer, seed: int = 0) -> None:
+        self.incumbent, self.instance, self.start = incumbent, incumbent.instance, start
+        self._random = np.random.default_rng(seed)
+        instance = self.instance
+        mixed = math.isfinite(instance.budget) and np.ptp(instance.price) > 0
+        self.powers = PRICE_POWERS if mixed else (0.0,)
+        self._divisors = {power: np.maximum(instance.price, 1e-9 * instance.price.max()) ** power for power in self.powers}
+
+    def first(self) -> Steps:
+        """Find a first placement: the best of greedy choices by gain and by gain per price."""
+        for power in self.powers:
+            chosen = yield from self.filled(self.start, power, "choosing greedily")
+            self.incumbent.offer(chosen)
+            yield self.incumbent.progress("choosing greedily")
+        yield from self._improved(self.incumbent.chosen)
+
+    def adapt(self, known: Integer) -> Steps:
+        """Improve a placement of a similar problem: drop the sensors that are too many, add others, and swap."""
+        chosen = known
+        while len(chosen) and not self._is_within_limits(chosen):
+            chosen = self._without_weakest(chosen)
+        yield from self._improved((yield from self.filled(chosen, 0.0)))
+
+    def restarts(self, effort: float) -> Steps:
+        """Restart from a part of the best placement until that stops improving it, or for units of work."""
+        incumbent, work = self.incumbent, self.incumbent.work
+        last = work.left - effort
+        number = best_at = 0
+        current = incumbent.chosen
+        while number - best_at < PATIENCE + best_at and work.left > max(last, 0.0):
+            number += 1
+            before = incumbent.value
+            found = yield from self._improved((yield from self._restarted(current)))
+            if incumbent.value > before + self.instance.slack:
+                best_at = number
+            # A somewhat worse end of swaps is the next one to leave: the search moves away from the best placement.
+            near = self.instance.value(found) >= incumbent.value - TOLERATED_LOSS * abs(incumbent.value)
+            current = found if near and number % RETURN != 0 else incumbent.chosen
+
+    def _restarted(self, best: Integer) -> Generator[Progress, None, Integer]:
+        """Drop a random part of a placement, add another candidate, and fill up greedily."""
+        random, instance = self._random, self.instance
+        dropped = random.choice(best, random.integers(1, max(2, (len(best) + 1) // 2 + 1)), replace=False) if len(best) else best
+        kept = np.setdiff1d(best, dropped)
+        power = self.powers[random.integers(len(self.powers))]
+        gain = np.where(instance.addable(kept), self._rated(kept, power), -np.inf)
+        gain[dropped] = -np.inf
+        first = np.argsort(-gain, kind="stable")[:FIRST_CHOICES]
+        first = first[np.isfinite(gain[first])]
+        if len(first):
+            kept = np.append(kept, random.choice(first))
+        return (yield from self.filled(kept, power))
+
+    def filled(self, chosen: Integer, power: float, phase: str = "improving") -> Generator[Progress, None, Integer]:
+        """Add the candidate of largest gain, by a power of the price, until none can be added."""
+        instance = self.instance
+        while self.incumbent.work.left > 0 or len(chosen) == len(self.start):
+            addable = instance.addable(chosen)
+            if not addable.any():
+                break
+            rate = np.where(addable, self._rated(chosen, power), -np.inf)
+            best = int(np.argmax(rate))
+            if rate[best] <= 0 and instance.mandatory[:, chosen].any(axis=1).all():
+                break
+            chosen = np.append(chosen, best)
+            yield self.incumbent.progress(phase)
+        return chosen
+
+    def _rated(self, chosen: Integer, power: float) -> Float:
+        self.incumbent.work.spend(self.instance.update_operations)
+        rated: Float = self.instance.gains(chosen) / self._divisors[power]
+        return rated
+
+    def _improved(self, chosen: Integer) -> Generator[Progress, None, Integer]:
+        """Swap sensors until no swap helps; then, of a new best placement, try other mixtures of prices."""
+        chosen = yield from self._swapped(chosen)
+        while self.incumbent.offer(chosen) and len(self.powers) > 1:
+            mixed = yield from self._mixed(chosen)
+            if mixed is None:
+                break
+            chosen = yield from self._swapped(mixed)
+        return chosen
+
+    def _swapped(self, chosen: Integer) -> Generator[Progress, None, Integer]:
+        """Replace one sensor after the other by the best candidate, for as long as the value grows."""
+        instance, work = self.instance, self.incumbent.work
+        value, still, slot = instance.value(chosen), 0, 0
+        while still < len(chosen) and work.left > 0:
+            slot = (slot + 1) % len(chosen)
+            rest = np.delete(chosen, slot)
+            values = np.where(instance.addable(rest), instance.values_with(rest), -np.inf)
+            work.spend(instance.update_operations * (len(chosen) if instance.risk.failure != "none" else 1))
+            swapped = np.insert(rest, slot, int(np.argmax(values)))
+            still += 1
+            if values.max() > value and (reached := instance.value(swapped)) > value + instance.slack:
+                # what a cheaper sensor leaves of the budget may buy another one
+                chosen = yield from self.filled(swapped, 0.0)
+                value, still = (reached if len(chosen) == len(swapped) else instance.value(chosen)), 0
+            yield self.incumbent.progress("improving the placement")
+        return chosen
+
+    def _mixed(self, chosen: Integer) -> Generator[Progress, None, Integer | None]:
+        """Return a better placement with another mixture of prices, if one is found.
+
+        For each sensor and each price the sensor goes, and further ones of least loss, until the best candidate of that
+        price is affordable; the budget that is left is then spent greedily: several cheap sensors for a dear one, or
+        the reverse.
+        """
+        instance = self.instance
+        value = instance.value(chosen)
+        prices = np.unique(instance.price)
+        prices = prices[np.linspace(0, len(prices) - 1, min(len(prices), MAX_PRICES)).astype(np.int64)]
+        for gone in chosen.tolist():
+            for price in prices[prices != instance.price[gone]].tolist():
+                rest = chosen[chosen != gone]
+                while len(rest) and not instance.affordable(math.fsum(instance.price[rest]) + price):
+                    rest = self._without_weakest(rest)
+                gain = np.where(instance.addable(rest) & (instance.price == price), self._rated(rest, 0.0), -np.inf)
+                if not np.isfinite(gain.max()):
+                    continue
+                mixed = np.append(rest, int(np.argmax(gain)))
+                for power in (0.0, 1.0):
+                    other = yield from self.filled(mixed, power)
+                    if instance.value(other) > value + instance.slack and instance.feasible(other):
+                        return other
+                if self.incumbent.work.left <= 0:
+                    return None
+        return None
+
+    def _is_within_limits(self, chosen: Integer) -> bool:
+        price = math.fsum(self.instance.price[chosen])
+        return len(chosen) <= self.instance.count and bool(self.instance.affordable(price))
+
+    def _without_weakest(self, chosen: Integer) -> Integer:
+        """Remove the sensor whose loss lowers the value least."""
+        return max((chosen[chosen != one] for one in chosen), key=self.instance.value)
+
+
+def without_idle(incumbent: Incumbent) -> Integer:
+    """Return the best placement without sensors, the dearest first, that neither value nor mandatory groups need."""
+    instance, chosen = incumbent.instance, incumbent.chosen
+    for one in chosen[np.argsort(-instance.price[chosen], kind="stable")]:
+        rest = chosen[chosen != one]
+        if instance.feasible(rest) and instance.value(rest) >= incumbent.value - instance.slack:
+            chosen = rest
+    return chosen
